@@ -1,0 +1,122 @@
+"""What the rest of the world may know of an aircraft: state, command, route, flight model.
+
+Frame: local ENU plane, x = east, y = north, z = up, metres. Course and heading are radians clockwise
+from north; roll is positive right wing down; route curvature is positive for a left (counter-clockwise) turn.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class AircraftState(NamedTuple):
+    """One instant of flight. SI units; velocities are over the ground, in the local ENU plane."""
+
+    time_s: float
+    east_m: float
+    north_m: float
+    up_m: float
+    """Altitude above mean sea level."""
+    velocity_east_mps: float
+    velocity_north_mps: float
+    velocity_up_mps: float
+    heading_rad: float
+    roll_rad: float
+    pitch_rad: float
+    airspeed_mps: float
+    """True airspeed."""
+    load_factor: float
+    """Normal load factor, 1 in level flight."""
+
+    @property
+    def groundspeed_mps(self) -> float:
+        """Horizontal speed over the ground."""
+        return math.hypot(self.velocity_east_mps, self.velocity_north_mps)
+
+    @property
+    def course_rad(self) -> float:
+        """Direction of the ground velocity, clockwise from north, in [0, 2 pi)."""
+        return math.atan2(self.velocity_east_mps, self.velocity_north_mps) % math.tau
+
+
+class Command(NamedTuple):
+    """What guidance asks of the inner loops."""
+
+    roll_rad: float
+    altitude_m: float
+    airspeed_mps: float
+
+
+@dataclass(frozen=True, eq=False)
+class Route:
+    """A path to be flown: joined segments of constant curvature (lines and arcs).
+
+    Attributes:
+        segments: (n, 6) float64, one row a segment: start east, start north, unit tangent east, unit tangent
+            north at the start, curvature (1/m, positive = left turn), length (m). Read-only.
+        loiter: the last segment is a full circle that is flown again and again.
+    """
+
+    segments: FloatArray
+    loiter: bool = False
+
+    def __post_init__(self) -> None:
+        rows = np.array(self.segments, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
+            raise ValueError(f"route segments must have shape (n, 6), n > 0; got {rows.shape}")
+        if not np.isfinite(rows).all() or (rows[:, 5] <= 0).any():
+            raise ValueError("route segments must be finite and longer than zero")
+        rows.setflags(write=False)
+        object.__setattr__(self, "segments", rows)
+
+
+@dataclass(frozen=True)
+class Performance:
+    """What planning must know of an aircraft at one airspeed.
+
+    Attributes:
+        airspeed_mps: true airspeed the figures hold for.
+        turn_radius_m: smallest radius a plan may ask for, margins for wind and turbulence included.
+        roll_in_s: time from wings level to 90 % of the bank of that turn.
+        tracking_error_m: cross-track error that the guidance stays within on such a plan.
+    """
+
+    airspeed_mps: float
+    turn_radius_m: float
+    roll_in_s: float
+    tracking_error_m: float
+
+
+class FlightModel(Protocol):
+    """An aircraft in the air, its inner loops closed.
+
+    A model is made at its start state and is used for one flight.
+    """
+
+    @property
+    def step_rate_hz(self) -> int:
+        """Integration steps per simulated second."""
+        ...
+
+    def state(self) -> AircraftState:
+        """The state now."""
+        ...
+
+    def command(self, command: Command) -> None:
+        """Sets what the inner loops hold until the next call."""
+        ...
+
+    def advance(self, steps: int) -> None:
+        """Integrates `steps` steps of 1 / step_rate_hz."""
+        ...
+
+    def fault(self) -> str | None:
+        """A sentence if control is lost (not finite, at the ground, stalled), else None."""
+        ...

@@ -1,0 +1,1 @@
+"""The closed loop: scenario, true world, sensing, flight, record, metrics, recording."""

@@ -1,0 +1,1 @@
+"""Local path planners for unknown environments; knows only what a sensor has returned."""

@@ -1,0 +1,179 @@
+"""What goes into a planner and what comes out.
+
+Frame: local ENU plane, x = east, y = north, metres. Directions are unit vectors, never angles.
+Curvature is positive for a left (counter-clockwise) turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+class PlanStatus(Enum):
+    """How a call to a planner ended."""
+
+    FOUND = "found"
+    """A new path to fly."""
+    KEPT = "kept"
+    """The path being flown still serves; nothing new was made."""
+    NO_PATH = "no_path"
+    """None was found this time; the path being flown goes on."""
+    UNREACHABLE = "unreachable"
+    """No way can exist in what has been seen: the goal is proved unreachable."""
+
+
+class SeenWorld(Protocol):
+    """What the sensor has shown so far: obstacle edges and free space. All that a planner may know."""
+
+    @property
+    def spacing_m(self) -> float:
+        """Edge points of one wall are about this far apart."""
+        ...
+
+    @property
+    def revision(self) -> int:
+        """Grows by one with every change of the set of edge points."""
+        ...
+
+    def edges_within(self, center_m: FloatArray, radius_m: float) -> FloatArray:
+        """(k, 2) edge points not further than `radius_m` from `center_m`, in a fixed order."""
+        ...
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) edge points that came in after `revision`."""
+        ...
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) points lies in space seen to be free."""
+        ...
+
+
+@dataclass(frozen=True)
+class Mission:
+    """What stays the same for a whole flight.
+
+    Attributes:
+        goal_m: (east, north) of the goal.
+        goal_radius_m: reached when inside this circle.
+        bounds_m: xmin, ymin, xmax, ymax of the area; must not be crossed.
+        clearance_m: wanted distance from every obstacle edge.
+        turn_radius_m: smallest radius a path may have.
+        speed_mps: airspeed.
+        roll_in_s: time to roll into the tightest turn.
+        tracking_error_m: how far off the path the aircraft may be.
+        sensor_range_m: radius of the sensing range (the paper's r).
+        compute_latency_s: a plan takes effect this much after it was asked for.
+    """
+
+    goal_m: tuple[float, float]
+    goal_radius_m: float
+    bounds_m: tuple[float, float, float, float]
+    clearance_m: float
+    turn_radius_m: float
+    speed_mps: float
+    roll_in_s: float
+    tracking_error_m: float
+    sensor_range_m: float
+    compute_latency_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Joined segments of constant curvature.
+
+    Attributes:
+        segments: (n, 6): start east, start north, unit tangent east, unit tangent north, curvature (1/m,
+            positive = left), length (m). Read-only.
+        loiter: the last segment is a full circle to be flown for ever.
+    """
+
+    segments: FloatArray
+    loiter: bool = False
+
+    def __post_init__(self) -> None:
+        rows = np.array(self.segments, dtype=np.float64).reshape(-1, 6)
+        rows.setflags(write=False)
+        object.__setattr__(self, "segments", rows)
+
+    @property
+    def length_m(self) -> float:
+        """Length, one turn of a closing loiter circle included."""
+        return float(self.segments[:, 5].sum())
+
+    @property
+    def max_curvature_1pm(self) -> float:
+        """Largest absolute curvature."""
+        return float(np.abs(self.segments[:, 4]).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """One question to a planner.
+
+    Attributes:
+        time_s: simulated time.
+        position_m: (east, north) of the aircraft.
+        direction: unit vector of its ground velocity.
+        seen: what is known of the world.
+        flown: the plan in effect, None before the first.
+        station_m: how far along `flown.path` the aircraft is.
+    """
+
+    time_s: float
+    position_m: tuple[float, float]
+    direction: tuple[float, float]
+    seen: SeenWorld
+    flown: Plan | None = None
+    station_m: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class PlanPicture:
+    """What a person needs to see how a plan came about; never read by the loop.
+
+    Attributes:
+        guide_m: (2, 2) guide vector, from the aircraft to the point it aims at.
+        window_m: radius of the planning window (the paper's r1).
+        sectors: (k, 4) free sectors at the aircraft: unit vectors of the right and the left edge.
+        candidates: polylines (m, 2) that were compared, the chosen one first.
+    """
+
+    guide_m: FloatArray
+    window_m: float
+    sectors: FloatArray
+    candidates: tuple[FloatArray, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """One answer of a planner.
+
+    Attributes:
+        status: how the call ended.
+        reason: one sentence for the event log.
+        waypoints_m: (k, 2) fixed-altitude waypoints; empty unless FOUND.
+        path: the curve through them; None unless FOUND.
+        picture: how it came about, where the planner can tell.
+    """
+
+    status: PlanStatus
+    reason: str
+    waypoints_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    path: Path | None = None
+    picture: PlanPicture | None = None
+
+
+class Planner(Protocol):
+    """A local planner for one flight. It is asked after every scan, in order of time."""
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Answers one request. Must not use clocks or randomness of its own: same requests, same plans."""
+        ...
