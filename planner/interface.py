@@ -43,12 +43,13 @@ class SeenWorld(Protocol):
         """Grows by one with every change of the set of edge points."""
         ...
 
-    def edges_within(self, center_m: FloatArray, radius_m: float) -> FloatArray:
-        """(k, 2) edge points not further than `radius_m` from `center_m`, in a fixed order."""
+    @property
+    def taken_back_at(self) -> int:
+        """The last revision at which edge points were taken away again; 0 where none ever was."""
         ...
 
     def edges_since(self, revision: int) -> FloatArray:
-        """(k, 2) edge points that came in after `revision`."""
+        """(k, 2) edge points that came in after `revision`, oldest first; all of them after -1."""
         ...
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:

@@ -1,0 +1,242 @@
+"""Gains of the inner loops, from the linearised aircraft.
+
+The structure is in systems/autopilot.xml; it is the same for every aircraft. What differs are the gains, and
+they follow from the stability derivatives at trim by rules that put each loop at a fixed place relative to
+the aircraft's own modes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from aircraft.interface import FloatArray
+
+GRAVITY_FPS2 = 32.174
+ROLL_RATE_LIMIT_RADPS = 1.05
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Dimensional derivatives at a level trim, in JSBSim's units: ft, rad, s and normalised commands.
+
+    `lp` is d(p_dot)/dp, `lda` is d(p_dot)/d(aileron command), and so on: L roll, M pitch, N yaw, X the
+    airspeed, Z the angle of attack (`za` = d(alpha_dot)/d(alpha)). Inertia coupling is included.
+    """
+
+    airspeed_fps: float
+    alpha_rad: float
+    qbar_psf: float
+    lp: float
+    lr: float
+    lda: float
+    ldr: float
+    np: float
+    nr: float
+    nb: float
+    yb: float
+    nda: float
+    ndr: float
+    za: float
+    ma: float
+    mq: float
+    mde: float
+    xa: float
+    xdt: float
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of systems/autopilot.xml; the field `a_b` is the property `wayproof/gain/a-b`.
+
+    Attributes:
+        qbar_psf: dynamic pressure that the gains hold at, lbf/ft2; the autopilot scales them to others.
+        roll: roll rate over roll error, 1/s.
+        roll_rate_limit: rad/s.
+        aileron_p, aileron_p_integral: aileron over roll rate error, s, and over its integral.
+        aileron_p_forward, aileron_r_forward: aileron that holds a roll rate, and a yaw rate in a turn, s.
+        rudder_r: rudder over yaw rate beyond that of the coordinated turn, s.
+        rudder_beta_integral: rudder over the integral of sideslip, 1/(rad s).
+        rudder_p_forward, rudder_r_forward: rudder that keeps sideslip at zero in a roll, and in a turn, s.
+        altitude: climb rate over altitude error, 1/s.
+        climb_limit_fps: limit of the climb command, ft/s.
+        climb, climb_integral: pitch over flight path angle error, and over its integral (1/s).
+        pitch: pitch rate over pitch error, 1/s.
+        pitch_bank_forward: pitch added per (1 - cos roll), rad.
+        elevator_q, elevator_q_integral: elevator over pitch rate error, s, and over its integral.
+        elevator_q_forward: elevator that makes a steady pull-up rate, s.
+        elevator_turn_forward: elevator against pitch damping in a turn, s.
+        elevator_load_forward: elevator per unit of load factor beyond 1.
+        throttle, throttle_integral: throttle over airspeed error, s/ft, and over its integral.
+        throttle_climb_forward: throttle over commanded climb rate, s/ft.
+        throttle_load_forward: throttle against induced drag, per (load factor squared - 1).
+    """
+
+    qbar_psf: float
+    roll: float
+    roll_rate_limit: float
+    aileron_p: float
+    aileron_p_integral: float
+    aileron_p_forward: float
+    aileron_r_forward: float
+    rudder_r: float
+    rudder_beta_integral: float
+    rudder_p_forward: float
+    rudder_r_forward: float
+    altitude: float
+    climb_limit_fps: float
+    climb: float
+    climb_integral: float
+    pitch: float
+    pitch_bank_forward: float
+    elevator_q: float
+    elevator_q_integral: float
+    elevator_q_forward: float
+    elevator_turn_forward: float
+    elevator_load_forward: float
+    throttle: float
+    throttle_integral: float
+    throttle_climb_forward: float
+    throttle_load_forward: float
+
+    def properties(self) -> dict[str, float]:
+        """JSBSim property name to value."""
+        return {f"wayproof/gain/{f.name.replace('_', '-')}": getattr(self, f.name) for f in fields(self)}
+
+
+def derivatives(
+    states: Sequence[str],
+    inputs: Sequence[str],
+    system: FloatArray,
+    control: FloatArray,
+    *,
+    airspeed_fps: float,
+    alpha_rad: float,
+    qbar_psf: float,
+) -> Derivatives:
+    """Picks the derivatives from a linear model, propeller speeds eliminated as settled.
+
+    Args:
+        states: names of the states as JSBSim's FGLinearization gives them ("Vt", "Alpha", "Q", "Rpm0", ...).
+        inputs: names of the controls ("ThtlCmd", "DaCmd", "DeCmd", "DrCmd").
+        system: (n, n) A of x_dot = A x + B u.
+        control: (n, m) B.
+        airspeed_fps: true airspeed of the trim.
+        alpha_rad: angle of attack of the trim.
+        qbar_psf: dynamic pressure of the trim.
+    """
+    fast = [i for i, state in enumerate(states) if state.lower().startswith("rpm")]
+    slow = [i for i in range(len(states)) if i not in fast]
+    a, b = system[np.ix_(slow, slow)], control[slow]
+    if fast:
+        settle = system[np.ix_(slow, fast)] @ np.linalg.inv(system[np.ix_(fast, fast)])
+        a = a - settle @ system[np.ix_(fast, slow)]
+        b = b - settle @ control[fast]
+    row = {states[i]: k for k, i in enumerate(slow)}
+    column = {name: k for k, name in enumerate(inputs)}
+
+    def by_state(of: str, by: str) -> float:
+        return float(a[row[of], row[by]])
+
+    def by_control(of: str, by: str) -> float:
+        return float(b[row[of], column[by]])
+
+    return Derivatives(
+        airspeed_fps=airspeed_fps,
+        alpha_rad=alpha_rad,
+        qbar_psf=qbar_psf,
+        lp=by_state("P", "P"),
+        lr=by_state("P", "R"),
+        lda=by_control("P", "DaCmd"),
+        ldr=by_control("P", "DrCmd"),
+        np=by_state("R", "P"),
+        nr=by_state("R", "R"),
+        nb=by_state("R", "Beta"),
+        yb=by_state("Beta", "Beta"),
+        nda=by_control("R", "DaCmd"),
+        ndr=by_control("R", "DrCmd"),
+        za=by_state("Alpha", "Alpha"),
+        ma=by_state("Q", "Alpha"),
+        mq=by_state("Q", "Q"),
+        mde=by_control("Q", "DeCmd"),
+        # Along the flight path gravity counts with alpha at constant pitch; what is left is drag.
+        xa=GRAVITY_FPS2 - by_state("Vt", "Alpha"),
+        xdt=by_control("Vt", "ThtlCmd"),
+    )
+
+
+def gains(at: Derivatives) -> Gains:
+    """Places the loops.
+
+    Roll: the roll mode goes to lambda = max(1.4 |Lp|, 10) 1/s and roll to min(4, lambda/4). Yaw: the Dutch
+    roll is damped to 0.7; feed-forwards solve rolling and yawing moment for no sideslip. Pitch: the short
+    period omega^2 = -M_alpha + M_q Z_alpha sets the pitch, climb and altitude loops, each three to four
+    times slower than the one inside.
+    Throttle: 1.5 rad/s on airspeed, less where that would ask for more than 0.05 per ft/s.
+
+    Raises:
+        ValueError: if a control has no authority or the wrong sign, or the short period is not oscillatory.
+    """
+    authority = {"aileron": at.lda, "elevator": -at.mde, "rudder": -at.ndr, "throttle": at.xdt}
+    for name, value in authority.items():
+        if not value > 0.0:
+            raise ValueError(f"the {name} has no authority at trim ({value:.3g}): no gains can be derived")
+    short_period2 = -at.ma + at.mq * at.za
+    if not short_period2 > 0.0:
+        raise ValueError(
+            f"unstable in pitch at trim (omega^2 = {short_period2:.3g} 1/s2): no gains can be derived"
+        )
+    speed = at.airspeed_fps
+    roll_mode = max(1.4 * abs(at.lp), 10.0)
+    roll = min(4.0, roll_mode / 4.0)
+    aileron_p = (roll_mode - abs(at.lp)) / at.lda
+
+    determinant = at.lda * at.ndr - at.ldr * at.nda
+
+    def balance(rolling: float, yawing: float) -> tuple[float, float]:
+        """Aileron and rudder whose moments are the given accelerations."""
+        return (
+            (rolling * at.ndr - at.ldr * yawing) / determinant,
+            (at.lda * yawing - at.nda * rolling) / determinant,
+        )
+
+    aileron_p_forward, rudder_p_forward = balance(-at.lp, GRAVITY_FPS2 / speed - at.np)
+    aileron_r_forward, rudder_r_forward = balance(-at.lr, -at.nr)
+    dutch_roll = math.sqrt(max(at.nb + at.nr * at.yb, 0.0))
+    rudder_r = max(1.4 * dutch_roll + at.nr + at.yb, 0.0) / -at.ndr
+
+    short_period = math.sqrt(short_period2)
+    pitch = min(3.5, 0.315 * short_period)
+    alpha_per_load = GRAVITY_FPS2 / (speed * -at.za)
+    throttle = min(1.5 / at.xdt, 0.05)
+    return Gains(
+        qbar_psf=at.qbar_psf,
+        roll=roll,
+        roll_rate_limit=ROLL_RATE_LIMIT_RADPS,
+        aileron_p=aileron_p,
+        aileron_p_integral=2.0 * aileron_p,
+        aileron_p_forward=aileron_p_forward,
+        aileron_r_forward=aileron_r_forward,
+        rudder_r=rudder_r,
+        rudder_beta_integral=0.28 * max(at.nb, 0.0) / -at.ndr,
+        rudder_p_forward=rudder_p_forward,
+        rudder_r_forward=rudder_r_forward,
+        altitude=0.23 * pitch,
+        climb_limit_fps=0.08 * speed,
+        climb=2.4,
+        climb_integral=0.29 * pitch,
+        pitch=pitch,
+        pitch_bank_forward=alpha_per_load - at.alpha_rad,
+        elevator_q=short_period / -at.mde,
+        elevator_q_integral=0.64 * short_period2 / -at.mde,
+        elevator_q_forward=(at.ma / at.za - at.mq) / -at.mde,
+        elevator_turn_forward=-at.mq / -at.mde,
+        elevator_load_forward=-at.ma * alpha_per_load / -at.mde,
+        throttle=throttle,
+        throttle_integral=0.3 * throttle,
+        throttle_climb_forward=GRAVITY_FPS2 / (speed * at.xdt),
+        throttle_load_forward=0.5 * at.xa * alpha_per_load / at.xdt,
+    )

@@ -1,0 +1,53 @@
+"""What planning must know of an aircraft: turn radius, roll-in time, tracking error."""
+
+from __future__ import annotations
+
+import math
+
+from aircraft.airframes import AircraftError, Airframe
+from aircraft.guidance import GRAVITY_MPS2
+from aircraft.interface import Performance
+
+BANK_RESERVE_DEG = {None: 15.0, "light": 17.0, "moderate": 20.0, "severe": 25.0}
+"""Bank kept back from the limit for corrections: 9 degrees is the least that does not saturate in calm air or
+steady wind, and the rest is margin; moderate turbulence uses up 15 to 20."""
+
+TRACKING_ERROR_S = {None: 0.01, "light": 0.015, "moderate": 0.03, "severe": 0.06}
+"""Cross-track error that is hardly ever exceeded, as a time at airspeed plus wind."""
+
+
+def performance(
+    airframe: Airframe, airspeed_mps: float, wind_mps: float = 0.0, turbulence: str | None = None
+) -> Performance:
+    """Planning figures at one airspeed.
+
+    The radius follows from the coordinated turn at the fastest groundspeed, downwind, with bank in reserve:
+    R = (Va + W)^2 / (g tan(bank limit - reserve)). Below it the bank saturates and tracking fails abruptly.
+
+    Args:
+        airframe: the aircraft.
+        airspeed_mps: true airspeed.
+        wind_mps: speed of the steady wind.
+        turbulence: None, "light", "moderate" or "severe".
+
+    Raises:
+        AircraftError: if the airframe cannot hold the airspeed or cannot make way against the wind.
+        ValueError: if `wind_mps` is negative or not finite, or `turbulence` is none of the above.
+    """
+    airframe.check_airspeed(airspeed_mps)
+    if not 0.0 <= wind_mps < math.inf:
+        raise ValueError(f"wind_mps must be a finite number of at least 0; got {wind_mps:g}")
+    if turbulence not in BANK_RESERVE_DEG:
+        raise ValueError(f"turbulence must be light, moderate, severe or None; got {turbulence!r}")
+    if wind_mps >= airspeed_mps:
+        raise AircraftError(
+            f"{airframe.name} at {airspeed_mps:g} m/s cannot make way against a wind of {wind_mps:g} m/s"
+        )
+    bank = math.radians(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence])
+    fastest = airspeed_mps + wind_mps
+    return Performance(
+        airspeed_mps=airspeed_mps,
+        turn_radius_m=fastest * fastest / (GRAVITY_MPS2 * math.tan(bank)),
+        roll_in_s=airframe.roll_in_s,
+        tracking_error_m=fastest * TRACKING_ERROR_S[turbulence],
+    )

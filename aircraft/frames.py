@@ -1,0 +1,117 @@
+"""The local plane: geodetic (WGS84) to plane coordinates and back.
+
+The plane is the azimuthal equidistant projection about its origin: distance and bearing from the origin are
+true, so a point 142 km away is where the geodesic puts it. Closed forms on the normal section through the
+origin replace the geodesic; they agree with it to less than 0.1 m and 0.003 degrees out to 142 km.
+"""
+
+from __future__ import annotations
+
+import math
+
+SEMI_MAJOR_M = 6_378_137.0
+FLATTENING = 1.0 / 298.257223563
+ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
+
+
+def wrap_pi(angle_rad: float) -> float:
+    """The same angle in [-pi, pi)."""
+    return (angle_rad + math.pi) % math.tau - math.pi
+
+
+class LocalPlane:
+    """East and north in metres about an origin on the WGS84 ellipsoid."""
+
+    def __init__(self, latitude_deg: float, longitude_deg: float) -> None:
+        """Lays the plane about an origin.
+
+        Args:
+            latitude_deg: geodetic latitude of (0, 0), within 85 degrees of the equator.
+            longitude_deg: longitude of (0, 0), in [-180, 360].
+
+        Raises:
+            ValueError: if the origin is not finite or out of range.
+        """
+        if not abs(latitude_deg) <= 85.0:
+            raise ValueError(f"latitude_deg of the origin must be in [-85, 85]; got {latitude_deg:g}")
+        if not -180.0 <= longitude_deg <= 360.0:
+            raise ValueError(f"longitude_deg of the origin must be in [-180, 360]; got {longitude_deg:g}")
+        self.latitude_deg = latitude_deg
+        self.longitude_deg = longitude_deg
+        self._latitude = math.radians(latitude_deg)
+        self._longitude = math.radians(longitude_deg)
+        self._sin = math.sin(self._latitude)
+        self._cos = math.cos(self._latitude)
+        w2 = 1.0 - ECCENTRICITY_SQUARED * self._sin**2
+        self._prime_vertical_m = SEMI_MAJOR_M / math.sqrt(w2)
+        self._meridian_m = self._prime_vertical_m * (1.0 - ECCENTRICITY_SQUARED) / w2
+        self._axis_m = self._prime_vertical_m * self._cos
+        self._polar_m = self._prime_vertical_m * (1.0 - ECCENTRICITY_SQUARED) * self._sin
+
+    def project(self, latitude_rad: float, longitude_rad: float) -> tuple[float, float, float]:
+        """Plane coordinates of a geodetic point, and how the meridian leans there.
+
+        The point goes to the tangent plane through its ECEF coordinates. The distance is the arc over the
+        chord, with the radius of the normal section after Euler: 1/R = cos^2/M + sin^2/N.
+
+        Args:
+            latitude_rad: geodetic latitude.
+            longitude_rad: longitude.
+
+        Returns:
+            East (m), north (m) and the meridian convergence (rad): a direction in the plane is the true
+            direction minus the convergence, both clockwise from north.
+        """
+        sin_latitude = math.sin(latitude_rad)
+        cos_latitude = math.cos(latitude_rad)
+        prime_m = SEMI_MAJOR_M / math.sqrt(1.0 - ECCENTRICITY_SQUARED * sin_latitude * sin_latitude)
+        axis_m = prime_m * cos_latitude
+        half = 0.5 * math.remainder(longitude_rad - self._longitude, math.tau)
+        sin_half = math.sin(half)
+        cos_half = math.cos(half)
+        east = 2.0 * axis_m * sin_half * cos_half
+        outward = axis_m * (1.0 - 2.0 * sin_half * sin_half) - self._axis_m
+        polar = prime_m * (1.0 - ECCENTRICITY_SQUARED) * sin_latitude - self._polar_m
+        north = self._cos * polar - self._sin * outward
+        up = self._cos * outward + self._sin * polar
+        level2 = east * east + north * north
+        if level2 == 0.0:
+            return 0.0, 0.0, 0.0
+        curvature = (north * north / self._meridian_m + east * east / self._prime_vertical_m) / level2
+        chord2 = level2 + up * up
+        bend = chord2 * curvature * curvature
+        stretch = math.sqrt(chord2 / level2) * (1.0 + bend * (1.0 / 24.0 + bend * (3.0 / 640.0)))
+        mean = 0.5 * (latitude_rad + self._latitude)
+        convergence = 2.0 * math.atan2(
+            sin_half * math.sin(mean), cos_half * math.cos(0.5 * (latitude_rad - self._latitude))
+        )
+        return east * stretch, north * stretch, convergence
+
+    def plane(self, latitude_deg: float, longitude_deg: float) -> tuple[float, float]:
+        """East and north (m) of a geodetic point (degrees)."""
+        east_m, north_m, _ = self.project(math.radians(latitude_deg), math.radians(longitude_deg))
+        return east_m, north_m
+
+    def geodetic(self, east_m: float, north_m: float) -> tuple[float, float]:
+        """Geodetic latitude and longitude (degrees) of a plane point.
+
+        A first guess on the osculating sphere is corrected with `project`, so that the round trip closes
+        to a millimetre within 150 km.
+        """
+        latitude = self._latitude + north_m / self._meridian_m
+        longitude = self._longitude + east_m / (self._prime_vertical_m * math.cos(latitude))
+        for _ in range(5):
+            east, north, convergence = self.project(latitude, longitude)
+            east, north = east_m - east, north_m - north
+            true_east = east * math.cos(convergence) + north * math.sin(convergence)
+            true_north = north * math.cos(convergence) - east * math.sin(convergence)
+            w2 = 1.0 - ECCENTRICITY_SQUARED * math.sin(latitude) ** 2
+            prime_m = SEMI_MAJOR_M / math.sqrt(w2)
+            longitude += true_east / (prime_m * math.cos(latitude))
+            latitude += true_north * w2 / (prime_m * (1.0 - ECCENTRICITY_SQUARED))
+        return math.degrees(latitude), math.degrees(math.remainder(longitude, math.tau))
+
+    def convergence_rad(self, east_m: float, north_m: float) -> float:
+        """Meridian convergence at a plane point: true direction minus direction in the plane (rad)."""
+        latitude_deg, longitude_deg = self.geodetic(east_m, north_m)
+        return self.project(math.radians(latitude_deg), math.radians(longitude_deg))[2]

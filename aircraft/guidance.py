@@ -1,0 +1,314 @@
+"""Route following: from where the aircraft is to the roll angle it should hold.
+
+The law is path curvature plus a second-order correction of the cross-track error,
+
+    a = kappa Vg^2 - 2 zeta omega e_dot - omega^2 e,    phi = atan(a / (g cos(chi - psi)))
+
+with a, e positive to the right of the path, chi the course and psi the heading. Curvature, groundspeed and
+drift angle are taken where the aircraft will be when it has rolled, and curvature is averaged over the time
+that rolling into a turn takes, so that line and arc join without a bump. The roll command leads by the time
+constant of the roll loop, so that roll itself follows the law. Wind enters through the ground velocity alone.
+See R. W. Beard and T. W. McLain, "Small Unmanned Aircraft", chapter 9 (coordinated turn in wind), and
+PX4's npfg for the same use of ground and air velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from aircraft.frames import wrap_pi
+from aircraft.interface import AircraftState, FloatArray, Route
+
+GRAVITY_MPS2 = 9.80665
+UPDATE_RATE_HZ = 20
+DAMPING = 0.9
+INTERCEPT_SINE = 0.7
+"""Sine of the steepest angle to the path at which a far-off aircraft approaches it."""
+
+
+TYPICAL_BANK_RAD = math.radians(30.0)
+"""A step of curvature is blended over the time that rolling this far takes."""
+
+
+@dataclass(frozen=True)
+class GuidanceLimits:
+    """What guidance may ask of an aircraft.
+
+    Attributes:
+        bank_limit_rad: largest roll command.
+        roll_rate_radps: fastest change of the roll command.
+        roll_lag_s: time constant of roll behind its command; the command leads by it.
+        roll_delay_s: what further delay there is (actuators, the roll mode).
+        bandwidth_radps: natural frequency omega of the cross-track correction, about 0.3 / roll_lag_s.
+    """
+
+    bank_limit_rad: float
+    roll_rate_radps: float
+    roll_lag_s: float
+    roll_delay_s: float
+    bandwidth_radps: float
+
+
+class GuidanceOutput(NamedTuple):
+    """One decision of the path follower."""
+
+    roll_command_rad: float
+    cross_track_m: float
+    """Distance from the path, positive to its right."""
+    station_m: float
+    """Distance along the route of the nearest point; grows on in a loiter."""
+    bank_saturated: bool
+    """The bank limit cut the command."""
+    past_end: bool
+    """The route is flown out; straight on along its last tangent."""
+
+
+class PathFollower:
+    """Follows a route from one update to the next, `update_rate_hz` times a second.
+
+    Progress is local: the nearest point is sought from the last one onwards, so a route may cross itself.
+    """
+
+    def __init__(self, limits: GuidanceLimits, update_rate_hz: float = UPDATE_RATE_HZ) -> None:
+        """Makes a follower without a route.
+
+        Args:
+            limits: what may be asked of the aircraft.
+            update_rate_hz: how often `update` will be called.
+        """
+        self._limits = limits
+        self._roll_step = limits.roll_rate_radps / update_rate_hz
+        # The held command acts on average half an update late.
+        self._lead_s = limits.roll_delay_s + 0.5 / update_rate_hz
+        self._lead_updates = limits.roll_lag_s * update_rate_hz
+        self._blend_s = max(TYPICAL_BANK_RAD / limits.roll_rate_radps, 1.0 / update_rate_hz)
+        self._omega2 = limits.bandwidth_radps**2
+        self._two_zeta_omega = 2.0 * DAMPING * limits.bandwidth_radps
+        self._roll = 0.0
+        self._rolling = False
+        self._rows: list[tuple[float, float, float, float, float, float]] = []
+        self._starts: list[float] = []
+        self._turned: list[float] = []
+        self._loiter = False
+        self._length = 0.0
+        self._index = 0
+        self._along = 0.0
+
+    def follow(self, route: Route, station_m: float = 0.0) -> None:
+        """Takes a new route; the roll command goes on from where it is.
+
+        Args:
+            route: what to fly.
+            station_m: where on it to begin looking for the nearest point, m from its start.
+        """
+        self._rows = [(e, n, te, tn, k, length) for e, n, te, tn, k, length in route.segments.tolist()]
+        self._loiter = route.loiter
+        self._starts, self._turned = [], []
+        start = turned = 0.0
+        for row in self._rows:
+            self._starts.append(start)
+            self._turned.append(turned)
+            start += row[5]
+            turned += row[4] * row[5]
+        self._length = start
+        self._index = 0
+        while self._index < len(self._rows) - 1 and self._starts[self._index + 1] <= station_m:
+            self._index += 1
+        self._along = station_m - self._starts[self._index]
+
+    def update(self, state: AircraftState) -> GuidanceOutput:
+        """Decides the roll command for the next update interval.
+
+        Args:
+            state: the aircraft now.
+
+        Returns:
+            Roll command, and where the aircraft is relative to the route.
+
+        Raises:
+            RuntimeError: if there is no route yet.
+        """
+        if not self._rows:
+            raise RuntimeError("follow() a route before update()")
+        cross, tangent_east, tangent_north = self._project(state.east_m, state.north_m)
+        station = self._starts[self._index] + self._along
+        limits = self._limits
+        velocity_east, velocity_north = state.velocity_east_mps, state.velocity_north_mps
+        speed = max(math.hypot(velocity_east, velocity_north), 1.0)
+        along_mps = velocity_east * tangent_east + velocity_north * tangent_north
+        cross_mps = velocity_east * tangent_north - velocity_north * tangent_east
+
+        bank_limit = limits.bank_limit_rad
+        if along_mps <= 0.0:
+            wanted = -bank_limit if cross_mps > 0.0 else bank_limit
+        else:
+            # The wind triangle a moment ahead: the air velocity turns with g tan(roll) / airspeed.
+            drift = wrap_pi(math.atan2(velocity_east, velocity_north) - state.heading_rad)
+            turn = GRAVITY_MPS2 * math.tan(max(-1.2, min(1.2, state.roll_rad)))
+            lead = self._lead_s
+            speed_ahead = max(speed + lead * turn * math.sin(drift), 1.0)
+            drift += lead * turn * (math.cos(drift) / speed - 1.0 / max(state.airspeed_mps, 1.0))
+            curvature = self._curvature_ahead(station, speed * lead, speed)
+            approach = INTERCEPT_SINE * speed
+            pull = max(-approach, min(approach, cross * self._omega2 / self._two_zeta_omega))
+            # Lift acts across the course, the correction across the path.
+            across = -self._two_zeta_omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
+            acceleration = across - curvature * speed_ahead * speed_ahead
+            wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(math.cos(drift), 0.2)))
+        saturated = abs(wanted) > bank_limit
+        wanted = max(-bank_limit, min(bank_limit, wanted))
+        step = max(-self._roll_step, min(self._roll_step, wanted - self._roll))
+        self._roll += step
+        # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
+        command = max(-bank_limit, min(bank_limit, self._roll + self._lead_updates * step))
+        past_end = not self._loiter and station > self._length
+        return GuidanceOutput(command, cross, station, saturated, past_end)
+
+    def _project(self, east: float, north: float) -> tuple[float, float, float]:
+        """Moves to the nearest point; cross-track error and the unit tangent there."""
+        last = len(self._rows) - 1
+        while True:
+            east0, north0, tangent_east, tangent_north, curvature, length = self._rows[self._index]
+            straight = curvature == 0.0 or (self._index == last and not self._loiter and self._along > length)
+            if straight and curvature != 0.0:
+                east0, north0, tangent_east, tangent_north = arc_point(self._rows[last], length)
+            offset_east, offset_north = east - east0, north - north0
+            if straight:
+                along = offset_east * tangent_east + offset_north * tangent_north
+                cross = offset_east * tangent_north - offset_north * tangent_east
+                if curvature != 0.0:
+                    along += length
+            else:
+                # The centre lies 1/curvature to the left of the start; `swept` is counted along the flight.
+                radius = 1.0 / curvature
+                from_centre_east = offset_east + radius * tangent_north
+                from_centre_north = offset_north - radius * tangent_east
+                outward_east, outward_north = tangent_north * radius, -tangent_east * radius
+                angle = math.atan2(
+                    outward_east * from_centre_north - outward_north * from_centre_east,
+                    outward_east * from_centre_east + outward_north * from_centre_north,
+                )
+                expected = self._along * curvature
+                angle = expected + math.remainder(angle - expected, math.tau)
+                along = angle * radius
+                distance = math.hypot(from_centre_east, from_centre_north)
+                cross = distance - radius if radius > 0.0 else -radius - distance
+                sine, cosine = math.sin(angle), math.cos(angle)
+                tangent_east, tangent_north = (
+                    tangent_east * cosine - tangent_north * sine,
+                    tangent_east * sine + tangent_north * cosine,
+                )
+            if self._index < last and along > length:
+                self._index += 1
+                self._along = 0.0
+                continue
+            self._along = max(along, 0.0)
+            return cross, tangent_east, tangent_north
+
+    def _curvature_ahead(self, station: float, ahead: float, speed: float) -> float:
+        """Curvature `ahead` of a station, averaged over the way that rolling into the coming turn takes."""
+        near = self._turn_at(station + ahead - 0.5 * speed * self._blend_s)
+        far = self._turn_at(station + ahead + 0.5 * speed * self._blend_s)
+        return (far - near) / (speed * self._blend_s)
+
+    def _turn_at(self, station: float) -> float:
+        """Direction change of the route from its start to a station, rad, positive to the left."""
+        index = self._index
+        while index > 0 and station < self._starts[index]:
+            index -= 1
+        last = len(self._rows) - 1
+        while index < last and station >= self._starts[index + 1]:
+            index += 1
+        along = station - self._starts[index]
+        if index == last and not self._loiter:
+            along = min(along, self._rows[index][5])
+        return self._turned[index] + self._rows[index][4] * along
+
+
+def arc_point(
+    row: tuple[float, float, float, float, float, float], along_m: float
+) -> tuple[float, float, float, float]:
+    """Point and unit tangent on a segment of constant curvature.
+
+    Args:
+        row: start east, start north, tangent east, tangent north, curvature (1/m, positive left), length (m).
+        along_m: distance from the segment's start.
+
+    Returns:
+        East, north (m), tangent east, tangent north.
+    """
+    east, north, tangent_east, tangent_north, curvature, _ = row
+    half = 0.5 * curvature * along_m
+    sine, cosine = math.sin(half), math.cos(half)
+    chord = along_m * (sine / half if abs(half) > 1e-9 else 1.0)
+    chord_east = tangent_east * cosine - tangent_north * sine
+    chord_north = tangent_east * sine + tangent_north * cosine
+    return (
+        east + chord * chord_east,
+        north + chord * chord_north,
+        chord_east * cosine - chord_north * sine,
+        chord_east * sine + chord_north * cosine,
+    )
+
+
+def route_length(route: Route) -> float:
+    """Length of a route (m), one turn of a closing loiter included."""
+    return float(route.segments[:, 5].sum())
+
+
+def route_point(route: Route, station_m: float) -> tuple[float, float, float, float]:
+    """Point and unit tangent of a route at a station.
+
+    Args:
+        route: any route.
+        station_m: distance from its start; beyond the end a loiter goes round, any other route straight on.
+
+    Returns:
+        East, north (m), tangent east, tangent north.
+    """
+    starts = np.concatenate(([0.0], np.cumsum(route.segments[:-1, 5])))
+    index = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
+    east, north, tangent_east, tangent_north, curvature, length = route.segments[index].tolist()
+    along = station_m - float(starts[index])
+    over = 0.0
+    if index == len(starts) - 1 and not route.loiter:
+        over = max(along - length, 0.0)
+    row = (east, north, tangent_east, tangent_north, curvature, length)
+    east, north, tangent_east, tangent_north = arc_point(row, along - over)
+    return east + over * tangent_east, north + over * tangent_north, tangent_east, tangent_north
+
+
+def sample_route(route: Route, spacing_m: float) -> FloatArray:
+    """Polyline along a route.
+
+    Args:
+        route: any route.
+        spacing_m: largest distance between neighbouring points, along the route.
+
+    Returns:
+        (k, 2) east and north (m); every segment's start and the route's end are among the points.
+
+    Raises:
+        ValueError: if `spacing_m` is not positive.
+    """
+    if not spacing_m > 0.0:
+        raise ValueError(f"spacing_m must be positive; got {spacing_m:g}")
+    rows = route.segments
+    counts = np.maximum(np.ceil(rows[:, 5] / spacing_m - 1e-9), 1.0).astype(np.int64)
+    index = np.repeat(np.arange(len(rows)), counts)
+    within = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
+    index = np.append(index, len(rows) - 1)
+    along = np.append(rows[index[:-1], 5] * within / counts[index[:-1]], rows[-1, 5])
+    east, north, tangent_east, tangent_north, curvature, _ = rows[index].T
+    half = 0.5 * curvature * along
+    chord = along * np.sinc(half / np.pi)
+    return np.column_stack(
+        (
+            east + chord * (tangent_east * np.cos(half) - tangent_north * np.sin(half)),
+            north + chord * (tangent_east * np.sin(half) + tangent_north * np.cos(half)),
+        )
+    )

@@ -1,0 +1,53 @@
+"""Makes a JSBSim model with the autopilot inside, for the time of loading it."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import as_file, files
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+THROTTLE = "fcs/throttle-cmd-norm"
+
+
+@contextmanager
+def with_autopilot(model: Path) -> Iterator[Path]:
+    """Derives an aircraft folder whose model starts with the autopilot system.
+
+    The other files of the model are linked, so that references from the model resolve as before.
+
+    Args:
+        model: the model's XML file, <folder>/<name>.xml.
+
+    Yields:
+        A folder that holds <name>/<name>.xml, gone when the context ends.
+
+    Raises:
+        ValueError: if the model is not well-formed XML or not a JSBSim model.
+    """
+    try:
+        root = ElementTree.parse(model).getroot()
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{model} is not well-formed XML: {error}") from None
+    if root.tag != "fdm_config":
+        raise ValueError(f"{model} is not a JSBSim model: its root element is <{root.tag}>, not <fdm_config>")
+    with as_file(files("aircraft").joinpath("systems", "autopilot.xml")) as path:
+        system = ElementTree.parse(path).getroot()
+    engines = len(root.findall("propulsion/engine"))
+    for component in system.iter("fcs_function"):
+        if any(output.text == THROTTLE for output in component.findall("output")):
+            for index in range(1, engines):
+                ElementTree.SubElement(component, "output").text = f"{THROTTLE}[{index}]"
+    # Systems run in document order: commands before whatever of the model reads them.
+    root.insert(0, system)
+    with TemporaryDirectory(prefix="wayproof-") as folder:
+        derived = Path(folder, model.stem)
+        derived.mkdir()
+        for item in model.resolve().parent.iterdir():
+            if item.name != model.name:
+                os.symlink(item, derived / item.name)
+        ElementTree.ElementTree(root).write(derived / model.name, encoding="utf-8", xml_declaration=True)
+        yield Path(folder)

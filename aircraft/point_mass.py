@@ -1,0 +1,110 @@
+"""A point mass in coordinated turns: the flight model for fast tests."""
+
+from __future__ import annotations
+
+import math
+
+from aircraft.guidance import GRAVITY_MPS2
+from aircraft.interface import AircraftState, Command
+from aircraft.start import Atmosphere, StartConditions
+
+STEP_RATE_HZ = 120
+LONGEST_STEP_S = 0.1
+
+
+class PointMass:
+    """Coordinated turns with first-order roll in a steady wind. Implements `FlightModel`.
+
+    phi_dot = (phi_command - phi) / roll_lag, psi_dot = g tan(phi) / Va, position by the air velocity plus
+    wind; airspeed and altitude take their commanded values at once. Roll is integrated exactly, heading by
+    Simpson's rule and position along the chord of the turn, in strides of at most 0.1 s.
+    """
+
+    def __init__(
+        self,
+        start: StartConditions,
+        atmosphere: Atmosphere | None = None,
+        roll_lag_s: float = 0.25,
+        step_rate_hz: int = STEP_RATE_HZ,
+    ) -> None:
+        """Starts level, along the course.
+
+        Args:
+            start: position, altitude, course and airspeed.
+            atmosphere: steady wind; default: calm.
+            roll_lag_s: time constant of roll.
+            step_rate_hz: steps per second that `advance` counts in.
+
+        Raises:
+            ValueError: if the course cannot be held in the wind, or turbulence is asked for, which this does
+                not model.
+        """
+        atmosphere = atmosphere or Atmosphere()
+        if atmosphere.turbulence is not None:
+            raise ValueError("the point mass does not model turbulence")
+        if not roll_lag_s > 0.0:
+            raise ValueError(f"roll_lag_s must be positive; got {roll_lag_s:g}")
+        self._step_rate_hz = step_rate_hz
+        self._roll_lag_s = roll_lag_s
+        self._wind_east, self._wind_north = atmosphere.wind_east_mps, atmosphere.wind_north_mps
+        self._step = 0
+        self._east, self._north = start.east_m, start.north_m
+        self._heading = start.heading_rad(atmosphere)
+        self._roll = 0.0
+        self._command = Command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
+
+    @property
+    def step_rate_hz(self) -> int:
+        """Integration steps per simulated second."""
+        return self._step_rate_hz
+
+    def state(self) -> AircraftState:
+        """The state now."""
+        airspeed = self._command.airspeed_mps
+        return AircraftState(
+            time_s=self._step / self._step_rate_hz,
+            east_m=self._east,
+            north_m=self._north,
+            up_m=self._command.altitude_m,
+            velocity_east_mps=airspeed * math.sin(self._heading) + self._wind_east,
+            velocity_north_mps=airspeed * math.cos(self._heading) + self._wind_north,
+            velocity_up_mps=0.0,
+            heading_rad=self._heading % math.tau,
+            roll_rad=self._roll,
+            pitch_rad=0.0,
+            airspeed_mps=airspeed,
+            load_factor=1.0 / math.cos(self._roll),
+        )
+
+    def command(self, command: Command) -> None:
+        """Sets roll, altitude and airspeed; the last two hold at once."""
+        self._command = command
+
+    def advance(self, steps: int) -> None:
+        """Integrates `steps` steps of 1 / step_rate_hz."""
+        duration = steps / self._step_rate_hz
+        strides = max(math.ceil(duration / LONGEST_STEP_S - 1e-9), 1)
+        dt = duration / strides
+        airspeed, target = self._command.airspeed_mps, self._command.roll_rad
+        half_decay = math.exp(-0.5 * dt / self._roll_lag_s)
+        for _ in range(strides):
+            begin = self._roll
+            middle = target + (begin - target) * half_decay
+            end = target + (middle - target) * half_decay
+            turn = math.tan(begin) + 4.0 * math.tan(middle) + math.tan(end)
+            turn *= GRAVITY_MPS2 / airspeed * dt / 6.0
+            half = 0.5 * turn
+            chord = airspeed * dt * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+            self._east += chord * math.sin(self._heading + half) + self._wind_east * dt
+            self._north += chord * math.cos(self._heading + half) + self._wind_north * dt
+            self._heading += turn
+            self._roll = end
+        self._step += steps
+
+    def fault(self) -> str | None:
+        """A sentence if the state is not finite or the ground is reached, else None."""
+        if not math.isfinite(self._east + self._north + self._heading + self._roll):
+            return "the state is not finite"
+        if self._command.altitude_m <= 0.0:
+            return f"the aircraft is at the ground ({self._command.altitude_m:.1f} m above sea level)"
+        return None

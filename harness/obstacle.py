@@ -1,0 +1,149 @@
+"""Obstacles as they truly are: exact circles and polygons that may move, appear and disappear.
+
+Frame: local ENU plane, x = east, y = north, metres; times are simulated seconds. A distance is to the edge of
+an obstacle, negative inside it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Circle:
+    """A disc.
+
+    Attributes:
+        center_m: (east, north).
+        radius_m: greater than 0.
+
+    Raises:
+        ValueError: a number is not finite or the radius not positive.
+    """
+
+    center_m: tuple[float, float]
+    radius_m: float
+
+    def __post_init__(self) -> None:
+        if not (all(map(math.isfinite, (*self.center_m, self.radius_m))) and self.radius_m > 0):
+            raise ValueError(f"a circle needs a finite centre and a positive radius; got {self}")
+
+    @property
+    def rounded_box(self) -> tuple[float, float, float, float, float]:
+        """Centre east, centre north, half widths east and north, rounding radius: here only rounding."""
+        return (*self.center_m, 0.0, 0.0, self.radius_m)
+
+    @property
+    def edges_m(self) -> FloatArray:
+        """(4, 0): a circle has no straight edges."""
+        return np.zeros((4, 0))
+
+    def distance(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
+        """(k,) distances from points to the circle."""
+        away: FloatArray = np.hypot(east_m - self.center_m[0], north_m - self.center_m[1])
+        return away - self.radius_m
+
+
+@dataclass(frozen=True)
+class Polygon:
+    """A simple polygon, convex or not, of either orientation. The last vertex joins the first.
+
+    Attributes:
+        vertices_m: (east, north) of each vertex.
+
+    Raises:
+        ValueError: fewer than three vertices, or a number is not finite.
+    """
+
+    vertices_m: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        if len(self.vertices_m) < 3 or not np.isfinite(self.vertices_m).all():
+            raise ValueError(f"a polygon needs at least three finite vertices; got {self}")
+
+    @property
+    def rounded_box(self) -> tuple[float, float, float, float, float]:
+        """Centre east, centre north, half widths east and north, rounding radius: here not rounded."""
+        east, north = zip(*self.vertices_m, strict=True)
+        (xmin, ymin), (xmax, ymax) = (min(east), min(north)), (max(east), max(north))
+        return ((xmin + xmax) / 2, (ymin + ymax) / 2, (xmax - xmin) / 2, (ymax - ymin) / 2, 0.0)
+
+    @cached_property
+    def edges_m(self) -> FloatArray:
+        """(4, e) edges: start east, start north, end east, end north. Each ends where the next one starts."""
+        vertices = np.array(self.vertices_m, dtype=np.float64)
+        edges = np.hstack((vertices, np.roll(vertices, -1, axis=0)))
+        edges_m: FloatArray = edges[(edges[:, :2] != edges[:, 2:]).any(axis=1)].T.copy()
+        edges_m.setflags(write=False)
+        return edges_m
+
+    def distance(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
+        """(k,) distances from points to the nearest edge, negative inside.
+
+        Inside is told by counting the edges that a ray crosses (Haines, Graphics Gems IV, 1994, I.4).
+        """
+        start_east, start_north, end_east, end_north = self.edges_m
+        along_east, along_north = end_east - start_east, end_north - start_north
+        from_east, from_north = east_m[:, None] - start_east, north_m[:, None] - start_north
+        share = (from_east * along_east + from_north * along_north) / (along_east**2 + along_north**2)
+        share = np.minimum(np.maximum(share, 0.0), 1.0)
+        off_east, off_north = from_east - share * along_east, from_north - share * along_north
+        distance = np.sqrt((off_east * off_east + off_north * off_north).min(axis=1))
+        straddled = (from_north >= 0) != (north_m[:, None] >= end_north)
+        on_left = along_east * from_north > along_north * from_east
+        crossed = straddled & (on_left == (along_north > 0))
+        signed_m: FloatArray = np.where(np.logical_xor.reduce(crossed, axis=1), -distance, distance)
+        return signed_m
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A solid body that stands or moves in a straight line, always or for some time.
+
+    Attributes:
+        shape: where it is at `epoch_s`.
+        velocity_mps: (east, north).
+        active_s: first and last time at which it is there, both included; None: always.
+    """
+
+    shape: Circle | Polygon
+    velocity_mps: tuple[float, float] = (0.0, 0.0)
+    active_s: tuple[float, float] | None = None
+
+    @property
+    def epoch_s(self) -> float:
+        """When its motion starts: as it appears, or at 0 if it is always there."""
+        return self.active_s[0] if self.active_s else 0.0
+
+    @property
+    def interval_s(self) -> tuple[float, float]:
+        """First and last time at which it is there, infinite if it always is."""
+        return self.active_s or (-math.inf, math.inf)
+
+    def active(self, time_s: float) -> bool:
+        """Whether it is there at a time."""
+        start, stop = self.interval_s
+        return start <= time_s <= stop
+
+    def displacement_m(self, time_s: float) -> tuple[float, float]:
+        """(east, north) from `shape` to where it is at a time."""
+        elapsed = time_s - self.epoch_s
+        return self.velocity_mps[0] * elapsed, self.velocity_mps[1] * elapsed
+
+    def distance(self, points_m: FloatArray, times_s: FloatArray) -> FloatArray:
+        """(k,) distances from points (k, 2), each at its own time (k,); +inf while it is not there."""
+        east, north = points_m[:, 0], points_m[:, 1]
+        if self.velocity_mps != (0.0, 0.0):
+            elapsed = times_s - self.epoch_s
+            east, north = east - self.velocity_mps[0] * elapsed, north - self.velocity_mps[1] * elapsed
+        distance = self.shape.distance(east, north)
+        if self.active_s is None:
+            return distance
+        return np.where((self.active_s[0] <= times_s) & (times_s <= self.active_s[1]), distance, math.inf)

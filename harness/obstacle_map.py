@@ -1,0 +1,274 @@
+"""What has been seen so far: obstacle edges and space seen to be free.
+
+Edges are points on a square grid of cells, at most one a cell, each where a ray hit. Evidence decides: a cell that was hit in
+two scans holds an edge; one that several scans looked through, with neighbouring rays agreeing, does not. So
+one false return makes no wall and one lost return opens none. Free space is a coarser grid, written from key scans.
+Both grids cover the area and a border, so that the map cannot outgrow them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.range_sensor import RangeScan
+from planner.interface import BoolArray, FloatArray
+
+MOST_CELLS = 4_000_000
+CONFIRMED = 2
+"""An edge is believed from this score on; a hit adds one, a look through takes one."""
+CERTAIN = 8
+"""Scores do not rise above this."""
+LOOK_THROUGH_EVERY = 4
+"""Every so many scans the points in range are asked whether they were looked through."""
+
+
+class ObstacleMap:
+    """The planner's only source of knowledge about obstacles (`planner.interface.SeenWorld`).
+
+    Args:
+        bounds_m: xmin, ymin, xmax, ymax of the area.
+        clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way between
+            them and are joined. Edge points lie about a quarter of it apart.
+        range_m: sensing range.
+    """
+
+    def __init__(self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float) -> None:
+        xmin, ymin, xmax, ymax = bounds_m
+        span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
+        self._cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
+        border = 2.0 * clearance_m + self._cell
+        self._x0, self._y0 = xmin - border, ymin - border
+        self._nx = math.ceil((xmax + border - self._x0) / self._cell)
+        self._ny = math.ceil((ymax + border - self._y0) / self._cell)
+        self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)
+        self._points = np.zeros((1024, 2))
+        self._score = np.zeros(1024, dtype=np.int16)
+        self._key = np.zeros(1024, dtype=np.int64)
+        self._count = 0
+        self._join = 2.0 * clearance_m
+        self._range = range_m
+        self._order: list[NDArray[np.int32]] = []  # slots in the order in which they were confirmed
+        self._revisions: list[int] = []
+        self._revision = 0
+        self._taken_back_at = 0
+        self._scans = 0
+        self._near = np.zeros(0, dtype=np.int32)
+        self._near_at = (math.inf, math.inf)
+        self._near_count = 0
+        self._free = _FreeSpace(bounds_m, clearance_m, range_m)
+
+    @property
+    def spacing_m(self) -> float:
+        """Edge points of one wall are about this far apart."""
+        return self._cell
+
+    @property
+    def revision(self) -> int:
+        """Grows with every change of the set of edge points."""
+        return self._revision
+
+    def update(self, scan: RangeScan) -> None:
+        """Takes in one scan."""
+        self._scans += 1
+        hits = np.flatnonzero(scan.ranges_m < math.inf)
+        if len(hits):
+            self._add(self._joined(scan, hits))
+        if self._scans % LOOK_THROUGH_EVERY == 0 and self._count:
+            self._look_through(scan)
+        self._free.update(scan)
+
+    @property
+    def taken_back_at(self) -> int:
+        """The last revision at which edge points were taken away again."""
+        return self._taken_back_at
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) edge points that came in after `revision`."""
+        slots: list[NDArray[np.int32]] = []
+        for at, added in zip(reversed(self._revisions), reversed(self._order), strict=True):
+            if at <= revision:
+                break
+            slots.append(added)
+        if not slots:
+            return np.zeros((0, 2))
+        fresh = np.concatenate(slots[::-1])
+        return self._points[fresh[self._score[fresh] >= CONFIRMED]]
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) points lies in space seen to be free."""
+        return self._free.contains(points_m)
+
+    def _joined(self, scan: RangeScan, hits: NDArray[np.intp]) -> FloatArray:
+        """Where rays hit, and points between neighbouring hits too near to each other to pass between."""
+        points = scan.directions[hits] * scan.ranges_m[hits, None]
+        step = np.diff(points, axis=0)
+        gap = np.sqrt(step[:, 0] * step[:, 0] + step[:, 1] * step[:, 1])
+        # One ray may be missing between neighbours: a lost return does not open a wall.
+        wide = np.flatnonzero((gap > self._cell) & (gap < self._join) & (np.diff(hits) <= 2))
+        if len(wide):
+            parts = np.ceil(gap[wide] / self._cell).astype(np.int64)
+            inner = parts - 1
+            which = np.repeat(np.arange(len(wide)), inner)
+            number = np.arange(len(which)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
+            share = (number / parts[which])[:, None]
+            points = np.concatenate((points, points[wide[which]] + share * step[wide[which]]))
+        points[:, 0] += scan.east_m
+        points[:, 1] += scan.north_m
+        return points
+
+    def _add(self, points: FloatArray) -> None:
+        """Counts hits; a cell hit for the first time gets a point, one hit in a second scan becomes an edge."""
+        ix = ((points[:, 0] - self._x0) / self._cell).astype(np.int64)
+        iy = ((points[:, 1] - self._y0) / self._cell).astype(np.int64)
+        keys = ix * self._ny + iy
+        if ix.min() < 0 or iy.min() < 0 or ix.max() >= self._nx or iy.max() >= self._ny:
+            inside = (ix >= 0) & (iy >= 0) & (ix < self._nx) & (iy < self._ny)
+            keys, points = keys[inside], points[inside]
+        slots = self._slot[keys]
+        fresh = np.flatnonzero(slots < 0)
+        known = slots[slots >= 0]
+        weak = known[self._score[known] < CERTAIN]
+        if len(weak):
+            before = self._score[weak]
+            self._score[weak] = before + 1  # duplicates of a cell count once a scan
+            raised = weak[before == CONFIRMED - 1]
+            if len(raised):
+                self._note(np.unique(raised))
+        if len(fresh):
+            new_keys, first = np.unique(keys[fresh], return_index=True)
+            self._grow(len(new_keys))
+            new = np.arange(self._count, self._count + len(new_keys), dtype=np.int32)
+            self._slot[new_keys] = new
+            self._points[new] = points[fresh[first]]
+            self._key[new] = new_keys
+            self._score[new] = 1
+            self._count += len(new_keys)
+
+    def _note(self, slots: NDArray[np.int32]) -> None:
+        self._revision += 1
+        self._order.append(slots)
+        self._revisions.append(self._revision)
+
+    def _grow(self, more: int) -> None:
+        if self._count + more <= len(self._score):
+            return
+        size = max(2 * len(self._score), self._count + more)
+        self._points = np.resize(self._points, (size, 2))
+        self._score = np.resize(self._score, size)
+        self._key = np.resize(self._key, size)
+
+    def _look_through(self, scan: RangeScan) -> None:
+        """Takes a point off every known point that three neighbouring rays looked past."""
+        moved = math.hypot(scan.east_m - self._near_at[0], scan.north_m - self._near_at[1])
+        if not moved < self._range / 8.0:
+            near = self._points[: self._count] - (scan.east_m, scan.north_m)
+            reach = 1.125 * self._range
+            self._near = np.flatnonzero((near * near).sum(axis=1) < reach * reach).astype(np.int32)
+            self._near_at, self._near_count = (scan.east_m, scan.north_m), self._count
+        slots = self._near
+        if self._near_count < self._count:
+            slots = np.concatenate((slots, np.arange(self._near_count, self._count, dtype=np.int32)))
+        points = self._points[slots]
+        dx, dy = points[:, 0] - scan.east_m, points[:, 1] - scan.north_m
+        distance = np.sqrt(dx * dx + dy * dy)
+        rays = len(scan.ranges_m)
+        position = (np.arctan2(dx, dy) - scan.start_rad) % math.tau / scan.spacing_rad
+        ray = np.rint(position).astype(np.int64)
+        circle = rays * scan.spacing_rad > math.tau - 1e-9
+        if circle:
+            ray %= rays
+        # Only a ray that passes close by says anything about the point.
+        aimed = (
+            (np.abs(position - np.rint(position)) * scan.spacing_rad * distance < 0.25 * self._cell)
+            & (distance < scan.max_range_m - 2.0 * self._cell)
+            & (self._score[slots] > 0)
+        )
+        if not circle:
+            aimed &= (ray >= 1) & (ray < rays - 1)
+        chosen = np.flatnonzero(aimed)
+        ray, past = ray[chosen], distance[chosen] + 1.5 * self._cell
+        ranges = scan.ranges_m
+        through = (ranges[ray] > past) & (ranges[ray - 1] > past) & (ranges[(ray + 1) % rays] > past)
+        weaker = slots[chosen[through]]
+        if len(weaker):
+            self._score[weaker] -= 1
+            if (self._score[weaker] == CONFIRMED - 1).any():
+                self._revision += 1
+                self._taken_back_at = self._revision
+
+
+class _FreeSpace:
+    """Cells of space that a scan has looked through, on a grid twice as coarse as the edges'."""
+
+    def __init__(self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float) -> None:
+        xmin, ymin, xmax, ymax = bounds_m
+        span = max(xmax - xmin, ymax - ymin)
+        self._cell = max(clearance_m / 2.0, span / math.sqrt(MOST_CELLS / 4))
+        self._x0, self._y0 = xmin, ymin
+        self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
+        self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
+        self._clearance, self._every = clearance_m, range_m / 40.0
+        self._last = (math.inf, math.inf)
+
+    def update(self, scan: RangeScan) -> None:
+        """Marks what a scan looked through, if the sensor has moved on far enough since the last time."""
+        if math.hypot(scan.east_m - self._last[0], scan.north_m - self._last[1]) < self._every:
+            return
+        self._last = (scan.east_m, scan.north_m)
+        # Beyond this range the rays are further apart than what must not be missed between them.
+        reach = min(scan.max_range_m, self._clearance / scan.spacing_rad)
+        x_low, x_high = self._cells(scan.east_m, reach, self._x0, self._nx)
+        y_low, y_high = self._cells(scan.north_m, reach, self._y0, self._ny)
+        if x_low >= x_high or y_low >= y_high:
+            return
+        x = self._x0 + (np.arange(x_low, x_high) + 0.5) * self._cell - scan.east_m
+        y = self._y0 + (np.arange(y_low, y_high) + 0.5) * self._cell - scan.north_m
+        distance = np.sqrt(x[:, None] ** 2 + y**2)
+        rays = len(scan.ranges_m)
+        position = (np.arctan2(x[:, None], y) - scan.start_rad) % math.tau / scan.spacing_rad
+        ray = np.rint(position).astype(np.int64)
+        if rays * scan.spacing_rad > math.tau - 1e-9:
+            ray %= rays
+            covered = np.ones(ray.shape, dtype=np.bool_)
+        else:
+            covered = ray < rays
+            ray = np.minimum(ray, rays - 1)
+        # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
+        half = 0.75 * self._cell
+        free_to = np.minimum(scan.ranges_m, reach) - half
+        width = 1
+        level = np.ceil(half / np.maximum(distance, half) / scan.spacing_rad) + 1.0
+        filtered = free_to
+        while covered.any():
+            filtered = _least(filtered, width, rays)
+            width *= 2
+            # After filters of width 1, 2, 4, ... the least of 2 width - 1 rays to either side is known.
+            enough = covered & (level <= width - 1)
+            fits = enough & (filtered[ray] > distance)
+            self._seen[x_low:x_high, y_low:y_high] |= fits
+            covered &= ~enough
+            if width > rays:
+                break
+
+    def contains(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each point lies in a cell seen to be free."""
+        ix = np.floor((points_m[:, 0] - self._x0) / self._cell).astype(np.int64)
+        iy = np.floor((points_m[:, 1] - self._y0) / self._cell).astype(np.int64)
+        inside = (ix >= 0) & (iy >= 0) & (ix < self._nx) & (iy < self._ny)
+        out = np.zeros(len(points_m), dtype=np.bool_)
+        out[inside] = self._seen[ix[inside], iy[inside]]
+        return out
+
+    def _cells(self, middle: float, reach: float, origin: float, count: int) -> tuple[int, int]:
+        low = math.floor((middle - reach - origin) / self._cell)
+        high = math.ceil((middle + reach - origin) / self._cell)
+        return max(low, 0), min(high, count)
+
+
+def _least(ranges: FloatArray, width: int, rays: int) -> FloatArray:
+    """The least of each range and those `width` rays to either side; the ends of a fan are joined."""
+    width %= rays
+    return np.minimum(ranges, np.minimum(np.roll(ranges, width), np.roll(ranges, -width)))

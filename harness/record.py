@@ -1,0 +1,307 @@
+"""What a flight leaves behind, as values: the track row by row, the accepted plans, the outcome.
+
+Everything is SI; angles are degrees in the track, because the track is a file format. Frame: local ENU plane,
+x = east, y = north, z = up above mean sea level; course and heading clockwise from north.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.interface import AircraftState
+from planner.interface import Plan
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+Clearance = Callable[[FloatArray, FloatArray], FloatArray]
+"""(k, 2) points and (k,) times -> (k,) true distance to the nearest active obstacle edge, m."""
+
+COLUMNS = (
+    "time_s",
+    "east_m",
+    "north_m",
+    "up_m",
+    "course_deg",
+    "heading_deg",
+    "roll_deg",
+    "pitch_deg",
+    "airspeed_mps",
+    "groundspeed_mps",
+    "load_factor",
+    "roll_command_deg",
+    "cross_track_m",
+    "clearance_m",
+    "plan_index",
+)
+"""Columns of `track.parquet` that the digest covers, in its order."""
+
+BLOCK_ROWS = 600
+CHORD_ERROR_M = 0.5
+
+
+class RunFolderError(ValueError):
+    """A run folder cannot be made or read; the message is one sentence that says why."""
+
+
+class Outcome(Enum):
+    """How a flight ended."""
+
+    REACHED = "reached"
+    UNREACHABLE = "unreachable"
+    COLLISION = "collision"
+    OUT_OF_BOUNDS = "out_of_bounds"
+    TIMEOUT = "timeout"
+    LOST_CONTROL = "lost_control"
+    PLANNER_FAILED = "planner_failed"
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """The flown track, one row per log tick. All columns are read-only and equally long.
+
+    Attributes:
+        time_s: simulated time.
+        east_m: position in the local plane.
+        north_m: position in the local plane.
+        up_m: altitude above mean sea level.
+        course_deg: direction of the ground velocity, in [0, 360).
+        heading_deg: direction of the nose, in [0, 360).
+        roll_deg: positive right wing down.
+        pitch_deg: positive nose up.
+        airspeed_mps: true airspeed.
+        groundspeed_mps: horizontal speed over the ground.
+        load_factor: normal load factor, 1 in level flight.
+        roll_command_deg: what guidance asked of the inner loops.
+        cross_track_m: distance from the plan being flown, positive right of it; NaN before the first plan.
+        clearance_m: true distance to the nearest active obstacle edge, negative inside, inf with none.
+        plan_index: row of `plans.parquet` being flown, -1 before the first.
+        station_m: distance along that plan; NaN before the first plan.
+    """
+
+    time_s: FloatArray
+    east_m: FloatArray
+    north_m: FloatArray
+    up_m: FloatArray
+    course_deg: FloatArray
+    heading_deg: FloatArray
+    roll_deg: FloatArray
+    pitch_deg: FloatArray
+    airspeed_mps: FloatArray
+    groundspeed_mps: FloatArray
+    load_factor: FloatArray
+    roll_command_deg: FloatArray
+    cross_track_m: FloatArray
+    clearance_m: FloatArray
+    plan_index: IntArray
+    station_m: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in TRACK_FIELDS:
+            column = np.array(getattr(self, name), dtype="<i8" if name == "plan_index" else "<f8")
+            if column.shape != (len(self.time_s),):
+                raise ValueError(
+                    f"track column {name} has shape {column.shape}, time_s has {len(self.time_s)} rows"
+                )
+            column.setflags(write=False)
+            object.__setattr__(self, name, column)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @staticmethod
+    def joined(blocks: Sequence[Track]) -> Track:
+        """One track of consecutive blocks; an empty sequence gives an empty track."""
+        return Track(
+            **{name: np.concatenate([[], *(getattr(b, name) for b in blocks)]) for name in TRACK_FIELDS}
+        )
+
+
+TRACK_FIELDS = (*COLUMNS, "station_m")
+"""All columns of `track.parquet`."""
+
+
+def digest(track: Track) -> str:
+    """SHA-256 (hex) over the little-endian bytes of every column of `COLUMNS`, one column after the other."""
+    sha = hashlib.sha256()
+    for name in COLUMNS:
+        sha.update(getattr(track, name).tobytes())
+    return sha.hexdigest()
+
+
+class TrackLog:
+    """Collects the track of one flight and hands it on in blocks while flying.
+
+    The true clearance is filled in block by block, not row by row.
+
+    Args:
+        clearance: distance to the nearest obstacle edge, vectorised.
+        sinks: each is called with every finished block, in order.
+        block_rows: rows a block.
+    """
+
+    def __init__(
+        self,
+        clearance: Clearance,
+        sinks: Iterable[Callable[[Track], None]] = (),
+        block_rows: int = BLOCK_ROWS,
+    ) -> None:
+        self._clearance = clearance
+        self._sinks = tuple(sinks)
+        self._block_rows = block_rows
+        self._rows: list[tuple[float, ...]] = []
+        self._blocks: list[Track] = []
+
+    def add(
+        self,
+        state: AircraftState,
+        roll_command_rad: float,
+        cross_track_m: float,
+        station_m: float,
+        plan_index: int,
+    ) -> None:
+        """Adds one row; without a plan, `cross_track_m` and `station_m` are NaN and `plan_index` is -1."""
+        self._rows.append(
+            (
+                *state,
+                state.course_rad,
+                state.groundspeed_mps,
+                roll_command_rad,
+                cross_track_m,
+                station_m,
+                plan_index,
+            )
+        )
+        if len(self._rows) == self._block_rows:
+            self._cut()
+
+    def close(self) -> Track:
+        """Hands on the last block and returns the whole track."""
+        if self._rows:
+            self._cut()
+        return Track.joined(self._blocks)
+
+    def _cut(self) -> None:
+        rows = np.array(self._rows, dtype=np.float64).T
+        self._rows = []
+        time, east, north, up, _, _, _, heading, roll, pitch, airspeed, load_factor = rows[:12]
+        course, groundspeed, roll_command, cross_track, station, plan_index = rows[12:]
+        block = Track(
+            time_s=time,
+            east_m=east,
+            north_m=north,
+            up_m=up,
+            course_deg=np.degrees(course),
+            heading_deg=np.degrees(heading) % 360.0,
+            roll_deg=np.degrees(roll),
+            pitch_deg=np.degrees(pitch),
+            airspeed_mps=airspeed,
+            groundspeed_mps=groundspeed,
+            load_factor=load_factor,
+            roll_command_deg=np.degrees(roll_command),
+            cross_track_m=cross_track,
+            clearance_m=self._clearance(np.column_stack((east, north)), time),
+            plan_index=plan_index,
+            station_m=station,
+        )
+        self._blocks.append(block)
+        for sink in self._sinks:
+            sink(block)
+
+
+@dataclass(frozen=True, eq=False)
+class AcceptedPlan:
+    """A plan that was flown.
+
+    Attributes:
+        plan_index: 0 for the first; row of `plans.parquet`.
+        time_s: in effect from this simulated time on.
+        compute_ms: processor time of the search that found it.
+        plan: the planner's answer; its `path` is not None.
+    """
+
+    plan_index: int
+    time_s: float
+    compute_ms: float
+    plan: Plan
+
+    def __post_init__(self) -> None:
+        if self.plan.path is None:
+            raise ValueError(f"accepted plan {self.plan_index} has no path")
+
+    @property
+    def segments(self) -> FloatArray:
+        """(n, 6) segments of the path, as in `planner.interface.Path`."""
+        assert self.plan.path is not None
+        return self.plan.path.segments
+
+    @property
+    def loiter(self) -> bool:
+        """Whether the last segment is a full circle, flown for ever."""
+        return self.plan.path is not None and self.plan.path.loiter
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """One flight, over.
+
+    Attributes:
+        track: every log tick from the start to the end.
+        plans: the plans flown, in order; `plans[i].plan_index == i`.
+        outcome: how it ended.
+        reason: the same as one sentence.
+        compute_ms: processor time of every search, also of those that found nothing new.
+        sim_s: simulated time flown.
+        wall_s: wall-clock time that took.
+        block_shares: share of the processor time each block of the loop took, by its name.
+    """
+
+    track: Track
+    plans: tuple[AcceptedPlan, ...]
+    outcome: Outcome
+    reason: str
+    compute_ms: tuple[float, ...]
+    sim_s: float
+    wall_s: float
+    block_shares: Mapping[str, float] = field(default_factory=dict)
+
+
+def polyline(segments: FloatArray, chord_error_m: float = CHORD_ERROR_M) -> FloatArray:
+    """Points along joined lines and arcs, dense enough that no chord leaves its arc by more than an error.
+
+    A chord that spans the angle `a` of an arc of curvature `k` leaves it by (1 - cos(a / 2)) / k.
+
+    Args:
+        segments: (n, 6) start east, start north, unit tangent east, unit tangent north, curvature (1/m,
+            positive = left), length (m).
+        chord_error_m: largest distance between a chord and its arc.
+
+    Returns:
+        (k, 2) points, the ends of every segment among them.
+    """
+    east, north, tangent_east, tangent_north, curvature, length = segments.T
+    bent = np.abs(curvature)
+    sharpest = 2.0 * np.arccos(np.clip(1.0 - chord_error_m * bent, 0.0, 1.0))
+    pieces = np.maximum(
+        np.ceil(np.divide(bent * length, sharpest, out=np.ones_like(bent), where=sharpest > 0)), 1
+    )
+    counts = pieces.astype(np.int64)
+    row = np.repeat(np.arange(len(segments)), counts)
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    station = (np.arange(len(row)) - first) / counts[row] * length[row]
+    row, station = np.append(row, len(segments) - 1), np.append(station, length[-1])
+    half = 0.5 * curvature[row] * station
+    chord = station * np.sinc(half / np.pi)
+    ahead, left = chord * np.cos(half), chord * np.sin(half)
+    return np.column_stack(
+        (
+            east[row] + ahead * tangent_east[row] - left * tangent_north[row],
+            north[row] + ahead * tangent_north[row] + left * tangent_east[row],
+        )
+    )

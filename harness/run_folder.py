@@ -1,0 +1,292 @@
+"""The folder of one run: written while flying, complete only when the manifest says so.
+
+The order of writing carries the meaning. The manifest comes first and says `complete: false`; every other
+file is written under a temporary name and renamed when it is whole; the manifest that says `complete: true`
+replaces the first one last of all. A process killed at any point leaves a folder that cannot be taken for a
+complete run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from harness.record import TRACK_FIELDS, AcceptedPlan, FloatArray, RunFolderError, Track, polyline
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SCENARIO = "scenario.yaml"
+MANIFEST = "manifest.json"
+TRACK = "track.parquet"
+PLANS = "plans.parquet"
+METRICS = "metrics.json"
+RECORDING = "flight.rrd"
+REPORT = "report.html"
+PARTIAL = ".partial"
+
+SCHEMA = "wayproof/run/1"
+DISTRIBUTIONS = ("wayproof", "jsbsim", "numpy", "shapely", "rerun-sdk", "pyarrow")
+COMPRESSION = "zstd"
+
+
+@dataclass(frozen=True, eq=False)
+class PlanRow:
+    """One row of `plans.parquet`.
+
+    Attributes:
+        plan_index: 0 for the first plan.
+        time_s: in effect from this simulated time on.
+        status: how the planner's call ended, a value of `planner.interface.PlanStatus`.
+        compute_ms: processor time of the search.
+        waypoints_m: (k, 2) east, north.
+        path_m: (m, 2) dense polyline, east, north.
+        length_m: length of the path.
+        max_curvature_1pm: its largest absolute curvature.
+    """
+
+    plan_index: int
+    time_s: float
+    status: str
+    compute_ms: float
+    waypoints_m: FloatArray
+    path_m: FloatArray
+    length_m: float
+    max_curvature_1pm: float
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A complete run, read back.
+
+    Attributes:
+        folder: where it lies.
+        scenario_yaml: the scenario as flown, YAML text.
+        manifest: versions, platform, command, start time.
+        track: the flown track.
+        plans: the accepted plans, in order.
+        metrics: the content of `metrics.json`.
+    """
+
+    folder: Path
+    scenario_yaml: str
+    manifest: Mapping[str, Any]
+    track: Track
+    plans: tuple[PlanRow, ...]
+    metrics: Mapping[str, Any]
+
+
+class RunFolder:
+    """A run folder being written. Use as a context manager; `finish` makes it complete.
+
+    Left without `finish` (an error, Ctrl-C), the folder stays marked incomplete.
+    """
+
+    def __init__(self, path: Path, manifest: dict[str, Any]) -> None:
+        self.path = path
+        self._manifest = manifest
+        self._track_writer: Any = None
+
+    @classmethod
+    def create(cls, path: Path, scenario_yaml: str, command: Sequence[str]) -> RunFolder:
+        """Makes the folder, marked incomplete, with scenario and manifest; removes a former run's files.
+
+        Args:
+            path: the folder; made with its parents where missing.
+            scenario_yaml: the scenario as flown, all defaults filled in.
+            command: command line, for the manifest.
+
+        Raises:
+            RunFolderError: the path is a file, a folder with other things in it, or cannot be written.
+        """
+        manifest = {
+            "schema": SCHEMA,
+            "complete": False,
+            "command": list(command),
+            "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            "versions": {
+                "python": platform.python_version(),
+                **{name: _version(name) for name in DISTRIBUTIONS},
+            },
+            "platform": {
+                "system": platform.platform(),
+                "machine": platform.machine(),
+                "byte_order": sys.byteorder,
+                "cpus": os.cpu_count(),
+            },
+        }
+        try:
+            _claim(path)
+            _replace(path / MANIFEST, _json(manifest))
+            for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, REPORT):
+                (path / name).unlink(missing_ok=True)
+                (path / (name + PARTIAL)).unlink(missing_ok=True)
+            _replace(path / SCENARIO, scenario_yaml)
+        except OSError as error:
+            raise RunFolderError(f"cannot write the run folder {path}: {error.strerror or error}") from error
+        return cls(path, manifest)
+
+    @property
+    def recording_path(self) -> Path:
+        """Where the recording belongs."""
+        return self.path / RECORDING
+
+    def write_block(self, block: Track) -> None:
+        """Appends consecutive rows of the track; a sink of `TrackLog`."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        table = pa.table({name: getattr(block, name) for name in TRACK_FIELDS})
+        if self._track_writer is None:
+            self._track_writer = pq.ParquetWriter(
+                self.path / (TRACK + PARTIAL), table.schema, compression=COMPRESSION, use_dictionary=False
+            )
+        self._track_writer.write_table(table)
+
+    def finish(self, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
+        """Closes the track, writes plans and metrics, then marks the run complete.
+
+        Call it last: after the recording is closed.
+
+        Raises:
+            RunFolderError: no block of the track was written.
+            ValueError: a metric is not finite (JSON has no such number).
+        """
+        if self._track_writer is None:
+            raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
+        import pyarrow.parquet as pq
+
+        text = _json(metrics)
+        self._close_track()
+        os.replace(self.path / (TRACK + PARTIAL), self.path / TRACK)
+        pq.write_table(_plans_table(plans), self.path / (PLANS + PARTIAL), compression=COMPRESSION)
+        os.replace(self.path / (PLANS + PARTIAL), self.path / PLANS)
+        _replace(self.path / METRICS, text)
+        _replace(self.path / MANIFEST, _json({**self._manifest, "complete": True}))
+
+    def __enter__(self) -> RunFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._close_track()
+
+    def _close_track(self) -> None:
+        if self._track_writer is not None and self._track_writer.is_open:
+            self._track_writer.close()
+
+
+def load_run(path: Path) -> Run:
+    """Reads a complete run back.
+
+    Raises:
+        RunFolderError: `path` is not a run folder, its run is incomplete, or a file of it is missing or
+            damaged.
+    """
+    manifest = _manifest(path)
+    if manifest is None:
+        raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
+    if manifest.get("complete") is not True:
+        raise RunFolderError(f"the run in {path} is incomplete: it was stopped before its end; fly it again")
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(path / TRACK, columns=list(TRACK_FIELDS))
+        return Run(
+            folder=path,
+            scenario_yaml=(path / SCENARIO).read_text(encoding="utf-8"),
+            manifest=manifest,
+            track=Track(**{name: table[name].to_numpy() for name in TRACK_FIELDS}),
+            plans=_plan_rows(pq.read_table(path / PLANS)),
+            metrics=json.loads((path / METRICS).read_text(encoding="utf-8")),
+        )
+    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+        raise RunFolderError(f"the run in {path} is damaged: {error}") from error
+
+
+def _claim(path: Path) -> None:
+    """Makes `path` a folder that may be written to, or raises RunFolderError."""
+    if path.exists() and not path.is_dir():
+        raise RunFolderError(f"{path} is a file, not a folder for a run")
+    path.mkdir(parents=True, exist_ok=True)
+    others = {entry.name for entry in path.iterdir()} - {MANIFEST + PARTIAL}
+    if others and _manifest(path) is None:
+        raise RunFolderError(
+            f"{path} is not empty and not a run folder: choose another folder or empty it first"
+        )
+
+
+def _manifest(path: Path) -> dict[str, Any] | None:
+    """The manifest of a run folder; None where there is none that is ours."""
+    try:
+        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return manifest if isinstance(manifest, dict) and manifest.get("schema") == SCHEMA else None
+
+
+def _version(distribution: str) -> str | None:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return None
+
+
+def _json(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def _replace(path: Path, text: str) -> None:
+    """Writes a file so that it is either the old one or the whole new one."""
+    partial = path.with_name(path.name + PARTIAL)
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, path)
+
+
+def _plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
+    import pyarrow as pa
+
+    paths = [accepted.plan.path for accepted in plans]
+    columns = {
+        "plan_index": pa.array([accepted.plan_index for accepted in plans], pa.int64()),
+        "time_s": pa.array([accepted.time_s for accepted in plans], pa.float64()),
+        "status": pa.array([accepted.plan.status.value for accepted in plans], pa.string()),
+        "compute_ms": pa.array([accepted.compute_ms for accepted in plans], pa.float64()),
+        "waypoints": _points_column([accepted.plan.waypoints_m for accepted in plans]),
+        "path": _points_column([polyline(accepted.segments) for accepted in plans]),
+        "length_m": pa.array([path.length_m for path in paths if path], pa.float64()),
+        "max_curvature_1pm": pa.array([path.max_curvature_1pm for path in paths if path], pa.float64()),
+    }
+    return pa.table(columns)
+
+
+def _points_column(polylines: Sequence[FloatArray]) -> pa.Array:
+    """A column of lists of [east_m, north_m]."""
+    import pyarrow as pa
+
+    flat = np.concatenate([np.zeros((0, 2)), *polylines]).ravel()
+    offsets = np.cumsum([0, *(len(points) for points in polylines)])
+    pairs = pa.FixedSizeListArray.from_arrays(pa.array(flat), 2)
+    return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), pairs)
+
+
+def _plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
+    rows = []
+    for row in table.to_pylist():
+        row["waypoints_m"] = np.array(row.pop("waypoints"), dtype=np.float64).reshape(-1, 2)
+        row["path_m"] = np.array(row.pop("path"), dtype=np.float64).reshape(-1, 2)
+        rows.append(PlanRow(**row))
+    return tuple(rows)

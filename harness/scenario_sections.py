@@ -1,0 +1,299 @@
+"""The sections of a scenario file as frozen types: attribute = key.
+
+Units are SI and stand in every name. Positions are metres in the local ENU plane, x = east, y = north;
+courses and wind directions are degrees clockwise from north.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
+
+SIMULATION_RATE_HZ: Final = 120
+"""Integration steps per simulated second; every other rate must divide it."""
+MAX_COORDINATE_M: Final = 1e6
+
+
+def key(
+    doc: str, *, unit: str | None = None, default: Any = ..., derived: str | None = None, **bounds: Any
+) -> Any:
+    """One key of the format.
+
+    Args:
+        doc: what it means, a sentence for the JSON Schema.
+        unit: its unit.
+        default: its default; none makes the key required.
+        derived: instead of a default, how it follows from other keys (filled in by `Scenario`).
+        **bounds: `default_factory`, `gt`, `ge`, `le`, `pattern` and the like, as pydantic's `Field` has them.
+    """
+
+    def describe(schema: dict[str, Any]) -> None:
+        schema.pop("title", None)
+        if unit:
+            schema["unit"] = unit
+        if derived:
+            del schema["default"]
+
+    if derived:
+        doc, default = f"{doc} Default: {derived}.", None
+    if "default_factory" in bounds:
+        return Field(description=doc, json_schema_extra=describe, **bounds)
+    return Field(default, description=doc, json_schema_extra=describe, **bounds)
+
+
+class Section(BaseModel):
+    """A mapping of the file: frozen, no unknown key, no conversion of types, finite numbers only."""
+
+    model_config = ConfigDict(
+        frozen=True, strict=True, extra="forbid", allow_inf_nan=False, protected_namespaces=()
+    )
+
+
+Coordinate = Annotated[float, Field(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Point = Annotated[tuple[Coordinate, Coordinate], Strict(False)]
+Bounds = Annotated[tuple[Coordinate, Coordinate, Coordinate, Coordinate], Strict(False)]
+Speed = Annotated[float, Field(ge=-1000, le=1000)]
+Velocity = Annotated[tuple[Speed, Speed], Strict(False)]
+Time = Annotated[float, Field(ge=0, le=1e7)]
+Interval = Annotated[tuple[Time, Time], Strict(False)]
+
+
+class Origin(Section):
+    """Where ENU (0, 0) lies on the WGS84 ellipsoid."""
+
+    latitude_deg: float = key("Geodetic latitude.", unit="deg", default=47.0, ge=-85, le=85)
+    longitude_deg: float = key("Longitude.", unit="deg", default=8.0, ge=-180, le=180)
+
+
+class Area(Section):
+    """The area of operations, known to the planner."""
+
+    bounds_m: Bounds = key("xmin, ymin, xmax, ymax of the area; the aircraft must not leave it.", unit="m")
+    origin: Origin = key("Where ENU (0, 0) lies.", default_factory=Origin)
+
+    @field_validator("bounds_m")
+    @classmethod
+    def _span_an_area(cls, bounds_m: Bounds) -> Bounds:
+        xmin, ymin, xmax, ymax = bounds_m
+        if not (xmin < xmax and ymin < ymax):
+            raise ValueError(
+                f"is {list(bounds_m)}; must be [xmin, ymin, xmax, ymax] with xmin < xmax and ymin < ymax"
+            )
+        return bounds_m
+
+
+class Circle(Section):
+    """A disc."""
+
+    center_m: Point = key("Centre: east, north.", unit="m")
+    radius_m: float = key("Radius.", unit="m", gt=0, le=MAX_COORDINATE_M)
+
+
+class Polygon(Section):
+    """A simple polygon, convex or not, its vertices in either direction; kept without a closing vertex."""
+
+    vertices_m: Annotated[tuple[Point, ...], Strict(False)] = key(
+        "Vertices in order round the shape: east, north; the first may be repeated at the end.",
+        unit="m",
+        min_length=3,
+    )
+
+    @field_validator("vertices_m")
+    @classmethod
+    def _enclose_an_area(cls, vertices_m: tuple[Point, ...]) -> tuple[Point, ...]:
+        import shapely
+
+        ring = vertices_m[:-1] if vertices_m[0] == vertices_m[-1] else vertices_m
+        for index, vertex in enumerate(ring):
+            if index and vertex == ring[index - 1]:
+                raise ValueError(
+                    f"vertex {index} repeats vertex {index - 1}, {list(vertex)}; leave one of them out"
+                )
+        if len(ring) < 3:
+            raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
+        shape = shapely.Polygon(ring)
+        if shape.convex_hull.area == 0:
+            raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
+        if not shape.is_valid:
+            where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
+            raise ValueError(
+                f"crosses or touches itself at ({where}); give the vertices in order round the shape"
+            )
+        return ring
+
+
+class Obstacle(Section):
+    """One obstacle, unknown to the planner until sensed: a circle or a polygon."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {"required": ["circle"], "not": {"required": ["polygon"]}},
+                {"required": ["polygon"], "not": {"required": ["circle"]}},
+            ]
+        }
+    )
+
+    circle: Circle | None = key("Its shape, if it is round.", default=None)
+    polygon: Polygon | None = key("Its shape, if it has corners.", default=None)
+    velocity_mps: Velocity | None = key(
+        "Moves in a straight line: east, north; as its shape says at active_s[0]. Default: it stands still.",
+        unit="m/s",
+        default=None,
+    )
+    active_s: Interval | None = key(
+        "Pops up at the first time and is gone after the second. Default: there for the whole flight.",
+        unit="s",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _has_one_shape(self) -> Obstacle:
+        if (self.circle is None) == (self.polygon is None):
+            have = "neither" if self.circle is None else "both"
+            raise ValueError(f"has {have} of circle and polygon; must have exactly one")
+        return self
+
+    @field_validator("active_s")
+    @classmethod
+    def _starts_before_it_stops(cls, active_s: Interval | None) -> Interval | None:
+        if active_s and not active_s[0] < active_s[1]:
+            raise ValueError(f"is {list(active_s)}; must be [start, stop] with start < stop")
+        return active_s
+
+    @property
+    def fixed(self) -> bool:
+        """Whether it is there, and at the same place, at every time."""
+        return self.active_s is None and self.velocity_mps in (None, (0.0, 0.0))
+
+
+class MissionSpec(Section):
+    """From where to where."""
+
+    start_m: Point = key("Start: east, north.", unit="m")
+    course_deg: float = key(
+        "Course over the ground at the start.", unit="deg", derived="towards the goal", ge=0, le=360
+    )
+    goal_m: Point = key("Goal: east, north.", unit="m")
+    goal_radius_m: float = key(
+        "Reached = the aircraft is inside this circle.",
+        unit="m",
+        derived="the planned turn radius, rounded up to 10 m",
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
+    altitude_m: float = key(
+        "Above mean sea level, held throughout.", unit="m", default=300.0, ge=50, le=20000
+    )
+    time_limit_s: float = key(
+        "Simulated time after which the flight ends.",
+        unit="s",
+        derived="ten times the straight line at airspeed less wind and one minute, rounded up to a minute",
+        gt=0,
+        le=1e7,
+    )
+
+
+class AircraftSpec(Section):
+    """What flies, and how fast."""
+
+    model: str = key(
+        "A name that `wayproof list aircraft` prints, or a folder.", default="aerosonde", min_length=1
+    )
+    airspeed_mps: float = key(
+        "True airspeed, held throughout; must lie in the aircraft's range.",
+        unit="m/s",
+        derived="the aircraft's cruising speed",
+        gt=0,
+        le=1000,
+    )
+
+
+class Sensor(Section):
+    """A planar range sensor: rays from the aircraft to the nearest obstacle edges."""
+
+    range_m: float = key(
+        "Largest distance a ray sees.",
+        unit="m",
+        derived="ten times the planned turn radius, rounded up to 100 m",
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
+    field_of_view_deg: float = key("Centred on the nose.", unit="deg", default=360.0, gt=0, le=360)
+    rays: int = key("Rays, spread evenly over the field of view.", unit="1", default=720, ge=3, le=100_000)
+    rate_hz: float = key(
+        f"Scans per simulated second; must divide {SIMULATION_RATE_HZ} Hz.",
+        unit="Hz",
+        default=2.0,
+        gt=0,
+        le=120,
+    )
+    range_noise_m: float = key(
+        "1 sigma of additive Gaussian noise on every range.", unit="m", default=0.0, ge=0, le=MAX_COORDINATE_M
+    )
+    dropout: float = key("Probability that a ray returns nothing.", unit="1", default=0.0, ge=0, le=1)
+    false_return: float = key(
+        "Probability that a ray returns a random range.", unit="1", default=0.0, ge=0, le=1
+    )
+    latency_s: float = key("A scan becomes available this much later.", unit="s", default=0.0, ge=0, le=60)
+
+    @field_validator("rate_hz")
+    @classmethod
+    def _divides_the_simulation_rate(cls, rate_hz: float) -> float:
+        steps = SIMULATION_RATE_HZ / rate_hz
+        if abs(steps - round(steps)) > 1e-9 * steps:
+            raise ValueError(
+                f"is {rate_hz:g}, which does not divide {SIMULATION_RATE_HZ} Hz; "
+                f"the nearest that does is {SIMULATION_RATE_HZ / round(steps):.12g}"
+            )
+        return rate_hz
+
+
+class PlannerSpec(Section):
+    """Which planner, and what it has to keep; the planner's own keys stand beside these."""
+
+    # The own keys depend on the kind: `Scenario` holds them against the planner's config.
+    model_config = ConfigDict(extra="allow")
+
+    kind: str = key("A name that `wayproof list planners` prints.", default="rolling_window")
+    clearance_m: float = key(
+        "Wanted distance from every obstacle edge; the boundary must only not be crossed.",
+        unit="m",
+        derived="the planned turn radius, rounded up to 10 m",
+        ge=0,
+        le=MAX_COORDINATE_M,
+    )
+    compute_latency_s: float = key(
+        "A plan takes effect this much after the scan it used.", unit="s", default=0.0, ge=0, le=60
+    )
+
+    @property
+    def own(self) -> dict[str, Any]:
+        """The planner's own keys."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class Wind(Section):
+    """Steady wind, the same everywhere."""
+
+    speed_mps: float = key(
+        "Wind speed; must be below 0.9 of the airspeed.", unit="m/s", default=0.0, ge=0, le=200
+    )
+    from_deg: float = key("Direction it blows from.", unit="deg", default=270.0, ge=0, le=360)
+
+
+class Turbulence(Section):
+    """Continuous gusts on top of the wind."""
+
+    model: Literal["tustin", "milspec"] = key(
+        "Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it.", default="tustin"
+    )
+    intensity: Literal["light", "moderate", "severe"] = key("How strong.", default="moderate")
+
+
+class Environment(Section):
+    """The air."""
+
+    wind: Wind | None = key("Steady wind. Default: calm.", default=None)
+    turbulence: Turbulence | None = key("Gusts. Default: smooth air.", default=None)

@@ -1,0 +1,40 @@
+"""The scenarios that come with the package, by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from harness.strict_yaml import InputError
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """Scenario files by name; in a wheel they lie in this package, in a checkout beside it."""
+    here = Path(__file__).parent
+    folder = here / "scenarios" if (here / "scenarios").is_dir() else here.parent / "scenarios"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def scenario_path(text: str) -> Path:
+    """The file that a command's SCENARIO means: a path, or the name or path of a shipped scenario.
+
+    `paper_circles` and, where there is no such file, `scenarios/paper_circles.yaml` name a shipped one.
+
+    Raises:
+        InputError: there is neither such a file nor such a shipped scenario.
+    """
+    path = Path(text)
+    if path.is_file():
+        return path
+    shipped = shipped_scenarios()
+    inside = path.parent in (Path(), Path("scenarios")) and path.suffix in ("", ".yaml")
+    if inside and path.stem in shipped and not path.exists():
+        return shipped[path.stem]
+    if path.exists():
+        raise InputError(f"{text}: is not a file; give a scenario file or one of {', '.join(shipped)}")
+    raise InputError(f"{text}: no such file; give a scenario file or one of {', '.join(shipped)}")
+
+
+def summary(path: Path) -> str:
+    """What a scenario is for: the first line of the comment it begins with."""
+    with path.open(encoding="utf-8") as file:
+        return file.readline().lstrip("# ").rstrip()

@@ -1,0 +1,189 @@
+"""How smooth a path is, planned and flown, in the same four figures.
+
+Both are brought to one form, a curvature profile: consecutive pieces of length `l_i` (m) and constant
+curvature `k_i` (1/m, positive = left). A plan has this form already. A flown track gets it from the course
+over the ground, averaged over `COURSE_WINDOW_S`, which is longer than the course jitter of turbulence and
+shorter than a turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.record import AcceptedPlan, FloatArray, Track
+
+COURSE_WINDOW_S = 1.0
+"""Time over which the flown curvature is averaged, and over which the curvature rate is taken."""
+
+CORNER_RAD = 1e-6
+"""A smaller change of tangent between two segments is rounding, not a corner."""
+
+
+ROUNDING_M = 1e-6
+"""Joints closer than this are one."""
+
+
+class Profile(NamedTuple):
+    """Consecutive pieces of constant curvature.
+
+    Attributes:
+        length_m: (n,) lengths.
+        curvature_1pm: (n,) curvatures, positive = left.
+    """
+
+    length_m: FloatArray
+    curvature_1pm: FloatArray
+
+
+@dataclass(frozen=True)
+class Smoothness:
+    """Four figures of a path; 0 for a straight one.
+
+    Attributes:
+        heading_change_deg: total absolute change of direction, the sum of |k_i| l_i.
+        bending_energy_1pm: integral of the squared curvature over the length, the sum of k_i^2 l_i (Horn, The
+            curve of least energy, ACM TOMS 9, 1983).
+        max_curvature_1pm: largest |k_i|.
+        max_curvature_rate_1pm2: largest |k(s + w) - k(s)| / w over a window w. The rate of curvature is what
+            an aircraft turns into roll rate (Kanayama and Hartman, Smooth local path planning for autonomous
+            vehicles, 1989); the window makes it finite where a line meets an arc.
+    """
+
+    heading_change_deg: float
+    bending_energy_1pm: float
+    max_curvature_1pm: float
+    max_curvature_rate_1pm2: float
+
+
+def smoothness(profile: Profile, window_m: float) -> Smoothness:
+    """The four figures of a curvature profile.
+
+    Args:
+        profile: pieces of constant curvature.
+        window_m: w of the curvature rate, > 0.
+    """
+    length, curvature = profile
+    bent = np.abs(curvature)
+    return Smoothness(
+        heading_change_deg=float(np.degrees(bent @ length)),
+        bending_energy_1pm=float((bent * bent) @ length),
+        max_curvature_1pm=float(bent.max(initial=0.0)),
+        max_curvature_rate_1pm2=_max_rate(profile, window_m),
+    )
+
+
+def window_m(track: Track) -> float:
+    """Distance flown in `COURSE_WINDOW_S` at the mean ground speed."""
+    return max(float(track.groundspeed_mps.mean()) * COURSE_WINDOW_S, 1e-3)
+
+
+def flown_profile(track: Track) -> Profile:
+    """Curvature profile of a flown track: course rate over ground speed.
+
+    Piece i reaches from row i to row i + 1. Its curvature is minus the change of course (course is clockwise,
+    curvature counter-clockwise) over a window centred on it, divided by the distance flown in that window.
+    """
+    if len(track) < 2:
+        return Profile(np.zeros(0), np.zeros(0))
+    length = flown_lengths(track)
+    station = np.append(0.0, np.cumsum(length))
+    course = np.unwrap(np.radians(track.course_deg))
+    step = float(np.median(np.diff(track.time_s)))
+    half = max(round(0.5 * COURSE_WINDOW_S / step), 1)
+    piece = np.arange(len(length))
+    first, last = np.maximum(piece - half + 1, 0), np.minimum(piece + half, len(length))
+    distance = station[last] - station[first]
+    change = course[first] - course[last]
+    return Profile(length, np.divide(change, distance, out=np.zeros_like(distance), where=distance > 0))
+
+
+def flown_lengths(track: Track) -> FloatArray:
+    """(n - 1,) distances between consecutive rows, m."""
+    return np.hypot(np.diff(track.east_m), np.diff(track.north_m))
+
+
+def planned_profile(track: Track, plans: Sequence[AcceptedPlan], window_m: float) -> Profile:
+    """Curvature profile of what was planned and in effect, plan after plan.
+
+    Of every plan, the part between the stations at which it was taken up and replaced counts. A corner inside
+    it, where the tangent jumps, counts as an arc of length `window_m`; where two plans meet, only their
+    curvatures count.
+
+    Args:
+        track: the flown track, with stations.
+        plans: `plans[i]` is the plan of rows with `plan_index` i.
+        window_m: length over which a corner is taken to be turned.
+    """
+    parts = [_stretch(plans[index], start, end, window_m) for index, start, end in stations_in_effect(track)]
+    length = np.concatenate([[], *(part.length_m for part in parts)])
+    curvature = np.concatenate([[], *(part.curvature_1pm for part in parts)])
+    return Profile(length[length > 0], curvature[length > 0])
+
+
+def stations_in_effect(track: Track) -> list[tuple[int, float, float]]:
+    """Which part of which plan was flown: (plan_index, first station, last station), in order of time.
+
+    Between the last row of one plan and the first of the next the distance flown is given to the older plan,
+    so that nothing is lost however often plans change.
+    """
+    index = track.plan_index
+    starts = np.flatnonzero(np.diff(index, prepend=index[:1] - 1))
+    ends = np.append(starts[1:], len(index)) - 1
+    between = flown_lengths(track)
+    stretches = []
+    for first, last in zip(starts.tolist(), ends.tolist(), strict=True):
+        if index[first] < 0:
+            continue
+        gap = float(between[last]) if last < len(between) else 0.0
+        start, end = float(track.station_m[first]), float(track.station_m[last]) + gap
+        stretches.append((int(index[first]), start, max(start, end)))
+    return stretches
+
+
+def _stretch(accepted: AcceptedPlan, start_m: float, end_m: float, window_m: float) -> Profile:
+    """The pieces of a plan between two stations; beyond its end a line, or the loiter circle again."""
+    segments = accepted.segments
+    joint = np.append(0.0, np.cumsum(segments[:, 5]))
+    lengths = np.clip(np.minimum(joint[1:], end_m) - np.maximum(joint[:-1], start_m), 0.0, None)
+    curvatures = segments[:, 4]
+    turn = segments[:-1, 4] * segments[:-1, 5]
+    out_east = segments[:-1, 2] * np.cos(turn) - segments[:-1, 3] * np.sin(turn)
+    out_north = segments[:-1, 2] * np.sin(turn) + segments[:-1, 3] * np.cos(turn)
+    corner = np.arctan2(
+        out_east * segments[1:, 3] - out_north * segments[1:, 2],
+        out_east * segments[1:, 2] + out_north * segments[1:, 3],
+    )
+    turned = (np.abs(corner) > CORNER_RAD) & (joint[1:-1] > start_m) & (joint[1:-1] < end_m)
+    at = np.flatnonzero(turned) + 1
+    lengths = np.insert(lengths, at, window_m)
+    curvatures = np.insert(curvatures, at, corner[at - 1] / window_m)
+    beyond = max(end_m - max(start_m, float(joint[-1])), 0.0)
+    return Profile(
+        np.append(lengths, beyond), np.append(curvatures, segments[-1, 4] if accepted.loiter else 0.0)
+    )
+
+
+def _max_rate(profile: Profile, window_m: float) -> float:
+    """Largest |k(s + w) - k(s)| / w, exact for a piecewise constant k.
+
+    The difference is itself piecewise constant; its joints are those of k, and those of k less w.
+    """
+    used = profile.length_m > 0
+    length, curvature = profile.length_m[used], profile.curvature_1pm[used]
+    joint = np.append(0.0, np.cumsum(length))
+    edges = np.concatenate((joint, joint - window_m))
+    edges = np.unique(edges[(edges >= 0.0) & (edges <= joint[-1] - window_m)])
+    wide = np.diff(edges) > ROUNDING_M
+    middle = 0.5 * (edges[:-1] + edges[1:])[wide]
+    if not len(middle):
+        return 0.0
+    here = np.searchsorted(joint, middle, side="right") - 1
+    there = np.searchsorted(joint, middle + window_m, side="right") - 1
+    last = len(length) - 1
+    return float(
+        np.abs(curvature[np.minimum(there, last)] - curvature[np.minimum(here, last)]).max() / window_m
+    )

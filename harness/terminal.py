@@ -1,0 +1,115 @@
+"""What a person sees on a terminal: progress while flying, and tables of results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, TypeAlias
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+from rich.table import Table
+
+Report: TypeAlias = Callable[[float, float, str], None]
+"""Takes simulated time (s), distance to go (m) and what is being done."""
+
+_OUTCOME_STYLE = {"reached": "bold green", "unreachable": "bold yellow"}
+
+
+@contextmanager
+def progress_bar(straight_m: float) -> Iterator[Report | None]:
+    """A progress bar on standard error, or None where that is not a terminal.
+
+    Args:
+        straight_m: distance from start to goal.
+    """
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    columns = (
+        BarColumn(bar_width=20),
+        TextColumn("{task.fields[time_s]:7.0f} s  {task.fields[speed_up]:5.0f} x real time"),
+        TextColumn("{task.fields[to_go_m]:8.0f} m to go  {task.description}"),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=straight_m, time_s=0.0, speed_up=0.0, to_go_m=straight_m)
+
+        def report(time_s: float, to_go_m: float, state: str) -> None:
+            elapsed_s = bar.tasks[0].elapsed or 0.0
+            bar.update(
+                task,
+                completed=max(0.0, straight_m - to_go_m),
+                description=state,
+                time_s=time_s,
+                to_go_m=to_go_m,
+                speed_up=time_s / elapsed_s if elapsed_s > 0 else 0.0,
+            )
+
+        yield report
+
+
+def print_table(title: str, rows: Mapping[str, str]) -> None:
+    """Two columns, name and value, on standard output and never wider than 80."""
+    console = Console()
+    table = Table(title=title, box=box.SIMPLE, show_header=False, title_justify="left", pad_edge=False)
+    table.add_column(style="dim", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in rows.items():
+        table.add_row(name, value)
+    console.print(table, width=min(80, console.width))
+
+
+def print_columns(rows: Mapping[str, str]) -> None:
+    """Names and what they stand for, one line each where they fit."""
+    console = Console()
+    width = max((len(name) for name in rows), default=0)
+    for name, text in rows.items():
+        console.print(f"{name:{width}}  {text}", highlight=False, markup=False, soft_wrap=True)
+
+
+def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """The rows of the table at the end of a flight, from the content of `metrics.json`."""
+    style = _OUTCOME_STYLE.get(metrics["outcome"], "bold red")
+    compute, timing = metrics["compute_ms"], metrics["timing"]
+    return {
+        "outcome": f"[{style}]{metrics['outcome']}[/]: {_plain(metrics['reason'])}",
+        "length flown": f"{_number(metrics['flown_length_m'])} m, "
+        f"planned {_number(metrics['planned_length_m'])} m",
+        "flight time": f"{_number(metrics['flight_time_s'])} s",
+        "least clearance": f"{_number(metrics['min_clearance_m'])} m, "
+        f"below the wanted one for {_number(metrics['clearance_violation_s'])} s",
+        "cross-track error": f"{_spread(metrics['cross_track_m'])} m",
+        "altitude error": f"{_spread(metrics['altitude_error_m'])} m",
+        "trackable": "yes" if metrics["trackable"] else "no",
+        "plans": f"{metrics['replans']}, p99 {_number(compute['p99'])} ms, max {_number(compute['max'])} ms",
+        "speed": f"{_number(timing['realtime_factor'])} x real time, {_number(timing['wall_s'])} s",
+    }
+
+
+def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
+    """The rows of the table of `wayproof bench`."""
+    planner = result["planner_ms"]
+    rows = {
+        "closed loop": f"{result['closed_loop_ratio']:.3f} of bare JSBSim",
+        "with recording": f"{result['closed_loop_recording_ratio']:.3f} of bare JSBSim",
+        "planner": ", ".join(f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")),
+    }
+    return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
+
+
+def _plain(text: str) -> str:
+    """`text` with nothing in it that rich would take for markup."""
+    return text.replace("[", "\\[")
+
+
+def _number(value: float | None) -> str:
+    """A number as a person reads it; a dash where there is none."""
+    if value is None or value != value:
+        return "-"
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def _spread(values: Mapping[str, float | None]) -> str:
+    return " / ".join(f"{name} {_number(values[name])}" for name in ("rms", "p95", "max"))

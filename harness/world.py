@@ -1,0 +1,259 @@
+"""The true world: obstacles, area bounds, contact. Only the sensor and the judges of a flight may see it.
+
+Frame: local ENU plane, x = east, y = north, metres; times are simulated seconds. A world never changes: every
+answer is a function of its arguments alone. Obstacles are first sorted by the distance to their rounded boxes
+(for a circle the distance itself, for a polygon a lower bound); exact geometry is asked only of those that
+this bound cannot rule out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.obstacle import Circle, Obstacle, Polygon
+
+if TYPE_CHECKING:
+    from harness.scenario import Scenario
+
+__all__ = ["Circle", "Faces", "Obstacle", "Polygon", "Surroundings", "World"]
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+# A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
+_BLOCK_ROWS = 128
+# What bounds are given to spare, for rounding.
+_ROUNDING_M = 1e-6
+
+
+class _Motions:
+    """Straight-line motion and presence of n things, one column each.
+
+    Args:
+        rows: (5, n): velocity east, velocity north, epoch, first and last time of presence.
+    """
+
+    def __init__(self, rows: FloatArray) -> None:
+        self._rows = rows
+        self.speeds_mps: FloatArray = np.hypot(rows[0], rows[1])
+        self.matter = bool(self.speeds_mps.any() or np.isfinite(rows[3:]).any())
+
+    @classmethod
+    def of(cls, obstacles: Iterable[Obstacle]) -> _Motions:
+        rows = [(*o.velocity_mps, o.epoch_s, *o.interval_s) for o in obstacles]
+        return cls(np.array(rows, dtype=np.float64).reshape(-1, 5).T.copy())
+
+    def take(self, columns: IntArray) -> _Motions:
+        return _Motions(self._rows[:, columns])
+
+    def shifts(self, time_s: float) -> FloatArray:
+        """(2, n) displacement since the epoch."""
+        shifts: FloatArray = self._rows[:2] * (time_s - self._rows[2])
+        return shifts
+
+    def present(self, start_s: float, stop_s: float) -> BoolArray:
+        """(n,) whether there at some time of an interval."""
+        present: BoolArray = (self._rows[3] <= stop_s) & (start_s <= self._rows[4])
+        return present
+
+    def present_throughout(self, start_s: float, stop_s: float) -> BoolArray:
+        """(n,) whether there during the whole of an interval."""
+        throughout: BoolArray = (self._rows[3] <= start_s) & (stop_s <= self._rows[4])
+        return throughout
+
+    def next_start(self, time_s: float) -> float:
+        """First time after `time_s` at which something appears, else +inf."""
+        starts = self._rows[3]
+        return float(starts[starts > time_s].min(initial=math.inf))
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """What a ray can hit, at one instant.
+
+    Attributes:
+        circles_m: (3, c): centre east, centre north, radius.
+        edges_m: (4, e) polygon edges: start east, start north, end east, end north. The end of an edge is,
+            bit for bit, the start of the next one of its polygon.
+    """
+
+    circles_m: FloatArray
+    edges_m: FloatArray
+
+
+class Surroundings:
+    """Every face that comes near a place during an interval of time; made by `World.surroundings`."""
+
+    def __init__(self, faces: Faces, circle_motions: _Motions, edge_motions: _Motions) -> None:
+        self._faces = faces
+        self._circle_motions = circle_motions
+        self._edge_motions = edge_motions
+
+    def faces(self, time_s: float) -> Faces:
+        """Those that are there at a time of the interval, where they are then."""
+        circles, edges = self._faces.circles_m, self._faces.edges_m
+        if self._circle_motions.matter:
+            there = self._circle_motions.present(time_s, time_s)
+            circles = np.vstack((circles[:2] + self._circle_motions.shifts(time_s), circles[2:]))[:, there]
+        if self._edge_motions.matter:
+            there = self._edge_motions.present(time_s, time_s)
+            edges = (edges + np.tile(self._edge_motions.shifts(time_s), (2, 1)))[:, there]
+        return Faces(circles, edges)
+
+
+class World:
+    """Obstacles in a rectangular area, as they truly are.
+
+    Args:
+        obstacles: their order gives their index.
+        bounds_m: xmin, ymin, xmax, ymax of the area.
+    """
+
+    def __init__(self, obstacles: Iterable[Obstacle], bounds_m: tuple[float, float, float, float]) -> None:
+        self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
+        self.bounds_m = bounds_m
+        self._motions = _Motions.of(self.obstacles)
+        self._boxes = np.array([o.shape.rounded_box for o in self.obstacles]).reshape(-1, 5).T.copy()
+        self._is_circle = np.array([isinstance(o.shape, Circle) for o in self.obstacles], dtype=np.bool_)
+        self._edges = np.hstack([np.zeros((4, 0)), *(o.shape.edges_m for o in self.obstacles)])
+        edge_counts = [o.shape.edges_m.shape[1] for o in self.obstacles]
+        self._edge_owner: IntArray = np.repeat(
+            np.arange(len(edge_counts)), np.array(edge_counts, dtype=np.intp)
+        )
+
+    @classmethod
+    def from_scenario(cls, scenario: Scenario) -> World:
+        """The world that a scenario describes."""
+        obstacles = []
+        for each in scenario.obstacles:
+            shape: Circle | Polygon
+            if each.circle is not None:
+                shape = Circle(each.circle.center_m, each.circle.radius_m)
+            elif each.polygon is not None:
+                shape = Polygon(each.polygon.vertices_m)
+            else:
+                raise ValueError(f"an obstacle needs a circle or a polygon; got {each}")
+            obstacles.append(Obstacle(shape, each.velocity_mps or (0.0, 0.0), each.active_s))
+        return cls(obstacles, scenario.area.bounds_m)
+
+    @property
+    def max_obstacle_speed_mps(self) -> float:
+        """Speed of the fastest obstacle.
+
+        Until an obstacle appears, clearance shrinks no faster than by this and one's own speed together.
+        """
+        return float(self._motions.speeds_mps.max(initial=0.0))
+
+    def next_appearance(self, time_s: float) -> float:
+        """First time after `time_s` at which an obstacle appears, +inf if none does."""
+        return self._motions.next_start(time_s)
+
+    def inside_bounds(self, east_m: float, north_m: float) -> bool:
+        """Whether a point is in the area; its boundary belongs to it."""
+        xmin, ymin, xmax, ymax = self.bounds_m
+        return xmin <= east_m <= xmax and ymin <= north_m <= ymax
+
+    def clearance_at(self, east_m: float, north_m: float, time_s: float) -> float:
+        """`clearance` of one point, in metres."""
+        gaps = self._gaps(east_m, north_m, time_s)
+        point, time = np.array([[east_m, north_m]]), np.array([time_s])
+        best = math.inf
+        while len(gaps) and gaps[nearest := int(gaps.argmin())] < best:
+            best = min(best, float(self.obstacles[nearest].distance(point, time)[0]))
+            gaps[nearest] = math.inf
+        return best
+
+    def clearance(self, points_m: FloatArray, times_s: FloatArray) -> FloatArray:
+        """True distance from points to the nearest obstacle edge, each at its own time.
+
+        Quick where neighbouring rows are near one another in place and time, as they are on a track.
+
+        Args:
+            points_m: (k, 2).
+            times_s: (k,).
+
+        Returns:
+            (k,) metres: negative inside an obstacle, +inf without obstacles, NaN where a row is not finite.
+        """
+        result = np.full(len(points_m), math.nan)
+        rows = np.flatnonzero(np.isfinite(points_m).all(axis=1) & np.isfinite(times_s))
+        for first in range(0, len(rows), _BLOCK_ROWS):
+            block = rows[first : first + _BLOCK_ROWS]
+            result[block] = self._block_clearance(points_m[block], times_s[block])
+        return result
+
+    def near(self, east_m: float, north_m: float, radius_m: float, time_s: float) -> tuple[int, ...]:
+        """Indices of the obstacles there at a time that come within a radius of a point, in rising order."""
+        point, time = np.array([[east_m, north_m]]), np.array([time_s])
+        close = np.flatnonzero(self._gaps(east_m, north_m, time_s) <= radius_m + _ROUNDING_M)
+        return tuple(i for i in close.tolist() if self.obstacles[i].distance(point, time)[0] <= radius_m)
+
+    def surroundings(
+        self, east_m: float, north_m: float, radius_m: float, start_s: float, stop_s: float
+    ) -> Surroundings:
+        """Every face that comes within a radius of a point at some time of an interval.
+
+        A few more may be among them: boxes are compared, not shapes. A caller that moves keeps the answer as
+        long as it stays in a smaller circle (a neighbour list; Verlet 1967, doi:10.1103/PhysRev.159.98).
+        """
+        middle, half_s = (start_s + stop_s) / 2, (stop_s - start_s) / 2
+        reach = radius_m + _ROUNDING_M + self._motions.speeds_mps * half_s
+        close = (self._gaps(east_m, north_m, middle) <= reach) & self._motions.present(start_s, stop_s)
+        circles = np.flatnonzero(close & self._is_circle)
+        edges = np.flatnonzero(close[self._edge_owner])
+        owners = self._edge_owner[edges]
+        ends = self._edges[:, edges] + np.tile(self._motions.shifts(middle)[:, owners], (2, 1))
+        edge_boxes = np.vstack(((ends[:2] + ends[2:]) / 2, np.abs(ends[2:] - ends[:2]) / 2, 0 * owners))
+        within = _gaps(edge_boxes, east_m, north_m) <= reach[owners]
+        edges, owners = edges[within], owners[within]
+        return Surroundings(
+            Faces(self._boxes[:, circles][[0, 1, 4]], self._edges[:, edges]),
+            self._motions.take(circles),
+            self._motions.take(owners),
+        )
+
+    def _gaps(self, east: float, north: float, time: float) -> FloatArray:
+        """(n,) lower bound of the distance to each obstacle, there or not; for a circle the distance."""
+        boxes = self._boxes
+        if self._motions.matter:
+            boxes = np.vstack((boxes[:2] + self._motions.shifts(time), boxes[2:]))
+        return _gaps(boxes, east, north)
+
+    def _block_clearance(self, points: FloatArray, times: FloatArray) -> FloatArray:
+        """`clearance` for finite rows near one another."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        (east, north), half_m = ((low + high) / 2).tolist(), math.hypot(*(high - low)) / 2
+        start, stop = float(times.min()), float(times.max())
+        middle, half_s = (start + stop) / 2, (stop - start) / 2
+        # Between the middle and any row, the distance to an obstacle changes by no more than this.
+        slack = half_m + self._motions.speeds_mps * half_s
+        gaps = self._gaps(east, north, middle) - slack
+        bound = math.inf
+        steady = np.flatnonzero(self._motions.present_throughout(start, stop))
+        if len(steady):
+            probe = int(steady[gaps[steady].argmin()])
+            nearest = self.obstacles[probe].distance(np.array([[east, north]]), np.array([middle]))[0]
+            bound = nearest + slack[probe] + _ROUNDING_M
+        result = np.full(len(points), math.inf)
+        for index in np.flatnonzero((gaps <= bound) & self._motions.present(start, stop)).tolist():
+            np.minimum(result, self.obstacles[index].distance(points, times), out=result)
+        return result
+
+
+def _gaps(boxes: FloatArray, east: float, north: float) -> FloatArray:
+    """(n,) signed distances from a point to rounded boxes (5, n).
+
+    A shape inside a box is never nearer than the box (formula: Quilez, "2D distance functions").
+    """
+    beside = np.abs(boxes[0] - east) - boxes[2]
+    above = np.abs(boxes[1] - north) - boxes[3]
+    outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)
+    gaps: FloatArray = outside + np.minimum(np.maximum(beside, above), 0.0) - boxes[4]
+    return gaps

@@ -1,0 +1,183 @@
+"""Paths of bounded curvature: building them from poses and nodes, measuring, cutting, sampling.
+
+A segment is one row of `planner.interface.Path.segments`: start east, start north, unit tangent east, unit
+tangent north, curvature (1/m, positive = left turn), length (m).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.interface import FloatArray, Path
+
+Point = tuple[float, float]
+Segment = tuple[float, float, float, float, float, float]
+
+SHORTEST_M = 1e-6
+"""Segments shorter than this are left out of a path."""
+
+
+class Pose(NamedTuple):
+    """A place (metres, ENU) and the unit vector of the direction of travel."""
+
+    east_m: float
+    north_m: float
+    tangent_east: float
+    tangent_north: float
+
+
+def along(segment: Sequence[float], distance_m: float) -> Pose:
+    """The pose `distance_m` after the start of a segment."""
+    x, y, tx, ty, curvature, _ = segment
+    if abs(curvature) < 1e-12:
+        return Pose(x + tx * distance_m, y + ty * distance_m, tx, ty)
+    turn = curvature * distance_m
+    sine, versine = math.sin(turn) / curvature, (1.0 - math.cos(turn)) / curvature
+    c, s = math.cos(turn), math.sin(turn)
+    return Pose(x + tx * sine - ty * versine, y + ty * sine + tx * versine, tx * c - ty * s, ty * c + tx * s)
+
+
+def end_of(path: Path) -> Pose:
+    """The pose at the end of a path."""
+    last = path.segments[-1]
+    return along(last, float(last[5]))
+
+
+def pose_at(path: Path, station_m: float) -> Pose:
+    """The pose `station_m` along a path, clamped to its ends."""
+    left = max(station_m, 0.0)
+    for row in path.segments.tolist():
+        if left <= row[5]:
+            return along(row, left)
+        left -= row[5]
+    return end_of(path)
+
+
+def between(path: Path, start_m: float, stop_m: float) -> list[Segment]:
+    """The segments of the stretch of a path from one station to another."""
+    out: list[Segment] = []
+    begin = 0.0
+    for row in path.segments.tolist():
+        lower, upper = max(start_m - begin, 0.0), min(stop_m - begin, row[5])
+        if upper - lower > SHORTEST_M:
+            out.append((*along(row, lower), row[4], upper - lower))
+        begin += row[5]
+    return out
+
+
+def sample(path: Path, spacing_m: float, deviation_m: float = math.inf) -> FloatArray:
+    """(k, 2) points along a path, both ends included.
+
+    Args:
+        path: the path.
+        spacing_m: largest distance between neighbours, along the path.
+        deviation_m: largest distance of an arc from the chord between neighbours.
+    """
+    pieces = [path.segments[:1, :2]]
+    for x, y, tx, ty, curvature, length in path.segments.tolist():
+        step = spacing_m
+        if curvature:
+            step = min(step, math.sqrt(8.0 * deviation_m / abs(curvature)))
+        elif math.isfinite(deviation_m) and math.isinf(spacing_m):
+            step = length
+        s = np.linspace(0.0, length, max(2, math.ceil(length / step) + 1))[1:]
+        if abs(curvature) < 1e-12:
+            pieces.append(np.column_stack((x + tx * s, y + ty * s)))
+            continue
+        sine, versine = np.sin(curvature * s) / curvature, (1.0 - np.cos(curvature * s)) / curvature
+        pieces.append(np.column_stack((x + tx * sine - ty * versine, y + ty * sine + tx * versine)))
+    return np.concatenate(pieces)
+
+
+def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | None:
+    """The shortest turn from a pose onto a straight line that ends at a point, and that line.
+
+    Returns None where the point lies inside both turning circles or so near that neither turn leads to it.
+    """
+    best: list[Segment] | None = None
+    for side in (1.0, -1.0):  # left, right
+        cx, cy = pose.east_m - side * radius_m * pose.tangent_north, pose.north_m + side * radius_m * pose.tangent_east
+        dx, dy = target[0] - cx, target[1] - cy
+        distance = math.hypot(dx, dy)
+        if distance <= radius_m:
+            continue
+        straight = math.sqrt(distance * distance - radius_m * radius_m)
+        # Direction of the tangent line that leaves the circle towards the target.
+        heading = math.atan2(dy, dx) + side * math.asin(radius_m / distance)
+        turn = side * (heading - math.atan2(pose.tangent_north, pose.tangent_east)) % math.tau
+        if math.tau - turn < 1e-9:
+            turn = 0.0
+        length = turn * radius_m + straight
+        if best is not None and length >= sum(segment[5] for segment in best):
+            continue
+        arc: Segment = (*pose, side / radius_m, turn * radius_m)
+        best = [arc] if arc[5] > SHORTEST_M else []
+        if straight > SHORTEST_M:
+            best.append((*along(arc, arc[5]), 0.0, straight))
+    return best
+
+
+def fillet(start: Pose, nodes: Sequence[Point], radius_m: float, cut_m: float) -> Path | None:
+    """A path from a pose through the corners of a polyline, each corner rounded by one arc.
+
+    The first turn has the smallest radius. Every corner gets the largest arc that its legs have room for and that
+    passes the corner within a given distance, so that curvature is no larger than it has to be.
+
+    Args:
+        start: where the path begins.
+        nodes: corners and, last, the end; all ahead of `start` in the order of flight.
+        radius_m: smallest radius allowed.
+        cut_m: how far from a corner its arc may pass, where the smallest radius leaves the choice.
+
+    Returns:
+        The path, or None where a corner cannot be rounded at `radius_m`.
+    """
+    first = turn_onto(start, nodes[0], radius_m)
+    if first is None:
+        return None
+    segments = [s for s in first if s[4]]
+    corner = along(segments[-1], segments[-1][5]) if segments else start
+    legs = [math.dist(corner[:2], nodes[0])] + [math.dist(a, b) for a, b in zip(nodes, nodes[1:], strict=False)]
+    used = 0.0  # how much of the present leg the corner before it has taken
+    for i, node in enumerate(nodes):
+        leg = legs[i]
+        if leg <= SHORTEST_M:
+            return None
+        ux, uy = (node[0] - corner[0]) / leg, (node[1] - corner[1]) / leg
+        if i + 1 == len(nodes):
+            trim, turn, radius = 0.0, 0.0, math.inf
+        else:
+            out = legs[i + 1]
+            vx, vy = (nodes[i + 1][0] - node[0]) / out, (nodes[i + 1][1] - node[1]) / out
+            turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+            tangent = math.tan(0.5 * abs(turn))
+            last = i + 2 == len(nodes)
+            room = min(leg - used if i == 0 else 0.5 * leg, out if last else 0.5 * out)
+            if tangent < 1e-9:
+                trim, radius = 0.0, math.inf
+            else:
+                need = radius_m * tangent
+                if need > min(leg - used, out):
+                    return None
+                # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
+                widest = cut_m / (1.0 / math.cos(0.5 * turn) - 1.0) * tangent
+                trim = min(max(need, min(room, widest)), leg - used)
+                radius = trim / tangent
+        straight = leg - used - trim
+        if straight > SHORTEST_M:
+            segments.append((corner[0] + ux * used, corner[1] + uy * used, ux, uy, 0.0, straight))
+        if math.isfinite(radius) and radius * abs(turn) > SHORTEST_M:
+            at = (node[0] - ux * trim, node[1] - uy * trim)
+            segments.append((*at, ux, uy, math.copysign(1.0 / radius, turn), radius * abs(turn)))
+        corner = Pose(node[0], node[1], ux, uy)
+        used = trim
+    return Path(np.array(segments)) if segments else None
+
+
+def full_turn(pose: Pose, radius_m: float, side: float) -> Segment:
+    """A full circle from a pose, to the left (`side` = 1) or to the right (-1)."""
+    return (*pose, side / radius_m, math.tau * radius_m)

@@ -1,0 +1,87 @@
+"""What a planner remembers of the flight so far: edge points, gathered into obstacles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.interface import FloatArray, SeenWorld
+
+IntArray = NDArray[np.intp]
+
+
+class ObstacleMemory:
+    """Every edge point seen so far and the obstacle that it belongs to.
+
+    Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They are gathered on a
+    grid whose neighbouring cells (diagonals too) are always that near, point by point as they come in.
+
+    Args:
+        clearance_m: distance to be kept from every point.
+    """
+
+    def __init__(self, clearance_m: float) -> None:
+        self._cell_m = clearance_m / math.sqrt(2.0)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._points = np.zeros((256, 2))
+        self._labels = np.zeros(256, dtype=np.intp)
+        self._count = 0
+        self._of_cell: dict[tuple[int, int], int] = {}
+        self._next = 0
+        self._revision = -1
+
+    @property
+    def points_m(self) -> FloatArray:
+        """(m, 2) edge points."""
+        return self._points[: self._count]
+
+    @property
+    def labels(self) -> IntArray:
+        """(m,) the obstacle that each point belongs to."""
+        return self._labels[: self._count]
+
+    def take_in(self, seen: SeenWorld) -> FloatArray:
+        """Remembers what has come in since the last call, and returns it: (k, 2).
+
+        Where something was taken back, all is learnt anew.
+        """
+        if seen.taken_back_at > self._revision >= 0:
+            self._forget()
+        fresh = seen.edges_since(self._revision)
+        self._revision = seen.revision
+        if len(fresh):
+            self._add(fresh)
+        return fresh
+
+    def _add(self, fresh: FloatArray) -> None:
+        total = self._count + len(fresh)
+        if total > len(self._points):
+            size = max(2 * len(self._points), total)
+            self._points = np.resize(self._points, (size, 2))
+            self._labels = np.resize(self._labels, size)
+        new = slice(self._count, total)
+        self._points[new] = fresh
+        self._count = total
+        cells = [tuple(cell) for cell in np.floor(fresh / self._cell_m).astype(np.int64).tolist()]
+        for cell in dict.fromkeys(cells):
+            if cell not in self._of_cell:
+                self._join(cell)
+        self._labels[new] = [self._of_cell[cell] for cell in cells]
+
+    def _join(self, cell: tuple[int, int]) -> None:
+        """Gives a new cell the label of its neighbours; neighbours with different labels become one obstacle."""
+        x, y = cell
+        around = ((x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
+        found = {self._of_cell[near] for near in around if near in self._of_cell}
+        label = min(found) if found else self._next
+        self._next += not found
+        self._of_cell[cell] = label
+        for other in found - {label}:
+            self._labels[: self._count][self._labels[: self._count] == other] = label
+            for key, value in self._of_cell.items():
+                if value == other:
+                    self._of_cell[key] = label

@@ -1,0 +1,138 @@
+"""Gains from derivatives, and the system that is given to a model."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aircraft
+from aircraft.airframes import aircraft_names, airframe
+from aircraft.autopilot import Derivatives, Gains, derivatives, gains
+from aircraft.injection import with_autopilot
+from aircraft.jsbsim_model import derived_gains
+
+AEROSONDE = Derivatives(
+    airspeed_fps=82.02,
+    alpha_rad=0.0497,
+    qbar_psf=8.28,
+    lp=-22.63,
+    lr=10.91,
+    lda=57.11,
+    ldr=-0.784,
+    np=-0.115,
+    nr=-1.228,
+    nb=19.58,
+    yb=-0.777,
+    nda=2.187,
+    ndr=-10.86,
+    za=-4.48,
+    ma=-99.96,
+    mq=-5.30,
+    mde=-15.76,
+    xa=8.76,
+    xdt=31.07,
+)
+
+
+def test_loops_lie_where_the_rules_put_them() -> None:
+    placed = gains(AEROSONDE)
+    roll_mode = -AEROSONDE.lp + placed.aileron_p * AEROSONDE.lda
+    assert roll_mode == pytest.approx(1.4 * 22.63)
+    assert placed.roll == 4.0
+    assert placed.elevator_q * -AEROSONDE.mde == pytest.approx(math.sqrt(99.96 + 5.30 * 4.48))
+    assert placed.throttle * AEROSONDE.xdt == pytest.approx(1.5, rel=0.05)
+
+
+def test_feed_forwards_cancel_the_moments_of_a_steady_turn() -> None:
+    at, placed = AEROSONDE, gains(AEROSONDE)
+    rolling = at.lr + at.lda * placed.aileron_r_forward + at.ldr * placed.rudder_r_forward
+    yawing = at.nr + at.nda * placed.aileron_r_forward + at.ndr * placed.rudder_r_forward
+    assert rolling == pytest.approx(0.0, abs=1e-9)
+    assert yawing == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("broken", "message"),
+    [
+        (replace(AEROSONDE, lda=0.0), "aileron has no authority"),
+        (replace(AEROSONDE, mde=3.0), "elevator has no authority"),
+        (replace(AEROSONDE, ndr=math.nan), "rudder has no authority"),
+        (replace(AEROSONDE, xdt=-1.0), "throttle has no authority"),
+        (replace(AEROSONDE, ma=200.0), "unstable in pitch"),
+    ],
+)
+def test_an_aircraft_that_cannot_be_held_is_refused(broken: Derivatives, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        gains(broken)
+
+
+def test_propeller_speed_is_eliminated_as_settled() -> None:
+    states = ["Vt", "Alpha", "Theta", "Q", "Rpm0", "Beta", "Phi", "P", "R"]
+    system = np.diag(np.full(9, -1.0))
+    system[0, 4] = 0.02
+    system[4, 4] = -5.0
+    control = np.zeros((9, 4))
+    control[4, 0] = 1000.0
+    at = derivatives(
+        states,
+        ["ThtlCmd", "DaCmd", "DeCmd", "DrCmd"],
+        system,
+        control,
+        airspeed_fps=100.0,
+        alpha_rad=0.0,
+        qbar_psf=10.0,
+    )
+    assert at.xdt == pytest.approx(0.02 * 1000.0 / 5.0)
+
+
+@pytest.mark.parametrize("name", aircraft_names())
+def test_the_table_holds_the_gains_of_the_model(name: str) -> None:
+    derived = asdict(derived_gains(name))
+    for gain, value in airframe(name).gains.items():
+        assert value == pytest.approx(derived[gain], rel=2e-3, abs=1e-5), gain
+
+
+def test_every_gain_is_a_property_of_the_system() -> None:
+    system = ElementTree.parse(Path(aircraft.__path__[0], "systems", "autopilot.xml")).getroot()
+    declared = {(node.text or "").strip() for node in system.findall("property")}
+    wanted = set(Gains(**dict.fromkeys((f.name for f in fields(Gains)), 0.0)).properties())
+    assert wanted == {name for name in declared if name.startswith("wayproof/gain/")}
+
+
+def model_file(folder: Path, text: str) -> Path:
+    """A model file in a folder of its own, with one neighbour."""
+    home = folder / "toy"
+    home.mkdir()
+    (home / "engine.xml").write_text("<engine/>", encoding="utf-8")
+    path = home / "toy.xml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_injection_puts_the_system_first_and_drives_every_throttle(tmp_path: Path) -> None:
+    path = model_file(
+        tmp_path, "<fdm_config><system/><propulsion><engine/><engine/></propulsion></fdm_config>"
+    )
+    with with_autopilot(path) as folder:
+        root = ElementTree.parse(folder / "toy" / "toy.xml").getroot()
+        assert (folder / "toy" / "engine.xml").read_text(encoding="utf-8") == "<engine/>"
+    assert root[0].get("name") == "wayproof-autopilot"
+    outputs = [node.text for node in root[0].iter("output")]
+    assert outputs.count("fcs/throttle-cmd-norm") == 1
+    assert outputs.count("fcs/throttle-cmd-norm[1]") == 1
+    assert not folder.exists()
+    assert "wayproof" not in path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [("<fdm_config>", "not well-formed"), ("<a/>", "root element is <a>")]
+)
+def test_injection_refuses_what_is_no_model(tmp_path: Path, text: str, message: str) -> None:
+    path = model_file(tmp_path, text)
+    with pytest.raises(ValueError, match=message), with_autopilot(path):
+        pass

@@ -1,0 +1,97 @@
+"""The local plane against PROJ and the geodesics of GeographicLib."""
+
+from __future__ import annotations
+
+import math
+
+import pyproj
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aircraft.frames import LocalPlane, wrap_pi
+
+GEOD = pyproj.Geod(ellps="WGS84")
+FURTHEST_M = 142_000.0
+
+latitudes = st.floats(-70.0, 70.0)
+longitudes = st.floats(-180.0, 180.0)
+bearings = st.floats(0.0, math.tau)
+distances = st.floats(1.0, FURTHEST_M)
+
+
+@given(latitudes, longitudes, bearings, distances)
+@settings(max_examples=300, deadline=None)
+def test_position_agrees_with_the_geodesic(lat: float, lon: float, bearing: float, distance: float) -> None:
+    point_lon, point_lat, _ = GEOD.fwd(lon, lat, math.degrees(bearing), distance)
+    east, north = LocalPlane(lat, lon).plane(point_lat, point_lon)
+    error = math.hypot(east - distance * math.sin(bearing), north - distance * math.cos(bearing))
+    assert error < 0.1
+
+
+@pytest.mark.parametrize("lat", [-70.0, -33.0, 0.0, 12.5, 47.0, 70.0])
+def test_plane_is_the_azimuthal_equidistant_projection(lat: float) -> None:
+    proj = pyproj.Proj(proj="aeqd", lat_0=lat, lon_0=8.0, ellps="WGS84")
+    plane = LocalPlane(lat, 8.0)
+    for east in (-100e3, -31e3, 0.0, 50e3, 100e3):
+        for north in (-100e3, 0.0, 77e3, 100e3):
+            lon_deg, lat_deg = proj(east, north, inverse=True)
+            ours = plane.plane(lat_deg, lon_deg)
+            assert ours == pytest.approx((east, north), abs=0.1)
+
+
+@given(latitudes, longitudes, bearings, distances, st.floats(0.0, 360.0))
+@settings(max_examples=300, deadline=None)
+def test_course_agrees_with_a_step_along_the_geodesic(
+    lat: float, lon: float, bearing: float, distance: float, true_course_deg: float
+) -> None:
+    def exact(point_lon: float, point_lat: float) -> tuple[float, float]:
+        azimuth_deg, _, length = GEOD.inv(lon, lat, point_lon, point_lat)
+        return length * math.sin(math.radians(azimuth_deg)), length * math.cos(math.radians(azimuth_deg))
+
+    point_lon, point_lat, _ = GEOD.fwd(lon, lat, math.degrees(bearing), distance)
+    behind = exact(*GEOD.fwd(point_lon, point_lat, true_course_deg + 180.0, 200.0)[:2])
+    ahead = exact(*GEOD.fwd(point_lon, point_lat, true_course_deg, 200.0)[:2])
+    plane_course = math.atan2(ahead[0] - behind[0], ahead[1] - behind[1])
+    convergence = LocalPlane(lat, lon).project(math.radians(point_lat), math.radians(point_lon))[2]
+    assert abs(math.degrees(wrap_pi(math.radians(true_course_deg) - convergence - plane_course))) < 0.01
+
+
+@given(latitudes, longitudes, bearings, distances)
+@settings(max_examples=200, deadline=None)
+def test_geodetic_is_the_inverse(lat: float, lon: float, bearing: float, distance: float) -> None:
+    plane = LocalPlane(lat, lon)
+    east, north = distance * math.sin(bearing), distance * math.cos(bearing)
+    assert plane.plane(*plane.geodetic(east, north)) == pytest.approx((east, north), abs=1e-3)
+
+
+def test_the_origin_is_the_origin() -> None:
+    plane = LocalPlane(47.0, 8.0)
+    assert plane.project(math.radians(47.0), math.radians(8.0)) == (0.0, 0.0, 0.0)
+    assert plane.geodetic(0.0, 0.0) == pytest.approx((47.0, 8.0), abs=1e-12)
+
+
+def test_meridians_converge_to_the_nearer_pole() -> None:
+    assert LocalPlane(47.0, 8.0).convergence_rad(50e3, 0.0) > 0.0
+    assert LocalPlane(47.0, 8.0).convergence_rad(-50e3, 0.0) < 0.0
+    assert LocalPlane(-47.0, 8.0).convergence_rad(50e3, 0.0) < 0.0
+
+
+def test_the_date_line_is_no_edge() -> None:
+    east, north = LocalPlane(10.0, 179.9).plane(10.0, -179.9)
+    assert 0.0 < east < 23e3
+    assert abs(north) < 10.0
+
+
+@pytest.mark.parametrize(("lat", "lon"), [(86.0, 0.0), (math.nan, 0.0), (0.0, 361.0), (0.0, math.inf)])
+def test_an_origin_out_of_range_is_refused(lat: float, lon: float) -> None:
+    with pytest.raises(ValueError, match="must be in"):
+        LocalPlane(lat, lon)
+
+
+@given(st.floats(-1e3, 1e3))
+def test_wrap_pi_keeps_the_direction(angle: float) -> None:
+    wrapped = wrap_pi(angle)
+    assert -math.pi <= wrapped < math.pi
+    assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)
+    assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-9)

@@ -1,0 +1,228 @@
+"""Route geometry and route following, on the point mass."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aircraft.airframes import airframe
+from aircraft.guidance import (
+    GuidanceLimits,
+    GuidanceOutput,
+    PathFollower,
+    arc_point,
+    route_length,
+    route_point,
+    sample_route,
+)
+from aircraft.interface import AircraftState, Command, Route
+from aircraft.point_mass import PointMass
+from aircraft.start import Atmosphere, StartConditions
+
+AIRSPEED = 25.0
+ALTITUDE = 300.0
+LIMITS = airframe("aerosonde").guidance_limits
+Piece = tuple[float, float]
+
+
+def joined(pieces: list[Piece], *, loiter: bool = False, east: float = 0.0, north: float = 0.0) -> Route:
+    """A route that begins northwards, of (curvature, length) pieces."""
+    rows = []
+    tangent = (0.0, 1.0)
+    for curvature, length in pieces:
+        row = (east, north, *tangent, curvature, length)
+        rows.append(row)
+        east, north, *tangent_list = arc_point(row, length)
+        tangent = (tangent_list[0], tangent_list[1])
+    return Route(np.array(rows), loiter=loiter)
+
+
+def fly(
+    route: Route, start: StartConditions, seconds: float, wind: tuple[float, float] = (0.0, 0.0)
+) -> list[tuple[AircraftState, GuidanceOutput]]:
+    """State and decision of every guidance update."""
+    model = PointMass(start, Atmosphere(*wind))
+    follower = PathFollower(LIMITS)
+    follower.follow(route)
+    flown = []
+    for _ in range(round(20 * seconds)):
+        state = model.state()
+        output = follower.update(state)
+        flown.append((state, output))
+        model.command(Command(output.roll_command_rad, ALTITUDE, AIRSPEED))
+        model.advance(6)
+    return flown
+
+
+def northwards(east: float = 0.0, north: float = 0.0, course: float = 0.0) -> StartConditions:
+    return StartConditions(east, north, ALTITUDE, course, AIRSPEED)
+
+
+pieces = st.lists(st.tuples(st.floats(-1e-2, 1e-2), st.floats(1.0, 2000.0)), min_size=1, max_size=6)
+
+
+@given(pieces, st.floats(1.0, 100.0))
+def test_samples_lie_on_the_route_no_further_apart_than_asked(parts: list[Piece], spacing: float) -> None:
+    route = joined(parts)
+    points = sample_route(route, spacing)
+    assert points[0] == pytest.approx((0.0, 0.0))
+    assert points[-1] == pytest.approx(route_point(route, route_length(route))[:2], abs=1e-6)
+    gaps = np.hypot(*np.diff(points, axis=0).T)
+    assert gaps.max() <= spacing * (1 + 1e-6)
+    counts = [math.ceil(length / spacing - 1e-9) for _, length in parts]
+    assert len(points) == sum(max(count, 1) for count in counts) + 1
+
+
+@given(pieces, st.floats(0.0, 1.0))
+def test_the_tangent_is_the_derivative_of_the_point(parts: list[Piece], share: float) -> None:
+    route = joined(parts)
+    station = share * (route_length(route) - 1e-3)
+    east, north, tangent_east, tangent_north = route_point(route, station)
+    ahead = route_point(route, station + 1e-3)
+    assert (ahead[0] - east) / 1e-3 == pytest.approx(tangent_east, abs=1e-4)
+    assert (ahead[1] - north) / 1e-3 == pytest.approx(tangent_north, abs=1e-4)
+    assert math.hypot(tangent_east, tangent_north) == pytest.approx(1.0)
+
+
+def test_beyond_the_end_a_route_goes_straight_on_and_a_loiter_round() -> None:
+    circle = [(0.01, math.tau * 100.0)]
+    assert route_point(joined(circle, loiter=True), 3.25 * math.tau * 100.0)[:2] == pytest.approx(
+        (-100.0, 100.0), abs=1e-6
+    )
+    assert route_point(joined([(0.0, 50.0)]), 80.0) == pytest.approx((0.0, 80.0, 0.0, 1.0))
+
+
+def test_spacing_must_be_positive() -> None:
+    with pytest.raises(ValueError, match="spacing_m must be positive"):
+        sample_route(joined([(0.0, 1.0)]), 0.0)
+
+
+def test_update_needs_a_route() -> None:
+    with pytest.raises(RuntimeError, match=r"follow\(\) a route"):
+        PathFollower(LIMITS).update(PointMass(northwards()).state())
+
+
+@given(st.floats(-200.0, 200.0), st.sampled_from([0.0, 1 / 400.0, -1 / 400.0]), st.floats(0.1, 0.9))
+def test_cross_track_is_signed_to_the_right(offset: float, curvature: float, share: float) -> None:
+    route = joined([(curvature, 600.0)])
+    east, north, tangent_east, tangent_north = route_point(route, share * 600.0)
+    course = math.atan2(tangent_east, tangent_north)
+    state = PointMass(
+        northwards(east + offset * tangent_north, north - offset * tangent_east, course)
+    ).state()
+    follower = PathFollower(LIMITS)
+    follower.follow(route)
+    output = follower.update(state)
+    assert output.cross_track_m == pytest.approx(offset, abs=1e-6)
+    assert output.station_m == pytest.approx(share * 600.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("wind", [(0.0, 0.0), (6.0, -4.0), (-12.0, 0.0)])
+def test_arcs_and_lines_are_tracked(wind: tuple[float, float]) -> None:
+    curvature = 1 / (110.0 * (1.0 + math.hypot(*wind) / AIRSPEED) ** 2)
+    turn = 1.5 / curvature
+    route = joined([(0.0, 300.0), (curvature, turn), (0.0, 200.0), (-curvature, turn), (curvature, turn)])
+    flown = fly(route, northwards(), 30.0, wind)
+    assert max(abs(output.cross_track_m) for _, output in flown) < 0.35
+    assert not any(output.bank_saturated for _, output in flown)
+
+
+def test_curvature_preview_is_what_keeps_a_joint_smooth() -> None:
+    """Without knowing the lag of the roll loop the bump at the joint is several times as high."""
+    route = joined([(0.0, 200.0), (1 / 120.0, 300.0), (0.0, 500.0)])
+
+    def worst(limits: GuidanceLimits) -> float:
+        model, follower = PointMass(northwards()), PathFollower(limits)
+        follower.follow(route)
+        errors = []
+        for _ in range(20 * 30):
+            output = follower.update(model.state())
+            errors.append(abs(output.cross_track_m))
+            model.command(Command(output.roll_command_rad, ALTITUDE, AIRSPEED))
+            model.advance(6)
+        return max(errors)
+
+    blind = GuidanceLimits(LIMITS.bank_limit_rad, LIMITS.roll_rate_radps, 0.0, 0.0, LIMITS.bandwidth_radps)
+    assert worst(LIMITS) < 0.2
+    assert worst(blind) > 3 * worst(LIMITS)
+
+
+@given(
+    st.floats(-3000.0, 3000.0),
+    st.floats(0.0, math.tau),
+    st.sampled_from([(0.0, 0.0), (8.0, 3.0), (-5.0, -10.0)]),
+)
+@settings(max_examples=25, deadline=None)
+def test_a_far_off_start_ends_on_the_path(offset: float, course: float, wind: tuple[float, float]) -> None:
+    flown = fly(joined([(0.0, 20000.0)]), northwards(offset, 0.0, course), 480.0, wind)
+    assert all(abs(output.cross_track_m) < 0.1 for _, output in flown[-200:])
+    assert max(abs(output.cross_track_m) for _, output in flown) < abs(offset) + 500.0
+
+
+def test_the_intercept_angle_is_bounded() -> None:
+    flown = fly(joined([(0.0, 20000.0)]), northwards(2000.0), 100.0)
+    steepest = max(abs(math.sin(state.course_rad)) for state, _ in flown)
+    assert steepest == pytest.approx(0.7, abs=0.02)
+
+
+def test_the_command_respects_bank_and_rate() -> None:
+    flown = fly(joined([(0.0, 500.0), (1 / 60.0, 300.0), (-1 / 60.0, 300.0)]), northwards(100.0), 60.0)
+    assert max(abs(output.roll_command_rad) for _, output in flown) <= LIMITS.bank_limit_rad + 1e-12
+    assert any(output.bank_saturated for _, output in flown)
+    rolls = [state.roll_rad for state, _ in flown]
+    fastest = max(abs(b - a) * 20.0 for a, b in pairwise(rolls))
+    assert fastest < 1.2 * LIMITS.roll_rate_radps
+
+
+def test_a_loiter_is_flown_for_ever() -> None:
+    circle = math.tau * 150.0
+    flown = fly(joined([(0.0, 200.0), (-1 / 150.0, circle)], loiter=True), northwards(), 300.0)
+    state, output = flown[-1]
+    assert math.hypot(state.east_m - 150.0, state.north_m - 200.0) == pytest.approx(150.0, abs=0.1)
+    assert output.station_m == pytest.approx(300.0 * AIRSPEED, rel=0.01)
+    assert not output.past_end
+
+
+def test_past_the_end_it_goes_straight_on() -> None:
+    flown = fly(joined([(0.0, 100.0), (1 / 150.0, 150.0 * math.pi / 2)]), northwards(), 40.0)
+    state, output = flown[-1]
+    assert output.past_end
+    assert not flown[0][1].past_end
+    assert math.sin(state.course_rad) == pytest.approx(-1.0, abs=1e-4)
+    assert state.north_m == pytest.approx(250.0, abs=0.1)
+
+
+def test_progress_stays_on_its_own_branch_of_a_crossing_route() -> None:
+    """A loop that crosses its own start: at the crossing both branches are equally near."""
+    route = joined([(0.0, 600.0), (1 / 150.0, 150.0 * 1.5 * math.pi), (0.0, 800.0)])
+    flown = fly(route, northwards(), 60.0)
+    steps = [b[1].station_m - a[1].station_m for a, b in pairwise(flown)]
+    assert min(steps) > 0.0
+    assert max(steps) < 2.0 * AIRSPEED / 20.0
+    assert max(abs(output.cross_track_m) for _, output in flown) < 0.35
+
+
+def test_hand_over_in_a_turn_makes_no_bump() -> None:
+    """Same path, new route that begins anywhere behind the aircraft: as if nothing had happened."""
+    whole = joined([(0.0, 100.0), (1 / 120.0, 600.0), (0.0, 2000.0)])
+    model, follower = PointMass(northwards()), PathFollower(LIMITS)
+    follower.follow(whole)
+    rolls, errors = [], []
+    for tick in range(20 * 20):
+        if tick == 160:
+            row = whole.segments[1].copy()
+            row[:4] = arc_point(tuple(whole.segments[1]), 60.0)
+            row[5] = 540.0
+            follower.follow(Route(np.vstack((row, whole.segments[2]))), station_m=30.0)
+        output = follower.update(model.state())
+        rolls.append(output.roll_command_rad)
+        errors.append(abs(output.cross_track_m))
+        model.command(Command(output.roll_command_rad, ALTITUDE, AIRSPEED))
+        model.advance(6)
+    assert max(errors) < 0.2
+    assert abs(rolls[160] - rolls[159]) < 0.02

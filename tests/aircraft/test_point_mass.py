@@ -1,0 +1,113 @@
+"""The point mass against the closed form of its own motion."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aircraft.guidance import GRAVITY_MPS2
+from aircraft.interface import Command, FlightModel
+from aircraft.point_mass import PointMass
+from aircraft.start import Atmosphere, StartConditions
+
+START = StartConditions(1000.0, 2000.0, 300.0, 0.5, 25.0)
+
+
+def test_is_a_flight_model() -> None:
+    model: FlightModel = PointMass(START)
+    assert model.step_rate_hz == 120
+
+
+def test_straight_flight_makes_the_course_good_in_wind() -> None:
+    model = PointMass(START, Atmosphere(wind_east_mps=-6.0, wind_north_mps=4.0))
+    before = model.state()
+    model.advance(1200)
+    after = model.state()
+    assert math.atan2(after.east_m - before.east_m, after.north_m - before.north_m) == pytest.approx(0.5)
+    assert math.hypot(after.east_m - before.east_m, after.north_m - before.north_m) == pytest.approx(
+        10.0 * before.groundspeed_mps
+    )
+    assert after.time_s == 10.0
+
+
+def test_a_steady_bank_flies_the_circle_of_its_radius() -> None:
+    model = PointMass(START, roll_lag_s=1e-3)
+    roll = math.radians(30.0)
+    model.command(Command(roll, 300.0, 25.0))
+    model.advance(12)
+    radius = 25.0**2 / (GRAVITY_MPS2 * math.tan(roll))
+    state = model.state()
+    east = state.east_m + radius * math.cos(state.course_rad)
+    north = state.north_m - radius * math.sin(state.course_rad)
+    for _ in range(50):
+        model.advance(60)
+        state = model.state()
+        assert math.hypot(state.east_m - east, state.north_m - north) == pytest.approx(radius, rel=1e-9)
+    assert state.load_factor == pytest.approx(1.0 / math.cos(roll))
+
+
+def test_roll_is_first_order() -> None:
+    model = PointMass(START, roll_lag_s=0.25)
+    model.command(Command(0.5, 300.0, 25.0))
+    model.advance(30)
+    assert model.state().roll_rad == pytest.approx(0.5 * (1.0 - math.exp(-1.0)))
+
+
+@given(st.integers(1, 120), st.floats(-0.7, 0.7))
+def test_big_strides_agree_with_single_steps(steps: int, roll: float) -> None:
+    whole, single = PointMass(START), PointMass(START)
+    for model in (whole, single):
+        model.command(Command(roll, 310.0, 27.0))
+    whole.advance(steps)
+    for _ in range(steps):
+        single.advance(1)
+    a, b = whole.state(), single.state()
+    assert a.time_s == b.time_s
+    assert a.east_m == pytest.approx(b.east_m, abs=0.01)
+    assert a.north_m == pytest.approx(b.north_m, abs=0.01)
+    assert a.roll_rad == pytest.approx(b.roll_rad, abs=1e-9)
+    assert (a.up_m, a.airspeed_mps) == (310.0, 27.0)
+
+
+def test_faults() -> None:
+    model = PointMass(START)
+    assert model.fault() is None
+    model.command(Command(0.0, -1.0, 25.0))
+    assert model.fault() == "the aircraft is at the ground (-1.0 m above sea level)"
+    model.command(Command(math.nan, 300.0, 25.0))
+    model.advance(1)
+    assert model.fault() == "the state is not finite"
+
+
+def test_what_it_cannot_do_is_refused() -> None:
+    with pytest.raises(ValueError, match="does not model turbulence"):
+        PointMass(START, Atmosphere(turbulence="tustin", intensity="light"))
+    with pytest.raises(ValueError, match="cannot be held at 25 m/s"):
+        PointMass(START, Atmosphere(wind_east_mps=40.0))
+    with pytest.raises(ValueError, match="roll_lag_s must be positive"):
+        PointMass(START, roll_lag_s=0.0)
+
+
+@pytest.mark.parametrize(
+    ("bad", "message"),
+    [
+        ({"wind_east_mps": math.inf}, "the wind must be finite"),
+        ({"turbulence": "dryden", "intensity": "light"}, "turbulence must be tustin"),
+        ({"turbulence": "tustin"}, "come together"),
+        ({"turbulence": "tustin", "intensity": "mild"}, "intensity must be light"),
+        ({"seed": -1}, "seed must be in"),
+    ],
+)
+def test_air_that_does_not_exist_is_refused(bad: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Atmosphere(**bad)  # type: ignore[arg-type]
+
+
+def test_a_start_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(ValueError, match="course_rad must be finite"):
+        StartConditions(0.0, 0.0, 300.0, math.nan, 25.0)
+    with pytest.raises(ValueError, match="airspeed_mps must be positive"):
+        StartConditions(0.0, 0.0, 300.0, 0.0, 0.0)

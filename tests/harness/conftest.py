@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from harness.record import AcceptedPlan, FloatArray, Track
+from planner.interface import Path, Plan, PlanPicture, PlanStatus
+
+MakeTrack = Callable[..., Track]
+MakePlan = Callable[..., AcceptedPlan]
+
+
+def track(rows: int, **columns: FloatArray | float) -> Track:
+    """A straight flight north at 25 m/s and 10 rows a second, with some columns replaced."""
+    time_s = np.arange(rows) / 10.0
+    level: dict[str, FloatArray | float] = {
+        "time_s": time_s,
+        "east_m": 0.0,
+        "north_m": 25.0 * time_s,
+        "up_m": 300.0,
+        "course_deg": 0.0,
+        "heading_deg": 0.0,
+        "roll_deg": 0.0,
+        "pitch_deg": 2.0,
+        "airspeed_mps": 25.0,
+        "groundspeed_mps": 25.0,
+        "load_factor": 1.0,
+        "roll_command_deg": 0.0,
+        "cross_track_m": 0.0,
+        "clearance_m": 1000.0,
+        "plan_index": 0,
+        "station_m": 25.0 * time_s,
+    }
+    filled = {name: np.broadcast_to(value, rows) for name, value in {**level, **columns}.items()}
+    return Track(**filled)
+
+
+def plan(
+    segments: Sequence[Sequence[float]],
+    index: int = 0,
+    time_s: float = 0.0,
+    picture: PlanPicture | None = None,
+) -> AcceptedPlan:
+    path = Path(np.array(segments, dtype=np.float64))
+    waypoints = path.segments[:, :2]
+    return AcceptedPlan(
+        index, time_s, 2.5, Plan(PlanStatus.FOUND, "a way was found", waypoints, path, picture)
+    )
+
+
+def circle_track(radius_m: float, seconds: float, speed_mps: float = 25.0) -> Track:
+    """A left turn at constant speed round (0, 0), from due east of it."""
+    time_s = np.arange(round(10 * seconds) + 1) / 10.0
+    angle = speed_mps * time_s / radius_m
+    return track(
+        len(time_s),
+        east_m=radius_m * np.cos(angle),
+        north_m=radius_m * np.sin(angle),
+        course_deg=np.degrees(-angle) % 360.0,
+        heading_deg=np.degrees(-angle) % 360.0,
+        groundspeed_mps=speed_mps,
+        station_m=speed_mps * time_s,
+    )
+
+
+@pytest.fixture
+def make_track() -> MakeTrack:
+    return track
+
+
+@pytest.fixture
+def make_plan() -> MakePlan:
+    return plan
+
+
+@pytest.fixture
+def make_circle() -> Callable[..., Track]:
+    return circle_track
+
+
+@pytest.fixture
+def straight_plan() -> AcceptedPlan:
+    return plan([(0.0, 0.0, 0.0, 1.0, 0.0, 5000.0)])
+
+
+@pytest.fixture
+def circle_plan() -> AcceptedPlan:
+    return plan([(500.0, 0.0, 0.0, 1.0, 1 / 500.0, math.tau * 500.0)])

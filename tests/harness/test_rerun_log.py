@@ -1,0 +1,346 @@
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aircraft.interface import AircraftState
+from harness.metrics import metrics
+from harness.obstacle import Circle, Obstacle, Polygon
+from harness.range_sensor import RangeScan
+from harness.record import AcceptedPlan, Flight, Outcome, RunFolderError, Track
+from harness.rerun_blueprint import Scene
+from harness.rerun_log import RerunLog
+from harness.rerun_overlay import write_overlay
+from harness.rerun_scene import quaternions
+from harness.rerun_viewer import NO_DRIVER, ViewerError, _executable, open_viewer, screenshot
+from harness.trackability import FlightLimits
+from planner.interface import Mission, PlanPicture
+
+MISSION = Mission(
+    goal_m=(0.0, 2500.0),
+    goal_radius_m=50.0,
+    bounds_m=(-2000.0, -1000.0, 2000.0, 3000.0),
+    clearance_m=100.0,
+    turn_radius_m=110.0,
+    speed_mps=25.0,
+    roll_in_s=0.6,
+    tracking_error_m=0.5,
+    sensor_range_m=800.0,
+)
+OBSTACLES = (
+    Obstacle(Circle((600.0, 1250.0), 300.0)),
+    Obstacle(Polygon(((-1500.0, 500.0), (-500.0, 500.0), (-500.0, 1500.0), (-1000.0, 800.0)))),
+    Obstacle(Circle((1000.0, 2500.0), 100.0), velocity_mps=(-2.0, 0.0)),
+    Obstacle(Circle((-1000.0, 2500.0), 100.0), active_s=(20.0, 60.0)),
+)
+SCENE = Scene("straight, none, aerosonde, seed 1", MISSION, (0.0, 0.0), 300.0, OBSTACLES)
+PICTURE = PlanPicture(
+    guide_m=np.array([[0.0, 0.0], [0.0, 800.0]]),
+    window_m=700.0,
+    sectors=np.array([[1.0, 0.0, 0.0, 1.0]]),
+    candidates=(np.array([[0.0, 0.0], [0.0, 700.0]]), np.array([[0.0, 0.0], [200.0, 600.0]])),
+)
+STATE = AircraftState(0.0, 0.0, 0.0, 300.0, 0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 25.0, 1.0)
+
+Columns = dict[str, list[Any]]
+
+
+@pytest.fixture(autouse=True)
+def strict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bad data is an error, not a warning."""
+    monkeypatch.setattr(rr.error_utils, "_strict_mode", True)
+
+
+def scan(time_s: float) -> RangeScan:
+    ranges = np.array([100.0, np.inf, 200.0, np.inf])
+    directions = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
+    return RangeScan(time_s, time_s, 5.0, 7.0, 0.0, math.pi / 2, directions, ranges, 800.0)
+
+
+def record(
+    path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan], east_m: float = 0.0
+) -> Flight:
+    """100 s north, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
+    track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
+    first = make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=PICTURE)
+    second = make_plan([(0, 1250, 0, 1, 0.0, 1250.0)], index=1, time_s=50.0)
+    log = RerunLog(path, SCENE, recording_id="a")
+    for tick in range(200):
+        log.on_scan(scan(0.5 * tick), STATE)
+        for plan in (first, second):
+            if plan.time_s == 0.5 * tick:
+                log.on_plan(plan, STATE)
+    log.on_event(99.9, "goal reached")
+    for start in range(0, 1001, 300):
+        log.on_block(Track(**{name: column[start : start + 300] for name, column in vars(track).items()}))
+    flight = Flight(track, (first, second), Outcome.REACHED, "in the goal's circle", (2.5, 2.5), 100.0, 0.1)
+    log.close(metrics(flight, FlightLimits(300.0, 100.0, 0.78, 110.0, 0.5)))
+    return flight
+
+
+@pytest.fixture
+def recording(
+    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> tuple[Path, Flight]:
+    (tmp_path / "run").mkdir()
+    path = tmp_path / "run" / "flight.rrd"
+    return path, record(path, make_track, make_plan)
+
+
+def read(path: Path) -> dict[str, Columns]:
+    """All rows of a recording, by entity and column, in the order of logging."""
+    entities: dict[str, Columns] = {}
+    chunks = [
+        (chunk.entity_path, chunk.to_record_batch().to_pydict())
+        for chunk in rr.chunk.RrdReader(str(path)).stream().to_chunks()
+    ]
+    for entity, rows in sorted(chunks, key=lambda chunk: chunk[1]["rerun.controls.RowId"][0]):
+        columns = entities.setdefault(entity, {})
+        for name, values in rows.items():
+            columns.setdefault(name, []).extend(values)
+    return entities
+
+
+def column(entities: dict[str, Columns], entity: str, ending: str) -> list[Any]:
+    (values,) = (values for name, values in entities[entity].items() if name.endswith(ending))
+    return values
+
+
+def seconds(entities: dict[str, Columns], entity: str) -> list[float]:
+    times = entities[entity]["sim_time"]
+    return [time.total_seconds() for time in times]
+
+
+def rerun(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([_executable(), *arguments], capture_output=True, text=True, check=False)
+
+
+def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
+    path, flight = recording
+    entities = read(path)
+    for entity, values in {
+        "cross_track/flown": flight.track.cross_track_m,
+        "clearance/wanted": np.full(1001, 100.0),
+        "bank/commanded": flight.track.roll_command_deg,
+        "bank/flown": flight.track.roll_deg,
+        "speed/ground": flight.track.groundspeed_mps,
+        "speed/flown": flight.track.airspeed_mps,
+        "altitude_error/flown": flight.track.up_m - 300.0,
+    }.items():
+        logged = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
+        np.testing.assert_array_equal(logged[-1001:], values)
+    clearance = np.array(column(entities, "/series/clearance/flown", "scalars"), dtype=np.float64).ravel()
+    assert np.isnan(clearance[:200]).all()
+    assert (clearance[200:] == 150.0).all()
+    assert seconds(entities, "/series/bank/flown")[:2] == [0.0, 0.1]
+    assert seconds(entities, "/series/bank/flown")[-1] == 100.0
+
+
+def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    position = np.array(column(entities, "/world/aircraft", "translation"), dtype=np.float64).reshape(-1, 3)
+    np.testing.assert_allclose(
+        position, np.column_stack((np.zeros(1001), np.arange(1001) * 2.5, np.full(1001, 300.0)))
+    )
+    times = seconds(entities, "/plan/flown")
+    pieces = column(entities, "/plan/flown", "strips")
+    assert times[-1] == 100.0
+    assert max(np.diff([0.0, *times])) <= 2.0 + 1e-9
+    ends = [strip[-1] for (strip,) in pieces]
+    starts = [strip[0] for (strip,) in pieces]
+    np.testing.assert_allclose(ends, [(0.0, 25.0 * time) for time in times], atol=1e-3)
+    np.testing.assert_array_equal(starts[1:], ends[:-1])
+
+
+def test_scans_are_drawn_for_plans_and_every_ten_seconds(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    assert seconds(entities, "/plan/scan") == [10.0 * i for i in range(10)]
+    np.testing.assert_array_equal(
+        column(entities, "/plan/scan", "positions")[0], [[105.0, 7.0], [-195.0, 7.0]]
+    )
+
+
+def test_scan_before_a_plan_is_drawn(tmp_path: Path, make_plan: Callable[..., AcceptedPlan]) -> None:
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    for time_s in (0.0, 3.0, 3.5):
+        log.on_scan(scan(time_s), STATE)
+    log.on_plan(make_plan([(0, 0, 0, 1, 0.0, 100.0)], time_s=3.7), STATE)
+    log.close()
+    assert seconds(read(tmp_path / "a.rrd"), "/plan/scan") == [0.0, 3.5]
+
+
+def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    assert seconds(entities, "/plan/chosen") == [0.0, 50.0]
+    np.testing.assert_array_equal(
+        column(entities, "/plan/chosen", "strips")[1], [[[0.0, 1250.0], [0.0, 2500.0]]]
+    )
+    np.testing.assert_array_equal(column(entities, "/plan/waypoints", "positions")[0], [[0.0, 0.0]])
+    np.testing.assert_array_equal(column(entities, "/plan/guide", "vectors")[0], [[0.0, 800.0]])
+    np.testing.assert_array_equal(
+        column(entities, "/plan/candidates", "strips")[0], [[[0.0, 0.0], [200.0, 600.0]]]
+    )
+    window, sector = column(entities, "/plan/window", "strips")[0]
+    np.testing.assert_allclose(np.hypot(*np.array(window).T), 700.0, rtol=1e-6)
+    np.testing.assert_allclose([sector[0], sector[1], sector[-2]], [[0, 0], [700, 0], [0, 700]], atol=1e-3)
+    for entity in ("guide", "window", "candidates"):
+        assert seconds(entities, f"/plan/{entity}") == [0.0, 50.0], "cleared where the planner shows nothing"
+
+
+def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    texts = [str(text) for (text,) in column(entities, "/events", "text")]
+    assert texts == ["plan 0: a way was found", "plan 1: a way was found", "goal reached"]
+    documents = [str(text) for (text,) in column(entities, "/summary", "text")]
+    assert "stopped before the end" in documents[0]
+    assert "reached: in the goal's circle" in documents[-1]
+    assert "2500 m in 100 s" in documents[-1]
+    figures = json.loads(column(entities, "/__properties/metrics", "json")[0][0])
+    assert figures["outcome"] == "reached"
+
+
+def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    (centre,) = column(entities, "/world/obstacles/circles", "centers")[0]
+    assert tuple(centre[:2]) == (600.0, 1250.0)
+    faces = np.array(column(entities, "/world/obstacles/polygons", "triangle_indices")[0])
+    corners = np.array(column(entities, "/world/obstacles/polygons", "vertex_positions")[0])
+    edge = corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]]
+    cross = 0.5 * np.cross(*edge)
+    assert cross[:, 2].sum() == pytest.approx(400000.0, rel=1e-5), "roof: the polygon's area, seen from above"
+    assert corners[:, 2].min() == 0.0
+    assert corners[:, 2].max() > 300.0
+    moved = np.array(column(entities, "/world/moving/2", "translation"), dtype=np.float64).reshape(-1, 3)
+    assert seconds(entities, "/world/moving/2")[-1] == 100.0
+    np.testing.assert_allclose(moved[-1], [-200.0, 0.0, 0.0])
+    assert seconds(entities, "/plan/moving/3") == [20.0, 60.0]
+    assert column(entities, "/plan/moving/3", "is_recursive")[-1] == [True]
+
+
+def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -> None:
+    path, _ = recording
+    done = rerun("rrd", "verify", str(path))
+    assert done.returncode == 0, done.stderr
+    reader = rr.chunk.RrdReader(str(path))
+    assert len(reader.blueprints()) == 1
+    assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
+    layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
+    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 9
+
+
+def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    times = [
+        time for entity in entities if "sim_time" in entities[entity] for time in seconds(entities, entity)
+    ]
+    assert (min(times), max(times)) == (0.0, 100.0)
+
+
+def test_killed_process_leaves_a_readable_recording(tmp_path: Path) -> None:
+    script = f"""
+import os, sys
+sys.path[:0] = {[str(Path(__file__).parent), str(Path(__file__).parents[2])]!r}
+from pathlib import Path
+from conftest import track
+from test_rerun_log import SCENE
+from harness.rerun_log import RerunLog
+log = RerunLog(Path({str(tmp_path / "a.rrd")!r}), SCENE, "a")
+log.on_block(track(600))
+log.flush()
+os._exit(9)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (9, "", "")
+    with pytest.warns(rr.error_utils.RerunWarning, match="no footer"):
+        entities = read(tmp_path / "a.rrd")
+    assert len(column(entities, "/series/bank/flown", "scalars")) == 600
+    shown = tmp_path / "overlay.rrd"
+    write_overlay([tmp_path / "a.rrd", tmp_path / "a.rrd"], ["one", "two"], shown)
+    assert rerun("rrd", "verify", str(shown)).returncode == 0
+
+
+def test_recording_is_silent(
+    tmp_path: Path,
+    make_track: Callable[..., Track],
+    make_plan: Callable[..., AcceptedPlan],
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    record(tmp_path / "a.rrd", make_track, make_plan)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_missing_folder_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no folder"):
+        RerunLog(tmp_path / "none" / "a.rrd", SCENE, "a")
+
+
+def test_overlay_keeps_every_track_and_one_world(
+    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    for name, east_m in (("a", 0.0), ("b", 40.0)):
+        record(tmp_path / f"{name}.rrd", make_track, make_plan, east_m)
+    write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "second"], tmp_path / "c.rrd")
+    entities = read(tmp_path / "c.rrd")
+    for number, east_m in enumerate((0.0, 40.0)):
+        position = column(entities, f"/world/runs/{number}/aircraft", "translation")[0]
+        assert position[0][0] == east_m
+        assert len(column(entities, f"/series/bank/flown/{number}", "scalars")) >= 1001
+    assert "/world/obstacles/circles" in entities
+    assert "/plan/chosen" not in entities
+    colours = [column(entities, f"/plan/runs/{number}/flown", "colors")[-1] for number in (0, 1)]
+    assert colours[0] != colours[1]
+
+
+def test_view_says_what_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match=r"has no flight\.rrd"):
+        open_viewer([tmp_path])
+    (tmp_path / "flight.rrd").write_bytes(b"not a recording")
+    with pytest.raises(RunFolderError, match="recording"):
+        open_viewer([tmp_path, tmp_path], web=True)
+    with pytest.raises(ViewerError, match="no recording"):
+        screenshot(tmp_path / "none.rrd", tmp_path / "a.png")
+
+
+def test_view_says_that_there_is_no_screen(
+    recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(ViewerError, match="no screen"):
+        open_viewer([recording[0].parent])
+
+
+def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
+    path, _ = recording
+    png = path.with_suffix(".png")
+    try:
+        complaints = screenshot(path, png, time_s=50.0, size=(1200, 700))
+    except ViewerError as error:
+        assert str(error) == NO_DRIVER  # noqa: PT017
+        return
+    assert complaints == []
+    assert png.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert int.from_bytes(png.read_bytes()[16:20]) == 1200
+
+
+@given(heading=st.floats(0.0, 360.0), pitch=st.floats(-80.0, 80.0), roll=st.floats(-180.0, 180.0))
+def test_attitude_points_nose_and_wing_the_right_way(heading: float, pitch: float, roll: float) -> None:
+    """Nose: heading from north and pitch up. Left wing: up by sin(roll) cos(pitch) in a right bank."""
+    ((x, y, z, w),) = quaternions(np.array([heading]), np.array([pitch]), np.array([roll]))
+    nose = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
+    left = np.array([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)])
+    h, p, r = np.radians((heading, pitch, roll))
+    np.testing.assert_allclose(nose, [np.sin(h) * np.cos(p), np.cos(h) * np.cos(p), np.sin(p)], atol=1e-9)
+    assert left[2] == pytest.approx(np.sin(r) * np.cos(p), abs=1e-9)

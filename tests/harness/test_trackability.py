@@ -1,0 +1,98 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from harness.record import AcceptedPlan, Track
+from harness.trackability import FlightLimits, legs
+
+LIMITS = FlightLimits(
+    altitude_m=300.0,
+    clearance_m=50.0,
+    bank_limit_rad=math.radians(45),
+    turn_radius_m=110.0,
+    tracking_error_m=1.0,
+)
+OFF = np.where(np.abs(np.arange(201) - 100) < 20, 6.0, 0.0)
+
+
+def test_threshold_is_the_margin_planners_keep() -> None:
+    assert LIMITS.cross_track_threshold_m == 5.0
+    assert FlightLimits(300.0, 10.0, 0.8, 110.0, 1.0).cross_track_threshold_m == 2.0
+
+
+@pytest.mark.parametrize(("error_m", "trackable"), [(5.0, True), (-5.0, True), (5.1, False), (-5.1, False)])
+def test_leg_is_trackable_up_to_the_threshold(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan, error_m: float, trackable: bool
+) -> None:
+    (leg,) = legs(make_track(201, cross_track_m=error_m), [straight_plan], LIMITS)
+    assert (leg.start_s, leg.end_s, leg.max_cross_track_m) == (0.0, 20.0, abs(error_m))
+    assert leg.trackable is trackable
+    assert leg.cause == (None if trackable else "tracking error")
+
+
+def test_each_plan_is_a_leg_and_short_ones_join_a_neighbour(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    """Plans flown for 10 s, 2 s, 3 s, 10 s and 1 s, after 1 s without any."""
+    index = np.repeat([-1, 0, 1, 2, 3, 4], [10, 100, 20, 30, 100, 10])
+    plans = [make_plan([(0, 0, 0, 1, 0.0, 5000.0)], index=i) for i in range(5)]
+    judged = legs(make_track(len(index), plan_index=index), plans, LIMITS)
+    assert [(leg.start_s, leg.end_s) for leg in judged] == [(1.0, 10.9), (11.0, 26.9)]
+
+
+def test_one_short_plan_is_still_judged(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    (leg,) = legs(make_track(10, cross_track_m=9.0), [straight_plan], LIMITS)
+    assert leg.trackable is False
+
+
+def test_without_a_plan_there_is_no_leg(make_track: Callable[..., Track]) -> None:
+    assert legs(make_track(100, plan_index=-1), [], LIMITS) == ()
+
+
+def test_cause_is_the_bank_limit(make_track: Callable[..., Track], straight_plan: AcceptedPlan) -> None:
+    track = make_track(201, cross_track_m=OFF, roll_command_deg=-45.0)
+    assert legs(track, [straight_plan], LIMITS)[0].cause == "bank limit"
+
+
+def test_cause_is_a_turn_tighter_than_can_be_flown(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    """The guidance is at its limit too, but because the plan asked for it."""
+    tight = make_plan([(0, 0, 0, 1, 0.0, 180.0), (0, 180, 0, 1, 1 / 80.0, 300.0)])
+    wide = make_plan([(0, 0, 0, 1, 0.0, 180.0), (0, 180, 0, 1, 1 / 120.0, 300.0)])
+    track = make_track(201, cross_track_m=OFF, roll_command_deg=45.0)
+    assert legs(track, [tight], LIMITS)[0].cause == "turn radius too tight"
+    assert legs(track, [wide], LIMITS)[0].cause == "bank limit"
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "side", "cause"),
+    [
+        (-15.0, 1.0, "wind drift"),
+        (15.0, -1.0, "wind drift"),
+        (-15.0, -1.0, "tracking error"),
+        (-3.0, 1.0, "tracking error"),
+    ],
+)
+def test_cause_is_the_wind_where_the_drift_is_downwind(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan, heading_deg: float, side: float, cause: str
+) -> None:
+    """Course north with the nose to the left: the wind blows from the left and drifts to the right."""
+    track = make_track(201, cross_track_m=side * OFF, heading_deg=heading_deg % 360.0)
+    assert legs(track, [straight_plan], LIMITS)[0].cause == cause
+
+
+def test_lost_control_is_on_the_last_leg(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    plans = [make_plan([(0, 0, 0, 1, 0.0, 5000.0)], index=i) for i in range(2)]
+    track = make_track(200, plan_index=np.repeat([0, 1], 100))
+    judged = legs(track, plans, LIMITS, lost_control=True)
+    assert [leg.cause for leg in judged] == [None, "lost control"]
+    assert [leg.trackable for leg in judged] == [True, False]

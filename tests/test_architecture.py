@@ -1,0 +1,102 @@
+"""The import rules of the project, read off the sources."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROOMS = ("planner", "aircraft", "harness")
+SOURCES = {str(p.relative_to(ROOT)): p for room in ROOMS for p in sorted((ROOT / room).rglob("*.py"))}
+MAX_LINES = 400
+
+# Which top-level packages a room may import besides the standard library and itself.
+ALLOWED = {
+    "planner": {"numpy", "shapely"},
+    "aircraft": {"numpy", "jsbsim", "yaml"},
+    "harness": {
+        "numpy",
+        "shapely",
+        "pydantic",
+        "pydantic_core",
+        "pyarrow",
+        "rerun",
+        "rich",
+        "typer",
+        "yaml",
+        "planner",
+        "aircraft",
+    },
+}
+# Packages that only these files may import.
+ONLY_IN = {
+    "jsbsim": {"aircraft/jsbsim_model.py"},
+    "rerun": {"harness/rerun_log.py"},
+    "yaml": {"aircraft/airframes.py", "harness/strict_yaml.py"},
+    "typer": {"harness/cli.py"},
+    "harness.cli": {"harness/__main__.py"},
+}
+
+
+def imports(source: str) -> Iterator[str]:
+    """Dotted names of all modules that a source imports, at its top or inside a function."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative import"
+            assert node.module
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def breaches(path: str, source: str) -> list[str]:
+    """What a source breaks of the rules."""
+    room = path.partition("/")[0]
+    found = []
+    for module in imports(source):
+        top = module.partition(".")[0]
+        if top not in {*sys.stdlib_module_names, room, *ALLOWED[room]}:
+            found.append(f"{path} imports {module}")
+        for guarded, files in ONLY_IN.items():
+            if f"{module}.".startswith(f"{guarded}.") and path not in files:
+                found.append(f"{path} imports {module}")
+    return found
+
+
+@pytest.mark.parametrize("path", SOURCES)
+def test_keeps_the_import_rules(path: str) -> None:
+    assert breaches(path, SOURCES[path].read_text()) == []
+
+
+@pytest.mark.parametrize("path", SOURCES)
+def test_is_of_a_readable_size(path: str) -> None:
+    assert len(SOURCES[path].read_text().splitlines()) <= MAX_LINES
+
+
+@pytest.mark.parametrize("path", SOURCES)
+def test_is_named_for_what_it_does(path: str) -> None:
+    assert Path(path).stem not in {"utils", "util", "helpers", "common", "manager", "misc"}
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("planner/a.py", "import jsbsim"),
+        ("planner/a.py", "from harness.world import World"),
+        ("planner/a.py", "from aircraft.interface import Route"),
+        ("aircraft/a.py", "def f():\n    from planner import dubins"),
+        ("aircraft/a.py", "import jsbsim"),
+        ("harness/a.py", "import rerun as rr"),
+        ("harness/a.py", "import rerun.blueprint as rrb"),
+        ("harness/a.py", "from harness import cli"),
+        ("harness/a.py", "import yaml"),
+        ("harness/a.py", "import matplotlib.pyplot"),
+    ],
+)
+def test_a_breach_is_seen(path: str, source: str) -> None:
+    assert breaches(path, source)
