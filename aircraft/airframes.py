@@ -30,7 +30,7 @@ class Airframe:
         cruise_mps: default true airspeed.
         bank_limit_deg: largest bank the guidance may command.
         roll_rate_dps: fastest change of the roll command.
-        roll_in_s: time from level to 90 % of a 30 degree bank.
+        roll_in_s: time from level to 90 % of 30 degrees, the command a step.
         stall_angle_deg: angle of attack beyond which control counts as lost.
         roll_lag_s: time constant of roll behind its command.
         roll_delay_s: further delay of roll behind its command.

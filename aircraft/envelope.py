@@ -12,8 +12,10 @@ BANK_RESERVE_DEG = {None: 15.0, "light": 17.0, "moderate": 20.0, "severe": 25.0}
 """Bank kept back from the limit for corrections: 9 degrees is the least that does not saturate in calm air or
 steady wind, and the rest is margin; moderate turbulence uses up 15 to 20."""
 
-TRACKING_ERROR_S = {None: 0.01, "light": 0.015, "moderate": 0.03, "severe": 0.06}
-"""Cross-track error that is hardly ever exceeded, as a time at airspeed plus wind."""
+TRACKING_FACTOR = {None: 1.0, "light": 1.5, "moderate": 3.0, "severe": 6.0}
+"""Cross-track error that is hardly ever exceeded, in units of (turn acceleration) * (roll lag)^2. That is the
+scale of the bump at an arc-line joint; what was flown stays below half of it in calm air, and the factors for
+turbulence leave as much."""
 
 
 def performance(
@@ -45,9 +47,10 @@ def performance(
         )
     bank = math.radians(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence])
     fastest = airspeed_mps + wind_mps
+    acceleration = GRAVITY_MPS2 * math.tan(bank)
     return Performance(
         airspeed_mps=airspeed_mps,
-        turn_radius_m=fastest * fastest / (GRAVITY_MPS2 * math.tan(bank)),
+        turn_radius_m=fastest * fastest / acceleration,
         roll_in_s=airframe.roll_in_s,
-        tracking_error_m=fastest * TRACKING_ERROR_S[turbulence],
+        tracking_error_m=TRACKING_FACTOR[turbulence] * acceleration * airframe.roll_lag_s**2,
     )

@@ -80,7 +80,7 @@ class LocalPlane:
         curvature = (north * north / self._meridian_m + east * east / self._prime_vertical_m) / level2
         chord2 = level2 + up * up
         bend = chord2 * curvature * curvature
-        stretch = math.sqrt(chord2 / level2) * (1.0 + bend * (1.0 / 24.0 + bend * (3.0 / 640.0)))
+        stretch = math.sqrt(chord2 / level2) * (1.0 + bend / 24.0)
         mean = 0.5 * (latitude_rad + self._latitude)
         convergence = 2.0 * math.atan2(
             sin_half * math.sin(mean), cos_half * math.cos(0.5 * (latitude_rad - self._latitude))

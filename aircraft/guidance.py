@@ -4,10 +4,11 @@ The law is path curvature plus a second-order correction of the cross-track erro
 
     a = kappa Vg^2 - 2 zeta omega e_dot - omega^2 e,    phi = atan(a / (g cos(chi - psi)))
 
-with a, e positive to the right of the path, chi the course and psi the heading. Curvature, groundspeed and
-drift angle are taken where the aircraft will be when it has rolled, and curvature is averaged over the time
-that rolling into a turn takes, so that line and arc join without a bump. The roll command leads by the time
-constant of the roll loop, so that roll itself follows the law. Wind enters through the ground velocity alone.
+with a, e positive to the right of the path (the curvature kappa is therefore taken positive to the right
+here), chi the course and psi the heading. Curvature is that where the aircraft will be when it has rolled,
+averaged over the time that rolling into a turn takes, so that line and arc join without a bump. The roll
+command leads by the time constant of the roll loop, so that roll itself follows the law. Wind enters through
+the ground velocity alone.
 See R. W. Beard and T. W. McLain, "Small Unmanned Aircraft", chapter 9 (coordinated turn in wind), and
 PX4's npfg for the same use of ground and air velocity.
 """
@@ -146,18 +147,13 @@ class PathFollower:
         if along_mps <= 0.0:
             wanted = -bank_limit if cross_mps > 0.0 else bank_limit
         else:
-            # The wind triangle a moment ahead: the air velocity turns with g tan(roll) / airspeed.
             drift = wrap_pi(math.atan2(velocity_east, velocity_north) - state.heading_rad)
-            turn = GRAVITY_MPS2 * math.tan(max(-1.2, min(1.2, state.roll_rad)))
-            lead = self._lead_s
-            speed_ahead = max(speed + lead * turn * math.sin(drift), 1.0)
-            drift += lead * turn * (math.cos(drift) / speed - 1.0 / max(state.airspeed_mps, 1.0))
-            curvature = self._curvature_ahead(station, speed * lead, speed)
+            curvature = self._curvature_ahead(station, speed)
             approach = INTERCEPT_SINE * speed
             pull = max(-approach, min(approach, cross * self._omega2 / self._two_zeta_omega))
             # Lift acts across the course, the correction across the path.
             across = -self._two_zeta_omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
-            acceleration = across - curvature * speed_ahead * speed_ahead
+            acceleration = across - curvature * speed * speed
             wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(math.cos(drift), 0.2)))
         saturated = abs(wanted) > bank_limit
         wanted = max(-bank_limit, min(bank_limit, wanted))
@@ -209,11 +205,11 @@ class PathFollower:
             self._along = max(along, 0.0)
             return cross, tangent_east, tangent_north
 
-    def _curvature_ahead(self, station: float, ahead: float, speed: float) -> float:
-        """Curvature `ahead` of a station, averaged over the way that rolling into the coming turn takes."""
-        near = self._turn_at(station + ahead - 0.5 * speed * self._blend_s)
-        far = self._turn_at(station + ahead + 0.5 * speed * self._blend_s)
-        return (far - near) / (speed * self._blend_s)
+    def _curvature_ahead(self, station: float, speed: float) -> float:
+        """Curvature where the aircraft will be when it has rolled, averaged over the way that takes."""
+        ahead = station + speed * self._lead_s
+        blend = speed * self._blend_s
+        return (self._turn_at(ahead + 0.5 * blend) - self._turn_at(ahead - 0.5 * blend)) / blend
 
     def _turn_at(self, station: float) -> float:
         """Direction change of the route from its start to a station, rad, positive to the left."""

@@ -32,6 +32,9 @@ from aircraft.start import Atmosphere, StartConditions
 FOOT_M = 0.3048
 REFERENCE_ALTITUDE_M = 300.0
 STEP_RATE_HZ = 120
+GROUND_M = 2.0
+"""Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
+
 MAX_ROLL_RAD = math.radians(75.0)
 STALL_SPEED_SHARE = 0.8
 """Share of the lowest level-flight airspeed below which the aircraft counts as stalled."""
@@ -165,7 +168,7 @@ class JsbsimModel:
         roll, airspeed, altitude, alpha = self._roll(), self._airspeed(), self._altitude(), self._alpha()
         if not math.isfinite(roll + airspeed + altitude + alpha):
             return "the state is not finite"
-        if altitude <= 0.0:
+        if altitude * FOOT_M <= GROUND_M:
             return f"the aircraft is at the ground ({altitude * FOOT_M:.1f} m above sea level)"
         limits = self.airframe
         alpha_deg = math.degrees(alpha)

@@ -35,7 +35,9 @@ class ObstacleMap:
         range_m: sensing range.
     """
 
-    def __init__(self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float) -> None:
+    def __init__(
+        self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float
+    ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
         span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
         self._cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
@@ -203,7 +205,9 @@ class ObstacleMap:
 class _FreeSpace:
     """Cells of space that a scan has looked through, on a grid twice as coarse as the edges'."""
 
-    def __init__(self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float) -> None:
+    def __init__(
+        self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float
+    ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
         span = max(xmax - xmin, ymax - ymin)
         self._cell = max(clearance_m / 2.0, span / math.sqrt(MOST_CELLS / 4))

@@ -33,7 +33,10 @@ def _to_arcs(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArr
     turn = np.arctan2(dx * tx + dy * ty, dx * rx + dy * ry) % math.tau
     # Beyond the end the nearer end counts: the middle of the part not swept parts the two.
     turn = np.where(turn <= sweep, turn, np.where(turn > 0.5 * (sweep + math.tau), 0.0, sweep))
-    px, py = radius * (np.cos(turn) * rx + np.sin(turn) * tx), radius * (np.cos(turn) * ry + np.sin(turn) * ty)
+    px, py = (
+        radius * (np.cos(turn) * rx + np.sin(turn) * tx),
+        radius * (np.cos(turn) * ry + np.sin(turn) * ty),
+    )
     return np.hypot(dx - px, dy - py), turn * radius
 
 
@@ -61,7 +64,9 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
     return distance[nearest, column], station[nearest, column]
 
 
-def first_breach(path: Path, points_m: FloatArray, radius_m: float | FloatArray, from_m: float = 0.0) -> float:
+def first_breach(
+    path: Path, points_m: FloatArray, radius_m: float | FloatArray, from_m: float = 0.0
+) -> float:
     """Station at which a path first comes nearest to a point that it passes within `radius_m` of.
 
     Args:
@@ -91,7 +96,12 @@ def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bo
         # An arc leaves a rectangle only at one of its four outermost points, or at its ends.
         centre_x, centre_y = bent[:, 0] - bent[:, 3] / bent[:, 4], bent[:, 1] + bent[:, 2] / bent[:, 4]
         radius = 1.0 / np.abs(bent[:, 4])
-        out = (centre_x - radius < xmin) | (centre_x + radius > xmax) | (centre_y - radius < ymin) | (centre_y + radius > ymax)
+        out = (
+            (centre_x - radius < xmin)
+            | (centre_x + radius > xmax)
+            | (centre_y - radius < ymin)
+            | (centre_y + radius > ymax)
+        )
         for x, y, r, row in zip(centre_x[out], centre_y[out], radius[out], bent[out], strict=True):
             extremes = np.array([[x - r, y], [x + r, y], [x, y - r], [x, y + r]])
             distance, _ = _to_arcs(row[None], extremes)

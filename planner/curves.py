@@ -100,7 +100,10 @@ def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | Non
     """
     best: list[Segment] | None = None
     for side in (1.0, -1.0):  # left, right
-        cx, cy = pose.east_m - side * radius_m * pose.tangent_north, pose.north_m + side * radius_m * pose.tangent_east
+        cx, cy = (
+            pose.east_m - side * radius_m * pose.tangent_north,
+            pose.north_m + side * radius_m * pose.tangent_east,
+        )
         dx, dy = target[0] - cx, target[1] - cy
         distance = math.hypot(dx, dy)
         if distance <= radius_m:
@@ -141,7 +144,9 @@ def fillet(start: Pose, nodes: Sequence[Point], radius_m: float, cut_m: float) -
         return None
     segments = [s for s in first if s[4]]
     corner = along(segments[-1], segments[-1][5]) if segments else start
-    legs = [math.dist(corner[:2], nodes[0])] + [math.dist(a, b) for a, b in zip(nodes, nodes[1:], strict=False)]
+    legs = [math.dist(corner[:2], nodes[0])] + [
+        math.dist(a, b) for a, b in zip(nodes, nodes[1:], strict=False)
+    ]
     used = 0.0  # how much of the present leg the corner before it has taken
     for i, node in enumerate(nodes):
         leg = legs[i]

@@ -86,7 +86,10 @@ def search_poses(
 
 
 def _clear(
-    segments: list[Segment], points_m: FloatArray, keep_m: FloatArray, bounds_m: tuple[float, float, float, float]
+    segments: list[Segment],
+    points_m: FloatArray,
+    keep_m: FloatArray,
+    bounds_m: tuple[float, float, float, float],
 ) -> bool:
     path = Path(np.array(segments))
     return inside_bounds(path, bounds_m) and math.isinf(first_breach(path, points_m, keep_m))

@@ -52,11 +52,21 @@ class RollingWindowConfig:
     )
     steps: int = field(
         default=16,
-        metadata={"doc": "N, how many steps the search looks ahead", "unit": "1", "minimum": 1, "maximum": 100},
+        metadata={
+            "doc": "N, how many steps the search looks ahead",
+            "unit": "1",
+            "minimum": 1,
+            "maximum": 100,
+        },
     )
     candidates: int = field(
         default=6,
-        metadata={"doc": "n, how many tracks are kept at every step", "unit": "1", "minimum": 1, "maximum": 100},
+        metadata={
+            "doc": "n, how many tracks are kept at every step",
+            "unit": "1",
+            "minimum": 1,
+            "maximum": 100,
+        },
     )
     margin_m: float | None = field(
         default=None,
@@ -218,7 +228,7 @@ class RollingWindow:
         if path is not None and math.isinf(self._breach_m):
             left = path.length_m - request.station_m
             if new.length_m > left * (1.0 - BETTER):
-                return Plan(PlanStatus.KEPT, "no better plan was found")
+                return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
         return Plan(
             PlanStatus.FOUND,
             self._sentence(request, nodes),
@@ -237,7 +247,9 @@ class RollingWindow:
             off = math.dist(nearest[:2], request.position_m)
             if off <= max(1.0, OFF_PATH * mission.tracking_error_m):
                 lead = mission.speed_mps * (LEAD_S + mission.compute_latency_s)
-                lead = max(0.0, min(lead, self._breach_m - request.station_m, path.length_m - request.station_m))
+                lead = max(
+                    0.0, min(lead, self._breach_m - request.station_m, path.length_m - request.station_m)
+                )
                 prefix = between(path, request.station_m, request.station_m + lead)
                 pose = pose_at(path, request.station_m + lead)
         points = self._memory.points_m
@@ -245,14 +257,22 @@ class RollingWindow:
         room = [np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) - 1e-3 for end in ends]
         return _Situation(pose, prefix, points, np.minimum(*room))
 
-    def _shortest(self, situation: _Situation, tracks: Sequence[Track], keep: FloatArray, cut: float) -> tuple[list[Point], Path] | None:
+    def _shortest(
+        self, situation: _Situation, tracks: Sequence[Track], keep: FloatArray, cut: float
+    ) -> tuple[list[Point], Path] | None:
         """Route optimisation of each of the n tracks; the shortest that can be flown."""
         best: tuple[list[Point], Path] | None = None
         for track in tracks:
             if best is not None and track.cost_m >= best[1].length_m:
                 continue
             found = optimise(
-                situation.pose, track.nodes, self._mission.turn_radius_m, cut, situation.points, keep, self._mission.bounds_m
+                situation.pose,
+                track.nodes,
+                self._mission.turn_radius_m,
+                cut,
+                situation.points,
+                keep,
+                self._mission.bounds_m,
             )
             if found is not None and (best is None or found[1].length_m < best[1].length_m):
                 best = found

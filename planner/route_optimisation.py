@@ -21,7 +21,11 @@ def shortcut(nodes: Sequence[Point], points_m: FloatArray, keep_m: float | Float
     i = 0
     while i < len(nodes) - 1:
         i = next(
-            (k for k in range(len(nodes) - 1, i + 1, -1) if line_is_clear(nodes[i], nodes[k], points_m, keep_m)),
+            (
+                k
+                for k in range(len(nodes) - 1, i + 1, -1)
+                if line_is_clear(nodes[i], nodes[k], points_m, keep_m)
+            ),
             i + 1,
         )
         kept.append(nodes[i])

@@ -13,7 +13,9 @@ def largest_course_change_rad(step_m: float, turn_radius_m: float) -> float:
     return 2.0 * math.asin(min(1.0, step_m / (2.0 * turn_radius_m)))
 
 
-def step(x_m: float, y_m: float, course_rad: float, change_rad: float, step_m: float) -> tuple[float, float, float]:
+def step(
+    x_m: float, y_m: float, course_rad: float, change_rad: float, step_m: float
+) -> tuple[float, float, float]:
     """The next track point: equations (1) to (3) of the paper.
 
     Args:

@@ -84,7 +84,9 @@ class Window:
         keys = cells[:, 0] * width + cells[:, 1]
         order = np.argsort(keys)
         ordered = keys[order]
-        wanted = keys[:, None] + np.array((-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1))
+        wanted = keys[:, None] + np.array(
+            (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)
+        )
         place = np.minimum(np.searchsorted(ordered, wanted), len(keys) - 1)
         around = np.where(ordered[place] == wanted, order[place], np.arange(len(keys))[:, None])
         self._members[label] = (members, around)
@@ -103,7 +105,9 @@ class Window:
             if not len(ux):
                 continue
             clear, met = self._clear_along(dx, dy, ux, uy)
-            for row in zip(ux.tolist(), uy.tolist(), touch.tolist(), clear.tolist(), met.tolist(), strict=True):
+            for row in zip(
+                ux.tolist(), uy.tolist(), touch.tolist(), clear.tolist(), met.tolist(), strict=True
+            ):
                 if row[3] >= row[2]:
                     edges.append(SectorEdge(*row[:4]))
                 elif (other := int(self.labels[row[4]])) not in looked_at and len(looked_at) < MOST_HIDING:
@@ -111,7 +115,9 @@ class Window:
                     pending.append(other)
         return edges
 
-    def _tangents(self, dx: FloatArray, dy: FloatArray, label: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _tangents(
+        self, dx: FloatArray, dy: FloatArray, label: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Unit vectors tangent to the ends of an obstacle's fan, and the distances at which they touch it."""
         members, around = self._obstacle(label)
         x, y = dx[members], dy[members]
@@ -167,5 +173,3 @@ class Window:
         if furthest[-1] < math.tau:
             right, left = np.append(right, start + furthest[-1]), np.append(left, start + math.tau)
         return np.column_stack((np.cos(right), np.sin(right), np.cos(left), np.sin(left)))
-
-

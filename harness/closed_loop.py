@@ -1,0 +1,282 @@
+"""The closed loop: world, sensor, map, planner, route, guidance, flight model, record. One call a block."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
+from aircraft.interface import AircraftState, Command, FlightModel, Route
+from harness.obstacle_map import ObstacleMap
+from harness.range_sensor import RangeScan, RangeSensor
+from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
+from harness.stopwatch import Stopwatch
+from harness.world import World
+from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
+
+LOG_RATE_HZ = 10
+PROGRESS_EVERY_S = 5.0
+LONGEST_UNCHECKED_S = 1.0
+"""Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
+
+Progress = Callable[[float, float, str], None]
+"""Called with simulated time (s), distance to go (m) and a word on the state."""
+
+
+class Observer(Protocol):
+    """What may look on while the loop runs. Nothing that it does reaches the loop."""
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        """A scan was taken."""
+        ...
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        """A plan takes effect."""
+        ...
+
+    def on_block(self, block: Track) -> None:
+        """Some hundred more rows of the track."""
+        ...
+
+    def on_event(self, time_s: float, text: str) -> None:
+        """Something worth a line in the log."""
+        ...
+
+
+@dataclass(frozen=True)
+class Loop:
+    """All parts of one flight, made and joined by `harness.run`.
+
+    Attributes:
+        world: the truth; only sensor, contact and record see it.
+        sensor: range sensor.
+        seen: obstacle map, all that the planner sees.
+        planner: planner under test.
+        model: aircraft with its inner loops.
+        follower: guidance.
+        mission: goal and limits.
+        altitude_m: altitude held, above mean sea level.
+        time_limit_s: simulated.
+        scan_rate_hz: scans a second; divides the model's step rate.
+    """
+
+    world: World
+    sensor: RangeSensor
+    seen: ObstacleMap
+    planner: Planner
+    model: FlightModel
+    follower: PathFollower
+    mission: Mission
+    altitude_m: float
+    time_limit_s: float
+    scan_rate_hz: float
+
+
+def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
+    """Flies a mission to its end.
+
+    Everything happens at whole steps of the flight model: guidance and log at their rates, a scan at the sensor's; a scan or a
+    plan that is late takes effect at the first of these steps after its delay. Time is a count of steps.
+    """
+    begun = time.perf_counter()
+    watch = Stopwatch()
+    model, follower, seen = loop.model, loop.follower, loop.seen
+    steps = _Steps(model.step_rate_hz, loop.scan_rate_hz)
+    log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
+    plans = _Plans(loop, observers)
+    judge = _Judge(loop)
+    late: deque[RangeScan] = deque()
+    command = Command(0.0, loop.altitude_m, loop.mission.speed_mps)
+    cross_track, station = math.nan, math.nan
+    next_report = 0.0
+    step = 0
+    while True:
+        state = model.state()
+        verdict = judge.verdict(state)
+        watch.lap("dynamics")
+        if verdict is None and step % steps.scan == 0:
+            scan = loop.sensor.scan(state.east_m, state.north_m, state.heading_rad, state.time_s)
+            late.append(scan)
+            for observer in observers:
+                observer.on_scan(scan, state)
+            watch.lap("sensor")
+        if verdict is None and late and late[0].available_s <= state.time_s + 1e-9:
+            seen.update(late.popleft())
+            watch.lap("map")
+            verdict = plans.ask(state, station)
+            watch.lap("planner")
+        if verdict is None and step % steps.guide == 0:
+            plans.take_effect(state, station)
+            if plans.index >= 0:
+                guided = follower.update(state)
+                cross_track, station = guided.cross_track_m, guided.station_m
+                command = Command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps)
+            model.command(command)
+            watch.lap("guidance")
+        if verdict is not None or step % steps.log == 0:
+            log.add(state, command.roll_rad, cross_track, station, plans.index)
+            watch.lap("record")
+        if progress is not None and (verdict is not None or state.time_s >= next_report):
+            progress(state.time_s, judge.to_go_m(state), verdict[0].value if verdict else plans.state)
+            next_report = state.time_s + PROGRESS_EVERY_S
+        if verdict is not None:
+            break
+        ahead = steps.to_next(step)
+        model.advance(ahead)
+        step += ahead
+    outcome, reason = verdict
+    for observer in observers:
+        observer.on_event(state.time_s, f"{outcome.value}: {reason}")
+    track = log.close()
+    watch.lap("record")
+    return Flight(
+        track,
+        tuple(plans.accepted),
+        outcome,
+        reason,
+        tuple(plans.compute_ms),
+        sim_s=state.time_s,
+        wall_s=time.perf_counter() - begun,
+        block_shares=watch.shares(),
+    )
+
+
+class _Steps:
+    """The steps of the flight model at which something happens."""
+
+    def __init__(self, step_rate_hz: int, scan_rate_hz: float) -> None:
+        self.guide, self.log = (
+            _whole(step_rate_hz, rate, name)
+            for rate, name in ((UPDATE_RATE_HZ, "guidance"), (LOG_RATE_HZ, "log"))
+        )
+        self.scan = _whole(step_rate_hz, scan_rate_hz, "scan")
+
+    def to_next(self, step: int) -> int:
+        """Steps from one at which something happens to the next."""
+        return min(every - step % every for every in (self.guide, self.scan, self.log))
+
+
+def _whole(step_rate_hz: int, rate_hz: float, name: str) -> int:
+    steps = round(step_rate_hz / rate_hz)
+    if steps < 1 or abs(steps * rate_hz - step_rate_hz) > 1e-9 * step_rate_hz:
+        raise ValueError(
+            f"the {name} rate {rate_hz:g} Hz does not divide the simulation rate {step_rate_hz} Hz"
+        )
+    return steps
+
+
+class _Plans:
+    """What has been planned: the plan in effect, the one on its way, and all before."""
+
+    def __init__(self, loop: Loop, observers: Sequence[Observer]) -> None:
+        self._loop, self._observers = loop, observers
+        self._coming: tuple[float, float, Plan] | None = None
+        self._hold = False
+        self.accepted: list[AcceptedPlan] = []
+        self.compute_ms: list[float] = []
+
+    @property
+    def index(self) -> int:
+        """Index of the plan in effect, -1 before the first."""
+        return len(self.accepted) - 1
+
+    @property
+    def state(self) -> str:
+        """One word for people."""
+        return "waiting" if not self.accepted else "holding" if self._hold else "following"
+
+    def ask(self, state: AircraftState, station_m: float) -> tuple[Outcome, str] | None:
+        """Asks the planner, unless it is still at work; returns how the flight ends if that is its answer."""
+        if self._coming is not None:
+            return None
+        flown = self.accepted[-1].plan if self.accepted else None
+        speed = max(state.groundspeed_mps, 1e-9)
+        request = PlanRequest(
+            time_s=state.time_s,
+            position_m=(state.east_m, state.north_m),
+            direction=(state.velocity_east_mps / speed, state.velocity_north_mps / speed),
+            seen=self._loop.seen,
+            flown=flown,
+            station_m=station_m if flown else 0.0,
+        )
+        begun = time.thread_time()
+        try:
+            plan = self._loop.planner.plan(request)
+        except Exception as error:
+            return Outcome.PLANNER_FAILED, f"the planner raised {type(error).__name__}: {error}"
+        compute_ms = 1e3 * (time.thread_time() - begun)
+        if plan.status is not PlanStatus.KEPT:
+            self.compute_ms.append(compute_ms)
+        if plan.status is PlanStatus.UNREACHABLE:
+            return Outcome.UNREACHABLE, plan.reason
+        if plan.status is PlanStatus.NO_PATH:
+            for observer in self._observers:
+                observer.on_event(state.time_s, plan.reason)
+        if plan.status is PlanStatus.FOUND:
+            due = state.time_s + self._loop.mission.compute_latency_s
+            self._coming = (due, compute_ms, plan)
+        return None
+
+    def take_effect(self, state: AircraftState, station_m: float) -> None:
+        """Hands the coming plan to the guidance once it is due."""
+        if self._coming is None or self._coming[0] > state.time_s + 1e-9:
+            return
+        due, compute_ms, plan = self._coming
+        self._coming = None
+        assert plan.path is not None
+        late = state.time_s - (due - self._loop.mission.compute_latency_s)
+        route = Route(plan.path.segments, plan.path.loiter)
+        self._loop.follower.follow(route, station_m=late * state.groundspeed_mps)
+        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
+        self.accepted.append(accepted)
+        self._hold = plan.path.loiter
+        for observer in self._observers:
+            observer.on_plan(accepted, state)
+
+
+class _Judge:
+    """Says when and how a flight is over."""
+
+    def __init__(self, loop: Loop) -> None:
+        self._loop = loop
+        self._next_contact_s = 0.0
+        self._appears_s = -math.inf
+
+    def to_go_m(self, state: AircraftState) -> float:
+        """Straight distance to the goal."""
+        east, north = self._loop.mission.goal_m
+        return math.hypot(state.east_m - east, state.north_m - north)
+
+    def verdict(self, state: AircraftState) -> tuple[Outcome, str] | None:
+        """How the flight ends now; None while it goes on."""
+        loop, mission = self._loop, self._loop.mission
+        fault = loop.model.fault()
+        if fault is not None:
+            return Outcome.LOST_CONTROL, fault
+        if state.time_s >= self._next_contact_s:
+            clearance = self._clearance(state)
+            if clearance < 0.0:
+                return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
+        if not loop.world.inside_bounds(state.east_m, state.north_m):
+            return Outcome.OUT_OF_BOUNDS, f"left the area at ({state.east_m:.0f}, {state.north_m:.0f}) m"
+        to_go = self.to_go_m(state)
+        if to_go <= mission.goal_radius_m:
+            return Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s"
+        if state.time_s >= loop.time_limit_s:
+            return Outcome.TIMEOUT, f"time limit {loop.time_limit_s:g} s, {to_go:.0f} m from the goal"
+        return None
+
+    def _clearance(self, state: AircraftState) -> float:
+        """True clearance now; says when to look again, before any obstacle can have been reached."""
+        world = self._loop.world
+        clearance = world.clearance_at(state.east_m, state.north_m, state.time_s)
+        closing = 2.0 * state.groundspeed_mps + world.max_obstacle_speed_mps
+        wait = min(max(clearance, 0.0) / closing, LONGEST_UNCHECKED_S)
+        if self._appears_s <= state.time_s:
+            self._appears_s = world.next_appearance(state.time_s)
+        self._next_contact_s = min(state.time_s + wait, self._appears_s)
+        return clearance

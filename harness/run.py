@@ -1,0 +1,178 @@
+"""From a scenario to a flight, and from a flight to a run folder."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aircraft.airframes import airframe
+from aircraft.frames import LocalPlane
+from aircraft.guidance import PathFollower
+from aircraft.interface import FlightModel
+from aircraft.start import Atmosphere, StartConditions
+from harness.closed_loop import Loop, Observer, Progress, fly
+from harness.metrics import metrics
+from harness.obstacle_map import ObstacleMap
+from harness.planner_keys import config_of
+from harness.range_sensor import RangeSensor
+from harness.record import AcceptedPlan, Flight, Track
+from harness.run_folder import RunFolder
+from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
+from harness.trackability import FlightLimits
+from harness.world import World
+from planner.registry import planner_kinds
+
+if TYPE_CHECKING:
+    from aircraft.interface import AircraftState
+    from harness.range_sensor import RangeScan
+
+SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
+"""Numbers of the random streams that derive from the scenario's seed."""
+
+
+def make_loop(
+    scenario: Scenario, make_model: Callable[[StartConditions, Atmosphere], FlightModel] | None = None
+) -> Loop:
+    """All parts of a scenario's flight.
+
+    Args:
+        scenario: a complete scenario.
+        make_model: makes the flight model; default: the scenario's JSBSim aircraft.
+
+    Raises:
+        AircraftError: the aircraft cannot be loaded or trimmed.
+    """
+    mission = mission_of(scenario)
+    world = World.from_scenario(scenario)
+    start, air = start_conditions(scenario), atmosphere(scenario)
+    return Loop(
+        world=world,
+        sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
+        seen=ObstacleMap(mission.bounds_m, mission.clearance_m, mission.sensor_range_m),
+        planner=planner_kinds()[scenario.planner.kind].make(config_of(scenario.planner), mission),
+        model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
+        follower=PathFollower(airframe(scenario.aircraft.model).guidance_limits),
+        mission=mission,
+        altitude_m=scenario.mission.altitude_m,
+        time_limit_s=_given(scenario.mission.time_limit_s),
+        scan_rate_hz=scenario.sensor.rate_hz,
+    )
+
+
+def start_conditions(scenario: Scenario) -> StartConditions:
+    """Where and how a scenario's flight begins."""
+    east, north = scenario.mission.start_m
+    course = math.radians(_given(scenario.mission.course_deg))
+    return StartConditions(
+        east, north, scenario.mission.altitude_m, course, _given(scenario.aircraft.airspeed_mps)
+    )
+
+
+def atmosphere(scenario: Scenario) -> Atmosphere:
+    """The air of a scenario."""
+    wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
+    blows = math.radians(wind.from_deg) + math.pi if wind else 0.0
+    speed = wind.speed_mps if wind else 0.0
+    return Atmosphere(
+        wind_east_mps=speed * math.sin(blows),
+        wind_north_mps=speed * math.cos(blows),
+        turbulence=turbulence.model if turbulence else None,
+        intensity=turbulence.intensity if turbulence else None,
+        seed=int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF,
+    )
+
+
+def jsbsim_aircraft(scenario: Scenario, start: StartConditions, air: Atmosphere) -> FlightModel:
+    """The scenario's aircraft, trimmed and in the air."""
+    from aircraft.jsbsim_model import JsbsimModel
+
+    origin = scenario.area.origin
+    plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
+    return JsbsimModel(scenario.aircraft.model, start, plane, air)
+
+
+def flight_limits(scenario: Scenario) -> FlightLimits:
+    """What a scenario's flight is measured against."""
+    performance = performance_of(scenario)
+    return FlightLimits(
+        altitude_m=scenario.mission.altitude_m,
+        clearance_m=_given(scenario.planner.clearance_m),
+        bank_limit_rad=airframe(scenario.aircraft.model).guidance_limits.bank_limit_rad,
+        turn_radius_m=performance.turn_radius_m,
+        tracking_error_m=performance.tracking_error_m,
+    )
+
+
+def fly_to_folder(
+    scenario: Scenario, out: Path, recording: bool, progress: Progress | None = None
+) -> dict[str, Any]:
+    """Flies a scenario into a run folder and returns the content of its `metrics.json`.
+
+    Args:
+        scenario: a complete scenario.
+        out: the run folder, made or written anew.
+        recording: whether to write `flight.rrd`.
+        progress: told of the flight as it goes on.
+
+    Raises:
+        AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
+        RunFolderError: the folder holds something else or cannot be written.
+    """
+    loop = make_loop(scenario)
+    with ExitStack() as stack:
+        folder = stack.enter_context(RunFolder.create(out, dump_scenario(scenario), [shlex.join(sys.argv)]))
+        observers: list[Observer] = [_Writer(folder)]
+        log = _recording(scenario, loop, folder) if recording else None
+        if log is not None:
+            observers.append(log)
+        flight = fly(loop, observers, progress)
+        figures = metrics(flight, flight_limits(scenario))
+        if log is not None:
+            log.close(figures)
+        folder.finish(flight.plans, figures)
+    return figures
+
+
+class _Writer:
+    """Writes the track block by block."""
+
+    def __init__(self, folder: RunFolder) -> None:
+        self._folder = folder
+
+    def on_block(self, block: Track) -> None:
+        self._folder.write_block(block)
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        """The folder holds no scans."""
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        """Plans are written at the end."""
+
+    def on_event(self, time_s: float, text: str) -> None:
+        """Events belong to the recording."""
+
+
+def _recording(scenario: Scenario, loop: Loop, folder: RunFolder) -> Any:
+    from harness.rerun_blueprint import Scene
+    from harness.rerun_log import RerunLog
+
+    title = f"{scenario.name}, {scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}"
+    scene = Scene(title, loop.mission, scenario.mission.start_m, loop.altitude_m, tuple(loop.world.obstacles))
+    return RerunLog(folder.recording_path, scene, recording_id=title)
+
+
+def _stream(seed: int, number: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=(number,))
+
+
+def _given(value: float | None) -> float:
+    """A key that a complete scenario always has."""
+    assert value is not None
+    return value
