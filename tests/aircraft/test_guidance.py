@@ -128,7 +128,8 @@ def test_arcs_and_lines_are_tracked(wind: tuple[float, float]) -> None:
     turn = 1.5 / curvature
     route = joined([(0.0, 300.0), (curvature, turn), (0.0, 200.0), (-curvature, turn), (curvature, turn)])
     flown = fly(route, northwards(), 30.0, wind)
-    assert max(abs(output.cross_track_m) for _, output in flown) < 0.35
+    # Without the drift angle in the law a crosswind of 12 m/s leaves 0.2 m in the turns.
+    assert max(abs(output.cross_track_m) for _, output in flown) < 0.12
     assert not any(output.bank_saturated for _, output in flown)
 
 
