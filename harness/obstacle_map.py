@@ -42,13 +42,15 @@ class ObstacleMap:
         span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
         self._cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
         border = 2.0 * clearance_m + self._cell
-        self._x0, self._y0 = xmin - border, ymin - border
-        self._nx = math.ceil((xmax + border - self._x0) / self._cell)
-        self._ny = math.ceil((ymax + border - self._y0) / self._cell)
-        self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)
-        self._points = np.zeros((1024, 2))
-        self._score = np.zeros(1024, dtype=np.int16)
-        self._key = np.zeros(1024, dtype=np.int64)
+        self._origin = np.array([[xmin], [ymin]]) - border
+        nx, self._ny = (
+            math.ceil((high - low + 2.0 * border) / self._cell) for low, high in ((xmin, xmax), (ymin, ymax))
+        )
+        self._shape = np.array([[nx], [self._ny]], dtype=np.uint64)
+        self._score = np.zeros(nx * self._ny, dtype=np.int8)  # by cell
+        self._slot = np.full(nx * self._ny, -1, dtype=np.int32)  # by cell, -1 where there is no point
+        self._points = np.zeros((1024, 2))  # by slot
+        self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
         self._count = 0
         self._join = 2.0 * clearance_m
         self._range = range_m
@@ -97,56 +99,52 @@ class ObstacleMap:
         if not slots:
             return np.zeros((0, 2))
         fresh = np.concatenate(slots[::-1])
-        return self._points[fresh[self._score[fresh] >= CONFIRMED]]
+        return self._points[fresh[self._score[self._key[fresh]] >= CONFIRMED]]
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
         return self._free.contains(points_m)
 
     def _joined(self, scan: RangeScan, hits: NDArray[np.intp]) -> FloatArray:
-        """Where rays hit, and points between neighbouring hits too near to each other to pass between."""
-        points = scan.directions[hits] * scan.ranges_m[hits, None]
-        step = np.diff(points, axis=0)
-        gap = np.sqrt(step[:, 0] * step[:, 0] + step[:, 1] * step[:, 1])
+        """(2, k) where rays hit, and points between neighbouring hits too near to each other to pass between."""
+        points = scan.directions.T.take(hits, axis=1) * scan.ranges_m.take(hits)
+        step = points[:, 1:] - points[:, :-1]
+        square = step * step
+        gap = np.sqrt(square[0] + square[1])
+        wide = np.flatnonzero((gap > self._cell) & (gap < self._join))
         # One ray may be missing between neighbours: a lost return does not open a wall.
-        wide = np.flatnonzero((gap > self._cell) & (gap < self._join) & (np.diff(hits) <= 2))
+        wide = wide[hits[wide + 1] - hits[wide] <= 2]
         if len(wide):
-            parts = np.ceil(gap[wide] / self._cell).astype(np.int64)
-            inner = parts - 1
-            which = np.repeat(np.arange(len(wide)), inner)
-            number = np.arange(len(which)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
-            share = (number / parts[which])[:, None]
-            points = np.concatenate((points, points[wide[which]] + share * step[wide[which]]))
-        points[:, 0] += scan.east_m
-        points[:, 1] += scan.north_m
+            parts = np.ceil(gap[wide] / self._cell)
+            which, number = np.nonzero(np.arange(1.0, parts.max()) < parts[:, None])
+            share = (number + 1) / parts[which]
+            which = wide[which]
+            points = np.hstack((points, points.take(which, axis=1) + share * step.take(which, axis=1)))
+        points += np.array([[scan.east_m], [scan.north_m]])
         return points
 
     def _add(self, points: FloatArray) -> None:
         """Counts hits; a cell hit for the first time gets a point, one hit in a second scan becomes an edge."""
-        ix = ((points[:, 0] - self._x0) / self._cell).astype(np.int64)
-        iy = ((points[:, 1] - self._y0) / self._cell).astype(np.int64)
-        keys = ix * self._ny + iy
-        if ix.min() < 0 or iy.min() < 0 or ix.max() >= self._nx or iy.max() >= self._ny:
-            inside = (ix >= 0) & (iy >= 0) & (ix < self._nx) & (iy < self._ny)
-            keys, points = keys[inside], points[inside]
-        slots = self._slot[keys]
-        fresh = np.flatnonzero(slots < 0)
-        known = slots[slots >= 0]
-        weak = known[self._score[known] < CERTAIN]
-        if len(weak):
-            before = self._score[weak]
-            self._score[weak] = before + 1  # duplicates of a cell count once a scan
-            raised = weak[before == CONFIRMED - 1]
-            if len(raised):
-                self._note(np.unique(raised))
+        cells = ((points - self._origin) / self._cell).astype(np.int64)
+        if not (cells.view(np.uint64) < self._shape).all():  # unsigned, a negative number is a large one
+            inside = (cells.view(np.uint64) < self._shape).all(axis=0)
+            cells, points = cells[:, inside], points[:, inside]
+        keys = cells[0] * self._ny + cells[1]
+        score = self._score.take(keys)
+        open_ = np.flatnonzero(score < CERTAIN)  # few: most of what is in sight has been seen often
+        keys, score = keys[open_], score[open_]
+        self._score[keys] = score + 1  # duplicates of a cell count once a scan
+        raised = keys[score == CONFIRMED - 1]
+        if len(raised):
+            self._note(np.unique(self._slot[raised]))
+        fresh = np.flatnonzero(self._slot[keys] < 0)
         if len(fresh):
             new_keys, first = np.unique(keys[fresh], return_index=True)
             self._grow(len(new_keys))
             new = np.arange(self._count, self._count + len(new_keys), dtype=np.int32)
             self._slot[new_keys] = new
-            self._points[new] = points[fresh[first]]
+            self._points[new] = points[:, open_[fresh[first]]].T
             self._key[new] = new_keys
-            self._score[new] = 1
             self._count += len(new_keys)
 
     def _note(self, slots: NDArray[np.int32]) -> None:
@@ -155,11 +153,10 @@ class ObstacleMap:
         self._revisions.append(self._revision)
 
     def _grow(self, more: int) -> None:
-        if self._count + more <= len(self._score):
+        if self._count + more <= len(self._key):
             return
-        size = max(2 * len(self._score), self._count + more)
+        size = max(2 * len(self._key), self._count + more)
         self._points = np.resize(self._points, (size, 2))
-        self._score = np.resize(self._score, size)
         self._key = np.resize(self._key, size)
 
     def _look_through(self, scan: RangeScan) -> None:
@@ -186,7 +183,7 @@ class ObstacleMap:
         aimed = (
             (np.abs(position - np.rint(position)) * scan.spacing_rad * distance < 0.25 * self._cell)
             & (distance < scan.max_range_m - 2.0 * self._cell)
-            & (self._score[slots] > 0)
+            & (self._score[self._key[slots]] > 0)
         )
         if not circle:
             aimed &= (ray >= 1) & (ray < rays - 1)
@@ -194,7 +191,7 @@ class ObstacleMap:
         ray, past = ray[chosen], distance[chosen] + 1.5 * self._cell
         ranges = scan.ranges_m
         through = (ranges[ray] > past) & (ranges[ray - 1] > past) & (ranges[(ray + 1) % rays] > past)
-        weaker = slots[chosen[through]]
+        weaker = self._key[slots[chosen[through]]]
         if len(weaker):
             self._score[weaker] -= 1
             if (self._score[weaker] == CONFIRMED - 1).any():
@@ -228,11 +225,15 @@ class _FreeSpace:
         y_low, y_high = self._cells(scan.north_m, reach, self._y0, self._ny)
         if x_low >= x_high or y_low >= y_high:
             return
+        seen = self._seen[x_low:x_high, y_low:y_high]
         x = self._x0 + (np.arange(x_low, x_high) + 0.5) * self._cell - scan.east_m
         y = self._y0 + (np.arange(y_low, y_high) + 0.5) * self._cell - scan.north_m
-        distance = np.sqrt(x[:, None] ** 2 + y**2)
+        square = (x * x)[:, None] + y * y
+        # Most of what is in reach has been seen from the places before.
+        column, row = np.nonzero((square < reach * reach) & ~seen)
+        distance = np.sqrt(square[column, row])
         rays = len(scan.ranges_m)
-        position = (np.arctan2(x[:, None], y) - scan.start_rad) % math.tau / scan.spacing_rad
+        position = (np.arctan2(x[column], y[row]) - scan.start_rad) % math.tau / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
         if rays * scan.spacing_rad > math.tau - 1e-9:
             ray %= rays
@@ -242,20 +243,18 @@ class _FreeSpace:
             ray = np.minimum(ray, rays - 1)
         # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
         half = 0.75 * self._cell
-        free_to = np.minimum(scan.ranges_m, reach) - half
-        width = 1
         level = np.ceil(half / np.maximum(distance, half) / scan.spacing_rad) + 1.0
-        filtered = free_to
-        while covered.any():
-            filtered = _least(filtered, width, rays)
+        free_to = np.minimum(scan.ranges_m, reach) - half
+        free = np.zeros(ray.shape, dtype=np.bool_)
+        width = 1
+        while covered.any() and width <= rays:
+            free_to = _least(free_to, width, rays)
             width *= 2
             # After filters of width 1, 2, 4, ... the least of 2 width - 1 rays to either side is known.
             enough = covered & (level <= width - 1)
-            fits = enough & (filtered[ray] > distance)
-            self._seen[x_low:x_high, y_low:y_high] |= fits
+            free |= enough & (free_to[ray] > distance)
             covered &= ~enough
-            if width > rays:
-                break
+        seen[column[free], row[free]] = True
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""

@@ -47,14 +47,27 @@ def end_of(path: Path) -> Pose:
     return along(last, float(last[5]))
 
 
-def pose_at(path: Path, station_m: float) -> Pose:
-    """The pose `station_m` along a path, clamped to its ends."""
+def place_on(path: Path, station_m: float) -> tuple[Pose, float]:
+    """The pose `station_m` along a path, clamped to its ends, and the curvature (1/m) there."""
     left = max(station_m, 0.0)
     for row in path.segments.tolist():
         if left <= row[5]:
-            return along(row, left)
+            return along(row, left), row[4]
         left -= row[5]
-    return end_of(path)
+    return end_of(path), 0.0
+
+
+def pose_at(path: Path, station_m: float) -> Pose:
+    """The pose `station_m` along a path, clamped to its ends."""
+    return place_on(path, station_m)[0]
+
+
+def on_loiter(path: Path, station_m: float) -> float:
+    """A station with whole turns of a closing loiter circle taken off."""
+    if not path.loiter or station_m <= path.length_m:
+        return station_m
+    turn = float(path.segments[-1, 5])
+    return path.length_m - turn + (station_m - path.length_m) % turn
 
 
 def between(path: Path, start_m: float, stop_m: float) -> list[Segment]:
@@ -124,7 +137,21 @@ def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | Non
     return best
 
 
-def fillet(start: Pose, nodes: Sequence[Point], radius_m: float, cut_m: float) -> Path | None:
+class Limits(NamedTuple):
+    """How a curve may bend.
+
+    Attributes:
+        radius_m: smallest radius.
+        roll_m: distance flown while rolling into the tightest turn; kept straight between a left and a right turn.
+    """
+
+    radius_m: float
+    roll_m: float
+
+
+def fillet(
+    start: Pose, nodes: Sequence[Point], limits: Limits, cut_m: float, start_curvature: float = 0.0
+) -> Path | None:
     """A path from a pose through the corners of a polyline, each corner rounded by one arc.
 
     The first turn has the smallest radius. Every corner gets the largest arc that its legs have room for and that
@@ -133,49 +160,53 @@ def fillet(start: Pose, nodes: Sequence[Point], radius_m: float, cut_m: float) -
     Args:
         start: where the path begins.
         nodes: corners and, last, the end; all ahead of `start` in the order of flight.
-        radius_m: smallest radius allowed.
+        limits: smallest radius and room to roll.
         cut_m: how far from a corner its arc may pass, where the smallest radius leaves the choice.
+        start_curvature: curvature (1/m) flown on arrival at the start.
 
     Returns:
-        The path, or None where a corner cannot be rounded at `radius_m`.
+        The path, or None where a corner cannot be rounded.
     """
-    first = turn_onto(start, nodes[0], radius_m)
+    first = turn_onto(start, nodes[0], limits.radius_m)
+    segments: list[Segment] = []
+    if first is not None and first[0][4] * start_curvature < 0.0:
+        segments.append((*start, 0.0, limits.roll_m))
+        start = along(segments[0], limits.roll_m)
+        first = turn_onto(start, nodes[0], limits.radius_m)
     if first is None:
         return None
-    segments = [s for s in first if s[4]]
+    segments += [segment for segment in first if segment[4]]
     corner = along(segments[-1], segments[-1][5]) if segments else start
-    legs = [math.dist(corner[:2], nodes[0])] + [
-        math.dist(a, b) for a, b in zip(nodes, nodes[1:], strict=False)
-    ]
+    last_turn = segments[-1][4] if segments else 0.0
     used = 0.0  # how much of the present leg the corner before it has taken
     for i, node in enumerate(nodes):
-        leg = legs[i]
+        leg = math.dist(corner[:2], node)
         if leg <= SHORTEST_M:
             return None
         ux, uy = (node[0] - corner[0]) / leg, (node[1] - corner[1]) / leg
-        if i + 1 == len(nodes):
-            trim, turn, radius = 0.0, 0.0, math.inf
-        else:
-            out = legs[i + 1]
+        trim, turn, radius = 0.0, 0.0, math.inf
+        if i + 1 < len(nodes):
+            out = math.dist(node, nodes[i + 1])
+            if out <= SHORTEST_M:
+                return None
             vx, vy = (nodes[i + 1][0] - node[0]) / out, (nodes[i + 1][1] - node[1]) / out
             turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
             tangent = math.tan(0.5 * abs(turn))
-            last = i + 2 == len(nodes)
-            room = min(leg - used if i == 0 else 0.5 * leg, out if last else 0.5 * out)
-            if tangent < 1e-9:
-                trim, radius = 0.0, math.inf
-            else:
-                need = radius_m * tangent
-                if need > min(leg - used, out):
+            if tangent > 1e-9:
+                free = leg - used - (limits.roll_m if turn * last_turn < 0.0 else 0.0)
+                need = limits.radius_m * tangent
+                if need > min(free, out):
                     return None
                 # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
                 widest = cut_m / (1.0 / math.cos(0.5 * turn) - 1.0) * tangent
-                trim = min(max(need, min(room, widest)), leg - used)
+                wanted = min(widest, 0.5 * leg, out if i + 2 == len(nodes) else 0.5 * out)
+                trim = min(max(need, wanted), free)
                 radius = trim / tangent
         straight = leg - used - trim
         if straight > SHORTEST_M:
             segments.append((corner[0] + ux * used, corner[1] + uy * used, ux, uy, 0.0, straight))
         if math.isfinite(radius) and radius * abs(turn) > SHORTEST_M:
+            last_turn = turn
             at = (node[0] - ux * trim, node[1] - uy * trim)
             segments.append((*at, ux, uy, math.copysign(1.0 / radius, turn), radius * abs(turn)))
         corner = Pose(node[0], node[1], ux, uy)

@@ -23,7 +23,7 @@ class ObstacleMemory:
     """
 
     def __init__(self, clearance_m: float) -> None:
-        self._cell_m = clearance_m / math.sqrt(2.0)
+        self.cell_m = clearance_m / math.sqrt(2.0)
         self._forget()
 
     def _forget(self) -> None:
@@ -66,7 +66,7 @@ class ObstacleMemory:
         new = slice(self._count, total)
         self._points[new] = fresh
         self._count = total
-        cells = [tuple(cell) for cell in np.floor(fresh / self._cell_m).astype(np.int64).tolist()]
+        cells = [tuple(cell) for cell in np.floor(fresh / self.cell_m).astype(np.int64).tolist()]
         for cell in dict.fromkeys(cells):
             if cell not in self._of_cell:
                 self._join(cell)

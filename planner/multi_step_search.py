@@ -10,17 +10,16 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-
-import numpy as np
 
 from planner.clearance import first_entry
 from planner.curves import Point
 from planner.step_model import distance_left_m
 from planner.window import SectorEdge, Window, guide_vector
 
-DETOUR = 1.03
-"""Tracks this much longer than the best one are not worth keeping."""
+APART = 0.3
+"""Track points nearer to each other than this share of the distance kept from obstacles are one."""
 
 
 @dataclass(frozen=True)
@@ -51,41 +50,43 @@ def search(
     steps: int,
     keep_best: int,
     outer_m: float,
-) -> list[Track]:
-    """Candidate tracks from the centre of the window to the goal, cheapest first.
+) -> Iterator[Track]:
+    """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
 
     Args:
         window: the planning window; `window.keep_m` is kept from every point in it.
         goal: where the guide vector points.
         bounds_m: area that no track point may leave.
         steps: N, how many steps are looked ahead.
-        keep_best: n: at every step so many tracks are kept, and so many are returned at most.
+        keep_best: n, how many tracks are kept at every step.
         outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`, so
             that steps around a round obstacle are long.
 
-    Returns:
-        At most n tracks that see the goal from their last track point but one; none where n tracks at
-        every one of N steps were not enough.
+    Yields:
+        Tracks that see the goal from their last track point but one; none where n tracks at every one
+        of N steps were not enough.
     """
     start = window.center_m
-    queue = [(guide_vector(start, goal)[2], 0, 0, Track((start,), 0.0, guide_vector(start, goal)[2]))]
+    _, _, straight = guide_vector(start, goal)
+    queue = [(straight, 0, 0, Track((start,), 0.0, straight))]
     kept_at = [0] * (steps + 1)
-    reached: dict[tuple[int, int], float] = {}
-    found: list[Track] = []
+    visited: set[tuple[int, int]] = set()
     count = 0
-    while queue and len(found) < keep_best:
+    while queue:
         cost, _, depth, track = heapq.heappop(queue)
-        if found and cost > DETOUR * found[0].cost_m:
-            break
-        here = track.nodes[-1]
-        place = (round(here[0] / (0.2 * outer_m)), round(here[1] / (0.2 * outer_m)))
-        if reached.get(place, math.inf) <= track.flown_m or kept_at[depth] == keep_best:
+        if not track.left_m:
+            yield track
             continue
-        reached[place] = track.flown_m
+        here = track.nodes[-1]
+        place = (round(here[0] / (APART * outer_m)), round(here[1] / (APART * outer_m)))
+        if place in visited or kept_at[depth] == keep_best:
+            continue
+        visited.add(place)
         kept_at[depth] += 1
         _, hit = first_entry(here, goal, window.points_m, window.keep_m)
+        count += 1
         if hit < 0:
-            found.append(Track((*track.nodes, goal), track.cost_m, 0.0))
+            heapq.heappush(queue, (cost, count, depth, Track((*track.nodes, goal), cost, 0.0)))
             continue
         if depth == steps:
             continue
@@ -94,33 +95,18 @@ def search(
             if child is not None and _inside(child.nodes[-1], bounds_m):
                 count += 1
                 heapq.heappush(queue, (child.cost_m, count, depth + 1, child))
-    return sorted(found, key=lambda track: track.cost_m)
 
 
 def _step(window: Window, track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
-    """One step along the edge of a free sector."""
+    """One step along the edge of a free sector; None where it leads nowhere."""
     here = track.nodes[-1]
-    length = min(_hugged(window, here, edge, outer_m), edge.clear_m)
+    length = min(window.hugged_m(here, edge, outer_m), edge.clear_m)
     if length < 1e-2 * outer_m:
         return None
     x, y = here[0] + edge.ux * length, here[1] + edge.uy * length
     gx, gy, left = guide_vector(here, goal)
     off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
     return Track((*track.nodes, (x, y)), track.flown_m + length, distance_left_m(left, length, off_guide))
-
-
-def _hugged(window: Window, origin: Point, edge: SectorEdge, outer_m: float) -> float:
-    """How far along an edge the outer distance from what it touches is reached again."""
-    dx, dy = window.points_m[:, 0] - origin[0], window.points_m[:, 1] - origin[1]
-    ahead = dx * edge.ux + dy * edge.uy
-    beside = dx * edge.uy - dy * edge.ux
-    reach = outer_m * outer_m - beside * beside
-    near = (reach > 0.0) & (ahead > -outer_m)
-    ahead, reach = ahead[near], np.sqrt(reach[near])
-    order = np.argsort(ahead - reach)
-    begin, end = (ahead - reach)[order], np.maximum.accumulate((ahead + reach)[order])
-    gap = np.flatnonzero((begin[1:] > end[:-1]) & (end[:-1] > edge.touch_m))
-    return float(end[gap[0]] if len(gap) else end[-1])
 
 
 def _inside(point: Point, bounds_m: tuple[float, float, float, float]) -> bool:

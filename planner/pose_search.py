@@ -11,46 +11,37 @@ import math
 
 import numpy as np
 
-from planner.clearance import first_breach, inside_bounds
-from planner.curves import Point, Pose, Segment, turn_onto
-from planner.interface import FloatArray, Path
+from planner.curves import Limits, Point, Pose, Segment, turn_onto
+from planner.interface import Path
+from planner.route_optimisation import Route, Terrain
 from planner.step_model import distance_left_m, largest_course_change_rad, step
 
-EXPANSIONS = 150
+EXPANSIONS = 200
 """Poses looked at before the search gives up."""
 
 
 def search_poses(
-    start: Pose,
-    goal: Point,
-    radius_m: float,
-    points_m: FloatArray,
-    keep_m: FloatArray,
-    bounds_m: tuple[float, float, float, float],
-    step_m: float | None = None,
-) -> tuple[list[Point], Path] | None:
-    """The cheapest flyable path by best-first search over (x, y, course).
+    start: Pose, start_curvature: float, goal: Point, limits: Limits, terrain: Terrain
+) -> Route | None:
+    """The cheapest flyable route by best-first search over (x, y, course), in steps S_0 of one turn radius.
+
+    A left turn never follows a right one without a straight step between.
 
     Args:
         start: first pose.
+        start_curvature: curvature (1/m) flown on arrival there.
         goal: the end.
-        radius_m: minimum turn radius R.
-        points_m: (m, 2) edge points.
-        keep_m: (m,) distance to be kept from each.
-        bounds_m: area that must not be left.
-        step_m: S_0; default: R.
+        limits: smallest radius.
+        terrain: where the route may lie.
 
     Returns:
-        Track points after the start and the path; None where the search ran out of poses or of its count.
+        The route; None where the search ran out of poses or of its count.
     """
-    step_m = radius_m if step_m is None else step_m
-    largest = largest_course_change_rad(step_m, radius_m)
-    changes = (0.0, 0.5 * largest, -0.5 * largest, largest, -largest)
+    step_m = limits.radius_m
+    largest = largest_course_change_rad(step_m, limits.radius_m)
     course = math.atan2(start.tangent_north, start.tangent_east)
-    guide = math.dist(start[:2], goal)
-    # Entries: estimate, tie-break, cost, x, y, course at the track point (tangent), segments so far
     queue: list[tuple[float, int, float, float, float, float, tuple[Segment, ...]]]
-    queue = [(guide, 0, 0.0, start.east_m, start.north_m, course, ())]
+    queue = [(math.dist(start[:2], goal), 0, 0.0, start.east_m, start.north_m, course, ())]
     seen: set[tuple[int, int, int]] = set()
     count = 0
     for _ in range(EXPANSIONS):
@@ -62,34 +53,25 @@ def search_poses(
             continue
         seen.add(key)
         pose = Pose(x, y, math.cos(course), math.sin(course))
-        near = np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) < keep_m + 2.0 * step_m
-        final = turn_onto(pose, goal, radius_m)
-        if final is not None and _clear(final, points_m, keep_m, bounds_m):
-            segments = [*done, *final]
-            nodes = [(s[0], s[1]) for s in segments[1:]]
-            return [*nodes, goal], Path(np.array(segments))
+        turning = done[-1][4] if done else start_curvature
+        final = turn_onto(pose, goal, limits.radius_m)
+        if final is not None and final[0][4] * turning >= 0.0:
+            path = Path(np.array([*done, *final]))
+            if terrain.admits(Path(np.array(final))):
+                return Route((*((s[0], s[1]) for s in path.segments[1:].tolist()), goal), path)
+        nearby = terrain.near(x, y, step_m)
         away = math.dist((x, y), goal)
-        for change in changes:
+        for change in (0.0, 0.5 * largest, -0.5 * largest, largest, -largest):
+            if change * turning < 0.0:
+                continue
             # The chord of an arc points half-way between the tangents at its ends: theta_k is the course of chords.
             nx, ny, chord = step(x, y, course, 0.5 * change, step_m)
             curvature = 2.0 * math.sin(0.5 * change) / step_m
-            length = step_m if change == 0.0 else change / curvature
-            arc: Segment = (x, y, pose.tangent_east, pose.tangent_north, curvature, length)
-            if not _clear([arc], points_m[near], keep_m[near], bounds_m):
+            arc: Segment = (*pose, curvature, change / curvature if change else step_m)
+            if not nearby.admits(Path(np.array([arc]))):
                 continue
             count += 1
-            off = chord - math.atan2(goal[1] - y, goal[0] - x)
-            left = distance_left_m(away, step_m, off)
-            queue_entry = (cost + length + left, count, cost + length, nx, ny, course + change, (*done, arc))
-            heapq.heappush(queue, queue_entry)
+            left = distance_left_m(away, step_m, chord - math.atan2(goal[1] - y, goal[0] - x))
+            so_far = cost + arc[5]
+            heapq.heappush(queue, (so_far + left, count, so_far, nx, ny, course + change, (*done, arc)))
     return None
-
-
-def _clear(
-    segments: list[Segment],
-    points_m: FloatArray,
-    keep_m: FloatArray,
-    bounds_m: tuple[float, float, float, float],
-) -> bool:
-    path = Path(np.array(segments))
-    return inside_bounds(path, bounds_m) and math.isinf(first_breach(path, points_m, keep_m))

@@ -2,83 +2,95 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
 
 from planner.clearance import first_breach, inside_bounds, line_is_clear
-from planner.curves import Point, Pose, fillet
+from planner.curves import Limits, Point, Pose, fillet
 from planner.interface import FloatArray, Path
 
 
-def shortcut(nodes: Sequence[Point], points_m: FloatArray, keep_m: float | FloatArray) -> list[Point]:
-    """Drops the track points between each one and the furthest that it sees.
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Where a curve may lie.
 
-    Args:
-        nodes: w_s1 ... w_sn; the first and the last are always kept.
+    Attributes:
         points_m: (m, 2) edge points.
-        keep_m: distance that a connection has to keep from them, one for all or one for each.
+        keep_m: (m,) distance to be kept from each.
+        bounds_m: xmin, ymin, xmax, ymax: area that must not be left.
     """
+
+    points_m: FloatArray
+    keep_m: FloatArray
+    bounds_m: tuple[float, float, float, float]
+
+    def admits(self, path: Path) -> bool:
+        """Whether a path keeps its distance and stays inside."""
+        return inside_bounds(path, self.bounds_m) and math.isinf(
+            first_breach(path, self.points_m, self.keep_m)
+        )
+
+    def near(self, x_m: float, y_m: float, reach_m: float) -> Terrain:
+        """What can matter to a path of at most `reach_m` from a place."""
+        distance = np.hypot(self.points_m[:, 0] - x_m, self.points_m[:, 1] - y_m)
+        chosen = distance < self.keep_m + reach_m
+        return Terrain(self.points_m[chosen], self.keep_m[chosen], self.bounds_m)
+
+
+@dataclass(frozen=True)
+class Route:
+    """Track points after the start, and the curve through them."""
+
+    nodes: tuple[Point, ...]
+    path: Path
+
+
+def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
+    """Drops the track points between each one and the furthest that it sees; the first and the last stay."""
     kept = [nodes[0]]
     i = 0
     while i < len(nodes) - 1:
-        i = next(
-            (
-                k
-                for k in range(len(nodes) - 1, i + 1, -1)
-                if line_is_clear(nodes[i], nodes[k], points_m, keep_m)
-            ),
-            i + 1,
-        )
+        furthest = range(len(nodes) - 1, i + 1, -1)
+        sees = (k for k in furthest if line_is_clear(nodes[i], nodes[k], terrain.points_m, terrain.keep_m))
+        i = next(sees, i + 1)
         kept.append(nodes[i])
     return kept
 
 
-def flyable(
+def optimise(
     start: Pose,
+    start_curvature: float,
     nodes: Sequence[Point],
-    radius_m: float,
+    limits: Limits,
     cut_m: float,
-    points_m: FloatArray,
-    keep_m: float | FloatArray,
-    bounds_m: tuple[float, float, float, float],
-) -> Path | None:
-    """The curve through some track points at the minimum turn radius, if it keeps its distance and the bounds.
+    terrain: Terrain,
+) -> Route | None:
+    """The curve through the shortcuts of a track, at the minimum turn radius.
+
+    All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near to
+    something, one corner after the other is left out, then corners are rounded as tightly as may be, and
+    then the track is tried as it came.
 
     Args:
         start: pose at which the curve begins.
-        nodes: track points after `start`, the end last.
-        radius_m: minimum turn radius.
+        start_curvature: curvature (1/m) flown on arrival there.
+        nodes: track points, that of `start` first.
+        limits: smallest radius and room to roll.
         cut_m: how far from a track point a wider turn may pass it.
-        points_m: (m, 2) edge points.
-        keep_m: distance to be kept from them, one for all or one for each.
-        bounds_m: area that must not be left.
-    """
-    path = fillet(start, nodes, radius_m, cut_m)
-    if path is None or not inside_bounds(path, bounds_m):
-        return None
-    return path if first_breach(path, points_m, keep_m) == float("inf") else None
-
-
-def optimise(
-    start: Pose,
-    nodes: Sequence[Point],
-    radius_m: float,
-    cut_m: float,
-    points_m: FloatArray,
-    keep_m: float | FloatArray,
-    bounds_m: tuple[float, float, float, float],
-) -> tuple[list[Point], Path] | None:
-    """The shortest flyable curve that shortcuts of a track give.
-
-    All shortcuts are tried first. Where their corners leave no room for the turns, track points are dropped one
-    by one from those that are left, and then the track is tried as it came.
+        terrain: where the curve may lie.
 
     Returns:
-        Track points after the start, and the curve; None where no choice can be flown.
+        The route; None where no choice can be flown.
     """
-    short = shortcut(nodes, points_m, keep_m)[1:]
-    choices = [short, *([*short[:i], *short[i + 1 :]] for i in range(len(short) - 1)), list(nodes[1:])]
-    for choice in choices:
-        path = flyable(start, choice, radius_m, cut_m, points_m, keep_m, bounds_m)
-        if path is not None:
-            return choice, path
+    short = shortcut(nodes, terrain)[1:]
+    choices = [(short, cut_m)]
+    choices += [([*short[:i], *short[i + 1 :]], cut_m) for i in range(len(short) - 1)]
+    choices += [(short, 0.0), (list(nodes[1:]), 0.0)]
+    for choice, cut in choices:
+        path = fillet(start, choice, limits, cut, start_curvature)
+        if path is not None and terrain.admits(path):
+            return Route(tuple(choice), path)
     return None

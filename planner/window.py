@@ -40,12 +40,46 @@ class SectorEdge(NamedTuple):
         ux, uy: unit vector along the edge, tangent to the obstacle.
         touch_m: distance at which it touches the obstacle.
         clear_m: distance up to which the direction is free; infinite where nothing is met.
+        obstacle: label of the obstacle.
     """
 
     ux: float
     uy: float
     touch_m: float
     clear_m: float
+    obstacle: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """The points of one obstacle, cell by cell of a square grid.
+
+    Attributes:
+        members: (k,) indices of the points, those of a cell next to each other.
+        first: (c,) where each cell begins in `members`.
+        counts: (c,) how many points it has.
+        around: (c, 8) the cells around it; itself where there is none.
+    """
+
+    members: IntArray
+    first: IntArray
+    counts: IntArray
+    around: IntArray
+
+    @staticmethod
+    def of(members: IntArray, points_m: FloatArray, cell_m: float) -> _Cells:
+        grid = np.floor(points_m / cell_m).astype(np.int64)
+        grid -= grid.min(axis=0) - 1
+        width = int(grid[:, 1].max()) + 2
+        keys = grid[:, 0] * width + grid[:, 1]
+        order = np.argsort(keys, kind="stable")
+        cells, first, counts = np.unique(keys[order], return_index=True, return_counts=True)
+        wanted = cells[:, None] + np.array(
+            (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)
+        )
+        place = np.minimum(np.searchsorted(cells, wanted), len(cells) - 1)
+        around = np.where(cells[place] == wanted, place, np.arange(len(cells))[:, None])
+        return _Cells(members[order], first, counts, around)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +91,7 @@ class Window:
         radius_m: r_1.
         points_m: (m, 2) sensed edge points.
         labels: (m,) the obstacle that each belongs to.
-        spacing_m: grid on which the points lie, at most one a cell.
+        cell_m: points within a square of this side are looked at as one piece of wall.
         keep_m: (m,) distance to be kept from each point.
     """
 
@@ -65,32 +99,16 @@ class Window:
     radius_m: float
     points_m: FloatArray
     labels: IntArray
-    spacing_m: float
+    cell_m: float
     keep_m: FloatArray
-    _members: dict[int, tuple[IntArray, IntArray]] = field(default_factory=dict, init=False, repr=False)
+    _cells: dict[int, _Cells] = field(default_factory=dict, init=False, repr=False)
 
-    def _obstacle(self, label: int) -> tuple[IntArray, IntArray]:
-        """Indices (k,) of the points of an obstacle, and for each the (k, 8) places of those in the cells around it.
-
-        Where a cell around a point is empty, the place is the point's own.
-        """
-        known = self._members.get(label)
-        if known is not None:
-            return known
-        members = np.flatnonzero(self.labels == label)
-        cells = np.floor(self.points_m[members] / self.spacing_m).astype(np.int64)
-        cells -= cells.min(axis=0) - 1
-        width = int(cells[:, 1].max()) + 2
-        keys = cells[:, 0] * width + cells[:, 1]
-        order = np.argsort(keys)
-        ordered = keys[order]
-        wanted = keys[:, None] + np.array(
-            (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)
-        )
-        place = np.minimum(np.searchsorted(ordered, wanted), len(keys) - 1)
-        around = np.where(ordered[place] == wanted, order[place], np.arange(len(keys))[:, None])
-        self._members[label] = (members, around)
-        return members, around
+    def _obstacle(self, label: int) -> _Cells:
+        """The points of an obstacle, gathered once."""
+        if label not in self._cells:
+            members = np.flatnonzero(self.labels == label)
+            self._cells[label] = _Cells.of(members, self.points_m[members], self.cell_m)
+        return self._cells[label]
 
     def sector_edges(self, origin: Point, label: int) -> list[SectorEdge]:
         """The edges M and N of the free sectors beside an obstacle, as seen from a track point.
@@ -101,7 +119,8 @@ class Window:
         pending, looked_at = [label], {label}
         dx, dy = self.points_m[:, 0] - origin[0], self.points_m[:, 1] - origin[1]
         while pending:
-            ux, uy, touch = self._tangents(dx, dy, pending.pop())
+            obstacle = pending.pop()
+            ux, uy, touch = self._tangents(dx, dy, obstacle)
             if not len(ux):
                 continue
             clear, met = self._clear_along(dx, dy, ux, uy)
@@ -109,34 +128,57 @@ class Window:
                 ux.tolist(), uy.tolist(), touch.tolist(), clear.tolist(), met.tolist(), strict=True
             ):
                 if row[3] >= row[2]:
-                    edges.append(SectorEdge(*row[:4]))
+                    edges.append(SectorEdge(*row[:4], obstacle))
                 elif (other := int(self.labels[row[4]])) not in looked_at and len(looked_at) < MOST_HIDING:
                     looked_at.add(other)
                     pending.append(other)
         return edges
 
+    def hugged_m(self, origin: Point, edge: SectorEdge, outer_m: float) -> float:
+        """How far along an edge an outer distance from the obstacle that it touches is reached again."""
+        points = self.points_m[self._obstacle(edge.obstacle).members]
+        dx, dy = points[:, 0] - origin[0], points[:, 1] - origin[1]
+        ahead = dx * edge.ux + dy * edge.uy
+        beside = dx * edge.uy - dy * edge.ux
+        reach = outer_m * outer_m - beside * beside
+        near = (reach > 0.0) & (ahead > -outer_m)
+        ahead, reach = ahead[near], np.sqrt(reach[near])
+        order = np.argsort(ahead - reach)
+        begin, end = (ahead - reach)[order], np.maximum.accumulate((ahead + reach)[order])
+        gap = np.flatnonzero((begin[1:] > end[:-1]) & (end[:-1] > edge.touch_m))
+        return float(end[gap[0]] if len(gap) else end[-1])
+
     def _tangents(
         self, dx: FloatArray, dy: FloatArray, label: int
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Unit vectors tangent to the ends of an obstacle's fan, and the distances at which they touch it."""
-        members, around = self._obstacle(label)
-        x, y = dx[members], dy[members]
+        cells = self._obstacle(label)
+        x, y = dx[cells.members], dy[cells.members]
         square = x * x + y * y
-        keep = self.keep_m[members]
-        outside = square > keep * keep
+        keep = self.keep_m[cells.members]
         half = np.arcsin(np.minimum(keep / np.sqrt(np.maximum(square, 1e-12)), 1.0))
         middle = np.arctan2(y, x)
-        angles, places = [], []
+        angles, touches = [], []
         for side in (1.0, -1.0):  # M, N
-            edge = middle + side * half
-            # The fan ends at a point whose tangent lies further out than those of the points around it.
-            beyond = side * (edge[around] - edge[:, None])
+            # Angles towards the side, each relative to the first point of its cell, so that none is cut at pi.
+            edge = side * middle + half
+            reference = edge[cells.first]
+            relative = edge - np.repeat(reference, cells.counts)
+            relative -= math.tau * np.rint(relative / math.tau)
+            furthest = np.maximum.reduceat(relative, cells.first)
+            outmost = reference + furthest
+            # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
+            beyond = outmost[cells.around] - outmost[:, None]
             beyond -= math.tau * np.rint(beyond / math.tau)
-            chosen = np.flatnonzero((beyond <= 0.0).all(axis=1) & outside)
-            angles.append(edge[chosen] + side * EDGE_OFF_RAD)
-            places.append(chosen)
-        angle, place = np.concatenate(angles), np.concatenate(places)
-        return np.cos(angle), np.sin(angle), np.sqrt(square[place] - keep[place] ** 2)
+            for cell in np.flatnonzero((beyond <= 0.0).all(axis=1)).tolist():
+                first = cells.first[cell]
+                place = first + int(relative[first : first + cells.counts[cell]].argmax())
+                touch2 = square[place] - keep[place] ** 2
+                if touch2 > 0.0:
+                    angles.append(side * (edge[place] + EDGE_OFF_RAD))
+                    touches.append(math.sqrt(touch2))
+        angle = np.array(angles)
+        return np.cos(angle), np.sin(angle), np.array(touches)
 
     def _clear_along(
         self, dx: FloatArray, dy: FloatArray, ux: FloatArray, uy: FloatArray

@@ -1,0 +1,74 @@
+"""Worlds of separate convex obstacles, drawn at random: the goal is reached and the clearance kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.metrics import clearance_violation_s
+from harness.record import Flight, Outcome
+from harness.scenario import Scenario
+
+CELL_M, CELLS = 1100.0, 4
+FIRST_CENTRE_M = 1350.0
+LARGEST_M, SHIFT_M = 280.0, 120.0
+"""Neighbours are at least 1100 - 2 (280 + 120) = 300 m apart, three turn radii of the aircraft."""
+
+SmallWorld = Callable[..., Scenario]
+FlyPointMass = Callable[[Scenario], Flight]
+
+
+@st.composite
+def obstacles(draw: st.DrawFn, east: float, north: float) -> dict[str, Any]:
+    """A circle or a convex polygon about a place."""
+    shift, radii = st.integers(-int(SHIFT_M), int(SHIFT_M)), st.integers(60, int(LARGEST_M))
+    x, y, radius = east + draw(shift), north + draw(shift), float(draw(radii))
+    corners = draw(st.integers(2, 7))
+    if corners == 2:
+        return {"circle": {"center_m": [x, y], "radius_m": radius}}
+    turned = math.radians(draw(st.integers(0, 119)))
+    angles = [turned + math.tau * corner / corners for corner in range(corners)]
+    ring = [[x + radius * math.cos(angle), y + radius * math.sin(angle)] for angle in angles]
+    return {"polygon": {"vertices_m": ring}}
+
+
+@st.composite
+def fields(draw: st.DrawFn) -> list[dict[str, Any]]:
+    """Up to one obstacle in each cell of a grid."""
+    places = [FIRST_CENTRE_M + CELL_M * step for step in range(CELLS)]
+    taken = draw(st.lists(st.booleans(), min_size=CELLS**2, max_size=CELLS**2))
+    cells = [(east, north) for east in places for north in places]
+    return [draw(obstacles(*cell)) for cell, full in zip(cells, taken, strict=True) if full]
+
+
+@given(field=fields())
+@settings(max_examples=30, deadline=None, derandomize=True)
+def test_reaches_the_goal_and_keeps_the_clearance(
+    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, field: list[dict[str, Any]]
+) -> None:
+    scenario = small_world(*field)
+    flight = flown_by_point_mass(scenario)
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    assert flight.track.clearance_m.min() >= scenario.planner.clearance_m
+    assert clearance_violation_s(flight.track, scenario.planner.clearance_m) == 0.0
+    straight_m = math.dist(scenario.mission.start_m, scenario.mission.goal_m)
+    assert flight.sim_s * 25.0 <= 1.15 * straight_m
+
+
+@given(field=fields(), wind_from_deg=st.integers(0, 359))
+@settings(max_examples=10, deadline=None, derandomize=True)
+def test_wind_changes_neither(
+    small_world: SmallWorld,
+    flown_by_point_mass: FlyPointMass,
+    field: list[dict[str, Any]],
+    wind_from_deg: int,
+) -> None:
+    wind = {"speed_mps": 5.0, "from_deg": float(wind_from_deg)}
+    scenario = small_world(*field, environment={"wind": wind})
+    flight = flown_by_point_mass(scenario)
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    assert flight.track.clearance_m.min() >= scenario.planner.clearance_m

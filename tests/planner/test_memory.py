@@ -1,0 +1,146 @@
+"""What is gathered into one obstacle, against brute force."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from planner.interface import BoolArray, FloatArray
+from planner.memory import ObstacleMemory
+
+CLEARANCE = 100.0
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+class Batches:
+    """A seen world whose edge points come in batches and may be taken back."""
+
+    spacing_m = CLEARANCE / 4.0
+
+    def __init__(self) -> None:
+        self.revision = 0
+        self.taken_back_at = 0
+        self._points: list[tuple[int, FloatArray]] = []
+
+    def add(self, points: FloatArray) -> None:
+        self.revision += 1
+        self._points.append((self.revision, points))
+
+    def take_back(self, keep: FloatArray) -> None:
+        self.revision += 1
+        self.taken_back_at = self.revision
+        self._points = [(1, keep)]
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return np.concatenate([np.zeros((0, 2)), *(p for at, p in self._points if at > revision)])
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.zeros(len(points_m), dtype=np.bool_)
+
+
+def components(points: FloatArray, link_m: float) -> NDArray[np.intp]:
+    """A number for each point: the lowest one that it is chained to by gaps of at most `link_m`."""
+    near = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1)) <= link_m
+    number = np.arange(len(points))
+    while True:
+        lowest = np.where(near, number, len(points)).min(axis=1)
+        if (lowest == number).all():
+            return number
+        number = lowest
+
+
+def is_finer(fine: NDArray[np.intp], coarse: NDArray[np.intp]) -> bool:
+    """Whether points together in the first partition are together in the second."""
+    return len(set(zip(fine.tolist(), coarse.tolist(), strict=True))) == len(set(fine.tolist()))
+
+
+def memory_of(*batches: FloatArray) -> ObstacleMemory:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    for batch in batches:
+        seen.add(batch)
+        memory.take_in(seen)
+    return memory
+
+
+def scattered(seed: int, count: int, span: float) -> FloatArray:
+    return np.random.default_rng(seed).uniform(-span, span, (count, 2))
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, count=st.integers(1, 80), span=st.sampled_from([200.0, 600.0, 1500.0]))
+def test_labels_lie_between_those_of_gaps_that_are_surely_closed_and_not_surely_open(
+    seed: int, count: int, span: float
+) -> None:
+    points = scattered(seed, count, span)
+    labels = memory_of(points).labels
+    assert is_finer(components(points, 0.7 * CLEARANCE), labels)
+    assert is_finer(labels, components(points, 2.0 * CLEARANCE))
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, clusters=st.integers(1, 6))
+def test_clear_clusters_are_the_connected_components(seed: int, clusters: int) -> None:
+    rng = np.random.default_rng(seed)
+    groups = []
+    for i in range(clusters):
+        steps = rng.uniform(0.2, 0.69, 12) * CLEARANCE
+        course = rng.uniform(0.0, math.tau, 12)
+        walk = np.cumsum(np.column_stack((steps * np.cos(course), steps * np.sin(course))), axis=0)
+        groups.append(walk + (2000.0 * i, 0.0))
+    points = np.concatenate(groups)
+    order = rng.permutation(len(points))
+    labels = memory_of(points[order]).labels
+    truth = np.repeat(np.arange(clusters), 12)[order]
+    assert is_finer(labels, truth)
+    assert is_finer(truth, labels)
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, count=st.integers(2, 80), parts=st.integers(1, 8))
+def test_point_by_point_gives_the_same_obstacles_as_at_once(seed: int, count: int, parts: int) -> None:
+    points = scattered(seed, count, 800.0)
+    at_once, by_and_by = memory_of(points), memory_of(*np.array_split(points, parts))
+    np.testing.assert_array_equal(by_and_by.points_m, points)
+    assert is_finer(at_once.labels, by_and_by.labels)
+    assert is_finer(by_and_by.labels, at_once.labels)
+
+
+def test_a_bridge_makes_two_obstacles_one() -> None:
+    left, right = np.array([(0.0, 0.0), (50.0, 0.0)]), np.array([(400.0, 0.0)])
+    memory = memory_of(left, right)
+    assert len(set(memory.labels.tolist())) == 2
+    bridge = np.column_stack((np.arange(90.0, 390.0, 50.0), np.zeros(6)))
+    assert set(memory_of(left, right, bridge).labels.tolist()) == {int(memory.labels[0])}
+
+
+def test_only_what_is_new_is_returned() -> None:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    assert memory.take_in(seen).shape == (0, 2)
+    first, second = scattered(1, 300, 1000.0), scattered(2, 400, 1000.0)
+    seen.add(first)
+    np.testing.assert_array_equal(memory.take_in(seen), first)
+    assert len(memory.take_in(seen)) == 0
+    seen.add(second)
+    np.testing.assert_array_equal(memory.take_in(seen), second)
+    np.testing.assert_array_equal(memory.points_m, np.concatenate((first, second)))
+    assert memory.labels.shape == (700,)
+
+
+@pytest.mark.parametrize("known_before", [True, False])
+def test_what_is_taken_back_is_forgotten(known_before: bool) -> None:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    seen.add(np.array([(0.0, 0.0), (60.0, 0.0), (120.0, 0.0), (180.0, 0.0), (240.0, 0.0)]))
+    if known_before:
+        memory.take_in(seen)
+        assert len(set(memory.labels.tolist())) == 1
+    ends = np.array([(0.0, 0.0), (240.0, 0.0)])
+    seen.take_back(ends)
+    np.testing.assert_array_equal(memory.take_in(seen), ends)
+    np.testing.assert_array_equal(memory.points_m, ends)
+    assert len(set(memory.labels.tolist())) == 2
+    assert len(memory.take_in(seen)) == 0
