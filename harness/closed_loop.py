@@ -79,8 +79,17 @@ class Loop:
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
     """Flies a mission to its end.
 
-    Everything happens at whole steps of the flight model: guidance and log at their rates, a scan at the sensor's; a scan or a
-    plan that is late takes effect at the first of these steps after its delay. Time is a count of steps.
+    Everything happens at whole steps of the flight model: guidance and log at their rates, a scan at the
+    sensor's. A scan or a plan that is late takes effect at the first of these steps after its delay. Time is a
+    count of steps.
+
+    Args:
+        loop: all parts of the flight; used up by it.
+        observers: look on.
+        progress: told of the flight every few simulated seconds.
+
+    Raises:
+        ValueError: the scan rate does not divide the simulation rate.
     """
     begun = time.perf_counter()
     watch = Stopwatch()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,7 @@ from harness.metrics import metrics
 from harness.obstacle_map import ObstacleMap
 from harness.planner_keys import config_of
 from harness.range_sensor import RangeSensor
-from harness.record import AcceptedPlan, Flight, Track
+from harness.record import AcceptedPlan, Track
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.trackability import FlightLimits

@@ -105,7 +105,8 @@ def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bo
         for x, y, r, row in zip(centre_x[out], centre_y[out], radius[out], bent[out], strict=True):
             extremes = np.array([[x - r, y], [x + r, y], [x, y - r], [x, y + r]])
             distance, _ = _to_arcs(row[None], extremes)
-            if not _all_within(*extremes[distance[0] < 1e-6 * r].T, bounds_m):
+            passed = extremes[distance[0] < 1e-6 * r]
+            if not _all_within(passed[:, 0], passed[:, 1], bounds_m):
                 return False
     end = end_of(path)
     return xmin <= end.east_m <= xmax and ymin <= end.north_m <= ymax

@@ -142,7 +142,8 @@ class Limits(NamedTuple):
 
     Attributes:
         radius_m: smallest radius.
-        roll_m: distance flown while rolling into the tightest turn; kept straight between a left and a right turn.
+        roll_m: distance flown while rolling into the tightest turn; kept straight between a left and a right
+            turn.
     """
 
     radius_m: float
@@ -154,8 +155,8 @@ def fillet(
 ) -> Path | None:
     """A path from a pose through the corners of a polyline, each corner rounded by one arc.
 
-    The first turn has the smallest radius. Every corner gets the largest arc that its legs have room for and that
-    passes the corner within a given distance, so that curvature is no larger than it has to be.
+    The first turn has the smallest radius. Every corner gets the largest arc that its legs have room for and
+    that passes the corner within a given distance, so that curvature is no larger than it has to be.
 
     Args:
         start: where the path begins.

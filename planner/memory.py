@@ -15,8 +15,8 @@ IntArray = NDArray[np.intp]
 class ObstacleMemory:
     """Every edge point seen so far and the obstacle that it belongs to.
 
-    Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They are gathered on a
-    grid whose neighbouring cells (diagonals too) are always that near, point by point as they come in.
+    Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They
+    are gathered on a grid whose neighbouring cells (diagonals too) are always that near, as they come in.
 
     Args:
         clearance_m: distance to be kept from every point.
@@ -73,7 +73,7 @@ class ObstacleMemory:
         self._labels[new] = [self._of_cell[cell] for cell in cells]
 
     def _join(self, cell: tuple[int, int]) -> None:
-        """Gives a new cell the label of its neighbours; neighbours with different labels become one obstacle."""
+        """Gives a new cell the label of its neighbours, which become one obstacle if they were several."""
         x, y = cell
         around = ((x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
         found = {self._of_cell[near] for near in around if near in self._of_cell}

@@ -1,9 +1,9 @@
 """The paper's multi-step search: N steps deep, at every step the n best tracks are kept.
 
-A step goes along the guide vector where nothing is in the way. Otherwise it goes along an edge of one of the free
-sectors: by equation (4) the way that is left grows with the angle off the guide vector, so that in the
-continuous plane the best direction in a sector is its edge nearest to the guide vector. The step along an edge is as long
-as it hugs the obstacle; from there the guide vector may turn inwards.
+A step goes along the guide vector where nothing is in the way. Otherwise it goes along an edge of one of the
+free sectors: by equation (4) the way that is left grows with the angle off the guide vector, so that in the
+continuous plane the best direction in a sector is its edge nearest to the guide vector. The step along an edge
+is as long as it hugs the obstacle; from there the guide vector may turn inwards.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ def search(
         bounds_m: area that no track point may leave.
         steps: N, how many steps are looked ahead.
         keep_best: n, how many tracks are kept at every step.
-        outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`, so
-            that steps around a round obstacle are long.
+        outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`,
+            so that steps around a round obstacle are long.
 
     Yields:
         Tracks that see the goal from their last track point but one; none where n tracks at every one

@@ -64,7 +64,7 @@ def search_poses(
         for change in (0.0, 0.5 * largest, -0.5 * largest, largest, -largest):
             if change * turning < 0.0:
                 continue
-            # The chord of an arc points half-way between the tangents at its ends: theta_k is the course of chords.
+            # theta_k is the course of chords: half-way between the tangents at the ends of an arc.
             nx, ny, chord = step(x, y, course, 0.5 * change, step_m)
             curvature = 2.0 * math.sin(0.5 * change) / step_m
             arc: Segment = (*pose, curvature, change / curvature if change else step_m)

@@ -24,9 +24,9 @@ class PlannerKind:
     Attributes:
         kind: the name, as in `planner.kind` of a scenario.
         summary: one line for `wayproof list planners`.
-        config: frozen dataclass of the planner's own keys. Each field has a default and the metadata
-            `doc` (a sentence), `unit`, and `minimum` / `maximum` or `above` where there is such a bound. A default of None
-            is derived: `config.resolved(mission)` returns the config with no None left and raises
+        config: frozen dataclass of the planner's own keys. Each field has a default and the metadata `doc` (a
+            sentence), `unit`, and `minimum` / `maximum` or `above` where there is such a bound. A default of
+            None is derived: `config.resolved(mission)` returns the config with no None left and raises
             ValueError, with a sentence, where keys contradict each other.
         make: the planner for one flight, from a resolved config.
     """

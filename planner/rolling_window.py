@@ -1,8 +1,8 @@
 """The rolling-window planner of the paper.
 
-In every rolling step: take the planning window about the track point where the new plan begins; search N steps
-deep among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum turn
-radius (`route_optimisation`); the shortest of the n is the plan. It is flown until the window rolls on.
+In every rolling step: take the planning window about the track point where the new plan begins; search N
+steps deep among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum
+turn radius (`route_optimisation`); the shortest of the n is the plan. It is flown until the window rolls on.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ WIDER = 6
 """Where n tracks at every one of N steps find no way, this many times as many are tried."""
 
 HOLD_SHARES = (1.0, 0.5, 0.1)
-"""Shares of the clearance with which a holding turn is sought: a turn too near to something is better than none."""
+"""Shares of the clearance with which a holding turn is sought: one too near to something is better than none."""
 
 BETTER = 0.005
 """A plan that still serves is dropped only for one that is shorter by this share of what is left to fly."""
@@ -252,8 +252,8 @@ class RollingWindow:
     def _attempts(self) -> list[tuple[float, float]]:
         """Distances and margins to search with, in order, until a track can be flown.
 
-        First as wanted. Then wide enough for a turn about the end of a wall at the turn radius. Last with what of the
-        margin there is room for.
+        First as wanted. Then wide enough for a turn about the end of a wall at the turn radius. Last with what
+        of the margin there is room for.
         """
         clearance, margin, radius = self._mission.clearance_m, self._margin_m, self._mission.turn_radius_m
         attempts = [(clearance, margin), (clearance, 0.2 * margin)]

@@ -70,9 +70,9 @@ def optimise(
 ) -> Route | None:
     """The curve through the shortcuts of a track, at the minimum turn radius.
 
-    All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near to
-    something, one corner after the other is left out, then corners are rounded as tightly as may be, and
-    then the track is tried as it came.
+    All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near
+    to something, one corner after the other is left out, then corners are rounded as tightly as may be,
+    and then the track is tried as it came.
 
     Args:
         start: pose at which the curve begins.

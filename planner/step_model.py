@@ -9,7 +9,7 @@ import math
 
 
 def largest_course_change_rad(step_m: float, turn_radius_m: float) -> float:
-    """Largest |Delta theta_0| over one step S_0: a chord S_0 of a circle of radius R turns by 2 asin(S_0 / 2R)."""
+    """Largest |Delta theta_0| over a step S_0: a chord S_0 of a circle of radius R turns by 2 asin(S_0 / 2R)."""
     return 2.0 * math.asin(min(1.0, step_m / (2.0 * turn_radius_m)))
 
 

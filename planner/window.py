@@ -1,10 +1,10 @@
 """The rolling window: what lies in it, the guide vector, and the fan-shaped sectors that obstacles cut.
 
 Definition 1 of the paper is the sensing range U, Definition 2 the guide vector alpha; section 3.3 has the
-planning window U_1 of radius r_1 <= r. Seen from a track point, an obstacle, grown by the distance to be kept from
-it, fills a fan of bearings. M and N are where its fan ends on the left and on the right: directions tangent to
-the obstacle. Between the fans lie the free sectors. Fans that overlap are merged, and an edge that something nearer
-hides is none.
+planning window U_1 of radius r_1 <= r. Seen from a track point, an obstacle, grown by the distance to be kept
+from it, fills a fan of bearings. M and N are where its fan ends on the left and on the right: directions
+tangent to the obstacle. Between the fans lie the free sectors. Fans that overlap are merged, and an edge that
+something nearer hides is none.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ class Window:
         middle = np.arctan2(y, x)
         angles, touches = [], []
         for side in (1.0, -1.0):  # M, N
-            # Angles towards the side, each relative to the first point of its cell, so that none is cut at pi.
+            # Angles towards the side, relative to the first point of their cell: none is cut at pi.
             edge = side * middle + half
             reference = edge[cells.first]
             relative = edge - np.repeat(reference, cells.counts)
@@ -183,7 +183,7 @@ class Window:
     def _clear_along(
         self, dx: FloatArray, dy: FloatArray, ux: FloatArray, uy: FloatArray
     ) -> tuple[FloatArray, IntArray]:
-        """How far (k,) directions lead before they come too near to a point (infinite: they do not), and to which."""
+        """How far (k,) directions lead before they come too near to a point, and to which; infinite: never."""
         ahead = ux[:, None] * dx + uy[:, None] * dy
         beside = uy[:, None] * dx - ux[:, None] * dy
         room = self.keep_m * self.keep_m - beside * beside
@@ -196,7 +196,8 @@ class Window:
     def free_sectors(self, origin: Point) -> FloatArray:
         """(k, 4) free sectors at a track point: unit vectors of the right and the left edge of each.
 
-        Fans that overlap or hide each other are merged. With nothing in the window there is no row: all is free.
+        Fans that overlap or hide each other are merged. With nothing in the window all is free and there is no
+        row.
         """
         if not len(self.points_m):
             return np.zeros((0, 4))

@@ -12,6 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.curves import (
+    Limits,
     Point,
     Pose,
     Segment,
@@ -20,6 +21,8 @@ from planner.curves import (
     end_of,
     fillet,
     full_turn,
+    on_loiter,
+    place_on,
     pose_at,
     sample,
     turn_onto,
@@ -29,6 +32,7 @@ from planner.interface import FloatArray, Path
 Integrated = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
 
+EAST = Pose(0.0, 0.0, 1.0, 0.0)
 ANGLES = st.floats(-math.pi, math.pi)
 POSES = st.builds(
     lambda x, y, course: Pose(x, y, math.cos(course), math.sin(course)),
@@ -170,32 +174,49 @@ def test_turn_onto_goes_straight_at_what_lies_ahead() -> None:
     assert sum(segment[5] for segment in segments) == pytest.approx(1000.0)
 
 
+def assert_room_to_roll(path: Path, roll_m: float, before: float) -> None:
+    """A left and a right turn are parted by a straight run, also that which ends at the start."""
+    last, straight = before, 0.0
+    for *_, curvature, length in path.segments.tolist():
+        if curvature == 0.0:
+            straight += length
+            continue
+        if curvature * last < 0.0:
+            assert straight >= roll_m - 1e-5
+        last, straight = curvature, 0.0
+
+
 @settings(deadline=None)
-@given(start=POSES, walk=WALKS, radius=st.floats(50.0, 300.0), cut=st.floats(1.0, 500.0))
+@given(
+    start=POSES,
+    walk=WALKS,
+    limits=st.builds(Limits, st.floats(50.0, 300.0), st.sampled_from([0.0, 60.0])),
+    cut=st.floats(0.0, 500.0),
+    before=st.sampled_from([-1.0, 0.0, 1.0]),
+)
 def test_a_fillet_is_smooth_and_passes_its_corners_as_near_as_asked(
     start: Pose,
     walk: list[tuple[float, float]],
-    radius: float,
+    limits: Limits,
     cut: float,
+    before: float,
     assert_flyable: AssertFlyable,
 ) -> None:
     nodes = corners(start, walk)
-    path = fillet(start, nodes, radius, cut)
+    path = fillet(start, nodes, limits, cut, before / limits.radius_m)
     assume(path is not None)
     assert path is not None
-    assert_flyable(path, radius)
+    assert_flyable(path, limits.radius_m)
+    assert_room_to_roll(path, limits.roll_m, before)
     np.testing.assert_allclose(path.segments[0, :4], start, atol=1e-5)
-    end = end_of(path)
-    np.testing.assert_allclose(end[:2], nodes[-1], atol=1e-4)
+    np.testing.assert_allclose(end_of(path)[:2], nodes[-1], atol=1e-4)
     line = shapely.LineString(sample(path, 50.0, 0.01))
-    polyline = [pose_at(path, 0.0)[:2], *nodes]
-    for before, corner, after in zip(polyline, nodes, nodes[1:], strict=False):
-        into = (corner[0] - before[0], corner[1] - before[1])
-        out = (after[0] - corner[0], after[1] - corner[1])
-        turn = abs(math.atan2(into[0] * out[1] - into[1] * out[0], into[0] * out[0] + into[1] * out[1]))
-        if corner == nodes[0]:
-            continue  # the first turn changes the course on which the first corner is met
-        tightest = radius * (1.0 / math.cos(0.5 * turn) - 1.0)
+    # The first turn changes the course on which the first corner is met: corners after it are judged.
+    for into, corner, after in zip(nodes, nodes[1:], nodes[2:], strict=False):
+        ax, ay = corner[0] - into[0], corner[1] - into[1]
+        bx, by = after[0] - corner[0], after[1] - corner[1]
+        turn = abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
+        tightest = limits.radius_m * (1.0 / math.cos(0.5 * turn) - 1.0)
         assert line.distance(shapely.Point(corner)) <= max(cut, tightest) + 0.05
 
 
@@ -203,14 +224,35 @@ def test_a_fillet_is_smooth_and_passes_its_corners_as_near_as_asked(
 @given(radius=st.floats(50.0, 300.0), turn=st.floats(0.2, 2.2), cut=st.floats(1.0, 400.0))
 def test_one_corner_is_cut_by_what_is_asked_and_room_allows(radius: float, turn: float, cut: float) -> None:
     leg = 4000.0
-    corner = (leg, 0.0)
-    end = (leg + leg * math.cos(turn), leg * math.sin(turn))
-    path = fillet(Pose(0.0, 0.0, 1.0, 0.0), [corner, end], radius, cut)
+    nodes = [(leg, 0.0), (leg + leg * math.cos(turn), leg * math.sin(turn))]
+    path = fillet(EAST, nodes, Limits(radius, 50.0), cut)
     assert path is not None
     sharpness = 1.0 / math.cos(0.5 * turn) - 1.0
-    widest = leg / math.tan(0.5 * turn)
-    wanted = max(radius, min(cut / sharpness, widest))
-    assert 1.0 / path.max_curvature_1pm == pytest.approx(wanted, rel=1e-6)
+    # No corner takes more than half of the leg that leads to it, unless the turn radius needs it.
+    widest = 0.5 * leg / math.tan(0.5 * turn)
+    assert 1.0 / path.max_curvature_1pm == pytest.approx(max(radius, min(cut / sharpness, widest)), rel=1e-6)
+
+
+def test_a_turn_against_the_one_before_begins_after_the_room_to_roll() -> None:
+    limits = Limits(100.0, 40.0)
+    behind_right = [(-1000.0, -500.0)]
+    at_once = fillet(EAST, behind_right, limits, 0.0)
+    against = fillet(EAST, behind_right, limits, 0.0, 1.0 / 100.0)
+    assert at_once is not None
+    assert against is not None
+    assert at_once.segments[0, 4] == pytest.approx(-0.01)
+    np.testing.assert_allclose(against.segments[0], (0.0, 0.0, 1.0, 0.0, 0.0, 40.0))
+    assert against.segments[1, 4] == pytest.approx(-0.01)
+
+
+def test_a_first_corner_against_the_turn_before_leaves_the_room_to_roll() -> None:
+    limits = Limits(100.0, 40.0)
+    nodes = [(100.0, 0.0), (100.0, -1000.0)]
+    at_once = fillet(EAST, nodes, limits, 0.0)
+    assert at_once is not None
+    assert_room_to_roll(at_once, 40.0, -1.0)
+    # The corner needs all of the first leg: a left turn before it leaves no room.
+    assert fillet(EAST, nodes, limits, 0.0, 1.0 / 100.0) is None
 
 
 @pytest.mark.parametrize(
@@ -219,14 +261,39 @@ def test_one_corner_is_cut_by_what_is_asked_and_room_allows(radius: float, turn:
         ([(1000.0, 0.0), (1000.0, 90.0), (2000.0, 90.0)], 100.0),  # a step too narrow for its two turns
         ([(1000.0, 0.0), (0.0, 0.0)], 10.0),  # straight back
         ([(1000.0, 0.0), (1000.0, 0.0)], 10.0),  # a leg of no length
+        ([(0.0, 0.0)], 10.0),  # the start itself
     ],
 )
 def test_what_cannot_be_rounded_has_no_fillet(nodes: list[Point], radius: float) -> None:
-    assert fillet(Pose(0.0, 0.0, 1.0, 0.0), nodes, radius, 50.0) is None
+    assert fillet(EAST, nodes, Limits(radius, 0.0), 50.0) is None
+
+
+def test_a_node_at_the_start_has_no_fillet_whatever_the_course() -> None:
+    for i in range(200):
+        start = Pose(10.0 * i, 7.0 * i, math.cos(i), math.sin(i))
+        path = fillet(start, [start[:2], (start[0] + 1000.0, start[1])], Limits(100.0, 10.0), 50.0)
+        assert path is None or path.length_m > 600.0
 
 
 def test_a_straight_run_through_nodes_is_straight() -> None:
-    path = fillet(Pose(0.0, 0.0, 1.0, 0.0), [(300.0, 0.0), (700.0, 0.0), (1000.0, 0.0)], 100.0, 50.0)
+    path = fillet(EAST, [(300.0, 0.0), (700.0, 0.0), (1000.0, 0.0)], Limits(100.0, 50.0), 50.0)
     assert path is not None
     assert path.max_curvature_1pm == 0.0
     assert path.length_m == pytest.approx(1000.0)
+
+
+def test_the_curvature_at_a_place_is_that_of_its_segment() -> None:
+    path = Path(np.array(joined(EAST, [(0.0, 100.0), (0.01, 50.0), (-0.02, 30.0)])))
+    assert [place_on(path, s)[1] for s in (50.0, 120.0, 160.0)] == [0.0, 0.01, -0.02]
+    assert place_on(path, 120.0)[0] == pose_at(path, 120.0)
+
+
+def test_stations_on_a_loiter_go_round_and_round() -> None:
+    turn = math.tau * 150.0
+    rows = [(0.0, 0.0, 1.0, 0.0, 0.0, 400.0), full_turn(Pose(400.0, 0.0, 1.0, 0.0), 150.0, 1.0)]
+    path = Path(np.array(rows), loiter=True)
+    assert on_loiter(path, 300.0) == 300.0
+    for turns in range(4):
+        assert on_loiter(path, 450.0 + turns * turn) == pytest.approx(450.0)
+    straight = Path(path.segments)
+    assert on_loiter(straight, 400.0 + 2.5 * turn) == 400.0 + 2.5 * turn

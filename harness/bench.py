@@ -1,0 +1,120 @@
+"""What the closed loop costs on this machine, against the bare flight model.
+
+All costs are processor time of the whole process, threads of libraries included, so that neither other programs
+nor work in the background changes a ratio. Flights and bare runs take turns, and the least of each counts: what
+disturbs a measurement only ever adds to it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from harness.closed_loop import Progress, fly
+from harness.run import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop, start_conditions
+from harness.scenario import Scenario
+
+ROUNDS = 3
+"""Each round is one bare run, one flight without and one with the recording."""
+
+T = TypeVar("T")
+
+
+def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any]:
+    """Measures one scenario, in this process.
+
+    First the loop is flown once alone: that loads what is loaded at its first use, and gives the shares of the
+    blocks. Then come `ROUNDS` rounds of three measurements:
+
+    - bare: `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start in
+      the same air, for as many steps as the flight takes; loading and trimming not counted;
+    - closed loop: the whole flight from the scenario to a complete run folder without the recording: loading,
+      trimming, flying, metrics, writing and closing every file;
+    - the same with the recording.
+
+    Args:
+        scenario: a complete scenario.
+        progress: told of the first flight as it goes on, and of each round.
+
+    Returns:
+        `scenario`, `outcome`; `sim_s` and `steps` of the flight; `cpu_s`, the least seconds of `bare`,
+        `closed_loop` and `closed_loop_recording`; `bare_step_us`; the ratios `closed_loop_ratio` and
+        `closed_loop_recording_ratio` of those to `bare`; `planner_ms`, `p50`, `p99` and `max` of all searches of
+        a flight, the least of all flights; `blocks`, the share of each block in the flight with the recording.
+
+    Raises:
+        AircraftError: the aircraft cannot be loaded or trimmed.
+        ValueError: the flight is over before anything was planned or flown, so there is nothing to compare.
+    """
+    loop = make_loop(scenario)
+    loop_s, flight = _cpu_s(lambda: fly(loop, (), progress))
+    steps = round(flight.sim_s * loop.model.step_rate_hz)
+    if not steps or not flight.compute_ms:
+        raise ValueError(f"nothing to measure: {flight.reason}")
+    bare_s: list[float] = []
+    plain: list[tuple[float, dict[str, Any]]] = []
+    recorded: list[tuple[float, dict[str, Any]]] = []
+    for number in range(1, ROUNDS + 1):
+        if progress is not None:
+            progress(flight.sim_s, 0.0, f"round {number} of {ROUNDS}")
+        bare_s.append(_bare_s(scenario, steps))
+        plain.append(_flown(scenario, recording=False))
+        recorded.append(_flown(scenario, recording=True))
+    bare, closed, recording = min(bare_s), _least(plain), _least(recorded)
+    searches = [figures["compute_ms"] for _, figures in (*plain, *recorded)]
+    return {
+        "scenario": scenario.name,
+        "outcome": flight.outcome.value,
+        "sim_s": flight.sim_s,
+        "steps": steps,
+        "cpu_s": {"bare": bare, "closed_loop": closed, "closed_loop_recording": recording},
+        "bare_step_us": 1e6 * bare / steps,
+        "closed_loop_ratio": closed / bare,
+        "closed_loop_recording_ratio": recording / bare,
+        "planner_ms": {name: min(each[name] for each in searches) for name in ("p50", "p99", "max")},
+        "blocks": block_shares(flight.block_shares, min(loop_s, closed), closed, max(recording, closed)),
+    }
+
+
+def block_shares(
+    in_loop: Mapping[str, float], loop_s: float, closed_s: float, recording_s: float
+) -> dict[str, float]:
+    """Share of each block in a whole flight with the recording; they sum to 1.
+
+    What comes before and after the loop (loading, metrics, files) is booked to `record`, what the recording adds
+    to `recording`.
+
+    Args:
+        in_loop: share of each block in the loop alone.
+        loop_s: processor time of the loop alone.
+        closed_s: that of the whole flight without the recording, not less.
+        recording_s: that of the whole flight with it, not less.
+    """
+    seconds = {block: share * loop_s for block, share in in_loop.items()}
+    seconds["record"] = seconds.get("record", 0.0) + closed_s - loop_s
+    seconds["recording"] = recording_s - closed_s
+    return {block: each / recording_s for block, each in seconds.items()}
+
+
+def _bare_s(scenario: Scenario, steps: int) -> float:
+    model = jsbsim_aircraft(scenario, start_conditions(scenario), atmosphere(scenario))
+    return _cpu_s(lambda: model.advance(steps))[0]
+
+
+def _flown(scenario: Scenario, *, recording: bool) -> tuple[float, dict[str, Any]]:
+    """Processor time and figures of one flight into a folder that is thrown away."""
+    with tempfile.TemporaryDirectory(prefix="wayproof-bench-") as folder:
+        return _cpu_s(lambda: fly_to_folder(scenario, Path(folder) / "run", recording))
+
+
+def _least(flights: Iterable[tuple[float, Any]]) -> float:
+    return min(seconds for seconds, _ in flights)
+
+
+def _cpu_s(action: Callable[[], T]) -> tuple[float, T]:
+    begun = time.process_time()
+    result = action()
+    return time.process_time() - begun, result

@@ -1,0 +1,68 @@
+"""A late, noisy or lying sensor and a slow planner: still reached, still safe, in a simple world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from harness.record import Flight, Outcome
+from harness.scenario import Scenario
+
+SmallWorld = Callable[..., Scenario]
+FlyPointMass = Callable[[Scenario], Flight]
+
+WORLD: tuple[dict[str, Any], ...] = (
+    {"circle": {"center_m": [1800.0, 1900.0], "radius_m": 250.0}},
+    {"polygon": {"vertices_m": [[3500.0, 3300.0], [4200.0, 3400.0], [4100.0, 4200.0], [3400.0, 4000.0]]}},
+    {"circle": {"center_m": [4700.0, 4100.0], "radius_m": 150.0}},
+)
+
+
+@pytest.mark.parametrize(
+    ("section", "keys"),
+    [
+        ("sensor", {"latency_s": 1.0}),
+        ("planner", {"compute_latency_s": 1.0}),
+        ("sensor", {"range_noise_m": 3.0}),
+        ("sensor", {"dropout": 0.2}),
+        ("sensor", {"false_return": 0.01}),
+        ("sensor", {"field_of_view_deg": 200.0}),
+        ("sensor", {"rate_hz": 0.5}),
+        ("sensor", {"latency_s": 0.5, "range_noise_m": 2.0, "dropout": 0.05, "false_return": 0.005}),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "-".join(value),
+)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_is_reached_and_safe(
+    section: str,
+    keys: dict[str, float],
+    seed: int,
+    small_world: SmallWorld,
+    flown_by_point_mass: FlyPointMass,
+) -> None:
+    scenario = small_world(*WORLD, **{section: keys}).model_copy(update={"seed": seed})
+    flight = flown_by_point_mass(scenario)
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    noise_m = 3.0 * scenario.sensor.range_noise_m
+    assert flight.track.clearance_m.min() >= 0.8 * scenario.planner.clearance_m - noise_m
+
+
+def test_a_late_scan_and_a_late_plan_take_effect_late(
+    small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    late = small_world(*WORLD, sensor={"latency_s": 0.75}, planner={"compute_latency_s": 0.5})
+    at_once = small_world(*WORLD)
+    assert flown_by_point_mass(at_once).plans[0].time_s == 0.0
+    first = flown_by_point_mass(late).plans[0]
+    assert first.time_s == 1.25
+
+
+def test_noise_is_that_of_the_seed(small_world: SmallWorld, flown_by_point_mass: FlyPointMass) -> None:
+    noisy = small_world(*WORLD, sensor={"range_noise_m": 3.0})
+    tracks = [
+        flown_by_point_mass(noisy.model_copy(update={"seed": seed})).track.east_m.tolist() for seed in (1, 1, 2)
+    ]
+    assert tracks[0] == tracks[1]
+    assert tracks[0] != tracks[2]

@@ -1,0 +1,145 @@
+"""Every way in which a flight can end: its outcome, its reason and what the command makes of it."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.point_mass import PointMass
+from aircraft.start import Atmosphere, StartConditions
+from harness import run
+from harness.cli import main
+from harness.record import Flight
+from harness.scenario import Scenario, dump_scenario
+from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+
+SmallWorld = Callable[..., Scenario]
+FlyPointMass = Callable[[Scenario], Flight]
+Answer = Callable[[Mission, PlanRequest], Plan]
+Install = Callable[[Answer], None]
+Fly = Callable[[Scenario], tuple[int, dict[str, Any]]]
+
+IN_THE_WAY = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
+
+
+def straight_on(mission: Mission, request: PlanRequest) -> Plan:
+    """Flies the course that it has, whatever is in the way."""
+    if request.flown is not None:
+        return Plan(PlanStatus.KEPT, "goes straight on")
+    row = (*request.position_m, *request.direction, 0.0, 20_000.0)
+    return Plan(PlanStatus.FOUND, "goes straight on", np.array([row[:2]]), Path(np.array([row])))
+
+
+def gives_up(mission: Mission, request: PlanRequest) -> Plan:
+    if request.time_s < 5.0:
+        return straight_on(mission, request)
+    return Plan(PlanStatus.UNREACHABLE, "a closed wall lies round the goal")
+
+
+def breaks(mission: Mission, request: PlanRequest) -> Plan:
+    if request.time_s < 5.0:
+        return straight_on(mission, request)
+    raise ZeroDivisionError("no room between\ntwo walls")
+
+
+class Failing(PointMass):
+    """Loses control after three seconds."""
+
+    def fault(self) -> str | None:
+        return "stalled, angle of attack 31 deg" if self.state().time_s >= 3.0 else super().fault()
+
+
+@pytest.fixture
+def fly(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> Fly:
+    """Flies a scenario through the command, on the point mass; returns exit status and metrics."""
+
+    def point_mass(_: Scenario, start: StartConditions, air: Atmosphere) -> PointMass:
+        return PointMass(start, air)
+
+    monkeypatch.setattr(run, "jsbsim_aircraft", point_mass)
+
+    def command(scenario: Scenario) -> tuple[int, dict[str, Any]]:
+        (tmp_path / "small.yaml").write_text(dump_scenario(scenario))
+        out = tmp_path / "run"
+        status = main(
+            ["fly", str(tmp_path / "small.yaml"), "--out", str(out), "--no-recording", "--quiet"]
+        )
+        return status, json.loads((out / "metrics.json").read_text())
+
+    return command
+
+
+def test_reached(fly: Fly, small_world: SmallWorld) -> None:
+    status, metrics = fly(small_world(IN_THE_WAY))
+    assert (status, metrics["outcome"]) == (0, "reached")
+    assert metrics["reason"].startswith("inside the goal circle after ")
+
+
+def test_collision_ends_the_flight_at_the_edge(
+    fly: Fly, answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    answering(straight_on)
+    scenario = small_world(IN_THE_WAY, planner={"kind": "stand_in"})
+    status, metrics = fly(scenario)
+    assert (status, metrics["outcome"]) == (1, "collision")
+    assert metrics["reason"].startswith("inside an obstacle by ")
+    track = flown_by_point_mass(scenario).track
+    assert (track.clearance_m[:-1] >= 0.0).all()
+    assert -25.0 * 0.05 - 0.1 <= track.clearance_m[-1] < 0.0
+
+
+def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(
+    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    answering(straight_on)
+    pops_up = {"circle": {"center_m": [1800.0, 1800.0], "radius_m": 200.0}, "active_s": [84.0, 90.0]}
+    flight = flown_by_point_mass(small_world(pops_up, planner={"kind": "stand_in"}))
+    assert flight.outcome.value == "collision"
+    assert 84.0 <= flight.sim_s <= 84.05
+
+
+def test_leaving_the_area(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+    answering(straight_on)
+    status, metrics = fly(small_world(planner={"kind": "stand_in"}, mission={"course_deg": 270.0}))
+    assert (status, metrics["outcome"]) == (1, "out_of_bounds")
+    assert metrics["reason"] == "left the area at (-1, 300) m"
+    assert metrics["flight_time_s"] == pytest.approx(300.0 / 25.0, abs=0.06)
+
+
+def test_timeout(fly: Fly, small_world: SmallWorld) -> None:
+    status, metrics = fly(small_world(mission={"time_limit_s": 60.0}))
+    assert (status, metrics["outcome"]) == (1, "timeout")
+    left_m = math.hypot(5400.0, 5400.0) - 60.0 * 25.0
+    assert metrics["reason"] == f"time limit 60 s, {left_m:.0f} m from the goal"
+    assert metrics["flight_time_s"] == 60.0
+
+
+def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+    answering(breaks)
+    status, metrics = fly(small_world(planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (1, "planner_failed")
+    assert metrics["reason"].startswith("the planner raised ZeroDivisionError: no room between")
+    assert metrics["flight_time_s"] == 5.0
+
+
+def test_unreachable(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+    answering(gives_up)
+    status, metrics = fly(small_world(planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (3, "unreachable")
+    assert metrics["reason"] == "a closed wall lies round the goal"
+    assert metrics["min_clearance_m"] is None
+
+
+def test_lost_control(fly: Fly, small_world: SmallWorld, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "jsbsim_aircraft", lambda _, start, air: Failing(start, air))
+    status, metrics = fly(small_world())
+    assert (status, metrics["outcome"]) == (1, "lost_control")
+    assert metrics["reason"] == "stalled, angle of attack 31 deg"
+    assert metrics["flight_time_s"] == pytest.approx(3.0, abs=1 / 120)
+    assert metrics["trackable"] is False

@@ -1,0 +1,56 @@
+"""Same scenario and seed, same track: in any process, and from the run folder's own scenario."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def digest_of(folder: Path, scenario: str, *options: str, hash_seed: int = 0) -> str:
+    """Flies in a process of its own."""
+    subprocess.run(
+        [sys.executable, "-m", "harness", "fly", scenario, "--out", str(folder), "--quiet", *options],
+        cwd=folder.parent,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": str(hash_seed)},
+        timeout=120,
+        check=True,
+    )
+    digest: str = json.loads((folder / "metrics.json").read_text())["digest"]
+    return digest
+
+
+@pytest.mark.parametrize("scenario", ["aerosonde_forest", "one_of_everything"])
+def test_three_processes_and_the_run_folder_agree(scenario: str, tmp_path: Path) -> None:
+    first = digest_of(tmp_path / "a", scenario, "--no-recording", hash_seed=1)
+    assert digest_of(tmp_path / "b", scenario, "--no-recording", hash_seed=2) == first
+    assert digest_of(tmp_path / "c", scenario, hash_seed=3) == first, "an observer changes the flight"
+    again = digest_of(tmp_path / "d", str(tmp_path / "a" / "scenario.yaml"), "--no-recording")
+    assert again == first
+    assert (tmp_path / "d" / "scenario.yaml").read_text() == (tmp_path / "a" / "scenario.yaml").read_text()
+
+
+def test_the_seed_counts_where_something_is_random(tmp_path: Path) -> None:
+    options = ("--no-recording", "--set", "mission.time_limit_s=20")
+    flights = {}
+    for scenario in ("one_of_everything", "aerosonde_forest"):
+        for seed in ("1", "2"):
+            folder = tmp_path / f"{scenario}-{seed}"
+            run = subprocess.run(
+                [sys.executable, "-m", "harness", "fly", scenario, "--out", str(folder), "--quiet"]
+                + ["--seed", seed, *options],
+                cwd=tmp_path,
+                env={**os.environ, "PYTHONPATH": str(ROOT)},
+                timeout=120,
+                check=False,
+            )
+            assert run.returncode == 1
+            flights[scenario, seed] = json.loads((folder / "metrics.json").read_text())["digest"]
+    assert flights["one_of_everything", "1"] != flights["one_of_everything", "2"]
+    assert flights["aerosonde_forest", "1"] == flights["aerosonde_forest", "2"]

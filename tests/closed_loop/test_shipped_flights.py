@@ -1,0 +1,138 @@
+"""The shipped scenarios on JSBSim, held against what a user is promised and against an independent judge."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.run import fly_to_folder
+from harness.run_folder import Run, load_run
+from harness.scenario import Scenario, load_scenario, parse_scenario
+from harness.shipped import scenario_path
+
+TOOLS = Path(__file__).parents[2].parent / "shared" / "tools"
+OPTIMUM_M = 94_318.0
+"""Shortest path through paper_circles at its clearance, for one who knows the world."""
+needs_the_judge = pytest.mark.skipif(not TOOLS.is_dir(), reason="the independent judge is not here")
+
+Flown = Callable[..., Run]
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
+    """Flies a shipped scenario with some keys replaced; each only once."""
+    runs: dict[tuple[str, ...], Run] = {}
+
+    def fly(name: str, *overrides: tuple[str, str]) -> Run:
+        case = (name, *(f"{key}={value}" for key, value in overrides))
+        if case not in runs:
+            folder = tmp_path_factory.mktemp(name) / "run"
+            fly_to_folder(load_scenario(scenario_path(name), overrides), folder, recording=False)
+            runs[case] = load_run(folder)
+        return runs[case]
+
+    return fly
+
+
+def judged(run: Run) -> list[str]:
+    """The faults that the independent judge finds."""
+    judge = [sys.executable, str(TOOLS / "referee.py"), "--json", str(run.folder)]
+    said = subprocess.run(judge, capture_output=True, text=True, timeout=120, check=False)
+    faults: list[str] = json.loads(said.stdout)["faults"]
+    return faults
+
+
+def optimum_m(scenario: Scenario, folder: Path) -> float:
+    """Shortest path that keeps the clearance, by the independent exact method."""
+    circles = [o.circle for o in scenario.obstacles if o.circle]
+    assert len(circles) == len(scenario.obstacles)
+    world = {
+        "name": scenario.name,
+        "bounds": scenario.area.bounds_m,
+        "start": scenario.mission.start_m,
+        "goal": scenario.mission.goal_m,
+        "circles": [[*circle.center_m, circle.radius_m] for circle in circles],
+        "polygons": [],
+    }
+    (folder / "world.json").write_text(json.dumps(world))
+    solve = [sys.executable, str(TOOLS / "optimal.py"), str(folder / "world.json")]
+    solve += ["--clearance", str(scenario.planner.clearance_m)]
+    said = subprocess.run(solve, capture_output=True, text=True, timeout=120, check=True)
+    length: float = json.loads(said.stdout)["length"]
+    return length
+
+
+def test_the_papers_world_is_flown_as_promised(flown: Flown) -> None:
+    metrics = flown("paper_circles").metrics
+    assert metrics["outcome"] == "reached"
+    assert metrics["clearance_violation_s"] == 0.0
+    assert metrics["min_clearance_m"] >= 300.0
+    assert metrics["trackable"] is True
+    assert metrics["cross_track_m"]["p95"] <= 0.3
+    assert metrics["cross_track_m"]["max"] <= 1.0
+    assert metrics["altitude_error_m"]["p95"] <= 0.3
+    assert metrics["flown_length_m"] <= 1.03 * OPTIMUM_M
+
+
+@needs_the_judge
+def test_the_papers_world_is_near_its_optimum(flown: Flown, tmp_path: Path) -> None:
+    run = flown("paper_circles")
+    optimum = optimum_m(parse_scenario(run.scenario_yaml), tmp_path)
+    assert optimum == pytest.approx(OPTIMUM_M, abs=1.0)
+    assert run.metrics["flown_length_m"] <= 1.03 * optimum
+
+
+@needs_the_judge
+@pytest.mark.parametrize(
+    "name", ["paper_circles", "aerosonde_forest", "polygon_town", "one_of_everything"]
+)
+def test_the_judge_finds_no_fault(name: str, flown: Flown) -> None:
+    assert judged(flown(name)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "share_of_clearance", "cross_track_p95_m"),
+    [
+        ("aerosonde_forest", 1.0, 0.3),
+        # Corners that the map blurs, in gusts.
+        ("polygon_town", 0.95, 0.5),
+        ("one_of_everything", 1.0, 0.5),
+    ],
+)
+def test_is_reached_with_the_clearance(
+    name: str, share_of_clearance: float, cross_track_p95_m: float, flown: Flown
+) -> None:
+    run = flown(name)
+    wanted_m = parse_scenario(run.scenario_yaml).planner.clearance_m
+    assert run.metrics["outcome"] == "reached", run.metrics["reason"]
+    assert run.metrics["min_clearance_m"] >= share_of_clearance * wanted_m
+    assert run.metrics["cross_track_m"]["p95"] <= cross_track_p95_m
+    assert run.metrics["trackable"] is True
+
+
+def test_another_aircraft_flies_the_papers_world(flown: Flown) -> None:
+    run = flown("paper_circles", ("aircraft.model", "c172p"), ("aircraft.airspeed_mps", "50"))
+    assert run.metrics["outcome"] == "reached"
+    assert run.metrics["clearance_violation_s"] == 0.0
+    assert run.metrics["cross_track_m"]["p95"] <= 0.3
+    assert run.metrics["cross_track_m"]["max"] <= 1.5
+    assert np.percentile(np.abs(run.track.airspeed_mps - 50.0), 95) <= 0.5
+
+
+def test_plans_can_be_flown_and_are_what_was_flown(flown: Flown) -> None:
+    run = flown("paper_circles")
+    assert [plan.plan_index for plan in run.plans] == list(range(len(run.plans)))
+    assert run.plans[0].time_s <= 1.0
+    tightest: Any = max(plan.max_curvature_1pm for plan in run.plans)
+    # 25 m/s at 36 degrees of bank, the nine below the limit that keep guidance from saturating.
+    assert tightest <= 1.01 * 9.81 * np.tan(np.radians(36.0)) / 25.0**2
+    assert run.metrics["bank_saturation_fraction"] == 0.0
+    for row, time_s in zip(run.track.plan_index, run.track.time_s, strict=True):
+        assert row < 0 or run.plans[row].time_s <= time_s + 1e-9

@@ -1,0 +1,123 @@
+"""The planner knows what has been sensed and nothing else."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from types import BuiltinFunctionType, FunctionType, ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.obstacle import Obstacle
+from harness.record import COLUMNS, Flight, FloatArray, Outcome
+from harness.run import make_loop
+from harness.scenario import Scenario
+from harness.world import World
+from planner.interface import Mission, Plan, PlanRequest
+from planner.registry import planner_kinds
+
+RANGE_M = 1500.0
+TRUTH = "clearance_m"
+"""The one column that knows of obstacles which have not been seen."""
+
+SmallWorld = Callable[..., Scenario]
+FlyPointMass = Callable[[Scenario], Flight]
+Answer = Callable[[Mission, PlanRequest], Plan]
+COMMON = ({"circle": {"center_m": [1500.0, 1600.0], "radius_m": 200.0}},)
+IMPERFECT = {"range_noise_m": 1.0, "dropout": 0.02, "false_return": 0.002, "latency_s": 0.1}
+
+
+def circle(east: float, north: float, radius: float) -> dict[str, Any]:
+    return {"circle": {"center_m": [east, north], "radius_m": radius}}
+
+
+def distance_to(flight: Flight, east: float, north: float, radius: float) -> FloatArray:
+    """From every row of a track to a circle's edge."""
+    track = flight.track
+    return np.asarray(np.hypot(track.east_m - east, track.north_m - north) - radius)
+
+
+def rows_alike(one: Flight, other: Flight) -> int:
+    """How many rows two tracks have in common from the start, bit for bit."""
+    length = min(len(one.track), len(other.track))
+    differ = np.zeros(length, dtype=bool)
+    for name in set(COLUMNS) - {TRUTH}:
+        a, b = (getattr(flight.track, name)[:length] for flight in (one, other))
+        differ |= a.view(np.uint64) != b.view(np.uint64)
+    return int(differ.argmax()) if differ.any() else length
+
+
+@pytest.mark.parametrize("sensor", [{}, IMPERFECT], ids=["perfect", "imperfect"])
+def test_an_obstacle_ahead_changes_nothing_before_it_is_in_range(
+    sensor: dict[str, float], small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    hidden = (4000.0, 4050.0, 300.0)
+    without = flown_by_point_mass(small_world(*COMMON, sensor=sensor))
+    with_it = flown_by_point_mass(small_world(*COMMON, circle(*hidden), sensor=sensor))
+    first_in_range = int((distance_to(with_it, *hidden) <= RANGE_M).argmax())
+    assert first_in_range > 600
+    assert first_in_range <= rows_alike(without, with_it) < len(with_it.track)
+
+
+@given(
+    east=st.integers(500, 5500), north=st.integers(500, 5500), radius=st.integers(30, 400), side=st.booleans()
+)
+@settings(max_examples=12, deadline=None, derandomize=True)
+def test_nor_does_one_anywhere(
+    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, east: int, north: int, radius: int, side: bool
+) -> None:
+    hidden = (float(east), float(north), float(radius))
+    ends = shapely.MultiPoint([(300.0, 300.0), (5700.0, 5700.0)])
+    if ends.distance(shapely.Point(hidden[:2])) < radius + 100.0:
+        hidden = (5300.0, 700.0, 200.0) if side else (700.0, 5300.0, 200.0)
+    without = flown_by_point_mass(small_world(*COMMON))
+    with_it = flown_by_point_mass(small_world(*COMMON, circle(*hidden)))
+    seen = distance_to(without, *hidden) <= RANGE_M
+    assert rows_alike(without, with_it) >= (int(seen.argmax()) if seen.any() else len(without.track))
+
+
+def reachable(roots: list[object]) -> list[object]:
+    """Everything that code which holds `roots` could get at through attributes and containers."""
+    found: dict[int, object] = {}
+    left = list(roots)
+    while left:
+        thing = left.pop()
+        code = isinstance(thing, type | ModuleType | FunctionType | BuiltinFunctionType)
+        if code or id(thing) in found:
+            continue
+        found[id(thing)] = thing
+        left.extend(gc.get_referents(thing))
+    return list(found.values())
+
+
+def true_parts(things: list[object]) -> list[str]:
+    return [type(thing).__name__ for thing in things if isinstance(thing, World | Obstacle)]
+
+
+def test_a_spy_in_the_planners_place_finds_nothing_of_the_true_world(
+    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, answering: Callable[[Answer], None]
+) -> None:
+    inner = planner_kinds()["rolling_window"]
+    planners: list[Any] = []
+    found: list[list[object]] = []
+
+    def spy(mission: Mission, request: PlanRequest) -> Plan:
+        if not planners:
+            planners.append(inner.make(inner.config(), mission))
+        if len(found) < 3 and request.time_s >= 40.0 * len(found):
+            found.append(reachable([mission, request]))
+        answer: Plan = planners[0].plan(request)
+        return answer
+
+    answering(spy)
+    scenario = small_world(*COMMON, planner={"kind": "stand_in"})
+    assert flown_by_point_mass(scenario).outcome is Outcome.REACHED
+    assert [true_parts(things) for things in found] == [[], [], []]
+    assert all(any(isinstance(thing, PlanRequest) for thing in things) for things in found)
+    # The same search does find the truth where it can be had.
+    assert "World" in true_parts(reachable([make_loop(scenario)]))
