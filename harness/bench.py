@@ -1,8 +1,8 @@
 """What the closed loop costs on this machine, against the bare flight model.
 
-All costs are processor time of the whole process, threads of libraries included, so that neither other programs
-nor work in the background changes a ratio. Flights and bare runs take turns, and the least of each counts: what
-disturbs a measurement only ever adds to it.
+All costs are processor time of the whole process, threads of libraries included, so that a ratio hides no
+work and does not count the time for which other programs had the core. Flights and bare runs take turns,
+and the least of each counts: what disturbs a measurement only ever adds to it.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ T = TypeVar("T")
 def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any]:
     """Measures one scenario, in this process.
 
-    First the loop is flown once alone: that loads what is loaded at its first use, and gives the shares of the
-    blocks. Then come `ROUNDS` rounds of three measurements:
+    First the loop is flown once alone: that gives the shares of the blocks, and loads what is loaded at its
+    first use. Then come `ROUNDS` rounds of three measurements:
 
-    - bare: `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start in
-      the same air, for as many steps as the flight takes; loading and trimming not counted;
-    - closed loop: the whole flight from the scenario to a complete run folder without the recording: loading,
-      trimming, flying, metrics, writing and closing every file;
+    - bare: `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start
+      in the same air, for as many steps as the flight takes; loading and trimming not counted;
+    - closed loop: the whole flight from the scenario to a complete run folder without the recording:
+      loading, trimming, flying, metrics, writing and closing every file;
     - the same with the recording.
 
     Args:
@@ -42,8 +42,9 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     Returns:
         `scenario`, `outcome`; `sim_s` and `steps` of the flight; `cpu_s`, the least seconds of `bare`,
         `closed_loop` and `closed_loop_recording`; `bare_step_us`; the ratios `closed_loop_ratio` and
-        `closed_loop_recording_ratio` of those to `bare`; `planner_ms`, `p50`, `p99` and `max` of all searches of
-        a flight, the least of all flights; `blocks`, the share of each block in the flight with the recording.
+        `closed_loop_recording_ratio` of those to `bare`; `planner_ms`, `p50`, `p99` and `max` of all searches
+        of a flight, the least of all flights; `blocks`, the share of each block in the flight with the
+        recording.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
@@ -84,8 +85,8 @@ def block_shares(
 ) -> dict[str, float]:
     """Share of each block in a whole flight with the recording; they sum to 1.
 
-    What comes before and after the loop (loading, metrics, files) is booked to `record`, what the recording adds
-    to `recording`.
+    What comes before and after the loop (loading, metrics, files) is booked to `record`, what the recording
+    adds to `recording`.
 
     Args:
         in_loop: share of each block in the loop alone.

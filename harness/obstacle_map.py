@@ -1,9 +1,10 @@
 """What has been seen so far: obstacle edges and space seen to be free.
 
-Edges are points on a square grid of cells, at most one a cell, each where a ray hit. Evidence decides: a cell that was hit in
-two scans holds an edge; one that several scans looked through, with neighbouring rays agreeing, does not. So
-one false return makes no wall and one lost return opens none. Free space is a coarser grid, written from key scans.
-Both grids cover the area and a border, so that the map cannot outgrow them.
+Edges are points on a square grid of cells, at most one a cell, each where a ray hit or between two such
+places. Evidence decides: a cell that was hit in two scans holds an edge; one that several scans looked
+through, with neighbouring rays agreeing, does not. So one false return makes no wall and one lost return
+opens none. Free space is a coarser grid, written from key scans. The grids cover the area, that of the
+edges with a border, so that the map cannot outgrow them.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ CONFIRMED = 2
 """An edge is believed from this score on; a hit adds one, a look through takes one."""
 CERTAIN = 8
 """Scores do not rise above this."""
+BETWEEN = np.arange(1, 8) / 8.0
+"""Where points are put between two hits that are joined: no more than a cell apart from each other."""
 LOOK_THROUGH_EVERY = 4
 """Every so many scans the points in range are asked whether they were looked through."""
 
@@ -30,8 +33,8 @@ class ObstacleMap:
 
     Args:
         bounds_m: xmin, ymin, xmax, ymax of the area.
-        clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way between
-            them and are joined. Edge points lie about a quarter of it apart.
+        clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way
+            between them and are joined. Edge points lie about a quarter of it apart.
         range_m: sensing range.
     """
 
@@ -51,11 +54,10 @@ class ObstacleMap:
         self._slot = np.full(nx * self._ny, -1, dtype=np.int32)  # by cell, -1 where there is no point
         self._points = np.zeros((1024, 2))  # by slot
         self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
+        self._since = np.zeros(1024, dtype=np.int64)  # by slot: revision at which it last became an edge
         self._count = 0
         self._join = 2.0 * clearance_m
         self._range = range_m
-        self._order: list[NDArray[np.int32]] = []  # slots in the order in which they were confirmed
-        self._revisions: list[int] = []
         self._revision = 0
         self._taken_back_at = 0
         self._scans = 0
@@ -77,9 +79,9 @@ class ObstacleMap:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         self._scans += 1
-        hits = np.flatnonzero(scan.ranges_m < math.inf)
+        hits = (scan.ranges_m < math.inf).nonzero()[0]
         if len(hits):
-            self._add(self._joined(scan, hits))
+            self._add(self._joined(scan, hits), np.array([[scan.east_m], [scan.north_m]]))
         if self._scans % LOOK_THROUGH_EVERY == 0 and self._count:
             self._look_through(scan)
         self._free.update(scan)
@@ -90,67 +92,67 @@ class ObstacleMap:
         return self._taken_back_at
 
     def edges_since(self, revision: int) -> FloatArray:
-        """(k, 2) edge points that came in after `revision`."""
-        slots: list[NDArray[np.int32]] = []
-        for at, added in zip(reversed(self._revisions), reversed(self._order), strict=True):
-            if at <= revision:
-                break
-            slots.append(added)
-        if not slots:
+        """(k, 2) edge points that came in after `revision`, in the order in which they did."""
+        if revision >= self._revision:
             return np.zeros((0, 2))
-        fresh = np.concatenate(slots[::-1])
-        return self._points[fresh[self._score[self._key[fresh]] >= CONFIRMED]]
+        slots = (self._since[: self._count] > revision).nonzero()[0]
+        slots = slots[self._score[self._key[slots]] >= CONFIRMED]
+        return self._points[slots[np.argsort(self._since[slots], kind="stable")]]
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
         return self._free.contains(points_m)
 
     def _joined(self, scan: RangeScan, hits: NDArray[np.intp]) -> FloatArray:
-        """(2, k) where rays hit, and points between neighbouring hits too near to each other to pass between."""
-        points = scan.directions.T.take(hits, axis=1) * scan.ranges_m.take(hits)
+        """(2, k) where rays hit, seen from the sensor, and points between neighbours that leave no way."""
+        rays = len(scan.ranges_m)
+        if _all_round(scan) and hits[0] + rays - hits[-1] <= 2:
+            hits = np.append(hits, hits[0] + rays)
+        points = scan.directions.T.take(hits, axis=1, mode="wrap") * scan.ranges_m.take(hits, mode="wrap")
         step = points[:, 1:] - points[:, :-1]
-        square = step * step
-        gap = np.sqrt(square[0] + square[1])
-        wide = np.flatnonzero((gap > self._cell) & (gap < self._join))
+        east, north = step
+        gap2 = east * east + north * north
+        wide = ((gap2 > self._cell * self._cell) & (gap2 < self._join * self._join)).nonzero()[0]
         # One ray may be missing between neighbours: a lost return does not open a wall.
         wide = wide[hits[wide + 1] - hits[wide] <= 2]
-        if len(wide):
-            parts = np.ceil(gap[wide] / self._cell)
-            which, number = np.nonzero(np.arange(1.0, parts.max()) < parts[:, None])
-            share = (number + 1) / parts[which]
-            which = wide[which]
-            points = np.hstack((points, points.take(which, axis=1) + share * step.take(which, axis=1)))
-        points += np.array([[scan.east_m], [scan.north_m]])
-        return points
+        if not len(wide):
+            return points
+        between = points.take(wide, axis=1)[:, :, None] + step.take(wide, axis=1)[:, :, None] * BETWEEN
+        return np.concatenate((points, between.reshape(2, -1)), axis=1)
 
-    def _add(self, points: FloatArray) -> None:
-        """Counts hits; a cell hit for the first time gets a point, one hit in a second scan becomes an edge."""
-        cells = ((points - self._origin) / self._cell).astype(np.int64)
+    def _add(self, points: FloatArray, sensor: FloatArray) -> None:
+        """Counts hits: a cell gets a point with the first and is an edge from the second scan on.
+
+        Args:
+            points: (2, k) places, seen from the sensor.
+            sensor: (2, 1) where it is.
+        """
+        cells = ((points + (sensor - self._origin)) / self._cell).astype(np.int64)
         if not (cells.view(np.uint64) < self._shape).all():  # unsigned, a negative number is a large one
             inside = (cells.view(np.uint64) < self._shape).all(axis=0)
             cells, points = cells[:, inside], points[:, inside]
         keys = cells[0] * self._ny + cells[1]
         score = self._score.take(keys)
-        open_ = np.flatnonzero(score < CERTAIN)  # few: most of what is in sight has been seen often
-        keys, score = keys[open_], score[open_]
+        uncertain = (score < CERTAIN).nonzero()[0]
+        if not len(uncertain):
+            return
+        keys, score = keys[uncertain], score[uncertain]
         self._score[keys] = score + 1  # duplicates of a cell count once a scan
         raised = keys[score == CONFIRMED - 1]
         if len(raised):
-            self._note(np.unique(self._slot[raised]))
-        fresh = np.flatnonzero(self._slot[keys] < 0)
+            self._revision += 1
+            self._since[self._slot[raised]] = self._revision
+        fresh = (score == 0).nonzero()[0]
+        fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
         if len(fresh):
             new_keys, first = np.unique(keys[fresh], return_index=True)
             self._grow(len(new_keys))
             new = np.arange(self._count, self._count + len(new_keys), dtype=np.int32)
             self._slot[new_keys] = new
-            self._points[new] = points[:, open_[fresh[first]]].T
+            self._points[new] = (points[:, uncertain[fresh[first]]] + sensor).T
             self._key[new] = new_keys
+            self._since[new] = 0
             self._count += len(new_keys)
-
-    def _note(self, slots: NDArray[np.int32]) -> None:
-        self._revision += 1
-        self._order.append(slots)
-        self._revisions.append(self._revision)
 
     def _grow(self, more: int) -> None:
         if self._count + more <= len(self._key):
@@ -158,6 +160,7 @@ class ObstacleMap:
         size = max(2 * len(self._key), self._count + more)
         self._points = np.resize(self._points, (size, 2))
         self._key = np.resize(self._key, size)
+        self._since = np.resize(self._since, size)
 
     def _look_through(self, scan: RangeScan) -> None:
         """Takes a point off every known point that three neighbouring rays looked past."""
@@ -176,16 +179,15 @@ class ObstacleMap:
         rays = len(scan.ranges_m)
         position = (np.arctan2(dx, dy) - scan.start_rad) % math.tau / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
-        circle = rays * scan.spacing_rad > math.tau - 1e-9
-        if circle:
-            ray %= rays
         # Only a ray that passes close by says anything about the point.
         aimed = (
-            (np.abs(position - np.rint(position)) * scan.spacing_rad * distance < 0.25 * self._cell)
+            (np.abs(position - ray) * scan.spacing_rad * distance < 0.25 * self._cell)
             & (distance < scan.max_range_m - 2.0 * self._cell)
             & (self._score[self._key[slots]] > 0)
         )
-        if not circle:
+        if _all_round(scan):
+            ray %= rays
+        else:
             aimed &= (ray >= 1) & (ray < rays - 1)
         chosen = np.flatnonzero(aimed)
         ray, past = ray[chosen], distance[chosen] + 1.5 * self._cell
@@ -235,15 +237,15 @@ class _FreeSpace:
         rays = len(scan.ranges_m)
         position = (np.arctan2(x[column], y[row]) - scan.start_rad) % math.tau / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
-        if rays * scan.spacing_rad > math.tau - 1e-9:
-            ray %= rays
-            covered = np.ones(ray.shape, dtype=np.bool_)
-        else:
-            covered = ray < rays
-            ray = np.minimum(ray, rays - 1)
         # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
         half = 0.75 * self._cell
         level = np.ceil(half / np.maximum(distance, half) / scan.spacing_rad) + 1.0
+        if _all_round(scan):
+            ray %= rays
+            covered = np.ones(ray.shape, dtype=np.bool_)
+        else:
+            covered = (ray >= level) & (ray < rays - level)
+            ray = np.minimum(ray, rays - 1)
         free_to = np.minimum(scan.ranges_m, reach) - half
         free = np.zeros(ray.shape, dtype=np.bool_)
         width = 1
@@ -269,6 +271,11 @@ class _FreeSpace:
         low = math.floor((middle - reach - origin) / self._cell)
         high = math.ceil((middle + reach - origin) / self._cell)
         return max(low, 0), min(high, count)
+
+
+def _all_round(scan: RangeScan) -> bool:
+    """Whether the first ray is the neighbour of the last."""
+    return len(scan.ranges_m) * scan.spacing_rad > math.tau - 1e-9
 
 
 def _least(ranges: FloatArray, width: int, rays: int) -> FloatArray:

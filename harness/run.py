@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
 from aircraft.guidance import PathFollower
 from aircraft.interface import FlightModel
+from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, StartConditions
 from harness.closed_loop import Loop, Observer, Progress, fly
 from harness.metrics import metrics
@@ -66,6 +68,12 @@ def make_loop(
     )
 
 
+def kinematic_loop(scenario: Scenario) -> Loop:
+    """The same loop with a point that flies every path exactly in place of aircraft and guidance."""
+    loop = make_loop(scenario, KinematicPoint)
+    return replace(loop, follower=cast(PathFollower, loop.model))
+
+
 def start_conditions(scenario: Scenario) -> StartConditions:
     """Where and how a scenario's flight begins."""
     east, north = scenario.mission.start_m
@@ -111,7 +119,13 @@ def flight_limits(scenario: Scenario) -> FlightLimits:
 
 
 def fly_to_folder(
-    scenario: Scenario, out: Path, recording: bool, progress: Progress | None = None
+    scenario: Scenario,
+    out: Path,
+    recording: bool,
+    progress: Progress | None = None,
+    *,
+    make: Callable[[Scenario], Loop] = make_loop,
+    watching: Sequence[Observer] = (),
 ) -> dict[str, Any]:
     """Flies a scenario into a run folder and returns the content of its `metrics.json`.
 
@@ -120,15 +134,17 @@ def fly_to_folder(
         out: the run folder, made or written anew.
         recording: whether to write `flight.rrd`.
         progress: told of the flight as it goes on.
+        make: makes the parts of the flight.
+        watching: look on besides those that write the folder.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
         RunFolderError: the folder holds something else or cannot be written.
     """
-    loop = make_loop(scenario)
+    loop = make(scenario)
     with ExitStack() as stack:
         folder = stack.enter_context(RunFolder.create(out, dump_scenario(scenario), [shlex.join(sys.argv)]))
-        observers: list[Observer] = [_Writer(folder)]
+        observers: list[Observer] = [_Writer(folder), *watching]
         log = _recording(scenario, loop, folder) if recording else None
         if log is not None:
             observers.append(log)

@@ -40,6 +40,18 @@ def _to_arcs(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArr
     return np.hypot(dx - px, dy - py), turn * radius
 
 
+def _nearest(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(n, m) distance of points to each segment, how far along it and along the path the nearest place is."""
+    rows = path.segments
+    begin = np.cumsum(rows[:, 5]) - rows[:, 5]
+    bent = np.abs(rows[:, 4]) > 1e-12
+    distance, along = np.empty((2, len(rows), len(points_m)))
+    for which, measure in ((~bent, _to_lines), (bent, _to_arcs)):
+        if which.any():
+            distance[which], along[which] = measure(rows[which], points_m)
+    return distance, along, along + begin[:, None]
+
+
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """How near a path comes to each of some points, and where.
 
@@ -50,15 +62,7 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
     Returns:
         (m,) distances in metres and (m,) stations along the path of the nearest places.
     """
-    rows = path.segments
-    begin = np.cumsum(rows[:, 5]) - rows[:, 5]
-    bent = np.abs(rows[:, 4]) > 1e-12
-    distance = np.empty((len(rows), len(points_m)))
-    station = np.empty_like(distance)
-    for which, measure in ((~bent, _to_lines), (bent, _to_arcs)):
-        if which.any():
-            distance[which], s = measure(rows[which], points_m)
-            station[which] = s + begin[which, None]
+    distance, _, station = _nearest(path, points_m)
     nearest = distance.argmin(axis=0)
     column = np.arange(len(points_m))
     return distance[nearest, column], station[nearest, column]
@@ -80,8 +84,11 @@ def first_breach(
     """
     if not len(points_m):
         return math.inf
-    distance, station = distances(path, points_m)
-    near = (distance < radius_m) & (station >= from_m)
+    distance, along, station = _nearest(path, points_m)
+    # Where a segment is nearest at its start, the path only leads away from there on.
+    approached = along > 0.0
+    approached[0] = True
+    near = (distance < radius_m) & approached & (station >= from_m)
     return float(station[near].min()) if near.any() else math.inf
 
 

@@ -170,15 +170,17 @@ def fillet(
     """
     first = turn_onto(start, nodes[0], limits.radius_m)
     segments: list[Segment] = []
-    if first is not None and first[0][4] * start_curvature < 0.0:
-        segments.append((*start, 0.0, limits.roll_m))
-        start = along(segments[0], limits.roll_m)
+    if first and first[0][4] * start_curvature < 0.0:
+        if limits.roll_m > SHORTEST_M:
+            segments.append((*start, 0.0, limits.roll_m))
+            start = along(segments[0], limits.roll_m)
         first = turn_onto(start, nodes[0], limits.radius_m)
-    if first is None:
+    if not first:
         return None
+    last_turn = 0.0 if segments else start_curvature
     segments += [segment for segment in first if segment[4]]
     corner = along(segments[-1], segments[-1][5]) if segments else start
-    last_turn = segments[-1][4] if segments else 0.0
+    last_turn = segments[-1][4] if segments and segments[-1][4] else last_turn
     used = 0.0  # how much of the present leg the corner before it has taken
     for i, node in enumerate(nodes):
         leg = math.dist(corner[:2], node)

@@ -17,6 +17,12 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
+def _frozen(array: FloatArray) -> FloatArray:
+    copy = np.array(array, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy
+
+
 class PlanStatus(Enum):
     """How a call to a planner ended."""
 
@@ -154,6 +160,11 @@ class PlanPicture:
     sectors: FloatArray
     candidates: tuple[FloatArray, ...] = ()
 
+    def __post_init__(self) -> None:
+        for name in ("guide_m", "sectors"):
+            object.__setattr__(self, name, _frozen(getattr(self, name)))
+        object.__setattr__(self, "candidates", tuple(_frozen(each) for each in self.candidates))
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -172,6 +183,9 @@ class Plan:
     waypoints_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     path: Path | None = None
     picture: PlanPicture | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))
 
 
 class Planner(Protocol):

@@ -55,7 +55,7 @@ def search_poses(
         pose = Pose(x, y, math.cos(course), math.sin(course))
         turning = done[-1][4] if done else start_curvature
         final = turn_onto(pose, goal, limits.radius_m)
-        if final is not None and final[0][4] * turning >= 0.0:
+        if final and final[0][4] * turning >= 0.0:
             path = Path(np.array([*done, *final]))
             if terrain.admits(Path(np.array(final))):
                 return Route((*((s[0], s[1]) for s in path.segments[1:].tolist()), goal), path)

@@ -85,6 +85,8 @@ def optimise(
     Returns:
         The route; None where no choice can be flown.
     """
+    if len(nodes) < 2:
+        return None
     short = shortcut(nodes, terrain)[1:]
     choices = [(short, cut_m)]
     choices += [([*short[:i], *short[i + 1 :]], cut_m) for i in range(len(short) - 1)]

@@ -19,15 +19,14 @@ LARGEST_M, SHIFT_M = 280.0, 120.0
 """Neighbours are at least 1100 - 2 (280 + 120) = 300 m apart, three turn radii of the aircraft."""
 
 CORNER_BLUR = 0.25
-"""What a corner may lack of the clearance, as a share of it."""
+"""What a corner may lack of the clearance, as a share of it: the spacing of the points that the map keeps of
+an edge. A corner may lie beside the nearest of them."""
 
 SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]
 
 
-BOUNDED = settings(
-    deadline=None, derandomize=True, phases=(Phase.explicit, Phase.reuse, Phase.generate)
-)
+BOUNDED = settings(deadline=None, derandomize=True, phases=(Phase.explicit, Phase.reuse, Phase.generate))
 """A flight takes a third of a second: a failure is shown as drawn, for shrinking it would take minutes."""
 
 
@@ -78,6 +77,5 @@ def test_reaches_the_goal_among_corners_in_any_wind(
     scenario = small_world(*field, environment={} if wind_from_deg is None else {"wind": wind})
     flight = flown_by_point_mass(scenario)
     assert flight.outcome is Outcome.REACHED, flight.reason
-    # The map holds one point for each stretch of an edge of a quarter of the clearance: a corner may lie beside it.
     wanted_m = scenario.planner.clearance_m
     assert flight.track.clearance_m.min() >= wanted_m - CORNER_BLUR * wanted_m

@@ -61,8 +61,7 @@ def test_a_late_scan_and_a_late_plan_take_effect_late(
 
 def test_noise_is_that_of_the_seed(small_world: SmallWorld, flown_by_point_mass: FlyPointMass) -> None:
     noisy = small_world(*WORLD, sensor={"range_noise_m": 3.0})
-    tracks = [
-        flown_by_point_mass(noisy.model_copy(update={"seed": seed})).track.east_m.tolist() for seed in (1, 1, 2)
-    ]
-    assert tracks[0] == tracks[1]
-    assert tracks[0] != tracks[2]
+    flights = [flown_by_point_mass(noisy.model_copy(update={"seed": seed})) for seed in (1, 1, 2)]
+    first, again, other = (flight.track.east_m.tolist() for flight in flights)
+    assert first == again
+    assert first != other

@@ -67,9 +67,7 @@ def fly(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> Fly:
     def command(scenario: Scenario) -> tuple[int, dict[str, Any]]:
         (tmp_path / "small.yaml").write_text(dump_scenario(scenario))
         out = tmp_path / "run"
-        status = main(
-            ["fly", str(tmp_path / "small.yaml"), "--out", str(out), "--no-recording", "--quiet"]
-        )
+        status = main(["fly", str(tmp_path / "small.yaml"), "--out", str(out), "--no-recording", "--quiet"])
         return status, json.loads((out / "metrics.json").read_text())
 
     return command

@@ -7,6 +7,7 @@ import inspect
 import math
 import types
 from dataclasses import FrozenInstanceError, fields, is_dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ class Flight:
         self.answers: list[tuple[PlanRequest, Plan]] = []
 
     def go(self, seconds: int) -> None:
-        """Asks after every scan, twice a second; flies 25 m a second."""
+        """Asks after every scan, twice a second, and flies 25 m a second, up to the goal."""
         flown, station = self.request.flown, self.request.station_m
         for number in range(2 * seconds):
             time_s = 0.5 * number
@@ -98,6 +99,8 @@ class Flight:
             if flown is not None and flown.path is not None:
                 pose = pose_at(flown.path, station)
                 position, direction = pose[:2], pose[2:]
+            if math.dist(position, MISSION.goal_m) <= MISSION.goal_radius_m:
+                break
             heading = math.atan2(*direction)
             self.seen.update(self._sensor.scan(*position, heading, time_s))
             self.request = PlanRequest(time_s, position, direction, self.seen, flown, station)
@@ -157,7 +160,7 @@ def test_its_config_is_frozen_described_and_resolves_to_itself(kind: str) -> Non
 def test_an_empty_world_is_flown_to_the_goal(kind: str) -> None:
     flight = Flight(kind, ())
     flight.go(950)
-    assert math.dist(flight.request.position_m, MISSION.goal_m) <= MISSION.goal_radius_m
+    assert math.dist(flight.request.position_m, MISSION.goal_m) <= MISSION.goal_radius_m + 12.5
     assert not {answer.status for _, answer in flight.answers} & {PlanStatus.NO_PATH, PlanStatus.UNREACHABLE}
 
 
@@ -165,7 +168,9 @@ def test_an_empty_world_is_flown_to_the_goal(kind: str) -> None:
 @pytest.mark.parametrize("course_deg", [0, 60, 120, 180, 240, 300])
 def test_never_raises_wherever_the_first_plan_begins(kind: str, course_deg: int) -> None:
     direction = (math.sin(math.radians(course_deg)), math.cos(math.radians(course_deg)))
-    ring = np.array([(3000.0 + 900.0 * math.cos(a), 3000.0 + 900.0 * math.sin(a)) for a in np.arange(0, 6.3, 0.05)])
+    ring = np.array(
+        [(3000.0 + 900.0 * math.cos(a), 3000.0 + 900.0 * math.sin(a)) for a in np.arange(0, 6.3, 0.05)]
+    )
     for points in (np.zeros((0, 2)), ring, np.array([MISSION.goal_m]), np.array([START])):
         for position in (START, (3000.0, 3000.0), (0.0, 0.0), MISSION.goal_m):
             plan = make(kind).plan(PlanRequest(0.0, position, direction, Recorded(points)))
@@ -210,10 +215,9 @@ def test_paths_are_smooth_no_tighter_than_the_turn_radius_and_inside(
             continue
         rows = plan.path.segments
         assert plan.path.max_curvature_1pm <= 1.0 / MISSION.turn_radius_m + 1e-9
-        for row, following in zip(rows, rows[1:], strict=False):
+        for row, following in pairwise(rows):
             np.testing.assert_allclose(along(row, float(row[5])), following[:4], atol=1e-4)
         points = sample(plan.path, 100.0, 0.1)
-        assert points.min(axis=0).tolist() >= [xmin - 1e-6, ymin - 1e-6]
         assert (points >= (xmin - 1e-6, ymin - 1e-6)).all()
         assert (points <= (xmax + 1e-6, ymax + 1e-6)).all()
 
@@ -269,8 +273,8 @@ def test_plans_cannot_be_changed(kind: str, flights: dict[str, Flight]) -> None:
 
 
 def reachable(*roots: object) -> list[object]:
-    """Everything that can be reached from objects through attributes and containers, code left out."""
-    code = (type, types.ModuleType, types.FunctionType, types.CodeType, types.BuiltinFunctionType, property)
+    """Everything that can be reached from objects through attributes, containers and closures."""
+    code = (type, types.ModuleType, types.CodeType, types.BuiltinFunctionType, property)
     found: dict[int, object] = {}
     pending = list(roots)
     while pending:
@@ -278,13 +282,21 @@ def reachable(*roots: object) -> list[object]:
         if id(each) in found or isinstance(each, code):
             continue
         found[id(each)] = each
+        if isinstance(each, types.FunctionType):
+            # What it has captured, but not the names of its module.
+            pending += [each.__closure__, each.__defaults__, each.__kwdefaults__]
+            continue
         pending += gc.get_referents(each)
         pending += getattr(each, "__dict__", {}).values()
     return list(found.values())
 
 
 def truths(*roots: object) -> list[object]:
-    return [each for each in reachable(*roots) if isinstance(each, World | Obstacle | Circle | Polygon | RangeSensor)]
+    return [
+        each
+        for each in reachable(*roots)
+        if isinstance(each, World | Obstacle | Circle | Polygon | RangeSensor)
+    ]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -292,16 +304,28 @@ def test_the_true_world_cannot_be_reached_from_what_a_planner_has(kind: str) -> 
     flight = Flight(kind, OBSTACLES)
     flight.go(40)
     assert truths(flight.request, flight.planner) == []
-    # The spy sees what is planted: a world behind the map, and one behind a method of the planner's.
     assert len(truths(flight)) >= 1 + len(OBSTACLES)
+
+
+@pytest.mark.parametrize("hide", ["attribute", "closure"])
+def test_the_spy_sees_a_world_that_is_planted(hide: str) -> None:
     planted = World(OBSTACLES, MISSION.bounds_m)
-    flight.seen.__dict__["truth"] = {"hidden": [planted]}
+    flight = Flight("rolling_window", OBSTACLES)
+
+    def peek() -> World:
+        return planted
+
+    setattr(flight.seen, "truth", {"hidden": [planted if hide == "attribute" else peek]})  # noqa: B010
     assert planted in truths(flight.request)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_has_not_come_into_range_changes_nothing(kind: str) -> None:
-    far = (*OBSTACLES, Obstacle(Circle((16_000.0, 13_500.0), 700.0)), Obstacle(Circle((2000.0, 13_000.0), 900.0)))
+    far = (
+        *OBSTACLES,
+        Obstacle(Circle((16_000.0, 13_500.0), 700.0)),
+        Obstacle(Circle((2000.0, 13_000.0), 900.0)),
+    )
     with_more, without = Flight(kind, far), Flight(kind, OBSTACLES)
     for flight in (with_more, without):
         flight.go(200)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +106,7 @@ def test_progress_is_told(tmp_path: Path) -> None:
     fly_to_folder(scenario, tmp_path / "run", False, lambda *report: told.append(report))
     assert [time_s for time_s, _, _ in told] == [0.0, 5.0, 10.0, 12.0]
     assert [word for _, _, word in told][-2:] == ["following", "timeout"]
-    assert all(later[1] < earlier[1] for earlier, later in zip(told, told[1:], strict=False))
+    assert all(later[1] < earlier[1] for earlier, later in pairwise(told))
 
 
 def test_an_aircraft_that_cannot_be_made_leaves_nothing(

@@ -33,8 +33,10 @@ def wall(start_m: tuple[float, float], end_m: tuple[float, float], spacing_m: fl
     return one_a_cell(np.concatenate((points[-1:], points)), spacing_m)
 
 
-def integrated(start: tuple[float, float, float, float], segments: list[Segment], step_m: float) -> FloatArray:
-    """(k, 4) places and tangents along joined segments by the midpoint rule, blind to where segments start."""
+def integrated(
+    start: tuple[float, float, float, float], segments: list[Segment], step_m: float
+) -> FloatArray:
+    """(k, 4) places and tangents along joined segments by the midpoint rule, blind to where each starts."""
     x, y, tx, ty = start
     course = math.atan2(ty, tx)
     rows = [np.array([[x, y, tx, ty]])]

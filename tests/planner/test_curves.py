@@ -140,7 +140,7 @@ def shortest_turn_by_search(pose: Pose, target: Point, radius: float) -> float:
         dx, dy = target[0] - x, target[1] - y
         off = side * (np.cos(course) * dy - np.sin(course) * dx)
         ahead = np.cos(course) * dx + np.sin(course) * dy > 0.0
-        # The first place from which the target lies straight ahead: it passes from the inner to the outer side.
+        # The first place with the target straight ahead: there it passes from the inner to the outer side.
         found = np.flatnonzero((off[:-1] > 0.0) & (off[1:] <= 0.0) & ahead[:-1])
         if len(found):
             i = found[0]

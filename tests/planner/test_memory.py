@@ -91,7 +91,7 @@ def test_clear_clusters_are_the_connected_components(seed: int, clusters: int) -
         steps = rng.uniform(0.2, 0.69, 12) * CLEARANCE
         course = rng.uniform(0.0, math.tau, 12)
         walk = np.cumsum(np.column_stack((steps * np.cos(course), steps * np.sin(course))), axis=0)
-        groups.append(walk + (2000.0 * i, 0.0))
+        groups.append(walk + np.array((2000.0 * i, 0.0)))
     points = np.concatenate(groups)
     order = rng.permutation(len(points))
     labels = memory_of(points[order]).labels

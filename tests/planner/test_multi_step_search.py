@@ -74,7 +74,9 @@ def tracks_in(
 def shortest_m(window: Window, goal: Point = GOAL) -> float:
     """Length of the shortest way that keeps the distance: a visibility graph round the grown points."""
     # Corners lie a little outside and the core a little inside: lines along the edge count as clear.
-    blocked = shapely.union_all(shapely.buffer(shapely.points(window.points_m), KEEP, quad_segs=4)).simplify(4.0)
+    blocked = shapely.union_all(shapely.buffer(shapely.points(window.points_m), KEEP, quad_segs=4)).simplify(
+        4.0
+    )
     vertices = shapely.get_coordinates(blocked.buffer(10.0, quad_segs=4).simplify(8.0))
     core = blocked.buffer(-10.0).simplify(4.0)
     shapely.prepare(core)
@@ -83,7 +85,9 @@ def shortest_m(window: Window, goal: Point = GOAL) -> float:
     lines = shapely.linestrings(np.stack((places[i], places[j]), axis=1))
     clear = ~shapely.intersects(core, lines)
     ways: list[list[tuple[int, float]]] = [[] for _ in places]
-    for a, b, length in zip(i[clear].tolist(), j[clear].tolist(), shapely.length(lines[clear]).tolist(), strict=True):
+    for a, b, length in zip(
+        i[clear].tolist(), j[clear].tolist(), shapely.length(lines[clear]).tolist(), strict=True
+    ):
         ways[a].append((b, length))
         ways[b].append((a, length))
     best, queue = {0: 0.0}, [(0.0, 0)]
@@ -156,7 +160,11 @@ def test_two_circles_one_behind_the_other(ring: MakePoints) -> None:
 def test_fields_of_circles(seed: int, count: int, ring: MakePoints) -> None:
     rng = np.random.default_rng(seed)
     circles = np.column_stack(
-        (rng.uniform(3500.0, 16_500.0, count), rng.uniform(-4000.0, 4000.0, count), rng.uniform(300, 2000.0, count))
+        (
+            rng.uniform(3500.0, 16_500.0, count),
+            rng.uniform(-4000.0, 4000.0, count),
+            rng.uniform(300, 2000.0, count),
+        )
     )
     ends = np.hypot(circles[:, 0, None] - (0.0, 20_000.0), circles[:, 1, None]) - circles[:, 2, None]
     assume(ends.min() > OUTER + 200.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,7 +30,11 @@ def terrain(points: FloatArray, bounds: tuple[float, float, float, float] = WIDE
 
 
 def found_way(
-    start: Pose, goal: Point, points: FloatArray, assert_flyable: AssertFlyable, bounds: tuple[float, float, float, float] = WIDE
+    start: Pose,
+    goal: Point,
+    points: FloatArray,
+    assert_flyable: AssertFlyable,
+    bounds: tuple[float, float, float, float] = WIDE,
 ) -> Path | None:
     """The path found, after a look at whether it can be flown."""
     found = search_poses(start, 0.0, goal, LIMITS, terrain(points, bounds))
@@ -73,7 +78,9 @@ def test_finds_a_way_where_no_straight_sided_curve_does(
     assert path.length_m < 4000.0
 
 
-def test_turns_into_an_opening_that_has_to_be_met_right(wall: MakePoints, assert_flyable: AssertFlyable) -> None:
+def test_turns_into_an_opening_that_has_to_be_met_right(
+    wall: MakePoints, assert_flyable: AssertFlyable
+) -> None:
     # A way out to the left that a turn at once would miss, and that a corner in its middle has no room for.
     points = np.concatenate(
         (
@@ -115,7 +122,9 @@ def test_whatever_is_found_can_be_flown(seed: int, count: int, assert_flyable: A
 @pytest.mark.parametrize("before", [1.0, -1.0])
 def test_a_turn_never_follows_the_opposite_one_at_once(before: float) -> None:
     for goal in ((300.0, 2000.0), (300.0, -2000.0), (-1000.0, 50.0), (-1000.0, -50.0)):
-        found = search_poses(Pose(0.0, 0.0, 1.0, 0.0), before / RADIUS, goal, LIMITS, terrain(np.zeros((0, 2))))
+        found = search_poses(
+            Pose(0.0, 0.0, 1.0, 0.0), before / RADIUS, goal, LIMITS, terrain(np.zeros((0, 2)))
+        )
         assert found is not None
         bends = [before / RADIUS, *found.path.segments[:, 4].tolist()]
-        assert all(a * b >= 0.0 for a, b in zip(bends, bends[1:], strict=False))
+        assert all(a * b >= 0.0 for a, b in pairwise(bends))

@@ -160,7 +160,11 @@ def test_arrives_through_fields_of_separate_circles(
 ) -> None:
     rng = np.random.default_rng(seed)
     circles = np.column_stack(
-        (rng.uniform(3000.0, 17_000.0, count), rng.uniform(-5000.0, 5000.0, count), rng.uniform(300.0, 2000.0, count))
+        (
+            rng.uniform(3000.0, 17_000.0, count),
+            rng.uniform(-5000.0, 5000.0, count),
+            rng.uniform(300.0, 2000.0, count),
+        )
     )
     ends = np.hypot(circles[:, :1] - (0.0, 20_000.0), circles[:, 1:2]) - circles[:, 2:]
     assume(ends.min() > 700.0)
@@ -207,7 +211,9 @@ def test_new_points_on_the_plan_bring_a_new_one(ring: MakePoints) -> None:
     assert answer.path is not None
     assert room(sample(answer.path, 50.0, 0.01), points) >= MISSION.clearance_m
     # It leaves the old plan a second of flight ahead of the aircraft, not at it.
-    np.testing.assert_allclose(pose_at(answer.path, 20.0), pose_at(plan.path or Path(nothing()), 520.0), atol=1e-6)
+    np.testing.assert_allclose(
+        pose_at(answer.path, 20.0), pose_at(plan.path or Path(nothing()), 520.0), atol=1e-6
+    )
 
 
 def test_new_points_beside_the_plan_do_not(ring: MakePoints) -> None:
@@ -283,7 +289,9 @@ def test_defaults_are_derived_from_the_mission() -> None:
     assert (config.planning_window_m, config.margin_m, config.rolling_step_m) == (8000.0, 20.0, 500.0)
     tight = RollingWindowConfig().resolved(replace(MISSION, clearance_m=20.0))
     assert tight.margin_m == 6.0  # twice the tracking error
-    own = RollingWindowConfig(planning_window_m=4000.0, margin_m=0.0, rolling_step_m=99.0, steps=5, candidates=2)
+    own = RollingWindowConfig(
+        planning_window_m=4000.0, margin_m=0.0, rolling_step_m=99.0, steps=5, candidates=2
+    )
     assert own.resolved(MISSION) == own
     assert RollingWindowConfig(planning_window_m=4000.0).resolved(MISSION).rolling_step_m == 250.0
     assert config.resolved(MISSION) == config

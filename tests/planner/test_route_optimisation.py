@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -26,7 +27,9 @@ LIMITS = Limits(RADIUS, 40.0)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def terrain(points: FloatArray, keep_m: float = KEEP, bounds: tuple[float, float, float, float] = WIDE) -> Terrain:
+def terrain(
+    points: FloatArray, keep_m: float = KEEP, bounds: tuple[float, float, float, float] = WIDE
+) -> Terrain:
     return Terrain(points, np.full(len(points), keep_m), bounds)
 
 
@@ -40,7 +43,11 @@ def walk(seed: int, count: int) -> list[Point]:
     rng = np.random.default_rng(seed)
     return [
         (0.0, 0.0),
-        *zip(np.sort(rng.uniform(500, 9500, count)).tolist(), rng.uniform(-2000, 2000, count).tolist(), strict=True),
+        *zip(
+            np.sort(rng.uniform(500, 9500, count)).tolist(),
+            rng.uniform(-2000, 2000, count).tolist(),
+            strict=True,
+        ),
         (10_000.0, 0.0),
     ]
 
@@ -71,11 +78,13 @@ def test_shortcuts_are_clear_and_never_longer(seed: int, count: int, nodes: int)
     assert kept[-1] == track[-1]
     assert [node for node in track if node in kept] == kept
     assert shapely.LineString(kept).length <= shapely.LineString(track).length + 1e-6
-    for a, b in zip(kept, kept[1:], strict=False):
+    for a, b in pairwise(kept):
         if track.index(b) > track.index(a) + 1:
             near = room([a, b], points)
             # Ends inside a disc may lead out of it.
-            assert near >= KEEP - 1e-6 or near == pytest.approx(min(room([a, a], points), room([b, b], points)))
+            assert near >= KEEP - 1e-6 or near == pytest.approx(
+                min(room([a, a], points), room([b, b], points))
+            )
 
 
 @settings(deadline=None)
@@ -111,7 +120,9 @@ def test_in_the_open_only_the_end_is_left() -> None:
     assert path.length_m == pytest.approx(10_000.0)
 
 
-def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_need_be(ring: MakePoints) -> None:
+def test_round_a_circle_the_curve_keeps_its_distance_and_is_hardly_longer_than_need_be(
+    ring: MakePoints,
+) -> None:
     points = ring(5000.0, 0.0, 1000.0, 25.0)
     outer = 1000.0 + KEEP + CUT
     turns = [math.acos(outer / 5000.0) + i * 0.12 for i in range(40)]

@@ -34,12 +34,14 @@ def test_steps_of_equal_changes_close_a_regular_polygon() -> None:
 
 
 @given(radius=st.floats(50.0, 5000.0), share=st.floats(0.01, 1.9))
-def test_steps_with_the_largest_change_lie_on_a_circle_of_the_turn_radius(radius: float, share: float) -> None:
+def test_steps_with_the_largest_change_lie_on_a_circle_of_the_turn_radius(
+    radius: float, share: float
+) -> None:
     length = share * radius
     change = largest_course_change_rad(length, radius)
     first = (0.0, 0.0)
-    *second, course = step(*first, 0.3, 0.0, length)
-    *third, _ = step(*second, course, change, length)
+    east, north, course = step(*first, 0.3, 0.0, length)
+    second, third = (east, north), step(east, north, course, change, length)[:2]
     # Radius of the circle through three points: the product of the sides over four times the area.
     area = 0.5 * abs(second[0] * third[1] - second[1] * third[0])
     sides = math.dist(first, second) * math.dist(second, third) * math.dist(third, first)

@@ -1,0 +1,125 @@
+"""A point that flies its route exactly and turns on the spot: what raw paths are scored with."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from aircraft.guidance import GuidanceOutput, route_length, route_point
+from aircraft.interface import AircraftState, Command, FloatArray, Route
+from aircraft.start import Atmosphere, StartConditions
+
+STEP_RATE_HZ = 120
+JOINED_M = 1e-6
+"""A route that begins nearer than this begins where the point is."""
+
+
+class KinematicPoint:
+    """Flight model and guidance in one: moves along its route at the commanded airspeed, whatever its bends.
+
+    Implements `FlightModel`, and `follow` and `update` as `PathFollower` has them. The air does not touch it:
+    speed over the ground is the airspeed, wind and turbulence are ignored. Before its first route it flies
+    straight on. To a route that begins elsewhere it first goes in a straight line; the cross-track error is
+    then the distance to where it joins, else 0. Beyond the end it goes straight on, or round a closing loiter.
+    """
+
+    def __init__(self, start: StartConditions, atmosphere: Atmosphere | None = None) -> None:
+        """Starts along the course.
+
+        Args:
+            start: position, altitude, course and airspeed.
+            atmosphere: ignored; taken so that a point is made as other flight models are.
+        """
+        del atmosphere
+        self._command = Command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
+        self._step = 0
+        tangent = math.sin(start.course_rad), math.cos(start.course_rad)
+        self._way = Route(np.array([[start.east_m, start.north_m, *tangent, 0.0, 1.0]]))
+        self._along_m = 0.0
+        self._gap_m = 0.0
+        self._joins_at_m = 0.0
+
+    @property
+    def step_rate_hz(self) -> int:
+        """Integration steps per simulated second."""
+        return STEP_RATE_HZ
+
+    def state(self) -> AircraftState:
+        """The state now; on a corner, in the direction that it leaves it."""
+        east, north, tangent_east, tangent_north = route_point(self._way, self._along_m)
+        speed = self._command.airspeed_mps
+        return AircraftState(
+            time_s=self._step / STEP_RATE_HZ,
+            east_m=east,
+            north_m=north,
+            up_m=self._command.altitude_m,
+            velocity_east_mps=speed * tangent_east,
+            velocity_north_mps=speed * tangent_north,
+            velocity_up_mps=0.0,
+            heading_rad=math.atan2(tangent_east, tangent_north) % math.tau,
+            roll_rad=0.0,
+            pitch_rad=0.0,
+            airspeed_mps=speed,
+            load_factor=1.0,
+        )
+
+    def command(self, command: Command) -> None:
+        """Sets altitude and airspeed, which hold at once; a point does not roll."""
+        self._command = command
+
+    def advance(self, steps: int) -> None:
+        """Moves on by `steps` steps of 1 / step_rate_hz."""
+        self._step += steps
+        self._along_m += self._command.airspeed_mps * steps / STEP_RATE_HZ
+
+    def fault(self) -> str | None:
+        """None: a point is always under control."""
+        return None
+
+    def follow(self, route: Route, station_m: float = 0.0) -> None:
+        """Takes a new route.
+
+        Args:
+            route: what to fly.
+            station_m: where on it to begin, m from its start.
+        """
+        east, north, *_ = route_point(self._way, self._along_m)
+        joint_east, joint_north, *_ = route_point(route, station_m)
+        rows = _rest(route, station_m)
+        gap = math.hypot(joint_east - east, joint_north - north)
+        if gap > JOINED_M:
+            towards = (joint_east - east) / gap, (joint_north - north) / gap
+            rows = np.vstack(([[east, north, *towards, 0.0, gap]], rows))
+        self._way = Route(rows, route.loiter)
+        self._gap_m = gap if gap > JOINED_M else 0.0
+        self._joins_at_m, self._along_m = station_m, 0.0
+
+    def update(self, state: AircraftState) -> GuidanceOutput:
+        """Says where on its route the point is; it has nothing to decide.
+
+        Args:
+            state: the point now.
+        """
+        on_route_m = self._along_m - self._gap_m
+        return GuidanceOutput(
+            roll_command_rad=0.0,
+            cross_track_m=max(-on_route_m, 0.0),
+            station_m=self._joins_at_m + max(on_route_m, 0.0),
+            bank_saturated=False,
+            past_end=not self._way.loiter and self._along_m > route_length(self._way),
+        )
+
+
+def _rest(route: Route, station_m: float) -> FloatArray:
+    """(n, 6) what is left of a route from a station on; a closing loiter is left whole."""
+    ends = np.cumsum(route.segments[:, 5])
+    index = int(np.searchsorted(ends, station_m, side="right"))
+    here = route_point(route, station_m)
+    if index == len(ends) and not route.loiter:
+        return np.array([[*here, 0.0, 1.0]])
+    index = min(index, len(ends) - 1)
+    curvature, length = route.segments[index, 4:].tolist()
+    whole = route.loiter and index == len(ends) - 1
+    first = [*here, curvature, length if whole else float(ends[index]) - station_m]
+    return np.vstack(([first], route.segments[index + 1 :]))

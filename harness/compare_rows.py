@@ -1,0 +1,211 @@
+"""The rows of a comparison and their forms: CSV for programs, Markdown for papers, labels for people."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+CRASHED = "crashed"
+"""Outcome of a flight that did not come to an end; the other outcomes are those of `metrics.json`."""
+
+DASH = "\N{EN DASH}"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One planner on one scenario. A figure that does not exist is None.
+
+    Attributes:
+        scenario: its name.
+        planner: its kind.
+        outcome: as in `metrics.json`, or `crashed`.
+        reason: the same as a sentence.
+        flown_length_m: length of the flown track.
+        optimum_m: the clairvoyant shortest path for a point that keeps the clearance.
+        ratio: flown length over the optimum; only where the goal was reached. The flight ends at the edge of
+            the goal circle, the optimum at its centre.
+        min_clearance_m: least distance to an obstacle edge.
+        clearance_violation_s: time below the wanted clearance.
+        turn_radius_m: smallest radius that a plan may ask the aircraft for.
+        tightest_turn: largest planned curvature times that radius; above 1 the aircraft cannot follow.
+        planned_heading_change_deg: sum of all changes of direction of the plans in effect.
+        flown_heading_change_deg: the same of the flown track.
+        planned_bending_energy_1pm: integral of the squared curvature over the length.
+        flown_bending_energy_1pm: the same of the flown track.
+        planned_max_curvature_1pm: largest curvature.
+        flown_max_curvature_1pm: the same of the flown track.
+        cross_track_p95_m: 95th percentile of the distance from the plan in effect.
+        cross_track_max_m: its largest value.
+        trackable: whether every leg of the plans was tracked; None where a point flew, which tracks anything.
+        planner_p50_ms: processor time of a search, median.
+        planner_p99_ms: the same, 99th percentile.
+        planner_max_ms: the same, largest.
+        replans: plans accepted after the first.
+        digest: SHA-256 of the track.
+    """
+
+    scenario: str
+    planner: str
+    outcome: str
+    reason: str
+    flown_length_m: float | None = None
+    optimum_m: float | None = None
+    ratio: float | None = None
+    min_clearance_m: float | None = None
+    clearance_violation_s: float | None = None
+    turn_radius_m: float | None = None
+    tightest_turn: float | None = None
+    planned_heading_change_deg: float | None = None
+    flown_heading_change_deg: float | None = None
+    planned_bending_energy_1pm: float | None = None
+    flown_bending_energy_1pm: float | None = None
+    planned_max_curvature_1pm: float | None = None
+    flown_max_curvature_1pm: float | None = None
+    cross_track_p95_m: float | None = None
+    cross_track_max_m: float | None = None
+    trackable: bool | None = None
+    planner_p50_ms: float | None = None
+    planner_p99_ms: float | None = None
+    planner_max_ms: float | None = None
+    replans: int | None = None
+    digest: str = ""
+
+
+def row_of(
+    scenario: str,
+    planner: str,
+    metrics: Mapping[str, Any],
+    *,
+    optimum_m: float | None,
+    turn_radius_m: float,
+    kinematic: bool,
+) -> Row:
+    """The row of a flight that came to an end.
+
+    Args:
+        scenario: its name.
+        planner: its kind.
+        metrics: content of `metrics.json`.
+        optimum_m: the clairvoyant optimum; None where there is none.
+        turn_radius_m: smallest radius of the aircraft.
+        kinematic: a point flew.
+    """
+    planned, flown = metrics["smoothness"]["planned"], metrics["smoothness"]["flown"]
+    length, compute, reached = metrics["flown_length_m"], metrics["compute_ms"], metrics["outcome"] == "reached"
+    return Row(
+        scenario=scenario,
+        planner=planner,
+        outcome=metrics["outcome"],
+        reason=metrics["reason"],
+        flown_length_m=length,
+        optimum_m=optimum_m,
+        ratio=length / optimum_m if reached and optimum_m else None,
+        min_clearance_m=metrics["min_clearance_m"],
+        clearance_violation_s=metrics["clearance_violation_s"],
+        turn_radius_m=turn_radius_m,
+        tightest_turn=planned["max_curvature_1pm"] * turn_radius_m,
+        planned_heading_change_deg=planned["heading_change_deg"],
+        flown_heading_change_deg=flown["heading_change_deg"],
+        planned_bending_energy_1pm=planned["bending_energy_1pm"],
+        flown_bending_energy_1pm=flown["bending_energy_1pm"],
+        planned_max_curvature_1pm=planned["max_curvature_1pm"],
+        flown_max_curvature_1pm=flown["max_curvature_1pm"],
+        cross_track_p95_m=metrics["cross_track_m"]["p95"],
+        cross_track_max_m=metrics["cross_track_m"]["max"],
+        trackable=None if kinematic else metrics["trackable"],
+        planner_p50_ms=compute["p50"],
+        planner_p99_ms=compute["p99"],
+        planner_max_ms=compute["max"],
+        replans=metrics["replans"],
+        digest=metrics["digest"],
+    )
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One line of a table for people.
+
+    Attributes:
+        label: what it is, with its unit.
+        short: the same in a few letters, for a terminal.
+        text: its value in a row.
+    """
+
+    label: str
+    short: str
+    text: Callable[[Row], str]
+
+
+FIGURES = (
+    Figure("outcome", "outcome", lambda row: row.outcome),
+    Figure("flown length, km", "km", lambda row: number(row.flown_length_m, 1e-3)),
+    Figure("ratio to the clairvoyant optimum", "ratio", lambda row: "" if row.ratio is None else f"{row.ratio:.4f}"),
+    Figure("least clearance, m", "clear m", lambda row: number(row.min_clearance_m)),
+    Figure("below the wanted clearance, s", "below s", lambda row: number(row.clearance_violation_s)),
+    Figure("tightest planned turn, curvature × turn radius", "κ·R", lambda row: number(row.tightest_turn)),
+    Figure("trackable", "tracks", lambda row: {None: "", True: "yes", False: "no"}[row.trackable]),
+    Figure("cross-track error p95, m", "xt p95", lambda row: number(row.cross_track_p95_m)),
+    Figure("cross-track error max, m", "xt max", lambda row: number(row.cross_track_max_m)),
+    Figure("heading change planned, °", "turn °", lambda row: number(row.planned_heading_change_deg)),
+    Figure("heading change flown, °", "flown °", lambda row: number(row.flown_heading_change_deg)),
+    Figure("bending energy planned, 1/km", "bend", lambda row: number(row.planned_bending_energy_1pm, 1e3)),
+    Figure("bending energy flown, 1/km", "bend fl.", lambda row: number(row.flown_bending_energy_1pm, 1e3)),
+    Figure("largest curvature planned, 1/km", "κ plan", lambda row: number(row.planned_max_curvature_1pm, 1e3)),
+    Figure("largest curvature flown, 1/km", "κ flown", lambda row: number(row.flown_max_curvature_1pm, 1e3)),
+    Figure("planner time p50, ms", "p50 ms", lambda row: number(row.planner_p50_ms)),
+    Figure("planner time p99, ms", "p99 ms", lambda row: number(row.planner_p99_ms)),
+    Figure("planner time max, ms", "max ms", lambda row: number(row.planner_max_ms)),
+    Figure("replans", "plans", lambda row: "" if row.replans is None else str(row.replans)),
+    Figure("digest", "digest", lambda row: row.digest[:12]),
+)
+"""What people are shown, in this order."""
+
+ON_TERMINAL = ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "xt max", "p99 ms")
+"""Those that fit 80 columns, by `short`."""
+
+
+def number(value: float | None, factor: float = 1.0) -> str:
+    """A value times a factor with three or four digits; empty where there is none."""
+    if value is None:
+        return ""
+    scaled = value * factor
+    if abs(scaled) < 1e-3:
+        return "0" if scaled == 0 else f"{scaled:.1e}"
+    return f"{scaled:.0f}" if abs(scaled) >= 1000 else f"{scaled:.3g}" if abs(scaled) < 100 else f"{scaled:.1f}"
+
+
+def to_csv(rows: Sequence[Row]) -> str:
+    """All figures at full precision; a figure that does not exist is an empty cell."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, [field.name for field in fields(Row)], lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow(asdict(row))
+    return text.getvalue()
+
+
+def to_markdown(rows: Sequence[Row]) -> str:
+    """One table a scenario: a line for each figure, a column for each planner."""
+    parts = []
+    for name in dict.fromkeys(row.scenario for row in rows):
+        own = [row for row in rows if row.scenario == name]
+        lines = [f"## {name}", "", _line(["", *(row.planner for row in own)])]
+        lines.append(_line(["---", *("---:" for _ in own)]))
+        lines += [_line([figure.label, *(figure.text(row) or DASH for row in own)]) for figure in FIGURES]
+        lines += ["", *(f"- {_escaped(row.planner)}: {_escaped(row.reason)}" for row in own), ""]
+        parts.append("\n".join(lines))
+    return "\n".join(parts)
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(map(_escaped, cells))} |"
+
+
+def _escaped(text: str) -> str:
+    """Text that Markdown takes for nothing else."""
+    for mark in "\\|<>`*":
+        text = text.replace(mark, f"\\{mark}")
+    return text

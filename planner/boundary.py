@@ -1,0 +1,353 @@
+"""The boundary of the known obstacles grown by the distance to be kept: what a BUG follows.
+
+Every edge point is the centre of a disc that must not be entered. The discs that overlap are one grown
+obstacle, and its boundary is made of their arcs. It is traced from arc to arc by exact intersections of
+circles, in the sense of travel, so that following it needs no steps, closes where it began, and changes only
+where a new disc covers a part of it. The area to be flown in is a wall that is known from the start.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.clearance import first_entry
+from planner.curves import SHORTEST_M, Point, Segment
+from planner.interface import FloatArray, Mission, SeenWorld
+from planner.memory import IntArray, ObstacleMemory
+
+ANGLE_OFF_RAD = 1e-7
+"""Angles nearer to each other than this are the same: intersections of circles are no better known."""
+
+TOUCH_SHARE = 0.05
+"""A place this share of the kept distance off a disc still touches it: a path cuts across the dents between."""
+
+HALF_TURN = 3.0
+"""Longer arcs are cut in two (rad)."""
+
+SEAT_DISCS = 40
+"""So many discs at most are looked at to find the boundary near a place."""
+
+FENCE = -1
+"""Label of the discs that keep a path inside the area."""
+
+
+class Contact(NamedTuple):
+    """The arc of one disc that lies on the boundary, in the sense of travel.
+
+    Attributes:
+        disc: index of the disc.
+        begin_rad: bearing of its beginning from the centre of the disc, counted in the sense of travel.
+        end_rad: that of its end, not less.
+    """
+
+    disc: int
+    begin_rad: float
+    end_rad: float
+
+
+def margin_of(mission: Mission) -> float:
+    """Planned distance beyond the clearance where none is given (m)."""
+    return max(0.1 * mission.clearance_m, 2.0 * mission.tracking_error_m)
+
+
+class GrownObstacles:
+    """The discs about all edge points seen so far.
+
+    Args:
+        mission: the area, the goal and the clearance.
+        margin_m: distance kept beyond the clearance, and from the bounds of the area.
+    """
+
+    def __init__(self, mission: Mission, margin_m: float) -> None:
+        self.keep_m = mission.clearance_m + margin_m
+        self._mission = mission
+        self._memory = ObstacleMemory(mission.clearance_m)
+        self._fence = _fence(mission.bounds_m, self.keep_m, margin_m)
+        self._rebuild()
+
+    def _rebuild(self) -> None:
+        self.points_m = np.zeros((0, 2))
+        self.radii_m = np.zeros(0)
+        self._cells: dict[tuple[int, int], list[int]] = {}
+        self._meets: dict[int, tuple[int, IntArray, FloatArray, FloatArray]] = {}
+        self._add(self._fence)
+
+    def take_in(self, seen: SeenWorld) -> tuple[FloatArray, bool]:
+        """Remembers what has come in.
+
+        Returns:
+            The (k, 2) new edge points, and whether some were taken back: then everything may be different.
+        """
+        fresh = self._memory.take_in(seen)
+        taken_back = len(self._memory.points_m) + len(self._fence) != len(self.points_m) + len(fresh)
+        if taken_back:
+            self._rebuild()
+            fresh = self._memory.points_m
+        if len(fresh):
+            self._add(fresh)
+        return fresh, taken_back
+
+    @property
+    def labels(self) -> IntArray:
+        """(m,) the obstacle that each disc belongs to."""
+        return np.concatenate((np.full(len(self._fence), FENCE, dtype=np.intp), self._memory.labels))
+
+    @property
+    def cell_m(self) -> float:
+        """Points within a square of this side are looked at as one piece of wall."""
+        return self._memory.cell_m
+
+    def _add(self, fresh: FloatArray) -> None:
+        begin = len(self.points_m)
+        east, north = self._mission.goal_m
+        # The goal itself may lie nearer to an edge than what is kept elsewhere, but not than the clearance.
+        room = np.hypot(fresh[:, 0] - east, fresh[:, 1] - north) - 1e-3
+        radii = np.clip(room, min(self._mission.clearance_m, self.keep_m), self.keep_m)
+        self.points_m = np.concatenate((self.points_m, fresh))
+        self.radii_m = np.concatenate((self.radii_m, radii))
+        cells = np.floor(fresh / (2.0 * self.keep_m)).astype(np.int64).tolist()
+        for i, (x, y) in enumerate(cells):
+            self._cells.setdefault((x, y), []).append(begin + i)
+
+    def first_hit(self, a: Point, b: Point) -> tuple[float, int]:
+        """Where the line from a to b first enters a disc: distance (m) and disc; infinite and -1 for never."""
+        return first_entry(a, b, self.points_m, self.radii_m)
+
+    def turned_back(self, place: Point, target: Point) -> bool:
+        """Whether the line from a place on the boundary to a target begins inside the obstacle."""
+        near = self._near(place)
+        dx, dy = self.points_m[near, 0] - place[0], self.points_m[near, 1] - place[1]
+        distance = np.hypot(dx, dy)
+        inward = dx * (target[0] - place[0]) + dy * (target[1] - place[1])
+        return bool(((distance < self.radii_m[near] + TOUCH_SHARE * self.keep_m) & (inward > 0.0)).any())
+
+    def covers(self, place: Point) -> bool:
+        """Whether a place lies inside a disc."""
+        return bool(self._covered(np.array([place]), self._near(place))[0])
+
+    def seat(self, place: Point) -> tuple[int, Point]:
+        """The boundary place nearest to a place on or in an obstacle, and a disc it lies on."""
+        near = self._near(place)
+        if not len(near):
+            square = (self.points_m[:, 0] - place[0]) ** 2 + (self.points_m[:, 1] - place[1]) ** 2
+            near = np.array([int(square.argmin())])
+        dx, dy = place[0] - self.points_m[near, 0], place[1] - self.points_m[near, 1]
+        distance = np.maximum(np.hypot(dx, dy), 1e-9)
+        order = np.argsort(distance - self.radii_m[near], kind="stable")[:SEAT_DISCS]
+        chosen, scale = near[order], self.radii_m[near[order]] / distance[order]
+        feet = self.points_m[chosen] + np.column_stack((dx[order] * scale, dy[order] * scale))
+        corners, owners = self._corners(chosen)
+        places, discs = np.concatenate((feet, corners)), np.concatenate((chosen, owners))
+        free = np.flatnonzero(~self._covered(places, near))
+        if not len(free):
+            return int(chosen[0]), (float(feet[0, 0]), float(feet[0, 1]))
+        off = np.hypot(places[free, 0] - place[0], places[free, 1] - place[1])
+        best = free[int(off.argmin())]
+        return int(discs[best]), (float(places[best, 0]), float(places[best, 1]))
+
+    def _corners(self, discs: IntArray) -> tuple[FloatArray, IntArray]:
+        """(k, 2) where the circles of some discs cross, and (k,) one of the two."""
+        i, j = np.triu_indices(len(discs), 1)
+        i, j = discs[i], discs[j]
+        step = self.points_m[j] - self.points_m[i]
+        distance = np.hypot(step[:, 0], step[:, 1])
+        ri, rj = self.radii_m[i], self.radii_m[j]
+        meet = (distance > 1e-6) & (distance < ri + rj) & (distance > np.abs(ri - rj))
+        i, step, distance, ri, rj = i[meet], step[meet], distance[meet], ri[meet], rj[meet]
+        along = (distance**2 + ri**2 - rj**2) / (2.0 * distance)
+        across = np.sqrt(np.maximum(ri**2 - along**2, 0.0))
+        unit = step / distance[:, None]
+        foot = self.points_m[i] + along[:, None] * unit
+        off = across[:, None] * np.column_stack((-unit[:, 1], unit[:, 0]))
+        return np.concatenate((foot + off, foot - off)), np.concatenate((i, i))
+
+    def _covered(self, places: FloatArray, discs: IntArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        dx = places[:, :1] - self.points_m[discs, 0]
+        dy = places[:, 1:] - self.points_m[discs, 1]
+        inside: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
+            np.hypot(dx, dy) < self.radii_m[discs] - ANGLE_OFF_RAD * self.keep_m
+        ).any(axis=1)
+        return inside
+
+    def _near(self, place: Sequence[float]) -> IntArray:
+        """All discs whose centre is within two kept distances, and some more."""
+        side = 2.0 * self.keep_m
+        x, y = math.floor(place[0] / side), math.floor(place[1] / side)
+        cells = (self._cells.get((x + i, y + j)) for i in (-1, 0, 1) for j in (-1, 0, 1))
+        return np.array([disc for cell in cells if cell for disc in cell], dtype=np.intp)
+
+    def _met_by(self, disc: int) -> tuple[IntArray, FloatArray, FloatArray]:
+        """The discs that meet one: their indices, the bearings of their middles, and half their widths."""
+        center = self.points_m[disc]
+        near = self._near(center.tolist())
+        known = self._meets.get(disc)
+        if known is not None and known[0] == len(near):
+            return known[1:]
+        dx, dy = self.points_m[near, 0] - center[0], self.points_m[near, 1] - center[1]
+        distance = np.hypot(dx, dy)
+        mine, other = self.radii_m[disc], self.radii_m[near]
+        meet = (distance > 1e-6) & (distance < mine + other) & (distance > np.abs(mine - other))
+        distance, other = distance[meet], other[meet]
+        half = np.arccos(np.clip((distance**2 + mine**2 - other**2) / (2.0 * distance * mine), -1.0, 1.0))
+        found = near[meet], np.arctan2(dy[meet], dx[meet]), half
+        self._meets[disc] = (len(near), *found)
+        return found
+
+    def contacts(self, disc: int, place: Point, side: float) -> Iterator[Contact]:
+        """The arcs of the boundary one after the other, without end.
+
+        Args:
+            disc: a disc that the first place lies on.
+            place: where to begin, on the boundary.
+            side: 1 for the obstacle on the left, -1 for on the right.
+        """
+        bearing = self._bearing(disc, place, side)
+        came_from = -1
+        while True:
+            others, middle, half = self._met_by(disc)
+            if not len(others):
+                yield Contact(disc, bearing, bearing + HALF_TURN)
+                bearing += HALF_TURN
+                continue
+            entry = side * middle - half
+            turn = (entry - bearing) % math.tau
+            inside = (bearing - entry) % math.tau < 2.0 * half - ANGLE_OFF_RAD
+            now = (inside | (turn > math.tau - ANGLE_OFF_RAD)) & (others != came_from)
+            turn[now] = 0.0
+            first = int(turn.argmin())
+            end = bearing + float(turn[first])
+            while end - bearing > HALF_TURN:
+                yield Contact(disc, bearing, bearing + HALF_TURN)
+                bearing += HALF_TURN
+            if end - bearing > ANGLE_OFF_RAD:
+                yield Contact(disc, bearing, end)
+            place = self._on(disc, end, side)
+            came_from, disc = disc, int(others[first])
+            bearing = self._bearing(disc, place, side)
+
+    def _bearing(self, disc: int, place: Point, side: float) -> float:
+        x, y = self.points_m[disc].tolist()
+        return math.atan2(side * (place[1] - y), place[0] - x)
+
+    def _on(self, disc: int, bearing: float, side: float) -> Point:
+        (x, y), radius = self.points_m[disc].tolist(), float(self.radii_m[disc])
+        return x + radius * math.cos(bearing), y + side * radius * math.sin(bearing)
+
+    def path_along(self, begin: Point, contacts: Sequence[Contact], side: float) -> list[Segment]:
+        """Lines and arcs along a stretch of the boundary, from a place on it or beside it.
+
+        Dents between neighbouring discs are bridged by the common tangent, so that a straight wall is followed
+        on a straight line and a bend that is hollow has a corner.
+
+        Args:
+            begin: where the path begins.
+            contacts: the stretch, from the place nearest to `begin` on.
+            side: as for `contacts`.
+        """
+        centers = self.points_m[[contact.disc for contact in contacts]] * (1.0, side)
+        radii = self.radii_m[[contact.disc for contact in contacts]]
+        bearings = _tangents(contacts, centers, radii)
+        x, y = begin[0], side * begin[1]
+        places: list[tuple[float, float, float, float]] = [
+            (x, y, 0.0, 0.0)
+        ]  # x, y, curvature and turn up to it
+        first = _first_touch(x, y, contacts, centers, radii, bearings)
+        for k in range(first[0], len(contacts)):
+            enter, leave = (first[1] if k == first[0] else bearings[k][0]), bearings[k][1]
+            cx, cy, radius = float(centers[k, 0]), float(centers[k, 1]), float(radii[k])
+            if enter <= leave:
+                places.append((cx + radius * math.cos(enter), cy + radius * math.sin(enter), 0.0, 0.0))
+                end = cx + radius * math.cos(leave), cy + radius * math.sin(leave)
+                places.append((*end, 1.0 / radius, leave - enter))
+            else:  # hollow: the two tangents meet before they touch
+                middle, reach = 0.5 * (enter + leave), radius / math.cos(0.5 * (enter - leave))
+                places.append((cx + reach * math.cos(middle), cy + reach * math.sin(middle), 0.0, 0.0))
+        return _joined(places, side)
+
+
+def _fence(bounds_m: tuple[float, float, float, float], keep_m: float, margin_m: float) -> FloatArray:
+    """(k, 2) centres outside the area whose discs leave all of it free but a margin."""
+    xmin, ymin, xmax, ymax = bounds_m
+    off = keep_m - margin_m
+    xs = np.linspace(xmin - off, xmax + off, max(2, math.ceil((xmax - xmin + 2 * off) / (0.5 * keep_m))))
+    ys = np.linspace(ymin - off, ymax + off, max(2, math.ceil((ymax - ymin + 2 * off) / (0.5 * keep_m))))[
+        1:-1
+    ]
+    rows = [np.column_stack((xs, np.full(len(xs), y))) for y in (ymin - off, ymax + off)]
+    columns = [np.column_stack((np.full(len(ys), x), ys)) for x in (xmin - off, xmax + off)]
+    return np.concatenate((*rows, *columns))
+
+
+def _tangents(
+    contacts: Sequence[Contact], centers: FloatArray, radii: FloatArray
+) -> list[tuple[float, float]]:
+    """The bearings at which each disc is reached and left: of the common tangents, else of the crossings."""
+    count = len(contacts)
+    step = np.diff(centers, axis=0)
+    length = np.hypot(step[:, 0], step[:, 1])
+    across = np.arctan2(step[:, 1], step[:, 0]) - 0.5 * math.pi
+    bridged = (length > SHORTEST_M) & (np.diff(radii) == 0.0)
+    begin = np.array([contact.begin_rad for contact in contacts])
+    end = np.array([contact.end_rad for contact in contacts])
+    leave, reach = np.append(across, 0.0), np.append(0.0, across)
+    # Bearings of one disc are counted from the middle of its arc.
+    middle = 0.5 * (begin + end)
+    leave, reach = (middle + (angle - middle + math.pi) % math.tau - math.pi for angle in (leave, reach))
+    while True:
+        out, into = np.append(bridged, False), np.append(False, bridged)
+        enter, left = np.where(into, reach, begin), np.where(out, leave, end)
+        hollow = np.maximum(enter - left, 0.0)
+        trim = radii * np.tan(np.minimum(0.5 * hollow, 1.5))
+        # A corner between two tangents takes at most half of each; one between a tangent and an arc is none.
+        room = np.minimum(np.append(length, math.inf), np.append(math.inf, length))
+        bad = (hollow > ANGLE_OFF_RAD) & (~(out & into) | (trim > 0.5 * room))
+        if not bad.any():
+            break
+        worst = np.flatnonzero(bad)
+        bridged[worst[worst < count - 1]] = False
+        bridged[worst[worst > 0] - 1] = False
+    return list(zip(enter.tolist(), left.tolist(), strict=True))
+
+
+def _first_touch(
+    x: float,
+    y: float,
+    contacts: Sequence[Contact],
+    centers: FloatArray,
+    radii: FloatArray,
+    bearings: list[tuple[float, float]],
+) -> tuple[int, float]:
+    """The first disc that a straight line from a place beside the boundary reaches, and at which bearing."""
+    for k in range(min(3, len(contacts))):
+        dx, dy = x - float(centers[k, 0]), y - float(centers[k, 1])
+        distance, radius = math.hypot(dx, dy), float(radii[k])
+        if distance < radius:
+            continue
+        touch = math.atan2(dy, dx) + math.acos(radius / distance)
+        low, high = contacts[k].begin_rad, bearings[k][1]
+        touch = low + (touch - low + ANGLE_OFF_RAD) % math.tau - ANGLE_OFF_RAD
+        if touch <= high:
+            return k, touch
+    return 0, contacts[0].begin_rad
+
+
+def _joined(places: list[tuple[float, float, float, float]], side: float) -> list[Segment]:
+    """Segments from place to place, each given with the curvature and the turn of the way to it."""
+    out: list[Segment] = []
+    for (x, y, _, _), (to_x, to_y, curvature, turn) in zip(places, places[1:], strict=False):
+        chord = math.hypot(to_x - x, to_y - y)
+        length = turn / curvature if curvature else chord
+        if length <= SHORTEST_M:
+            continue
+        if curvature:
+            # The tangent at the beginning is the chord turned back by half the turn.
+            direction = math.atan2(to_y - y, to_x - x) - 0.5 * turn
+            ux, uy = math.cos(direction), math.sin(direction)
+        else:
+            ux, uy = (to_x - x) / chord, (to_y - y) / chord
+        out.append((x, side * y, ux, side * uy, side * curvature, length))
+    return out

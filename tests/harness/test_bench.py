@@ -1,0 +1,148 @@
+"""The bench: what it measures, and that its figures are those of the flight that it flew."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import harness.bench
+from harness.bench import bench, block_shares
+from harness.scenario import Scenario, parse_scenario
+from harness.terminal import bench_rows
+
+SHORT = """\
+schema: wayproof/scenario/1
+name: short
+area: {bounds_m: [0, 0, 20000, 20000]}
+mission: {start_m: [5000, 5000], goal_m: [5000, 8000], goal_radius_m: 200}
+obstacles:
+  - circle: {center_m: [5300, 6400], radius_m: 300}
+sensor: {range_m: 4000, rays: 360, rate_hz: 2}
+environment:
+  wind: {speed_mps: 4.0, from_deg: 270}
+"""
+BLOCKS = {"dynamics", "guidance", "sensor", "map", "planner", "record", "recording"}
+
+
+def scenario() -> Scenario:
+    return parse_scenario(SHORT)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """One bench, with its temporary files where they can be counted, and what it told of its progress."""
+    told: list[tuple[float, float, str]] = []
+    folder = tmp_path_factory.mktemp("temporary")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tempfile.tempdir", str(folder))
+        measured = bench(scenario(), lambda *report: told.append(report))
+    return {**measured, "told": told, "left": list(folder.iterdir())}
+
+
+def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
+    cpu = result["cpu_s"]
+    assert result["closed_loop_ratio"] == pytest.approx(cpu["closed_loop"] / cpu["bare"])
+    assert result["closed_loop_recording_ratio"] == pytest.approx(cpu["closed_loop_recording"] / cpu["bare"])
+    assert result["bare_step_us"] == pytest.approx(1e6 * cpu["bare"] / result["steps"])
+
+
+def test_the_bare_run_has_as_many_steps_as_the_flight(result: dict[str, Any]) -> None:
+    assert result["outcome"] == "reached"
+    assert result["steps"] == round(120 * result["sim_s"])
+    assert 2600 < 25 * result["sim_s"] < 4000
+
+
+def test_the_loop_costs_more_than_its_flight_model_and_the_recording_more_than_none(
+    result: dict[str, Any],
+) -> None:
+    assert 1.0 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
+
+
+def test_every_block_has_its_share(result: dict[str, Any]) -> None:
+    assert set(result["blocks"]) == BLOCKS
+    assert sum(result["blocks"].values()) == pytest.approx(1.0)
+    assert min(result["blocks"].values()) > 0.0
+
+
+def test_search_times_are_in_order(result: dict[str, Any]) -> None:
+    planner = result["planner_ms"]
+    assert 0.0 < planner["p50"] <= planner["p99"] <= planner["max"]
+
+
+def test_can_be_printed(result: dict[str, Any]) -> None:
+    rows = bench_rows(result)
+    assert {name.strip() for name in rows} >= BLOCKS
+
+
+def test_leaves_no_file_behind(result: dict[str, Any]) -> None:
+    assert result["left"] == []
+
+
+def test_tells_of_every_round(result: dict[str, Any]) -> None:
+    states = [state for _, _, state in result["told"]]
+    assert states[-3:] == ["round 1 of 3", "round 2 of 3", "round 3 of 3"]
+    assert len(states) > 3
+
+
+def test_the_least_of_each_measurement_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With planted costs: a bare run of 4, 2, 5 s, flights of 8, 7, 6 s, recorded ones of 9, 12, 10 s."""
+    bare, flights = iter([4.0, 2.0, 5.0]), iter([8.0, 9.0, 7.0, 12.0, 6.0, 10.0])
+    figures = iter({"p50": float(i), "p99": 10.0 + i, "max": 20.0 + i} for i in (5, 4, 3, 7, 9, 8))
+    recordings: list[bool] = []
+    steps: list[int] = []
+
+    def bare_s(_: Scenario, count: int) -> float:
+        steps.append(count)
+        return next(bare)
+
+    def flown(_: Scenario, *, recording: bool) -> tuple[float, dict[str, Any]]:
+        recordings.append(recording)
+        return next(flights), {"compute_ms": next(figures)}
+
+    monkeypatch.setattr(harness.bench, "_bare_s", bare_s)
+    monkeypatch.setattr(harness.bench, "_flown", flown)
+    result = bench(scenario())
+    assert recordings == [False, True] * 3
+    assert steps == [result["steps"]] * 3
+    assert result["cpu_s"] == {"bare": 2.0, "closed_loop": 6.0, "closed_loop_recording": 9.0}
+    assert (result["closed_loop_ratio"], result["closed_loop_recording_ratio"]) == (3.0, 4.5)
+    assert result["planner_ms"] == {"p50": 3.0, "p99": 13.0, "max": 23.0}
+    assert result["blocks"]["recording"] == pytest.approx(3.0 / 9.0)
+
+
+def test_a_flight_without_a_plan_cannot_be_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    short = scenario()
+    late = short.model_copy(update={"mission": short.mission.model_copy(update={"time_limit_s": 0.4})})
+    late = late.model_copy(update={"sensor": late.sensor.model_copy(update={"latency_s": 1.0})})
+    monkeypatch.setattr(harness.bench, "_bare_s", lambda *_: pytest.fail("measured all the same"))
+    with pytest.raises(ValueError, match=r"nothing to measure: time limit 0\.4 s"):
+        bench(late)
+
+
+SECONDS = st.floats(0.01, 100.0)
+
+
+@given(
+    weights=st.dictionaries(
+        st.sampled_from(sorted(BLOCKS - {"recording"})), st.floats(0.001, 1.0), min_size=1
+    ),
+    loop_s=SECONDS,
+    files_s=SECONDS,
+    recording_s=SECONDS,
+)
+def test_shares_of_blocks_sum_to_one(
+    weights: dict[str, float], loop_s: float, files_s: float, recording_s: float
+) -> None:
+    total = sum(weights.values())
+    in_loop = {block: weight / total for block, weight in weights.items()}
+    whole = loop_s + files_s + recording_s
+    shares = block_shares(in_loop, loop_s, loop_s + files_s, whole)
+    assert math.isclose(sum(shares.values()), 1.0)
+    assert math.isclose(shares["recording"], recording_s / whole)
+    assert math.isclose(shares["record"], (in_loop.get("record", 0.0) * loop_s + files_s) / whole)
+    for block in set(in_loop) - {"record"}:
+        assert math.isclose(shares[block], in_loop[block] * loop_s / whole)

@@ -1,0 +1,198 @@
+"""Space seen to be free, by the obstacle map, against the true world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from harness.obstacle_map import ObstacleMap
+from harness.range_sensor import RangeScan, RangeSensor
+from harness.scenario_sections import Sensor
+from harness.world import Circle, Obstacle, Polygon, World
+
+FloatArray = NDArray[np.float64]
+
+BOUNDS = (0.0, 0.0, 10_000.0, 10_000.0)
+CLEARANCE, RANGE = 200.0, 3000.0
+FREE_CELL = CLEARANCE / 2.0
+MIDDLE = (5000.0, 5000.0)
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
+    return RangeSensor(world, Sensor(**{"range_m": RANGE} | keys), np.random.SeedSequence(seed))
+
+
+def world_of(*shapes: Circle | Polygon) -> World:
+    return World([Obstacle(shape) for shape in shapes], BOUNDS)
+
+
+def on_circle(count: int, radius_m: float = 300.0) -> list[tuple[float, float]]:
+    return [
+        (
+            MIDDLE[0] + radius_m * math.cos(math.tau * i / count),
+            MIDDLE[1] + radius_m * math.sin(math.tau * i / count),
+        )
+        for i in range(count)
+    ]
+
+
+def scans(
+    eye: RangeSensor, places: Iterable[tuple[float, float]], start_s: float = 0.0, heading_rad: float = 0.0
+) -> list[RangeScan]:
+    return [eye.scan(*place, heading_rad, start_s + 0.5 * i) for i, place in enumerate(places)]
+
+
+def distance_to(world: World, points: FloatArray) -> FloatArray:
+    distance: FloatArray = world.clearance(points, np.zeros(len(points)))
+    return distance
+
+
+WALL = Polygon(((4000.0, 6000.0), (6000.0, 6000.0), (6000.0, 6400.0), (4000.0, 6400.0)))
+
+
+def random_world(seed: int) -> World:
+    """Obstacles wider than what rays may miss, none about the middle."""
+    rng = np.random.default_rng(seed)
+    shapes: list[Circle | Polygon] = []
+    for _ in range(int(rng.integers(1, 7))):
+        away, turn, size = rng.uniform(1300.0, 3500.0), rng.uniform(0.0, math.tau), rng.uniform(200.0, 600.0)
+        x, y = MIDDLE[0] + away * math.cos(turn), MIDDLE[1] + away * math.sin(turn)
+        if rng.random() < 0.5:
+            shapes.append(Circle((x, y), float(size)))
+            continue
+        tilt = rng.uniform(0.0, math.tau)
+        corners = tilt + math.tau * np.arange(4) / 4
+        shapes.append(
+            Polygon(tuple((x + float(size) * math.cos(a), y + float(size) * math.sin(a)) for a in corners))
+        )
+    return world_of(*shapes)
+
+
+def fed(taken: Iterable[RangeScan]) -> ObstacleMap:
+    seen = ObstacleMap(BOUNDS, CLEARANCE, RANGE)
+    for scan in taken:
+        seen.update(scan)
+    return seen
+
+
+def test_a_lost_return_shows_no_free_space_behind_the_wall() -> None:
+    first = sensor(world_of(WALL)).scan(*MIDDLE, 0.0, 0.0)
+    ranges = first.ranges_m.copy()
+    ranges[np.argmin(np.abs(first.directions[:, 0]) - first.directions[:, 1])] = math.inf
+    behind = np.column_stack((np.full(60, 5000.0), np.linspace(6010.0, 7500.0, 60)))
+    assert not fed([replace(first, ranges_m=ranges)]).seen_free(behind).any()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_with_a_fifth_of_the_returns_lost_what_is_behind_walls_stays_unknown(seed: int) -> None:
+    world = world_of(WALL)
+    seen = fed(scans(sensor(world, seed, dropout=0.2), on_circle(100, 600.0)))
+    points = np.random.default_rng(seed).uniform(2000.0, 8000.0, (20_000, 2))
+    assert distance_to(world, points[seen.seen_free(points)]).min() > 0.0
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=SEEDS, field=st.sampled_from([360.0, 360.0, 120.0]), heading=st.floats(0.0, 6.0))
+def test_seen_free_is_true_only_where_there_is_nothing(seed: int, field: float, heading: float) -> None:
+    world = random_world(seed)
+    seen = fed(scans(sensor(world, field_of_view_deg=field), on_circle(6, 500.0), heading_rad=heading))
+    points = np.random.default_rng(seed).uniform(1000.0, 9000.0, (20_000, 2))
+    free = seen.seen_free(points)
+    assert free.any()
+    assert distance_to(world, points[free]).min() > 0.0
+
+
+@settings(deadline=None, max_examples=20)
+@given(seed=SEEDS)
+def test_most_of_what_is_plainly_visible_is_seen_free(seed: int) -> None:
+    world = random_world(seed)
+    seen = fed(scans(sensor(world), [MIDDLE]))
+    points = np.random.default_rng(seed).uniform(2000.0, 8000.0, (2000, 2))
+    lines = shapely.linestrings(np.stack((np.broadcast_to(MIDDLE, points.shape), points), axis=1))
+    shapes = [
+        shapely.Point(o.shape.center_m).buffer(o.shape.radius_m)
+        if isinstance(o.shape, Circle)
+        else shapely.Polygon(o.shape.vertices_m)
+        for o in world.obstacles
+    ]
+    gap = shapely.distance(lines, shapely.union_all(shapes))
+    in_range = np.hypot(*(points - MIDDLE).T) < RANGE - 2.0 * FREE_CELL
+    plain = in_range & (gap > 2.0 * FREE_CELL)
+    assert seen.seen_free(points[plain]).mean() > 0.97
+    assert not seen.seen_free(points[gap == 0.0]).any()
+
+
+def test_nothing_beyond_the_range_is_known() -> None:
+    seen = fed(scans(sensor(world_of()), [MIDDLE]))
+    points = np.random.default_rng(3).uniform(0.0, 10_000.0, (20_000, 2))
+    away = np.hypot(*(points - MIDDLE).T)
+    free = seen.seen_free(points)
+    assert away[free].max() <= RANGE
+    assert free[away < RANGE - 2.0 * FREE_CELL].all()
+
+
+def test_nothing_is_known_before_the_first_scan_nor_outside_the_area() -> None:
+    outside = np.array([(-10.0, 5000.0), (5000.0, 10_010.0), (1e7, 1e7), (-1e7, 0.0)])
+    assert not ObstacleMap(BOUNDS, CLEARANCE, RANGE).seen_free(np.array([MIDDLE, *outside])).any()
+    seen = fed(scans(sensor(world_of()), [(100.0, 5000.0), (5000.0, 9900.0)]))
+    assert not seen.seen_free(outside).any()
+    assert seen.seen_free(np.array([(150.0, 5000.0)])).all()
+    assert seen.seen_free(np.zeros((0, 2))).shape == (0,)
+
+
+def test_beyond_where_rays_are_as_far_apart_as_the_clearance_nothing_is_known() -> None:
+    # 40 rays: 0.157 rad apart, 200 m at a distance of 1273 m.
+    seen = fed(scans(sensor(world_of(), rays=40), [MIDDLE]))
+    points = np.random.default_rng(3).uniform(0.0, 10_000.0, (20_000, 2))
+    free = seen.seen_free(points)
+    assert free.any()
+    assert np.hypot(*(points - MIDDLE).T)[free].max() <= CLEARANCE / (math.tau / 40) + 1e-6
+
+
+@pytest.mark.parametrize("heading_deg", [0.0, 77.0, 200.0, 350.0])
+@pytest.mark.parametrize("field_deg", [60.0, 180.0, 300.0])
+def test_outside_the_field_of_view_nothing_is_known(heading_deg: float, field_deg: float) -> None:
+    heading = math.radians(heading_deg)
+    world = world_of(*(Circle(place, 250.0) for place in on_circle(12, 1500.0)))
+    eye = sensor(world, field_of_view_deg=field_deg)
+    seen = fed(scans(eye, [MIDDLE] * 4, heading_rad=heading))
+    points = np.random.default_rng(5).uniform(2000.0, 8000.0, (40_000, 2))
+    offset = points - MIDDLE
+    away = np.hypot(*offset.T)
+    off_nose = np.abs((np.arctan2(offset[:, 0], offset[:, 1]) - heading + math.pi) % math.tau - math.pi)
+    outside = off_nose > math.radians(field_deg) / 2
+    # A whole cell is marked or not: beside the edge of the field no more than a cell.
+    beside = away * np.sin(np.minimum(off_nose - math.radians(field_deg) / 2, math.pi / 2))
+    free = seen.seen_free(points)
+    assert free.any()
+    assert not free[outside & (beside > FREE_CELL * math.sqrt(2.0)) & (away > 2 * FREE_CELL)].any()
+    known = seen.edges_since(-1)
+    assert np.abs(distance_to(world, known)).max() < 0.5 * FREE_CELL
+    known_off = np.arctan2(known[:, 0] - MIDDLE[0], known[:, 1] - MIDDLE[1]) - heading
+    assert np.abs((known_off + math.pi) % math.tau - math.pi).max() <= math.radians(field_deg) / 2 + 1e-6
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_what_hides_just_beside_the_field_of_view_is_not_in_free_space(side: float) -> None:
+    # Circles that begin half a degree off the outermost ray.
+    edge = side * math.radians(45.0)
+    shapes = []
+    for away in (700.0, 1200.0, 1800.0, 2400.0):
+        turn = edge + side * (math.asin(150.0 / away) + math.radians(0.5))
+        shapes.append(Circle((MIDDLE[0] + away * math.sin(turn), MIDDLE[1] + away * math.cos(turn)), 150.0))
+    world = world_of(*shapes)
+    seen = fed(scans(sensor(world, field_of_view_deg=90.0), [MIDDLE]))
+    points = np.random.default_rng(7).uniform(2000.0, 8000.0, (60_000, 2))
+    free = seen.seen_free(points)
+    assert free.any()
+    assert distance_to(world, points[free]).min() > 0.0

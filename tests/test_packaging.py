@@ -1,0 +1,123 @@
+"""What the wheel holds, and that it flies from anywhere."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tomllib
+import venv
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.run_folder import load_run
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("planner", "aircraft", "harness")
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def constraints() -> dict[str, str]:
+    """Pinned versions by normalised name."""
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pins = [line.split("==") for line in lines if not line.startswith("#")]
+    return {normalised(name): pinned for name, pinned in pins}
+
+
+def normalised(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from this checkout."""
+    folder = tmp_path_factory.mktemp("wheel")
+    build = f"import hatchling.build; hatchling.build.build_wheel({str(folder)!r})"
+    subprocess.run([sys.executable, "-c", build], cwd=ROOT, capture_output=True, timeout=60, check=True)
+    (built,) = folder.glob("*.whl")
+    return built
+
+
+def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if ".dist-info/" not in name}
+        notes = {Path(name).name for name in archive.namelist()} - {Path(name).name for name in held}
+    sources = {
+        str(path.relative_to(ROOT))
+        for room in ROOMS
+        for path in (ROOT / room).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    scenarios = {f"harness/scenarios/{path.name}" for path in (ROOT / "scenarios").glob("*.yaml")}
+    assert held == sources | scenarios
+    assert {"aircraft/systems/autopilot.xml", "aircraft/airframes.yaml", "planner/py.typed"} <= held
+    assert {"LICENSE", "entry_points.txt", "METADATA"} <= notes
+
+
+def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "site")
+    (tmp_path / "empty").mkdir()
+    where = "import harness, sys; sys.stdout.write(harness.__file__)"
+    command = "from harness.cli import main; raise SystemExit(main())"
+    for code, arguments, shown in (
+        (where, [], str(tmp_path / "site")),
+        (command, ["fly", "aerosonde_forest", "--no-recording"], "reached: inside the goal circle"),
+    ):
+        run = subprocess.run(
+            [sys.executable, "-c", code, *arguments],
+            cwd=tmp_path / "empty",
+            env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        assert run.returncode == 0, run.stderr
+        assert shown in run.stdout
+    read = load_run(tmp_path / "empty" / "runs" / "aerosonde_forest" / "rolling_window-aerosonde-1")
+    assert read.metrics["outcome"] == "reached"
+
+
+def test_everything_needed_is_pinned() -> None:
+    pinned = constraints()
+    needed = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["dev"]]
+    names = {normalised(re.split(r"[<>=!~\[; ]", line)[0]) for line in needed}
+    assert names - pinned.keys() == set()
+    assert all(re.fullmatch(r"\d+(\.\d+)*", pin) for pin in pinned.values())
+    assert "rerun-sdk" in names
+
+
+def test_rerun_is_held_to_one_minor_version() -> None:
+    major, minor, _ = version("rerun-sdk").split(".")
+    assert f"rerun-sdk>={major}.{minor},<{major}.{int(minor) + 1}" in PROJECT["dependencies"]
+
+
+@pytest.mark.slow
+def test_wheel_installs_and_flies_in_a_fresh_environment(wheel: Path, tmp_path: Path) -> None:
+    venv.create(tmp_path / "env", with_pip=True)
+    programs = tmp_path / "env" / "bin"
+    plain = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    (tmp_path / "empty").mkdir()
+    for command in (
+        [programs / "pip", "install", "-q", "-c", ROOT / "constraints.txt", wheel],
+        [programs / "wayproof", "fly", "paper_circles"],
+    ):
+        run = subprocess.run(
+            [str(part) for part in command],
+            cwd=tmp_path / "empty",
+            env=plain,
+            capture_output=True,
+            text=True,
+            timeout=600,
+            check=False,
+        )
+        assert run.returncode == 0, run.stderr
+    assert "reached: inside the goal circle" in run.stdout
+    folder = tmp_path / "empty" / "runs" / "paper_circles" / "rolling_window-aerosonde-1"
+    assert (folder / "flight.rrd").stat().st_size > 100_000

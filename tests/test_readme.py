@@ -1,0 +1,152 @@
+"""README's commands and examples, run as they are written."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from harness.run_folder import load_run
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SET_UP = "python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt "
+FLY, TESTS = (line for line in README.splitlines() if line.startswith(SET_UP))
+
+
+def blocks(language: str) -> list[str]:
+    """The code blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+
+
+COMMANDS = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("wayproof ")]
+
+
+def wayproof(arguments: str, folder: Path, *, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """Runs the command in a folder, the packages taken from `path`."""
+    return subprocess.run(
+        [sys.executable, "-m", "harness", *shlex.split(arguments)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, dict.fromkeys((path, ROOT))))},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_the_first_command_flies_the_papers_scenario_and_prints_what_readme_shows(tmp_path: Path) -> None:
+    arguments = FLY.removeprefix(f"{SET_UP}. && .venv/bin/wayproof ")
+    assert arguments == "fly scenarios/paper_circles.yaml"
+    flown = wayproof(arguments, tmp_path)
+    assert (flown.returncode, flown.stderr) == (0, "")
+    (shown,) = (block for block in blocks("text") if "run folder:" in block)
+    names = [line[:20].strip() for line in shown.splitlines()]
+    assert [line[:20].strip() for line in flown.stdout.splitlines()] == names
+    folder = shown.splitlines()[-1].removeprefix("run folder: ")
+    assert load_run(tmp_path / folder).metrics["outcome"] == "reached"
+    assert f"`wayproof view {folder}`" in README
+
+
+def test_the_second_command_runs_these_tests_and_is_what_ci_runs() -> None:
+    assert f"{SET_UP}-e '.[dev]' && .venv/bin/pytest" == TESTS
+    ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert "tests=$(grep -m1 '^python3 -m venv .*pytest' README.md)" in ci
+    assert 'bash -c "$tests"' in ci
+    assert os.access(ROOT / ".ci" / "run", os.X_OK)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_shown_ends_well(command: str, tmp_path: Path) -> None:
+    shown = wayproof(command.removeprefix("wayproof "), tmp_path)
+    assert shown.returncode == 0, shown.stderr
+
+
+def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_path: Path) -> None:
+    (text,) = blocks("yaml")
+    (tmp_path / "my_world.yaml").write_text(text)
+    assert wayproof("fly my_world.yaml --no-recording --quiet", tmp_path).returncode == 0
+
+    spoilt = text.replace("goal_m: [7500, 3000]", "goal_m: [3500, 3400]")
+    assert spoilt != text
+    (tmp_path / "my_world.yaml").write_text(spoilt)
+    refused = wayproof("fly my_world.yaml", tmp_path)
+    assert refused.returncode == 2
+    assert refused.stderr in blocks("text")
+
+
+def test_ones_own_planner_is_found_and_flown(tmp_path: Path) -> None:
+    (planner,), (project,), (scenario,) = blocks("python"), blocks("toml"), blocks("yaml")
+    (tmp_path / "my_planner.py").write_text(planner)
+    (tmp_path / "pyproject.toml").write_text(project)
+    (tmp_path / "my_world.yaml").write_text(scenario)
+    build = f"import hatchling.build; hatchling.build.build_wheel({str(tmp_path)!r})"
+    subprocess.run([sys.executable, "-c", build], cwd=tmp_path, capture_output=True, timeout=60, check=True)
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "installed")
+
+    run = tmp_path / "run"
+    listed = wayproof("list planners", run.parent, path=tmp_path / "installed")
+    assert "beeline         straight to the goal" in listed.stdout.splitlines()
+    fly = f"fly my_world.yaml --planner beeline --set planner.beyond_m=700 --out {run}"
+    flown = wayproof(f"{fly} --no-recording --quiet", tmp_path, path=tmp_path / "installed")
+    assert (flown.returncode, flown.stderr) == (1, "")
+    read = load_run(run)
+    assert read.metrics["outcome"] == "collision"
+    assert [plan.length_m for plan in read.plans] == [pytest.approx(7700.0)]
+
+
+def test_the_scenarios_named_are_those_there_are() -> None:
+    for path in (ROOT / "scenarios").glob("*.yaml"):
+        assert f"`{path.stem}`" in README
+
+
+def test_files_and_pictures_named_are_there() -> None:
+    named = [
+        name.strip("`!()[]")
+        for name in re.findall(r"\]\((\.[^)]+)\)|`((?:planner|aircraft|harness|tests)/[\w./]+)`", README)
+        for name in name
+        if name
+    ]
+    assert len(named) > 8
+    assert [name for name in named if not (ROOT / name).exists()] == []
+    assert (ROOT / ".pictures" / "paper_circles.png").stat().st_size < 200 * 1024
+
+
+def test_readme_keeps_a_mistake_off_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["fly", "my_world.yaml"]) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_both_commands_run_as_written_in_a_fresh_copy(tmp_path: Path) -> None:
+    copy = tmp_path / "copy"
+    leave = shutil.ignore_patterns(".git", ".venv", "runs", "__pycache__", ".*_cache", ".hypothesis")
+    shutil.copytree(ROOT, copy, ignore=leave)
+    plain = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    flown = subprocess.run(
+        ["bash", "-c", FLY], cwd=copy, env=plain, capture_output=True, text=True, timeout=600, check=False
+    )
+    assert flown.returncode == 0, flown.stderr
+    assert "reached: inside the goal circle" in flown.stdout
+    collected = subprocess.run(
+        ["bash", "-c", TESTS],
+        cwd=copy,
+        env={**plain, "PYTEST_ADDOPTS": "--collect-only -q"},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert collected.returncode == 0, collected.stdout + collected.stderr
+    assert "tests/test_readme.py::" in collected.stdout
