@@ -14,14 +14,17 @@ STEP_RATE_HZ = 120
 JOINED_M = 1e-6
 """A route that begins nearer than this begins where the point is."""
 
+JOINING_STEPS = 8
+
 
 class KinematicPoint:
     """Flight model and guidance in one: moves along its route at the commanded airspeed, whatever its bends.
 
     Implements `FlightModel`, and `follow` and `update` as `PathFollower` has them. The air does not touch it:
     speed over the ground is the airspeed, wind and turbulence are ignored. Before its first route it flies
-    straight on. To a route that begins elsewhere it first goes in a straight line; the cross-track error is
-    then the distance to where it joins, else 0. Beyond the end it goes straight on, or round a closing loiter.
+    straight on. A route that begins elsewhere is joined in a straight line, where it comes near; the cross-track
+    error is then the distance to that place, else 0. Beyond the end it goes straight on, or round a closing
+    loiter.
     """
 
     def __init__(self, start: StartConditions, atmosphere: Atmosphere | None = None) -> None:
@@ -82,9 +85,10 @@ class KinematicPoint:
 
         Args:
             route: what to fly.
-            station_m: where on it to begin, m from its start.
+            station_m: where on it to begin looking for the nearest point, m from its start.
         """
         east, north, *_ = route_point(self._way, self._along_m)
+        station_m = _nearest_station(route, station_m, east, north)
         joint_east, joint_north, *_ = route_point(route, station_m)
         rows = _rest(route, station_m)
         gap = math.hypot(joint_east - east, joint_north - north)
@@ -109,6 +113,18 @@ class KinematicPoint:
             bank_saturated=False,
             past_end=not self._way.loiter and self._along_m > route_length(self._way),
         )
+
+
+def _nearest_station(route: Route, station_m: float, east_m: float, north_m: float) -> float:
+    """The station of the nearest point of a route close to a station and not before it, by Newton's method."""
+    nearest, gap, station = station_m, math.inf, station_m
+    for _ in range(JOINING_STEPS):
+        at_east, at_north, tangent_east, tangent_north = route_point(route, station)
+        away_east, away_north = east_m - at_east, north_m - at_north
+        if math.hypot(away_east, away_north) < gap:
+            nearest, gap = station, math.hypot(away_east, away_north)
+        station = max(station + away_east * tangent_east + away_north * tangent_north, station_m)
+    return nearest
 
 
 def _rest(route: Route, station_m: float) -> FloatArray:

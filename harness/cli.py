@@ -111,6 +111,61 @@ def fly(
 
 
 @app.command()
+def compare(
+    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Files or shipped names.")],
+    planners: Annotated[str, typer.Option(metavar="A,B,...", help="Kinds of planners, in order.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The comparison's folder.")] = Path(
+        "runs/comparison"
+    ),
+    kinematic: Annotated[
+        bool, _flag("--kinematic", "Fly a point that follows every plan exactly, not the aircraft.")
+    ] = False,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
+    ] = None,
+    no_recording: Annotated[bool, _flag("--no-recording", "Write no recordings and no overlay.")] = False,
+    as_json: Annotated[bool, _flag("--json", "Print comparison.json, and nothing else.")] = False,
+) -> int:
+    """Every planner on every scenario, side by side: table, figures, report, overlay recordings.
+
+    For example: wayproof compare paper_circles --planners rolling_window,bug2
+
+    Exit status:
+
+    0 every planner reached every goal
+
+    1 one did not, or crashed
+
+    2 bad input or usage, nothing flown
+    """
+    kinds = [kind.strip() for kind in planners.split(",")]
+    loaded = [_load(scenario, [("planner.kind", kind)]) for scenario in scenarios for kind in kinds]
+
+    from harness.compare import compare as fly_and_compare
+    from harness.compare_terminal import comparison_bar, print_comparison
+    from harness.record import RunFolderError
+
+    try:
+        with comparison_bar(loaded) as report:
+            comparison = fly_and_compare(
+                loaded,
+                out,
+                recording=not no_recording,
+                kinematic=kinematic,
+                workers=workers or os.cpu_count() or 1,
+                progress=report,
+            )
+    except RunFolderError as error:
+        raise _bad_input(error) from error
+    if as_json:
+        _print_json(comparison.plain())
+    else:
+        print_comparison(comparison.rows)
+        typer.echo(f"report: {out / 'report.html'}")
+    return 0 if comparison.all_reached else FAILED
+
+
+@app.command()
 def validate(
     files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenario files or shipped names.")],
 ) -> int:

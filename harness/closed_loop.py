@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
 from collections import deque
@@ -95,6 +96,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     watch = Stopwatch()
     model, follower, seen = loop.model, loop.follower, loop.seen
     steps = _Steps(model.step_rate_hz, loop.scan_rate_hz)
+    strides = itertools.cycle(steps.strides)
     log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
     plans = _Plans(loop, observers)
     judge = _Judge(loop)
@@ -119,7 +121,8 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             verdict = plans.ask(state, station)
             watch.lap("planner")
         if verdict is None and step % steps.guide == 0:
-            plans.take_effect(state, station)
+            if plans.due_s <= state.time_s:
+                plans.take_effect(state, station)
             if plans.index >= 0:
                 guided = follower.update(state)
                 cross_track, station = guided.cross_track_m, guided.station_m
@@ -134,7 +137,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             next_report = state.time_s + PROGRESS_EVERY_S
         if verdict is not None:
             break
-        ahead = steps.to_next(step)
+        ahead = next(strides)
         model.advance(ahead)
         step += ahead
     outcome, reason = verdict
@@ -163,10 +166,10 @@ class _Steps:
             for rate, name in ((UPDATE_RATE_HZ, "guidance"), (LOG_RATE_HZ, "log"))
         )
         self.scan = _whole(step_rate_hz, scan_rate_hz, "scan")
-
-    def to_next(self, step: int) -> int:
-        """Steps from one at which something happens to the next."""
-        return min(every - step % every for every in (self.guide, self.scan, self.log))
+        every = (self.guide, self.scan, self.log)
+        happens = sorted({step for rate in every for step in range(0, math.lcm(*every) + 1, rate)})
+        self.strides = tuple(after - before for before, after in itertools.pairwise(happens))
+        """Steps from each one at which something happens to the next, until all of it begins again."""
 
 
 def _whole(step_rate_hz: int, rate_hz: float, name: str) -> int:
@@ -183,15 +186,14 @@ class _Plans:
 
     def __init__(self, loop: Loop, observers: Sequence[Observer]) -> None:
         self._loop, self._observers = loop, observers
-        self._coming: tuple[float, float, Plan] | None = None
+        self._coming: tuple[float, Plan] | None = None
+        self.due_s = math.inf
+        """When the plan on its way takes effect."""
+        self.index = -1
+        """Index of the plan in effect, -1 before the first."""
         self._hold = False
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
-
-    @property
-    def index(self) -> int:
-        """Index of the plan in effect, -1 before the first."""
-        return len(self.accepted) - 1
 
     @property
     def state(self) -> str:
@@ -226,22 +228,22 @@ class _Plans:
             for observer in self._observers:
                 observer.on_event(state.time_s, plan.reason)
         if plan.status is PlanStatus.FOUND:
-            due = state.time_s + self._loop.mission.compute_latency_s
-            self._coming = (due, compute_ms, plan)
+            self._coming = (compute_ms, plan)
+            self.due_s = state.time_s + self._loop.mission.compute_latency_s - 1e-9
         return None
 
     def take_effect(self, state: AircraftState, station_m: float) -> None:
-        """Hands the coming plan to the guidance once it is due."""
-        if self._coming is None or self._coming[0] > state.time_s + 1e-9:
-            return
-        due, compute_ms, plan = self._coming
-        self._coming = None
+        """Hands the coming plan, now due, to the guidance."""
+        assert self._coming is not None
+        compute_ms, plan = self._coming
         assert plan.path is not None
-        late = state.time_s - (due - self._loop.mission.compute_latency_s)
+        late = state.time_s - (self.due_s - self._loop.mission.compute_latency_s)
+        self._coming, self.due_s = None, math.inf
         route = Route(plan.path.segments, plan.path.loiter)
         self._loop.follower.follow(route, station_m=late * state.groundspeed_mps)
         accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
         self.accepted.append(accepted)
+        self.index = accepted.plan_index
         self._hold = plan.path.loiter
         for observer in self._observers:
             observer.on_plan(accepted, state)
@@ -252,7 +254,7 @@ class _Judge:
 
     def __init__(self, loop: Loop) -> None:
         self._loop = loop
-        self._next_contact_s = 0.0
+        self._next_look_s = 0.0
         self._appears_s = -math.inf
 
     def to_go_m(self, state: AircraftState) -> float:
@@ -266,26 +268,26 @@ class _Judge:
         fault = loop.model.fault()
         if fault is not None:
             return Outcome.LOST_CONTROL, fault
-        if state.time_s >= self._next_contact_s:
-            clearance = self._clearance(state)
-            if clearance < 0.0:
-                return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
-        if not loop.world.inside_bounds(state.east_m, state.north_m):
-            return Outcome.OUT_OF_BOUNDS, f"left the area at ({state.east_m:.0f}, {state.north_m:.0f}) m"
+        if state.time_s < self._next_look_s:
+            return None
+        world, east, north = loop.world, state.east_m, state.north_m
+        clearance = world.clearance_at(east, north, state.time_s)
+        if clearance < 0.0:
+            return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
+        if not world.inside_bounds(east, north):
+            return Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m"
         to_go = self.to_go_m(state)
         if to_go <= mission.goal_radius_m:
             return Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s"
         if state.time_s >= loop.time_limit_s:
             return Outcome.TIMEOUT, f"time limit {loop.time_limit_s:g} s, {to_go:.0f} m from the goal"
-        return None
-
-    def _clearance(self, state: AircraftState) -> float:
-        """True clearance now; says when to look again, before any obstacle can have been reached."""
-        world = self._loop.world
-        clearance = world.clearance_at(state.east_m, state.north_m, state.time_s)
-        closing = 2.0 * state.groundspeed_mps + world.max_obstacle_speed_mps
-        wait = min(max(clearance, 0.0) / closing, LONGEST_UNCHECKED_S)
+        xmin, ymin, xmax, ymax = world.bounds_m
+        room = min(to_go - mission.goal_radius_m, east - xmin, north - ymin, xmax - east, ymax - north)
+        fastest = 2.0 * state.groundspeed_mps
+        wait = min(
+            clearance / (fastest + world.max_obstacle_speed_mps), room / fastest, LONGEST_UNCHECKED_S
+        )
         if self._appears_s <= state.time_s:
             self._appears_s = world.next_appearance(state.time_s)
-        self._next_contact_s = min(state.time_s + wait, self._appears_s)
-        return clearance
+        self._next_look_s = min(state.time_s + wait, self._appears_s, loop.time_limit_s)
+        return None

@@ -10,6 +10,9 @@ import numpy as np
 from harness.record import AcceptedPlan, FloatArray, Track
 from harness.smoothness import CORNER_RAD, window_m
 
+SAME_TURN = 1e-3
+"""Curvatures that differ by no more than this share of them are equal."""
+
 
 @dataclass(frozen=True, eq=False)
 class PlannedRows:
@@ -28,9 +31,14 @@ class PlannedRows:
 
     @property
     def tightest(self) -> int | None:
-        """The row at which the plan bends most; None where it never bends."""
+        """The row in the middle of the tightest turn, of equal ones the longest; None where no plan bends."""
         bend = np.nan_to_num(np.abs(self.curvature_1pm))
-        return int(bend.argmax()) if bend.any() else None
+        if not bend.any():
+            return None
+        tight = np.concatenate(([False], bend >= (1.0 - SAME_TURN) * bend.max(), [False]))
+        first, stop = np.flatnonzero(np.diff(tight)).reshape(-1, 2).T
+        longest = int((stop - first).argmax())
+        return int(first[longest] + stop[longest] - 1) // 2
 
 
 def planned_rows(track: Track, plans: Sequence[AcceptedPlan]) -> PlannedRows:

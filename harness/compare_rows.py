@@ -94,7 +94,11 @@ def row_of(
         kinematic: a point flew.
     """
     planned, flown = metrics["smoothness"]["planned"], metrics["smoothness"]["flown"]
-    length, compute, reached = metrics["flown_length_m"], metrics["compute_ms"], metrics["outcome"] == "reached"
+    length, compute, reached = (
+        metrics["flown_length_m"],
+        metrics["compute_ms"],
+        metrics["outcome"] == "reached",
+    )
     return Row(
         scenario=scenario,
         planner=planner,
@@ -142,10 +146,10 @@ class Figure:
 FIGURES = (
     Figure("outcome", "outcome", lambda row: row.outcome),
     Figure("flown length, km", "km", lambda row: number(row.flown_length_m, 1e-3)),
-    Figure("ratio to the clairvoyant optimum", "ratio", lambda row: "" if row.ratio is None else f"{row.ratio:.4f}"),
+    Figure("ratio to the clairvoyant optimum", "ratio", lambda row: _fixed(row.ratio, 4)),
     Figure("least clearance, m", "clear m", lambda row: number(row.min_clearance_m)),
     Figure("below the wanted clearance, s", "below s", lambda row: number(row.clearance_violation_s)),
-    Figure("tightest planned turn, curvature × turn radius", "κ·R", lambda row: number(row.tightest_turn)),
+    Figure("tightest planned turn, curvature × turn radius", "κ·R", lambda row: _fixed(row.tightest_turn, 2)),
     Figure("trackable", "tracks", lambda row: {None: "", True: "yes", False: "no"}[row.trackable]),
     Figure("cross-track error p95, m", "xt p95", lambda row: number(row.cross_track_p95_m)),
     Figure("cross-track error max, m", "xt max", lambda row: number(row.cross_track_max_m)),
@@ -153,7 +157,9 @@ FIGURES = (
     Figure("heading change flown, °", "flown °", lambda row: number(row.flown_heading_change_deg)),
     Figure("bending energy planned, 1/km", "bend", lambda row: number(row.planned_bending_energy_1pm, 1e3)),
     Figure("bending energy flown, 1/km", "bend fl.", lambda row: number(row.flown_bending_energy_1pm, 1e3)),
-    Figure("largest curvature planned, 1/km", "κ plan", lambda row: number(row.planned_max_curvature_1pm, 1e3)),
+    Figure(
+        "largest curvature planned, 1/km", "κ plan", lambda row: number(row.planned_max_curvature_1pm, 1e3)
+    ),
     Figure("largest curvature flown, 1/km", "κ flown", lambda row: number(row.flown_max_curvature_1pm, 1e3)),
     Figure("planner time p50, ms", "p50 ms", lambda row: number(row.planner_p50_ms)),
     Figure("planner time p99, ms", "p99 ms", lambda row: number(row.planner_p99_ms)),
@@ -174,7 +180,13 @@ def number(value: float | None, factor: float = 1.0) -> str:
     scaled = value * factor
     if abs(scaled) < 1e-3:
         return "0" if scaled == 0 else f"{scaled:.1e}"
-    return f"{scaled:.0f}" if abs(scaled) >= 1000 else f"{scaled:.3g}" if abs(scaled) < 100 else f"{scaled:.1f}"
+    return (
+        f"{scaled:.0f}" if abs(scaled) >= 1000 else f"{scaled:.3g}" if abs(scaled) < 100 else f"{scaled:.1f}"
+    )
+
+
+def _fixed(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"
 
 
 def to_csv(rows: Sequence[Row]) -> str:

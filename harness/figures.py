@@ -9,7 +9,7 @@ import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
@@ -50,6 +50,7 @@ STYLE = {
 WIDTH_IN = 4.8
 """Narrow, so that the letters stay legible on a phone and in a column of a paper."""
 
+BEHIND_TEXT = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
 DRAWN_ROWS = 1500
 CLOSE_UP_RADII = 4.0
 SPARE = 1.35
@@ -100,15 +101,19 @@ class Scene:
     optimum_m: FloatArray
 
 
-def overview(scene: Scene, runs: Sequence[DrawnRun]) -> Figure:
+Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
+"""Flights with the numbers of their planners, which give their colours in every figure."""
+
+
+def overview(scene: Scene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
     with _styled(figsize=(WIDTH_IN, 5.4)) as figure:
         axes = figure.add_subplot()
         legend = _map(axes, scene)
-        for index, run in enumerate(runs):
-            legend.append(_flown(axes, run, index, scene))
+        for index, run in runs:
+            legend.append(_flown(axes, scene, run, index, DASHES[index % len(DASHES)]))
         axes.set_title(scene.name)
-        if any(run.planned.tightest is not None for run in runs):
+        if any(run.planned.tightest is not None for _, run in runs):
             legend.append(_tightest_key())
         figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
     return figure
@@ -124,10 +129,12 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
     """
     row = run.planned.tightest
     with _styled(figsize=(WIDTH_IN, 5.4 if row is None else 7.6)) as figure:
-        rows = figure.add_gridspec(1 if row is None else 2, 2, height_ratios=[1.0] if row is None else [2.0, 1.0])
+        rows = figure.add_gridspec(
+            1 if row is None else 2, 2, height_ratios=[1.0] if row is None else [2.0, 1.0]
+        )
         axes = figure.add_subplot(rows[0, :])
         legend = _map(axes, scene)
-        legend.append(_flown(axes, run, index, scene))
+        legend.append(_flown(axes, scene, run, index))
         axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
         if row is not None:
             legend.append(_tightest_key())
@@ -140,18 +147,19 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
     return figure
 
 
-def profiles(scene: Scene, runs: Sequence[DrawnRun]) -> Figure:
+def profiles(scene: Scene, runs: Numbered) -> Figure:
     """Curvature and cross-track error along the way, two strips a planner."""
     with _styled(figsize=(WIDTH_IN, 0.9 + 2.1 * len(runs))) as figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
-        for index, run in enumerate(runs):
-            bend, cross = strips[2 * index], strips[2 * index + 1]
+        for place, (index, run) in enumerate(runs):
+            bend, cross = strips[2 * place], strips[2 * place + 1]
             distance = _distance_m(run.track) / 1e3
             planned = run.planned.curvature_1pm * scene.turn_radius_m
             flown = _flown_curvature(run.track) * scene.turn_radius_m
-            bend.plot(*_extremes(distance, planned), color="0.55", lw=0.8, label="planned")
+            most = float(np.nanmax(np.abs(planned), initial=0.0))
+            bend.plot(*_extremes(distance, planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
             bend.plot(*_extremes(distance, flown), color=_colour(index), lw=0.9, label="flown")
-            _limits(bend, flown, planned)
+            _limits(bend, flown)
             bend.set_ylabel("curvature × R")
             bend.set_title(run.planner, loc="left", color=_colour(index))
             bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
@@ -197,7 +205,9 @@ def _map(axes: Axes, scene: Scene) -> list[Any]:
         ):
             axes.add_patch(_outline(obstacle, grown, **style))
     (east, north), (goal_east, goal_north) = np.array(scene.start_m) / 1e3, np.array(scene.goal_m) / 1e3
-    straight = axes.plot([east, goal_east], [north, goal_north], color="0.3", lw=0.7, ls="--", label="straight line")
+    straight = axes.plot(
+        [east, goal_east], [north, goal_north], color="0.3", lw=0.7, ls="--", label="straight line"
+    )
     legend: list[Any] = [*straight]
     if len(scene.optimum_m):
         legend += axes.plot(
@@ -230,12 +240,11 @@ def _outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
     return patches.Polygon(vertices / 1e3, **style)
 
 
-def _flown(axes: Axes, run: DrawnRun, index: int, scene: Scene) -> Line2D:
-    """Draws a track and the place of its tightest planned turn."""
+def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
+    """Draws a track and the place of its tightest planned turn; the first planner's lies on top."""
     points = _thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
-    (line,) = axes.plot(
-        *points.T / 1e3, color=_colour(index), lw=1.5, ls=DASHES[index % len(DASHES)], label=run.planner, zorder=5
-    )
+    style = {"color": _colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
+    (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
     if run.outcome != "reached":
         axes.plot(*points[-1] / 1e3, "X", color=_colour(index), ms=7, mec="white", mew=0.6, zorder=7)
     row = run.planned.tightest
@@ -246,7 +255,9 @@ def _flown(axes: Axes, run: DrawnRun, index: int, scene: Scene) -> Line2D:
 
 
 def _tightest_key() -> Line2D:
-    return Line2D([], [], ls="", marker="o", mfc="none", mec="0.2", mew=1.2, ms=8, label="tightest planned turn")
+    return Line2D(
+        [], [], ls="", marker="o", mfc="none", mec="0.2", mew=1.2, ms=8, label="tightest planned turn"
+    )
 
 
 def _thinned(points: FloatArray, scene: Scene) -> FloatArray:
@@ -254,7 +265,9 @@ def _thinned(points: FloatArray, scene: Scene) -> FloatArray:
     import shapely
 
     xmin, ymin, xmax, ymax = scene.bounds_m
-    drawn: FloatArray = np.array(shapely.LineString(points).simplify(max(xmax - xmin, ymax - ymin) / 5000).coords)
+    drawn: FloatArray = np.array(
+        shapely.LineString(points).simplify(max(xmax - xmin, ymax - ymin) / 5000).coords
+    )
     return drawn
 
 
@@ -283,7 +296,8 @@ def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> 
     bar_m = _round_length_m(half)
     left, low = east - 0.9 * half_km, north - 0.88 * half_km
     axes.plot([left, left + bar_m / 1e3], [low, low], color="black", lw=2, solid_capstyle="butt")
-    axes.annotate(f"{bar_m:g} m", (left, low), (0, 3), textcoords="offset points")
+    text = axes.annotate(f"{bar_m:g} m", (left, low), (0, 4), textcoords="offset points", fontsize=8)
+    text.set_bbox(BEHIND_TEXT)
     axes.set_title("its tightest planned turn")
 
 
@@ -296,21 +310,21 @@ def _curvature_near(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: in
     planned = (run.planned.curvature_1pm * scene.turn_radius_m)[near]
     axes.plot(along, flown, color=_colour(index), lw=1.5)
     axes.plot(along, planned, color="black", lw=0.9, ls=(0, (4, 2)))
-    _limits(axes, flown, planned)
+    _limits(axes, flown)
+    most = float(np.nanmax(np.abs(planned), initial=0.0))
+    text = axes.annotate(f"planned up to {most:.3g}", (0.03, 0.04), xycoords="axes fraction", fontsize=8)
+    text.set_bbox(BEHIND_TEXT)
     axes.set_xlabel("along the path, m")
     axes.set_title("curvature × turn radius")
 
 
-def _limits(axes: Axes, flown: FloatArray, planned: FloatArray) -> None:
-    """The aircraft's turn limit, and a scale on which it can be read; what leaves it is said in figures."""
+def _limits(axes: Axes, flown: FloatArray) -> None:
+    """The aircraft's turn limit, and a scale on which the flown curve can be read; corners may leave it."""
     for limit in (-1.0, 1.0):
         axes.axhline(limit, color="0.35", lw=0.7, ls="--")
     axes.axhline(0.0, color="0.8", lw=0.6)
     reach = SPARE * max(1.0, float(np.abs(flown).max(initial=0.0)))
     axes.set_ylim(-reach, reach)
-    most = float(np.nanmax(np.abs(planned), initial=0.0))
-    if most > reach:
-        axes.annotate(f"planned up to {most:.3g}", (0.02, 0.95), xycoords="axes fraction", va="top", fontsize=7)
 
 
 def _distance_m(track: Track) -> FloatArray:

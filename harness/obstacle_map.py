@@ -1,7 +1,8 @@
 """What has been seen so far: obstacle edges and space seen to be free.
 
 Edges are points on a square grid of cells, at most one a cell, each where a ray hit or between two such
-places. Evidence decides: a cell that was hit in two scans holds an edge; one that several scans looked
+places. Near by, where the edge of an obstacle stands out against what is behind it, a finer grid keeps more of
+them: paths bend about such places. Evidence decides: a cell that was hit in two scans holds an edge; one that several scans looked
 through, with neighbouring rays agreeing, does not. So one false return makes no wall and one lost return
 opens none. Free space is a coarser grid, written from key scans. The grids cover the area, that of the
 edges with a border, so that the map cannot outgrow them.
@@ -24,6 +25,10 @@ CERTAIN = 8
 """Scores do not rise above this."""
 BETWEEN = np.arange(1, 8) / 8.0
 """Where points are put between two hits that are joined: no more than a cell apart from each other."""
+NEAR = 5.0
+"""Outlines are kept in detail up to so many clearances away."""
+FINER = 4
+"""Cells of the fine grid in one of the coarse one, along a side."""
 LOOK_THROUGH_EVERY = 4
 """Every so many scans the points in range are asked whether they were looked through."""
 
@@ -50,13 +55,16 @@ class ObstacleMap:
             math.ceil((high - low + 2.0 * border) / self._cell) for low, high in ((xmin, xmax), (ymin, ymax))
         )
         self._shape = np.array([[nx], [self._ny]], dtype=np.uint64)
-        self._score = np.zeros(nx * self._ny, dtype=np.int8)  # by cell
-        self._slot = np.full(nx * self._ny, -1, dtype=np.int32)  # by cell, -1 where there is no point
+        self._coarse = nx * self._ny
+        self._fine: dict[tuple[int, int], int] = {}  # fine cells that were hit, numbered after the coarse ones
+        self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # by cell
+        self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
         self._points = np.zeros((1024, 2))  # by slot
         self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
         self._since = np.zeros(1024, dtype=np.int64)  # by slot: revision at which it last became an edge
         self._count = 0
         self._join = 2.0 * clearance_m
+        self._near_by = NEAR * clearance_m
         self._range = range_m
         self._revision = 0
         self._taken_back_at = 0
@@ -81,7 +89,8 @@ class ObstacleMap:
         self._scans += 1
         hits = (scan.ranges_m < math.inf).nonzero()[0]
         if len(hits):
-            self._add(self._joined(scan, hits), np.array([[scan.east_m], [scan.north_m]]))
+            points, outline = self._joined(scan, hits)
+            self._add(points, outline, np.array([[scan.east_m], [scan.north_m]]))
         if self._scans % LOOK_THROUGH_EVERY == 0 and self._count:
             self._look_through(scan)
         self._free.update(scan)
@@ -103,28 +112,38 @@ class ObstacleMap:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
         return self._free.contains(points_m)
 
-    def _joined(self, scan: RangeScan, hits: NDArray[np.intp]) -> FloatArray:
-        """(2, k) where rays hit, seen from the sensor, and points between neighbours that leave no way."""
+    def _joined(self, scan: RangeScan, hits: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+        """Where rays hit, and points between neighbours that leave no way; and near outlines among the hits.
+
+        Returns:
+            (2, k) and (2, j) places, seen from the sensor.
+        """
         rays = len(scan.ranges_m)
-        if _all_round(scan) and hits[0] + rays - hits[-1] <= 2:
+        closed = _all_round(scan) and hits[0] + rays - hits[-1] <= 2
+        if closed:
             hits = np.append(hits, hits[0] + rays)
-        points = scan.directions.T.take(hits, axis=1, mode="wrap") * scan.ranges_m.take(hits, mode="wrap")
+        ranges = scan.ranges_m.take(hits, mode="wrap")
+        points = scan.directions.T.take(hits, axis=1, mode="wrap") * ranges
         step = points[:, 1:] - points[:, :-1]
         east, north = step
         gap2 = east * east + north * north
-        wide = ((gap2 > self._cell * self._cell) & (gap2 < self._join * self._join)).nonzero()[0]
         # One ray may be missing between neighbours: a lost return does not open a wall.
-        wide = wide[hits[wide + 1] - hits[wide] <= 2]
-        if not len(wide):
-            return points
-        between = points.take(wide, axis=1)[:, :, None] + step.take(wide, axis=1)[:, :, None] * BETWEEN
-        return np.concatenate((points, between.reshape(2, -1)), axis=1)
+        joined = (gap2 < self._join * self._join) & (hits[1:] - hits[:-1] <= 2)
+        ends = (~joined).nonzero()[0]
+        ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
+        outline = points[:, ends[ranges[ends] < self._near_by]]
+        wide = (joined & (gap2 > self._cell * self._cell)).nonzero()[0]
+        if len(wide):
+            between = points.take(wide, axis=1)[:, :, None] + step.take(wide, axis=1)[:, :, None] * BETWEEN
+            points = np.concatenate((points, between.reshape(2, -1)), axis=1)
+        return points, outline
 
-    def _add(self, points: FloatArray, sensor: FloatArray) -> None:
+    def _add(self, points: FloatArray, outline: FloatArray, sensor: FloatArray) -> None:
         """Counts hits: a cell gets a point with the first and is an edge from the second scan on.
 
         Args:
             points: (2, k) places, seen from the sensor.
+            outline: (2, j) those to be kept in detail.
             sensor: (2, 1) where it is.
         """
         cells = ((points + (sensor - self._origin)) / self._cell).astype(np.int64)
@@ -132,6 +151,9 @@ class ObstacleMap:
             inside = (cells.view(np.uint64) < self._shape).all(axis=0)
             cells, points = cells[:, inside], points[:, inside]
         keys = cells[0] * self._ny + cells[1]
+        if outline.size:
+            keys = np.concatenate((keys, self._fine_keys(outline + (sensor - self._origin))))
+            points = np.concatenate((points, outline), axis=1)
         score = self._score.take(keys)
         uncertain = (score < CERTAIN).nonzero()[0]
         if not len(uncertain):
@@ -153,6 +175,17 @@ class ObstacleMap:
             self._key[new] = new_keys
             self._since[new] = 0
             self._count += len(new_keys)
+
+    def _fine_keys(self, places: FloatArray) -> NDArray[np.int64]:
+        """Numbers of the fine cells at (2, j) places, seen from the corner of the grid."""
+        cells = (places * (FINER / self._cell)).astype(np.int64).T.tolist()
+        keys = [self._fine.setdefault((x, y), self._coarse + len(self._fine)) for x, y in cells]
+        if self._coarse + len(self._fine) > len(self._score):
+            size = self._coarse + 2 * len(self._fine)
+            more = size - len(self._score)
+            self._score = np.concatenate((self._score, np.zeros(more, dtype=np.int8)))
+            self._slot = np.concatenate((self._slot, np.full(more, -1, dtype=np.int32)))
+        return np.array(keys, dtype=np.int64)
 
     def _grow(self, more: int) -> None:
         if self._count + more <= len(self._key):

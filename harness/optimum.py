@@ -192,7 +192,12 @@ class _Scene:
         direction = bearing[apart] - np.arcsin(np.clip(shift / distance[apart], -1.0, 1.0))
         leaves, arrives = direction - side * math.pi / 2, direction - sides * math.pi / 2
         touching = self.in_cone(disc, leaves) & self.in_cone(others, arrives)
-        others, sides, leaves, arrives = others[touching], sides[touching], leaves[touching], arrives[touching]
+        others, sides, leaves, arrives = (
+            others[touching],
+            sides[touching],
+            leaves[touching],
+            arrives[touching],
+        )
         begin, end = self.contacts(np.full(len(others), disc), leaves), self.contacts(others, arrives)
         free = self.free_segments(begin, end)
         begin, end = begin[free], end[free]
@@ -222,9 +227,9 @@ class _Scene:
         return np.vstack((np.array(outside).reshape(-1, 2), arcs))
 
     def _inside(self, points: FloatArray) -> BoolArray:
-        within: BoolArray = (
-            (points >= self.low - self.slack_m) & (points <= self.high + self.slack_m)
-        ).all(axis=1)
+        within: BoolArray = ((points >= self.low - self.slack_m) & (points <= self.high + self.slack_m)).all(
+            axis=1
+        )
         return within
 
     def _offset_edges(self) -> FloatArray:

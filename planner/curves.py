@@ -57,6 +57,21 @@ def place_on(path: Path, station_m: float) -> tuple[Pose, float]:
     return end_of(path), 0.0
 
 
+def poses_at(path: Path, stations_m: FloatArray) -> FloatArray:
+    """(k, 4) poses at (k,) stations along a path, clamped to its ends."""
+    rows = path.segments
+    ends = np.cumsum(rows[:, 5])
+    stations = np.clip(stations_m, 0.0, ends[-1])
+    which = np.minimum(np.searchsorted(ends, stations), len(rows) - 1)
+    x, y, tx, ty, curvature, length = rows[which].T
+    s = stations - (ends[which] - length)
+    half = 0.5 * curvature * s
+    chord = s * np.sinc(half / np.pi)
+    c, sn = np.cos(half), np.sin(half)
+    cx, cy = tx * c - ty * sn, ty * c + tx * sn  # direction of the chord
+    return np.column_stack((x + chord * cx, y + chord * cy, cx * c - cy * sn, cy * c + cx * sn))
+
+
 def pose_at(path: Path, station_m: float) -> Pose:
     """The pose `station_m` along a path, clamped to its ends."""
     return place_on(path, station_m)[0]

@@ -29,7 +29,7 @@ LEAD_S = 1.0
 OFF_PATH = 4.0
 """Further off the path than this many times the tracking error, a plan begins at the aircraft itself."""
 
-SEARCH_SHARE, PATH_SHARE = 0.6, 0.25
+SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
 
 WIDER = 6

@@ -13,14 +13,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import islice
 from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
 from planner.boundary import Contact, GrownObstacles, margin_of
 from planner.clearance import distances, first_breach
-from planner.curves import SHORTEST_M, Point, Segment, along, between, pose_at
+from planner.curves import SHORTEST_M, Point, Segment, along, between, end_of, pose_at
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 
 OFF_PATH = 4.0
@@ -97,11 +96,19 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Cut:
-    """Where a stretch of boundary is left: the way up to there."""
+class Straight:
+    """On the straight line to the goal."""
 
-    segments: tuple[Segment, ...]
-    place: Point
+
+@dataclass(frozen=True)
+class Enclosed:
+    """At the end: the goal cannot be reached.
+
+    Attributes:
+        sentence: why.
+    """
+
+    sentence: str
 
 
 class Walker(ABC, Generic[State]):
@@ -127,8 +134,8 @@ class Walker(ABC, Generic[State]):
         self._breach_keep_m = self.keep_m - BREACH_SHARE * config.margin_m
         self._plan: Plan | None = None
         self._legs: tuple[Leg[State], ...] = ()
-        self._whole = False
         self._breach_m = math.inf
+        self._look_at_m = math.inf
 
     @abstractmethod
     def begin(self, place: Point) -> State:
@@ -143,71 +150,151 @@ class Walker(ABC, Generic[State]):
         """What the algorithm does from a place on, in what is known, leg by leg to the goal or the horizon."""
 
     @abstractmethod
-    def verdict(self, state: State) -> str | None:
-        """Why the goal cannot be reached, a sentence, once this state is reached; None in any other state."""
+    def says(self, state: State) -> str:
+        """What the algorithm does in a state, a sentence for the event log."""
 
-    def rethinks(self, station_m: float) -> bool:
-        """Whether the algorithm looks round here although its walk is still right."""
-        return False
+    def look_again_m(self) -> float:
+        """After how much of a walk the algorithm looks round although it can go on (m)."""
+        return math.inf
+
+    def prefers(self, new: tuple[Leg[State], ...], old: tuple[Leg[State], ...], left_m: float) -> bool:
+        """Whether a new walk is better than what is left of the old one, which can go on."""
+        return True
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the walk while it serves; takes it up anew where it does not."""
         fresh, taken_back = self.known.take_in(request.seen)
-        path = request.flown.path if request.flown is self._plan and request.flown else None
+        path = request.flown.path if request.flown and request.flown is self._plan else None
         if path is None:
-            return self._answer(request, request.position_m, self.begin(request.position_m))
-        station = request.station_m
+            return self._found(tuple(self.walk(request.position_m, self.begin(request.position_m))), request)
+        station, end = request.station_m, self._legs[-1].state
+        left = path.length_m - station
+        if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
+            return Plan(PlanStatus.UNREACHABLE, end.sentence)
         if len(fresh):
             breach = first_breach(path, fresh, self._breach_keep_m, station)
             self._breach_m = min(self._breach_m, breach)
-        due = self._breach_m - station < self._near_m or (
-            not self._whole and path.length_m - station < max(self._near_m, 0.5 * self.horizon_m)
+        ends_early = not isinstance(end, Enclosed) and math.dist(end_of(path)[:2], self.goal) > 1.0
+        must = (
+            taken_back
+            or self._breach_m - station < self._near_m
+            or (ends_early and left < max(self._near_m, 0.5 * self.horizon_m))
         )
-        if not (due or taken_back or self.rethinks(station)):
-            return Plan(PlanStatus.KEPT, "the walk goes on")
-        state = self._state_at(path, station)
-        sentence = self.verdict(state)
-        if sentence is not None:
-            return Plan(PlanStatus.UNREACHABLE, sentence)
-        if not (due or taken_back) and self.rethinks(station) is False:
+        if not must and station < self._look_at_m:
             return Plan(PlanStatus.KEPT, "the walk goes on")
         place = pose_at(path, station)[:2]
         if math.dist(place, request.position_m) > max(1.0, OFF_PATH * self.mission.tracking_error_m):
             place = request.position_m
-        return self._answer(request, place, state)
+        legs = tuple(self.walk(place, self._state_at(path, station)))
+        if not must and not self.prefers(legs, self._legs, left):
+            self._look_at_m = station + self.look_again_m()
+            return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
+        return self._found(legs, request, place)
 
     def _state_at(self, path: Path, station_m: float) -> State:
         """The state of the algorithm at a station of the path in effect."""
         begin = 0.0
-        for leg, following in zip(self._legs, (*self._legs[1:], None), strict=True):
-            end = begin + sum(segment[5] for segment in leg.segments)
-            if following is None or station_m < end - SHORTEST_M:
-                return self.after(leg.state, between(path, begin, station_m))
+        for leg in self._legs:
+            end = begin + length_of(leg.segments)
+            if station_m < end - SHORTEST_M or leg is self._legs[-1]:
+                break
             begin = end
-        raise AssertionError("a walk has a leg")
+        return self.after(leg.state, between(path, begin, station_m))
 
-    def _answer(self, request: PlanRequest, place: Point, state: State) -> Plan:
-        legs = tuple(self.walk(place, state))
-        sentence = self.verdict(legs[0].state)
-        if sentence is not None:
-            return Plan(PlanStatus.UNREACHABLE, sentence)
+    def _found(self, legs: tuple[Leg[State], ...], request: PlanRequest, place: Point | None = None) -> Plan:
         segments = [segment for leg in legs for segment in leg.segments]
+        end = legs[-1].state
         if not segments:
-            return Plan(PlanStatus.NO_PATH, "there is no room to move")
-        path = Path(np.array(segments))
-        joints = [
-            segment[:2]
-            for before, segment in zip(segments, segments[1:], strict=False)
-            if _kink(before, segment)
-        ]
+            reason = end.sentence if isinstance(end, Enclosed) else "there is no room to move"
+            status = PlanStatus.UNREACHABLE if isinstance(end, Enclosed) else PlanStatus.NO_PATH
+            return Plan(status, reason)
+        here = place or request.position_m
         last = along(segments[-1], segments[-1][5])[:2]
-        self._whole = math.dist(last, self.goal) < 1.0 or self.verdict(legs[-1].state) is not None and False
-        self._legs, self._breach_m = legs, math.inf
+        self._legs, self._breach_m, self._look_at_m = legs, math.inf, self.look_again_m()
         self._plan = Plan(
             PlanStatus.FOUND,
-            self.sentence(legs),
-            np.array([place, *joints, last]),
-            path,
-            PlanPicture(np.array([place, self.goal]), self.mission.sensor_range_m, np.zeros((0, 4))),
+            self.says(legs[0].state),
+            np.array([*(segment[:2] for segment in segments), last]),
+            Path(np.array(segments)),
+            PlanPicture(np.array([here, self.goal]), self.mission.sensor_range_m, np.zeros((0, 4))),
         )
         return self._plan
+
+    def enclosed(self) -> str:
+        """How a sentence on a goal that cannot be reached begins."""
+        return f"an obstacle encloses the goal at a distance of {self.keep_m:.0f} m from its edge"
+
+    def straight(self, place: Point, target: Point) -> tuple[tuple[Segment, ...], bool]:
+        """The line from a place towards a target, up to the first obstacle, and whether it meets one."""
+        clear, _ = self.known.first_hit(place, target)
+        whole = math.dist(place, target)
+        length = min(whole, clear)
+        if length <= SHORTEST_M:
+            return (), clear < whole
+        ux, uy = (target[0] - place[0]) / whole, (target[1] - place[1]) / whole
+        return ((*place, ux, uy, 0.0, length),), clear < whole
+
+    def boundary(self, place: Point, side: float, length_m: float) -> tuple[Segment, ...]:
+        """The way along the boundary next to a place.
+
+        Args:
+            place: on the boundary or near it.
+            side: 1 for the obstacle on the left, -1 for on the right.
+            length_m: how much of the boundary.
+        """
+        disc, seat = self.known.seat(place)
+        contacts: list[Contact] = []
+        length = 0.0
+        for contact in self.known.contacts(disc, seat, side):
+            contacts.append(contact)
+            length += float(self.known.radii_m[contact.disc]) * (contact.end_rad - contact.begin_rad)
+            if length >= length_m:
+                break
+        return tuple(self.known.path_along(place, contacts, side))
+
+    def passes(self, segments: Sequence[Segment], mark: Mark, from_m: float) -> float:
+        """Station at which a way passes a mark in its sense, not before a station; infinite for never."""
+        begin, best, best_at = 0.0, SAME_PLACE * self.keep_m, math.inf
+        for segment in segments:
+            end = begin + segment[5]
+            if end >= from_m:
+                reach = math.dist(segment[:2], mark.place) - segment[5]
+                distance, at = nearest(segment, mark.place) if reach < best else (math.inf, 0.0)
+                if distance < best and _same_way(segment, at, mark) and begin + at >= from_m:
+                    best, best_at = distance, begin + at
+                elif math.isfinite(best_at) and begin - best_at > self.keep_m:
+                    break
+            begin = end
+        return best_at
+
+
+def length_of(segments: Iterable[Segment]) -> float:
+    """Length of a way (m)."""
+    return sum(segment[5] for segment in segments)
+
+
+def _same_way(segment: Segment, at_m: float, mark: Mark) -> bool:
+    _, _, tx, ty = along(segment, at_m)
+    return tx * mark.ux + ty * mark.uy > 0.0
+
+
+def nearest(segment: Segment, place: Point) -> tuple[float, float]:
+    """Distance of a place from a segment, and where along it (m)."""
+    distance, station = distances(Path(np.array([segment])), np.array([place]))
+    return float(distance[0]), float(station[0])
+
+
+def rest_of(segments: Sequence[Segment], station_m: float) -> tuple[Segment, ...]:
+    """The way from a station on."""
+    return tuple(between(Path(np.array(segments)), station_m, math.inf)) if segments else ()
+
+
+def cut(segments: Sequence[Segment], station_m: float) -> tuple[Segment, ...]:
+    """The way up to a station."""
+    return tuple(between(Path(np.array(segments)), 0.0, station_m)) if segments else ()
+
+
+def mark_at(segments: Sequence[Segment], station_m: float) -> Mark:
+    """The place at a station of a way, and its direction there."""
+    x, y, ux, uy = pose_at(Path(np.array(segments)), station_m)
+    return Mark((x, y), ux, uy)

@@ -1,0 +1,101 @@
+"""Proof that no way exists: a closed chain of seen edges between start and goal.
+
+Two edge points nearer to each other than twice the clearance let nothing through between them: no point of the
+line that joins them is as far as the clearance from both. Nor is there a way between an edge point and the border of
+the area that is nearer to it than the clearance. A closed chain of such lines, where the border closes chains
+outside of the area, that crosses the straight line from start to goal an odd number of times parts the two (Jordan
+curve theorem, modulo 2). Chains are kept as a forest with the parity of their crossings, so that the first link
+that closes an odd one is noticed: union-find with parity.
+"""
+
+from __future__ import annotations
+
+import math
+
+from planner.curves import Point
+from planner.interface import FloatArray
+
+OUTSIDE = 0
+"""Node of the world outside of the area."""
+
+
+class Barrier:
+    """Watches for a closed chain of edge points between two places.
+
+    Args:
+        start: a place that keeps the clearance from all points.
+        goal: another.
+        bounds_m: xmin, ymin, xmax, ymax of the area, which is never left.
+        clearance_m: distance that a way keeps from every point.
+    """
+
+    def __init__(
+        self, start: Point, goal: Point, bounds_m: tuple[float, float, float, float], clearance_m: float
+    ) -> None:
+        self._start, self._goal = start, goal
+        self._bounds = bounds_m
+        self._clearance = clearance_m
+        self._parent = [OUTSIDE]
+        self._parity = [False]  # crossings on the way to the parent
+        self._cells: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
+        self.closed = False
+
+    @property
+    def count(self) -> int:
+        """How many points have been taken in."""
+        return len(self._parent) - 1
+
+    def add(self, points_m: FloatArray) -> None:
+        """Takes in edge points, (k, 2)."""
+        for x, y in points_m.tolist():
+            self._add(x, y)
+
+    def _add(self, x: float, y: float) -> None:
+        node = len(self._parent)
+        self._parent.append(node)
+        self._parity.append(False)
+        xmin, ymin, xmax, ymax = self._bounds
+        for border in ((xmin, y), (xmax, y), (x, ymin), (x, ymax)):
+            if math.dist(border, (x, y)) < self._clearance:
+                self._link(node, OUTSIDE, self._crosses((x, y), border))
+        reach = 2.0 * self._clearance
+        column, row = math.floor(x / reach), math.floor(y / reach)
+        for i in (column - 1, column, column + 1):
+            for j in (row - 1, row, row + 1):
+                for other_x, other_y, other in self._cells.get((i, j), ()):
+                    if math.hypot(other_x - x, other_y - y) < reach:
+                        self._link(node, other, self._crosses((x, y), (other_x, other_y)))
+        self._cells.setdefault((column, row), []).append((x, y, node))
+
+    def _link(self, a: int, b: int, crosses: bool) -> None:
+        root_a, parity_a = self._root(a)
+        root_b, parity_b = self._root(b)
+        odd = parity_a ^ parity_b ^ crosses
+        if root_a != root_b:
+            self._parent[root_a], self._parity[root_a] = root_b, odd
+        elif odd:
+            self.closed = True
+
+    def _root(self, node: int) -> tuple[int, bool]:
+        """The root of a node's tree and the parity of crossings on the way there; shortens the way."""
+        way = []
+        while self._parent[node] != node:
+            way.append(node)
+            node = self._parent[node]
+        parity = False
+        for each in reversed(way):
+            parity ^= self._parity[each]
+            self._parent[each], self._parity[each] = node, parity
+        return node, parity
+
+    def _crosses(self, a: Point, b: Point) -> bool:
+        """Whether the line from a to b crosses that from start to goal."""
+        (sx, sy), (gx, gy) = self._start, self._goal
+        dx, dy = gx - sx, gy - sy
+        side_a = dx * (a[1] - sy) - dy * (a[0] - sx)
+        side_b = dx * (b[1] - sy) - dy * (b[0] - sx)
+        if (side_a > 0.0) == (side_b > 0.0):
+            return False
+        share = side_a / (side_a - side_b)
+        x, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
+        return 0.0 <= (x - sx) * dx + (y - sy) * dy < dx * dx + dy * dy

@@ -1,0 +1,114 @@
+"""Safety by construction: how far a path may be committed to.
+
+Invariant: the path in effect ends in a full turn at the minimum radius, and path and turn lie in space that has
+been seen to be free, with the clearance kept from every edge seen. Whatever the unseen part of the world holds,
+the aircraft can fly the path it has into that turn and go on planning from there, for ever. (Schouwenaars et
+al., "Receding horizon path planning with implicit safety guarantees", ACC 2004.) The turn is certified as a
+disc, not as a circle: a circle can enclose the tip of a wall.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.curves import Limits, Segment, along, between, full_turn, place_on, poses_at
+from planner.interface import Path, SeenWorld
+from planner.route_optimisation import Terrain
+
+DISC = 1.04
+"""Radius of the certified disc over that of the turn: room for tracking error and rolling in."""
+
+MOST_STATIONS = 32
+
+
+@dataclass(frozen=True)
+class Certified:
+    """The part of a path that may be flown.
+
+    Attributes:
+        path: up to the turn, and the turn.
+        leaves_m: station at which the turn begins.
+    """
+
+    path: Path
+    leaves_m: float
+
+
+class Certifier:
+    """Looks for the last safe turn off a path.
+
+    Args:
+        limits: smallest radius and room to roll.
+        horizon_m: nothing further along a path than this is looked at.
+        spacing_m: distance between the places at which space is asked to be free.
+    """
+
+    def __init__(self, limits: Limits, horizon_m: float, spacing_m: float) -> None:
+        self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
+        radius = DISC * limits.radius_m
+        count = max(math.ceil(radius / spacing_m), 2)
+        axis = np.linspace(-radius, radius, 2 * count + 1)
+        x, y = (each.ravel() for each in np.meshgrid(axis, axis))
+        inside = x * x + y * y <= radius * radius
+        self._disc = np.column_stack((x[inside], y[inside]))
+
+    def seen_free_to_m(self, path: Path, seen: SeenWorld) -> float:
+        """Station up to which a path lies in space seen to be free."""
+        end = min(path.length_m, self._horizon)
+        stations = np.linspace(0.0, end, max(math.ceil(end / self._spacing), 1) + 1)
+        hidden = np.flatnonzero(~seen.seen_free(poses_at(path, stations)[:, :2]))
+        return float(stations[hidden[0]]) if len(hidden) else end
+
+    def certify(self, path: Path, seen: SeenWorld, terrain: Terrain) -> Certified | None:
+        """The longest part of a path that ends in a turn which is seen to be free.
+
+        Args:
+            path: a path that keeps its distance from all edges seen.
+            seen: what has been seen to be free.
+            terrain: the edges, and the distance that the turn has to keep from each.
+        """
+        free_to = self.seen_free_to_m(path, seen)
+        step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
+        stations = free_to - step * np.arange(int(free_to / step) + 1)
+        poses = poses_at(path, stations)
+        free = {}
+        for side in (1.0, -1.0):  # left, right
+            centres = poses[:, :2] + side * self._limits.radius_m * np.column_stack((-poses[:, 3], poses[:, 2]))
+            places = (centres[:, None] + self._disc).reshape(-1, 2)
+            free[side] = seen.seen_free(places).reshape(len(stations), -1).all(axis=1)
+        for i, station in enumerate(stations.tolist()):
+            for side in (1.0, -1.0):
+                if free[side][i]:
+                    turn = self._turn(path, station, side)
+                    if terrain.admits(Path(np.array(turn))):
+                        return Certified(
+                            Path(np.array([*between(path, 0.0, station), *turn]), loiter=True), station
+                        )
+        return None
+
+    def _turn(self, path: Path, station_m: float, side: float) -> list[Segment]:
+        """A full turn off a path, after a straight to roll where the path turns the other way."""
+        pose, curvature = place_on(path, station_m)
+        if side * curvature >= 0.0:
+            return [full_turn(pose, self._limits.radius_m, side)]
+        roll: Segment = (*pose, 0.0, self._limits.roll_m)
+        return [roll, full_turn(along(roll, self._limits.roll_m), self._limits.radius_m, side)]
+
+
+def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:
+    """Sensing range without which not even a turn can be certified.
+
+    A disc that touches the course reaches two radii to the side; beyond it lie the clearance and what is flown
+    until a plan takes effect.
+
+    Args:
+        radius_m: turn radius.
+        clearance_m: wanted distance from obstacles.
+        speed_mps: speed over the ground.
+        reaction_s: latency of sensor and planner, and the time to roll.
+    """
+    return 2.0 * DISC * radius_m + clearance_m + speed_mps * reaction_s
+
