@@ -22,9 +22,9 @@ class KinematicPoint:
 
     Implements `FlightModel`, and `follow` and `update` as `PathFollower` has them. The air does not touch it:
     speed over the ground is the airspeed, wind and turbulence are ignored. Before its first route it flies
-    straight on. A route that begins elsewhere is joined in a straight line, where it comes near; the cross-track
-    error is then the distance to that place, else 0. Beyond the end it goes straight on, or round a closing
-    loiter.
+    straight on. A route that begins elsewhere is joined in a straight line, where it comes near; the
+    cross-track error is then the distance to that place, else 0. Beyond the end it goes straight on, or round
+    a closing loiter.
     """
 
     def __init__(self, start: StartConditions, atmosphere: Atmosphere | None = None) -> None:
@@ -116,7 +116,7 @@ class KinematicPoint:
 
 
 def _nearest_station(route: Route, station_m: float, east_m: float, north_m: float) -> float:
-    """The station of the nearest point of a route close to a station and not before it, by Newton's method."""
+    """The station of the point of a route nearest to a place, sought from a station on by Newton's method."""
     nearest, gap, station = station_m, math.inf, station_m
     for _ in range(JOINING_STEPS):
         at_east, at_north, tangent_east, tangent_north = route_point(route, station)

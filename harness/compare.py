@@ -1,8 +1,8 @@
-"""Planners side by side: flies every one on every scenario and writes tables, figures, overlays and a report.
+"""Planners side by side: flies every one on every scenario, writes tables, figures, overlays and a report.
 
-The folder of a comparison holds `comparison.csv`, `comparison.md`, `comparison.json` and `report.html`, and for
-each scenario a folder with its figures, `overlay.rrd` and a run folder for each planner. `comparison.json` is
-written first and last and says whether the comparison is complete.
+The folder of a comparison holds `comparison.csv`, `comparison.md`, `comparison.json` and `report.html`, and
+for each scenario a folder with its figures, `overlay.rrd` and a run folder for each planner. The index
+`comparison.json` is written first and last and says whether the comparison is complete.
 """
 
 from __future__ import annotations
@@ -102,12 +102,14 @@ def compare(
     jobs = [
         Job(each, out / each.name / each.planner.kind, recording, kinematic) for each in _distinct(scenarios)
     ]
-    begun = Comparison(shlex.join(sys.argv), _now(), {}, kinematic, ())
+    begun = Comparison(shlex.join(["wayproof", *sys.argv[1:]]), _now(), {}, kinematic, ())
     _claim(out, begun)
     answers = fly_all(jobs, workers, progress)
     optima = {name: _optimum(own[0]) for name, own in _by_name(scenarios, lambda each: each.name).items()}
     entries = [_entry(*each, optima) for each in zip(jobs, answers, strict=True)]
-    versions = next((each.run.manifest["versions"] for each in entries if each.run), {})
+    runs = [each.run for each in entries if each.run]
+    named = runs[0].manifest["versions"] if runs else {}
+    versions = {name: version for name, version in named.items() if version}
     done = Comparison(begun.command, begun.started_utc, versions, kinematic, tuple(e.row for e in entries))
     chapters = [
         _chapter(out / name, own, optima[name])
@@ -128,14 +130,12 @@ def _by_name(things: Sequence[Any], name: Callable[[Any], str]) -> dict[str, lis
 
 
 def _distinct(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
-    for number_, each in enumerate(scenarios):
-        if any(
-            each.name == other.name and each.planner.kind == other.planner.kind
-            for other in scenarios[:number_]
-        ):
-            raise InputError(
-                f"wayproof: the scenario {each.name} is there twice for {each.planner.kind}; leave one out or rename it"
-            )
+    seen = set()
+    for each in scenarios:
+        name, kind = flight = each.name, each.planner.kind
+        if flight in seen:
+            raise InputError(f"wayproof: {kind} is to fly {name} twice; leave one out or rename the scenario")
+        seen.add(flight)
     return scenarios
 
 
@@ -192,6 +192,7 @@ def _entry(job: Job, answer: Answer, optima: Mapping[str, Optimum]) -> _Entry:
         run.metrics,
         optimum_m=optima[name].length_m,
         turn_radius_m=performance_of(job.scenario).turn_radius_m,
+        tightest_1pm=answer.planned.tightest_1pm,
         kinematic=job.kinematic,
     )
     return _Entry(job, answer, run, row)

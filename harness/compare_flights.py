@@ -83,8 +83,8 @@ def fly_all(jobs: Sequence[Job], workers: int, progress: Progress | None = None)
                 # Only the child may hold this end: then its death is the end of the stream.
                 theirs.close()
                 flying[ours] = index, process
-            for ours in wait(list(flying)):
-                assert isinstance(ours, Connection)
+            ready = wait(list(flying))
+            for ours in [each for each in flying if each in ready]:
                 index, process = flying[ours]
                 message = _receive(ours, process)
                 if isinstance(message, Answer):

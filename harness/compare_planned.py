@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,12 +23,18 @@ class PlannedRows:
         east_m: (n,) point of the plan that is flown at the row.
         north_m: (n,) the same.
         curvature_1pm: (n,) curvature of the plan there, positive = left. A corner counts as an arc of the
-            length that `harness.smoothness` gives it.
+            length that `harness.smoothness` gives it, and so does the angle between the course flown and a
+            plan that takes effect, where that is tighter than the plan itself.
     """
 
     east_m: FloatArray
     north_m: FloatArray
     curvature_1pm: FloatArray
+
+    @property
+    def tightest_1pm(self) -> float:
+        """The largest absolute curvature; 0 without a plan."""
+        return float(np.nan_to_num(np.abs(self.curvature_1pm)).max(initial=0.0))
 
     @property
     def tightest(self) -> int | None:
@@ -53,12 +60,27 @@ def planned_rows(track: Track, plans: Sequence[AcceptedPlan]) -> PlannedRows:
     for accepted in plans:
         rows = np.flatnonzero(track.plan_index == accepted.plan_index)
         if len(rows):
-            columns[:, rows] = _along(accepted, track.station_m[rows], corner_m)
+            place, bend, direction = _along(accepted, track.station_m[rows], corner_m)
+            turn = _asked_for(track, int(rows[0]), float(direction[0])) / corner_m
+            taking_up = track.station_m[rows] - track.station_m[rows[0]] < corner_m
+            bend[taking_up & (np.abs(bend) < abs(turn))] = turn
+            columns[:, rows] = np.vstack((place, bend))
     return PlannedRows(*columns)
 
 
-def _along(accepted: AcceptedPlan, station_m: FloatArray, corner_m: float) -> FloatArray:
-    """(3, k) east, north and curvature of a plan at stations; beyond its end straight on, or round again."""
+def _asked_for(track: Track, row: int, direction_rad: float) -> float:
+    """The turn that a plan asks for as it takes effect at a row, from the course of the row before."""
+    course = math.pi / 2 - math.radians(track.course_deg[max(row - 1, 0)])
+    return math.remainder(direction_rad - course, math.tau)
+
+
+def _along(
+    accepted: AcceptedPlan, station_m: FloatArray, corner_m: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """A plan at stations: (2, k) places, (k,) curvatures, (k,) directions, counter-clockwise from east.
+
+    Beyond its end it goes straight on, or round again.
+    """
     segments = accepted.segments
     joint = np.append(0.0, np.cumsum(segments[:, 5]))
     index = np.clip(np.searchsorted(joint, station_m, side="right") - 1, 0, len(segments) - 1)
@@ -72,13 +94,13 @@ def _along(accepted: AcceptedPlan, station_m: FloatArray, corner_m: float) -> Fl
     left = chord * np.sin(half) + on * np.sin(2 * half)
     at_corner = (along < corner_m) & (joint[index] > station_m[0])
     bend = np.where(on > 0, 0.0, curvature) + np.where(at_corner, _corners(segments)[index] / corner_m, 0.0)
-    return np.stack(
+    place = np.stack(
         (
             east + ahead * tangent_east - left * tangent_north,
             north + ahead * tangent_north + left * tangent_east,
-            bend,
         )
     )
+    return place, bend, np.arctan2(tangent_north, tangent_east) + 2 * half
 
 
 def _corners(segments: FloatArray) -> FloatArray:

@@ -30,13 +30,13 @@ class Row:
         min_clearance_m: least distance to an obstacle edge.
         clearance_violation_s: time below the wanted clearance.
         turn_radius_m: smallest radius that a plan may ask the aircraft for.
-        tightest_turn: largest planned curvature times that radius; above 1 the aircraft cannot follow.
+        tightest_turn: largest planned curvature times that radius, as in `PlannedRows`: the turn onto a plan
+            that takes effect counts too; above 1 the aircraft cannot follow.
+        tightest_flown_turn: largest flown curvature times that radius.
         planned_heading_change_deg: sum of all changes of direction of the plans in effect.
         flown_heading_change_deg: the same of the flown track.
         planned_bending_energy_1pm: integral of the squared curvature over the length.
         flown_bending_energy_1pm: the same of the flown track.
-        planned_max_curvature_1pm: largest curvature.
-        flown_max_curvature_1pm: the same of the flown track.
         cross_track_p95_m: 95th percentile of the distance from the plan in effect.
         cross_track_max_m: its largest value.
         trackable: whether every leg of the plans was tracked; None where a point flew, which tracks anything.
@@ -58,12 +58,11 @@ class Row:
     clearance_violation_s: float | None = None
     turn_radius_m: float | None = None
     tightest_turn: float | None = None
+    tightest_flown_turn: float | None = None
     planned_heading_change_deg: float | None = None
     flown_heading_change_deg: float | None = None
     planned_bending_energy_1pm: float | None = None
     flown_bending_energy_1pm: float | None = None
-    planned_max_curvature_1pm: float | None = None
-    flown_max_curvature_1pm: float | None = None
     cross_track_p95_m: float | None = None
     cross_track_max_m: float | None = None
     trackable: bool | None = None
@@ -81,6 +80,7 @@ def row_of(
     *,
     optimum_m: float | None,
     turn_radius_m: float,
+    tightest_1pm: float,
     kinematic: bool,
 ) -> Row:
     """The row of a flight that came to an end.
@@ -91,6 +91,7 @@ def row_of(
         metrics: content of `metrics.json`.
         optimum_m: the clairvoyant optimum; None where there is none.
         turn_radius_m: smallest radius of the aircraft.
+        tightest_1pm: largest planned curvature.
         kinematic: a point flew.
     """
     planned, flown = metrics["smoothness"]["planned"], metrics["smoothness"]["flown"]
@@ -110,13 +111,12 @@ def row_of(
         min_clearance_m=metrics["min_clearance_m"],
         clearance_violation_s=metrics["clearance_violation_s"],
         turn_radius_m=turn_radius_m,
-        tightest_turn=planned["max_curvature_1pm"] * turn_radius_m,
+        tightest_turn=tightest_1pm * turn_radius_m,
+        tightest_flown_turn=flown["max_curvature_1pm"] * turn_radius_m,
         planned_heading_change_deg=planned["heading_change_deg"],
         flown_heading_change_deg=flown["heading_change_deg"],
         planned_bending_energy_1pm=planned["bending_energy_1pm"],
         flown_bending_energy_1pm=flown["bending_energy_1pm"],
-        planned_max_curvature_1pm=planned["max_curvature_1pm"],
-        flown_max_curvature_1pm=flown["max_curvature_1pm"],
         cross_track_p95_m=metrics["cross_track_m"]["p95"],
         cross_track_max_m=metrics["cross_track_m"]["max"],
         trackable=None if kinematic else metrics["trackable"],
@@ -149,7 +149,12 @@ FIGURES = (
     Figure("ratio to the clairvoyant optimum", "ratio", lambda row: _fixed(row.ratio, 4)),
     Figure("least clearance, m", "clear m", lambda row: number(row.min_clearance_m)),
     Figure("below the wanted clearance, s", "below s", lambda row: number(row.clearance_violation_s)),
-    Figure("tightest planned turn, curvature × turn radius", "κ·R", lambda row: _fixed(row.tightest_turn, 2)),
+    Figure("tightest planned turn, curvature · turn radius", "κ·R", lambda row: _fixed(row.tightest_turn, 2)),
+    Figure(
+        "tightest flown turn, curvature · turn radius",
+        "κ·R fl.",
+        lambda row: _fixed(row.tightest_flown_turn, 2),
+    ),
     Figure("trackable", "tracks", lambda row: {None: "", True: "yes", False: "no"}[row.trackable]),
     Figure("cross-track error p95, m", "xt p95", lambda row: number(row.cross_track_p95_m)),
     Figure("cross-track error max, m", "xt max", lambda row: number(row.cross_track_max_m)),
@@ -157,10 +162,6 @@ FIGURES = (
     Figure("heading change flown, °", "flown °", lambda row: number(row.flown_heading_change_deg)),
     Figure("bending energy planned, 1/km", "bend", lambda row: number(row.planned_bending_energy_1pm, 1e3)),
     Figure("bending energy flown, 1/km", "bend fl.", lambda row: number(row.flown_bending_energy_1pm, 1e3)),
-    Figure(
-        "largest curvature planned, 1/km", "κ plan", lambda row: number(row.planned_max_curvature_1pm, 1e3)
-    ),
-    Figure("largest curvature flown, 1/km", "κ flown", lambda row: number(row.flown_max_curvature_1pm, 1e3)),
     Figure("planner time p50, ms", "p50 ms", lambda row: number(row.planner_p50_ms)),
     Figure("planner time p99, ms", "p99 ms", lambda row: number(row.planner_p99_ms)),
     Figure("planner time max, ms", "max ms", lambda row: number(row.planner_max_ms)),

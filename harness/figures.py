@@ -6,6 +6,7 @@ Drawn without a screen. The same values give the same files: SVG carries no date
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -33,7 +34,9 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1)), (0, (6, 1, 1, 1)), (0, (1, 1)))
 """Of the planners in order, so that they differ in print too."""
 
-STYLE = {
+PLANNED_DASHES: Any = (0, (4, 2))
+
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
     "axes.labelsize": 9,
@@ -49,6 +52,10 @@ STYLE = {
 }
 WIDTH_IN = 4.8
 """Narrow, so that the letters stay legible on a phone and in a column of a paper."""
+
+LEGEND_ROW_IN = 0.19
+CLOSE_UP_IN = 2.3
+TALLEST_MAP_IN = 6.0
 
 BEHIND_TEXT = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
 DRAWN_ROWS = 1500
@@ -107,7 +114,7 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 
 def overview(scene: Scene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
-    with _styled(figsize=(WIDTH_IN, 5.4)) as figure:
+    with _styled(_map_height_in(scene) + LEGEND_ROW_IN * (2 + math.ceil(len(runs) / 2))) as figure:
         axes = figure.add_subplot()
         legend = _map(axes, scene)
         for index, run in runs:
@@ -128,17 +135,17 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
         index: number of the planner, for its colour.
     """
     row = run.planned.tightest
-    with _styled(figsize=(WIDTH_IN, 5.4 if row is None else 7.6)) as figure:
-        rows = figure.add_gridspec(
-            1 if row is None else 2, 2, height_ratios=[1.0] if row is None else [2.0, 1.0]
-        )
+    below_in = [] if row is None else [CLOSE_UP_IN]
+    map_in = _map_height_in(scene)
+    with _styled(map_in + sum(below_in) + 3 * LEGEND_ROW_IN) as figure:
+        rows = figure.add_gridspec(1 + len(below_in), 2, height_ratios=[map_in, *below_in])
         axes = figure.add_subplot(rows[0, :])
         legend = _map(axes, scene)
         legend.append(_flown(axes, scene, run, index))
         axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
         if row is not None:
             legend.append(_tightest_key())
-            planned = Line2D([], [], color="black", lw=0.9, ls=(0, (4, 2)), label="planned (below)")
+            planned = Line2D([], [], color="black", lw=0.9, ls=PLANNED_DASHES, label="planned (below)")
             legend.append(planned)
             close_up, curvature = figure.add_subplot(rows[1, 0]), figure.add_subplot(rows[1, 1])
             _close_up(close_up, scene, run, index, row)
@@ -149,7 +156,7 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
 
 def profiles(scene: Scene, runs: Numbered) -> Figure:
     """Curvature and cross-track error along the way, two strips a planner."""
-    with _styled(figsize=(WIDTH_IN, 0.9 + 2.1 * len(runs))) as figure:
+    with _styled(0.9 + 2.1 * len(runs)) as figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
         for place, (index, run) in enumerate(runs):
             bend, cross = strips[2 * place], strips[2 * place + 1]
@@ -160,7 +167,7 @@ def profiles(scene: Scene, runs: Numbered) -> Figure:
             bend.plot(*_extremes(distance, planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
             bend.plot(*_extremes(distance, flown), color=_colour(index), lw=0.9, label="flown")
             _limits(bend, flown)
-            bend.set_ylabel("curvature × R")
+            bend.set_ylabel("curvature · R")
             bend.set_title(run.planner, loc="left", color=_colour(index))
             bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
             cross.axhline(0.0, color="0.8", lw=0.6)
@@ -184,14 +191,22 @@ def png(figure: Figure) -> bytes:
 def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
     file = io.BytesIO()
     with mpl.rc_context(STYLE):
+        # A map of fixed shape gives room back only once it has been laid out.
+        figure.draw_without_rendering()
         figure.savefig(file, format=kind, **options)
     return file.getvalue()
 
 
 @contextmanager
-def _styled(figsize: tuple[float, float]) -> Iterator[Figure]:
+def _styled(height_in: float) -> Iterator[Figure]:
     with mpl.rc_context(STYLE):
-        yield Figure(figsize=figsize, layout="constrained")
+        yield Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+
+
+def _map_height_in(scene: Scene) -> float:
+    """What a map as wide as a figure needs, title and axis labels included."""
+    xmin, ymin, xmax, ymax = scene.bounds_m
+    return 0.8 + min((WIDTH_IN - 0.6) * (ymax - ymin) / (xmax - xmin), TALLEST_MAP_IN)
 
 
 def _map(axes: Axes, scene: Scene) -> list[Any]:
@@ -243,7 +258,7 @@ def _outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
 def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
     """Draws a track and the place of its tightest planned turn; the first planner's lies on top."""
     points = _thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
-    style = {"color": _colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
+    style: dict[str, Any] = {"color": _colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
     if run.outcome != "reached":
         axes.plot(*points[-1] / 1e3, "X", color=_colour(index), ms=7, mec="white", mew=0.6, zorder=7)
@@ -283,12 +298,12 @@ def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> 
             axes.add_patch(_outline(obstacle, grown, **style))
     planned = np.column_stack((run.planned.east_m, run.planned.north_m))
     flown = np.column_stack((run.track.east_m, run.track.north_m))
-    for points, style in (
-        (flown, {"color": _colour(index), "lw": 1.8}),
-        (planned, {"color": "black", "lw": 0.9, "ls": (0, (4, 2))}),
+    for points, colour, width, dashes in (
+        (flown, _colour(index), 1.8, "-"),
+        (planned, "black", 0.9, PLANNED_DASHES),
     ):
         near = (np.abs(points - middle) < 2 * half).all(axis=1)
-        axes.plot(*np.where(near[:, None], points, np.nan).T / 1e3, **style)
+        axes.plot(*np.where(near[:, None], points, np.nan).T / 1e3, color=colour, lw=width, ls=dashes)
     (east, north), half_km = middle / 1e3, half / 1e3
     axes.set(xlim=(east - half_km, east + half_km), ylim=(north - half_km, north + half_km), aspect="equal")
     axes.set_xticks([])
@@ -309,13 +324,13 @@ def _curvature_near(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: in
     flown = (_flown_curvature(run.track) * scene.turn_radius_m)[near]
     planned = (run.planned.curvature_1pm * scene.turn_radius_m)[near]
     axes.plot(along, flown, color=_colour(index), lw=1.5)
-    axes.plot(along, planned, color="black", lw=0.9, ls=(0, (4, 2)))
+    axes.plot(along, planned, color="black", lw=0.9, ls=PLANNED_DASHES)
     _limits(axes, flown)
     most = float(np.nanmax(np.abs(planned), initial=0.0))
     text = axes.annotate(f"planned up to {most:.3g}", (0.03, 0.04), xycoords="axes fraction", fontsize=8)
     text.set_bbox(BEHIND_TEXT)
     axes.set_xlabel("along the path, m")
-    axes.set_title("curvature × turn radius")
+    axes.set_title("curvature · turn radius")
 
 
 def _limits(axes: Axes, flown: FloatArray) -> None:
@@ -334,7 +349,8 @@ def _distance_m(track: Track) -> FloatArray:
 
 def _flown_curvature(track: Track) -> FloatArray:
     """(n,) curvature flown from each row to the next."""
-    return np.append(flown_profile(track).curvature_1pm, 0.0)
+    pieces = flown_profile(track).curvature_1pm
+    return np.append(pieces, pieces[-1:]) if len(pieces) else np.zeros(len(track))
 
 
 def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

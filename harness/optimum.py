@@ -5,8 +5,8 @@ Path planning using a tangent graph, IJRR 11, 1992). A circle grown by the clear
 r + C, a convex corner of a polygon one of radius C that can be touched only between the normals of its two
 edges, start and goal are discs of radius 0. A path keeps a disc on its left (side +1) or its right (side -1).
 The graph is searched with A*; the tangents of a disc are made when the search first comes to it. No boundary
-is sampled: on the rim of a disc, free and blocked arcs alternate only where the rim crosses another grown edge,
-so one point between two neighbouring crossings decides for all of them.
+is sampled: free and blocked arcs of a rim alternate only where it crosses another grown edge, so one point
+between two neighbouring crossings decides for all of them.
 
 Frame: local ENU plane, metres; angles are mathematical (counter-clockwise from east), radians.
 """
@@ -152,7 +152,7 @@ class _Scene:
         import shapely
 
         free = self._inside(points)
-        gaps = np.hypot(*(points[:, None] - self.hubs).T).T
+        gaps: FloatArray = np.hypot(*(points[:, None] - self.hubs).T).T
         free &= (gaps >= self.hub_radii - self.slack_m).all(axis=1)
         free[self._tree.query(shapely.points(points), "dwithin", self.clearance_m)[0]] = False
         return free
@@ -221,15 +221,15 @@ class _Scene:
         angles = np.unique(np.concatenate((ends, self._crossings(disc))) % math.tau)
         widths = np.diff(np.append(angles, angles[0] + math.tau))
         middles = angles + widths / 2
-        blocked = ~self.free_points(self.contacts(np.full(len(middles), disc), middles))
-        blocked &= (middles - cone_from) % math.tau < cone_width
+        free = self.free_points(self.contacts(np.full(len(middles), disc), middles))
+        touchable = (middles - cone_from) % math.tau < cone_width
+        blocked = np.flatnonzero(np.logical_and(~free, touchable))
         arcs = np.column_stack((angles[blocked], widths[blocked]))
         return np.vstack((np.array(outside).reshape(-1, 2), arcs))
 
     def _inside(self, points: FloatArray) -> BoolArray:
-        within: BoolArray = ((points >= self.low - self.slack_m) & (points <= self.high + self.slack_m)).all(
-            axis=1
-        )
+        low, high = self.low - self.slack_m, self.high + self.slack_m
+        within: BoolArray = np.logical_and.reduce((points >= low) & (points <= high), axis=1)
         return within
 
     def _offset_edges(self) -> FloatArray:

@@ -28,7 +28,7 @@ TOUCH_SHARE = 0.05
 HALF_TURN = 3.0
 """Longer arcs are cut in two (rad)."""
 
-SEAT_DISCS = 40
+SEAT_DISCS = 24
 """So many discs at most are looked at to find the boundary near a place."""
 
 FENCE = -1
@@ -137,9 +137,12 @@ class GrownObstacles:
             near = np.array([int(square.argmin())])
         dx, dy = place[0] - self.points_m[near, 0], place[1] - self.points_m[near, 1]
         distance = np.maximum(np.hypot(dx, dy), 1e-9)
-        order = np.argsort(distance - self.radii_m[near], kind="stable")[:SEAT_DISCS]
+        off = distance - self.radii_m[near]
+        order = np.argsort(off, kind="stable")[: SEAT_DISCS if off.min() < 0.0 else 1]
         chosen, scale = near[order], self.radii_m[near[order]] / distance[order]
         feet = self.points_m[chosen] + np.column_stack((dx[order] * scale, dy[order] * scale))
+        if len(chosen) == 1:  # outside of all discs the nearest one has the nearest boundary
+            return int(chosen[0]), (float(feet[0, 0]), float(feet[0, 1]))
         corners, owners = self._corners(chosen)
         places, discs = np.concatenate((feet, corners)), np.concatenate((chosen, owners))
         free = np.flatnonzero(~self._covered(places, near))
@@ -173,20 +176,25 @@ class GrownObstacles:
         ).any(axis=1)
         return inside
 
-    def _near(self, place: Sequence[float]) -> IntArray:
-        """All discs whose centre is within two kept distances, and some more."""
+    def _around(self, place: Sequence[float]) -> list[list[int]]:
+        """The discs of the grid cells about a place: all whose centre is within two kept distances, and more."""
         side = 2.0 * self.keep_m
         x, y = math.floor(place[0] / side), math.floor(place[1] / side)
-        cells = (self._cells.get((x + i, y + j)) for i in (-1, 0, 1) for j in (-1, 0, 1))
-        return np.array([disc for cell in cells if cell for disc in cell], dtype=np.intp)
+        return [
+            self._cells[key] for i in (-1, 0, 1) for j in (-1, 0, 1) if (key := (x + i, y + j)) in self._cells
+        ]
+
+    def _near(self, place: Sequence[float]) -> IntArray:
+        return np.array([disc for cell in self._around(place) for disc in cell], dtype=np.intp)
 
     def _met_by(self, disc: int) -> tuple[IntArray, FloatArray, FloatArray]:
         """The discs that meet one: their indices, the bearings of their middles, and half their widths."""
-        center = self.points_m[disc]
-        near = self._near(center.tolist())
+        center = self.points_m[disc].tolist()
+        count = sum(map(len, self._around(center)))
         known = self._meets.get(disc)
-        if known is not None and known[0] == len(near):
+        if known is not None and known[0] == count:
             return known[1:]
+        near = self._near(center)
         dx, dy = self.points_m[near, 0] - center[0], self.points_m[near, 1] - center[1]
         distance = np.hypot(dx, dy)
         mine, other = self.radii_m[disc], self.radii_m[near]
@@ -194,7 +202,7 @@ class GrownObstacles:
         distance, other = distance[meet], other[meet]
         half = np.arccos(np.clip((distance**2 + mine**2 - other**2) / (2.0 * distance * mine), -1.0, 1.0))
         found = near[meet], np.arctan2(dy[meet], dx[meet]), half
-        self._meets[disc] = (len(near), *found)
+        self._meets[disc] = (count, *found)
         return found
 
     def contacts(self, disc: int, place: Point, side: float) -> Iterator[Contact]:

@@ -126,7 +126,9 @@ class Bug1(Walker[State]):
             if isinstance(state, Circling):
                 state = self._returning(self._circled(state, flown))
             elif self.known.turned_back(place, self.goal):
-                state = Enclosed(f"{self.enclosed()}: gone round, and the way from its nearest point leads inside")
+                state = Enclosed(
+                    f"{self.enclosed()}: gone round, and the way from its nearest point leads inside"
+                )
             else:
                 state = Straight()
 

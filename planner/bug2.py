@@ -133,7 +133,5 @@ def crossings(segment: Segment, origin: Point, normal: tuple[float, float]) -> l
             return []
         lead, swing = math.atan2(across, towards), math.asin(sine)
         side = math.copysign(1.0, curvature)
-        places = [
-            side * turn % math.tau / abs(curvature) for turn in (lead + swing, lead + math.pi - swing)
-        ]
+        places = [side * turn % math.tau / abs(curvature) for turn in (lead + swing, lead + math.pi - swing)]
     return sorted(at for at in places if 0.0 <= at <= length)

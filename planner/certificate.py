@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.curves import Limits, Segment, along, between, full_turn, place_on, poses_at
-from planner.interface import Path, SeenWorld
+from planner.interface import FloatArray, Path, SeenWorld
 from planner.route_optimisation import Terrain
 
 DISC = 1.04
@@ -58,7 +58,7 @@ class Certifier:
     def seen_free_to_m(self, path: Path, seen: SeenWorld) -> float:
         """Station up to which a path lies in space seen to be free."""
         end = min(path.length_m, self._horizon)
-        stations = np.linspace(0.0, end, max(math.ceil(end / self._spacing), 1) + 1)
+        stations: FloatArray = np.linspace(0.0, end, max(math.ceil(end / self._spacing), 1) + 1)
         hidden = np.flatnonzero(~seen.seen_free(poses_at(path, stations)[:, :2]))
         return float(stations[hidden[0]]) if len(hidden) else end
 
@@ -74,11 +74,13 @@ class Certifier:
         step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
         stations = free_to - step * np.arange(int(free_to / step) + 1)
         poses = poses_at(path, stations)
-        free = {}
+        free: dict[float, list[bool]] = {}
         for side in (1.0, -1.0):  # left, right
-            centres = poses[:, :2] + side * self._limits.radius_m * np.column_stack((-poses[:, 3], poses[:, 2]))
+            centres = poses[:, :2] + side * self._limits.radius_m * np.column_stack(
+                (-poses[:, 3], poses[:, 2])
+            )
             places = (centres[:, None] + self._disc).reshape(-1, 2)
-            free[side] = seen.seen_free(places).reshape(len(stations), -1).all(axis=1)
+            free[side] = np.all(seen.seen_free(places).reshape(len(stations), -1), axis=1).tolist()
         for i, station in enumerate(stations.tolist()):
             for side in (1.0, -1.0):
                 if free[side][i]:
@@ -111,4 +113,3 @@ def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, 
         reaction_s: latency of sensor and planner, and the time to roll.
     """
     return 2.0 * DISC * radius_m + clearance_m + speed_mps * reaction_s
-

@@ -232,6 +232,17 @@ def fillet(
     return Path(np.array(segments)) if segments else None
 
 
+def onward(path: Path, station_m: float, length_m: float) -> list[Segment]:
+    """The segments of a stretch of a path; where that ends in a loiter circle, round it as often as need be."""
+    stretch = between(path, station_m, station_m + length_m)
+    left = station_m + length_m - max(path.length_m, station_m)
+    turn = path.segments[-1].tolist()
+    while path.loiter and left > SHORTEST_M:
+        stretch.append((*turn[:5], min(left, turn[5])))
+        left -= turn[5]
+    return stretch
+
+
 def full_turn(pose: Pose, radius_m: float, side: float) -> Segment:
     """A full circle from a pose, to the left (`side` = 1) or to the right (-1)."""
     return (*pose, side / radius_m, math.tau * radius_m)

@@ -12,6 +12,9 @@ from planner.interface import FloatArray, SeenWorld
 IntArray = NDArray[np.intp]
 
 
+NOTHING = np.zeros((0, 2))
+
+
 class ObstacleMemory:
     """Every edge point seen so far and the obstacle that it belongs to.
 
@@ -29,6 +32,7 @@ class ObstacleMemory:
     def _forget(self) -> None:
         self._points = np.zeros((256, 2))
         self._labels = np.zeros(256, dtype=np.intp)
+        self._genuine = np.zeros(256, dtype=np.bool_)
         self._count = 0
         self._of_cell: dict[tuple[int, int], int] = {}
         self._next = 0
@@ -44,6 +48,15 @@ class ObstacleMemory:
         """(m,) the obstacle that each point belongs to."""
         return self._labels[: self._count]
 
+    @property
+    def genuine_m(self) -> FloatArray:
+        """(k, 2) those points that were seen, not refused."""
+        return self.points_m[self._genuine[: self._count]]
+
+    def refuse(self, place: tuple[float, float]) -> None:
+        """Remembers a place as if there were an edge: it is not to be gone to again."""
+        self._add(np.array([place]), genuine=False)
+
     def take_in(self, seen: SeenWorld) -> FloatArray:
         """Remembers what has come in since the last call, and returns it: (k, 2).
 
@@ -51,20 +64,24 @@ class ObstacleMemory:
         """
         if seen.taken_back_at > self._revision >= 0:
             self._forget()
+        if seen.revision == self._revision:
+            return NOTHING
         fresh = seen.edges_since(self._revision)
         self._revision = seen.revision
         if len(fresh):
-            self._add(fresh)
+            self._add(fresh, genuine=True)
         return fresh
 
-    def _add(self, fresh: FloatArray) -> None:
+    def _add(self, fresh: FloatArray, genuine: bool) -> None:
         total = self._count + len(fresh)
         if total > len(self._points):
             size = max(2 * len(self._points), total)
             self._points = np.resize(self._points, (size, 2))
             self._labels = np.resize(self._labels, size)
+            self._genuine = np.resize(self._genuine, size)
         new = slice(self._count, total)
         self._points[new] = fresh
+        self._genuine[new] = genuine
         self._count = total
         cells = [tuple(cell) for cell in np.floor(fresh / self.cell_m).astype(np.int64).tolist()]
         for cell in dict.fromkeys(cells):

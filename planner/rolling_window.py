@@ -1,27 +1,39 @@
-"""The rolling-window planner of the paper.
+"""The rolling-window planner of the paper, made safe and convergent.
 
 In every rolling step: take the planning window about the track point where the new plan begins; search N
 steps deep among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum
-turn radius (`route_optimisation`); the shortest of the n is the plan. It is flown until the window rolls on.
+turn radius (`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that
+part is put into effect which ends in a turn seen to be free (`certificate`), and flown until the window rolls
+on.
+
+Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there
+is a way, the course is a shortest one through what is known. Each course is flown until something seen
+contradicts it. Edge points lie on a finite grid, so that this can happen only finitely often, and a course that
+nothing contradicts ends at the goal. A place that the aircraft cannot be certified to enter is left out of
+further searches (`ObstacleMemory.refuse`): each such place covers a disc of the clearance, so that these are
+finitely many as well. Where no way is left, a closed chain of edges proves it (`barrier`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from itertools import islice
 
 import numpy as np
 
+from planner.barrier import Barrier
+from planner.certificate import Certified, Certifier, least_sensor_range_m
 from planner.clearance import first_breach
-from planner.curves import Limits, Point, Pose, Segment, between, on_loiter, place_on
+from planner.course import Course
+from planner.curves import Point, Pose, along, on_loiter, onward, place_on
 from planner.hold import hold
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
-from planner.multi_step_search import Track, search
-from planner.pose_search import search_poses
-from planner.route_optimisation import Route, Terrain, optimise
-from planner.window import Window, guide_vector
+from planner.multi_step_search import Track
+from planner.route_optimisation import Route
+from planner.window import guide_vector
 
 LEAD_S = 1.0
 """A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
@@ -29,17 +41,18 @@ LEAD_S = 1.0
 OFF_PATH = 4.0
 """Further off the path than this many times the tracking error, a plan begins at the aircraft itself."""
 
-SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
-"""Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
+BETTER = 0.005
+"""A course that still serves is dropped only for one that is shorter by this share of what is left to fly."""
 
-WIDER = 6
-"""Where n tracks at every one of N steps find no way, this many times as many are tried."""
+TURN_SHARE = 0.99
+"""Share of the clearance that a certified turn keeps; not all of it, so that a turn may begin where one is."""
 
 HOLD_SHARES = (1.0, 0.5, 0.1)
-"""Shares of the clearance with which a holding turn is sought: one too near to something is better than none."""
+"""Shares of the clearance with which a turn is sought where the certificate is broken."""
 
-BETTER = 0.005
-"""A plan that still serves is dropped only for one that is shorter by this share of what is left to fly."""
+
+class CertificateBroken(RuntimeError):
+    """Something was seen where the plan in effect was certified to be free, and there is no way out."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +108,19 @@ class RollingWindowConfig:
         """This config with every None replaced by its default for the mission.
 
         Raises:
-            ValueError: the planning window is larger than the sensing range.
+            ValueError: the planning window is larger than the sensing range, or that is too short for the turn
+                radius.
         """
+        reaction_s = LEAD_S + mission.compute_latency_s + mission.roll_in_s
+        least = least_sensor_range_m(
+            mission.turn_radius_m, mission.clearance_m, mission.speed_mps, reaction_s
+        )
+        if mission.sensor_range_m < least:
+            raise ValueError(
+                f"sensor.range_m is {mission.sensor_range_m:g}, too short for a turn radius of "
+                f"{mission.turn_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
+                f"no safe turn could be seen ahead: at least {math.ceil(least)} is needed"
+            )
         window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
         if window > mission.sensor_range_m:
             raise ValueError(
@@ -113,24 +137,24 @@ class RollingWindowConfig:
 
 
 @dataclass(frozen=True, eq=False)
-class _Situation:
-    """What one search works on.
+class _Effect:
+    """A plan in effect, and what it is the beginning of.
 
     Attributes:
-        position: where the aircraft is.
-        pose: where the new plan leaves the old one.
-        curvature: of the old one there, 1/m.
-        prefix: the stretch of the old one up to there.
-        points: (m, 2) edge points.
-        room: (m,) distance of each to the nearer of pose and goal: more than that cannot be kept from it.
+        plan: as it was given to the loop.
+        path: its path: along the course, then into the turn.
+        course: the whole way.
+        leaves_m: station at which the path leaves the course for the turn.
     """
 
-    position: Point
-    pose: Pose
-    curvature: float
-    prefix: list[Segment]
-    points: FloatArray
-    room: FloatArray
+    plan: Plan
+    path: Path
+    course: Course
+    leaves_m: float
+
+    def holds(self, station_m: float) -> bool:
+        """Whether an aircraft there is in the turn."""
+        return station_m >= self.leaves_m
 
 
 class RollingWindow:
@@ -141,173 +165,196 @@ class RollingWindow:
         assert config.planning_window_m is not None
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
-        self._config, self._mission = config, mission
-        self._window_m, self._margin_m = config.planning_window_m, config.margin_m
+        self._mission, self._window_m = mission, config.planning_window_m
         self._rolling_step_m = config.rolling_step_m
-        self._limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
-        self._urgent_m = 8.0 * mission.turn_radius_m + mission.speed_mps * (4.0 + mission.compute_latency_s)
         self._memory = ObstacleMemory(mission.clearance_m)
-        self._flown: Plan | None = None
-        self._searched_at_m = 0.0
-        self._breach_m = (
-            math.inf
-        )  # where the plan in effect comes too near to something seen since it was made
+        self._local = LocalPlanning(
+            mission,
+            self._memory,
+            window_m=config.planning_window_m,
+            margin_m=config.margin_m,
+            steps=config.steps,
+            candidates=config.candidates,
+        )
+        self._lead_m = mission.speed_mps * (LEAD_S + mission.compute_latency_s)
+        self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
+        self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.speed_mps
+        self._barrier: Barrier | None = None
+        self._proposed: _Effect | None = None
+        self._effect: _Effect | None = None
+        self._searched_at_m = 0.0  # station and number of edge points at the last search
+        self._searched_with = 0
+        self._refused_at_m = 0.0
+        self._cut_m = math.inf  # where the course comes too near to something seen since it was found
+        self._broken = False  # the certified part of it does, or its turn
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
-        if request.flown is not self._flown:
-            self._flown, self._breach_m, self._searched_at_m = request.flown, math.inf, 0.0
         fresh = self._memory.take_in(request.seen)
-        path = request.flown.path if request.flown else None
-        if path is None:
+        effect = self._in_effect(request)
+        if effect is None:
             return self._roll(request, None, 0.0)
-        if len(fresh):
-            keep = self._mission.clearance_m + 0.5 * PATH_SHARE * self._margin_m
-            here = on_loiter(path, request.station_m)
-            self._breach_m = min(
-                self._breach_m, first_breach(path, fresh, keep, 0.0 if path.loiter else here)
-            )
-        rolled = request.station_m - self._searched_at_m >= self._rolling_step_m
-        if not (rolled or self._breach_m - request.station_m < self._urgent_m):
+        here = on_loiter(effect.path, request.station_m)
+        newly_cut = len(fresh) > 0 and self._watch(effect, here, fresh)
+        since = request.station_m - self._searched_at_m
+        due = since >= self._rolling_step_m
+        due |= newly_cut and min(self._cut_m, effect.leaves_m) - here < self._urgent_m
+        due |= since >= self._lead_m and min(self._cut_m, effect.leaves_m) - here < self._least_m
+        if not due and not self._broken:
             return Plan(PlanStatus.KEPT, "the plan in effect serves")
         self._searched_at_m = request.station_m
-        if math.isinf(self._breach_m) and self._is_straight(request, path):
-            return Plan(PlanStatus.KEPT, "nothing in the window along the guide vector")
-        return self._roll(request, path, on_loiter(path, request.station_m))
+        return self._roll(request, effect, here)
 
-    def _is_straight(self, request: PlanRequest, path: Path) -> bool:
-        """Whether what is left of a path is hardly longer than the guide vector."""
-        left = path.length_m - request.station_m
-        _, _, guide = guide_vector(request.position_m, self._mission.goal_m)
-        return not path.loiter and left - guide < 1e-4 * guide + self._mission.tracking_error_m
+    def _in_effect(self, request: PlanRequest) -> _Effect | None:
+        """The plan in effect; a new one begins uncut."""
+        if self._proposed is not None and request.flown is self._proposed.plan:
+            self._effect, self._proposed = self._proposed, None
+            self._cut_m, self._broken = math.inf, False
+            self._searched_at_m = self._refused_at_m = 0.0
+        return self._effect
 
-    def _roll(self, request: PlanRequest, path: Path | None, station_m: float) -> Plan:
-        """One rolling step: search, optimise, compare with the plan in effect."""
-        situation = self._situation(request, path, station_m)
+    def _watch(self, effect: _Effect, here: float, fresh: FloatArray) -> bool:
+        """Looks whether what was seen just now is in the way; returns whether the course is cut anew."""
+        keep = 0.5 * (self._mission.clearance_m + self._local.path_keeps_m)
+        before = self._cut_m
+        if not effect.holds(here):
+            self._cut_m = min(before, first_breach(effect.course.path, fresh, keep, here))
+        turn = Path(effect.path.segments[-1:])
+        certain = self._mission.clearance_m * TURN_SHARE
+        self._broken |= self._cut_m < effect.leaves_m or first_breach(turn, fresh, certain) < math.inf
+        return self._cut_m < before
+
+    def _roll(self, request: PlanRequest, effect: _Effect | None, here: float) -> Plan:
+        """One rolling step: search, certify, compare with the plan in effect."""
+        start = self._start(request, effect, here)
+        ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
+        serves = ahead is not None and math.isinf(self._cut_m) and not self._broken
         tracks: list[Track] = []
-        route = self._shortest(situation, tracks)
-        if route is None:
-            return self._hold(request, path, station_m)
-        new = Path(np.array([*situation.prefix, *route.path.segments.tolist()]))
-        serves = path is not None and not path.loiter and math.isinf(self._breach_m)
-        if path is not None and serves and new.length_m > (path.length_m - station_m) * (1.0 - BETTER):
-            return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
-        return Plan(
-            PlanStatus.FOUND,
-            self._sentence(request, route.nodes),
-            waypoints_m=np.array([situation.position, *route.nodes]),
-            path=new,
-            picture=self._picture(situation, route, tracks),
-        )
-
-    def _situation(self, request: PlanRequest, path: Path | None, station_m: float) -> _Situation:
-        """Where the new plan begins, and what is known."""
-        mission = self._mission
-        pose, curvature = Pose(*request.position_m, *request.direction), 0.0
-        prefix: list[Segment] = []
-        if path is not None:
-            nearest, _ = place_on(path, station_m)
-            if math.dist(nearest[:2], request.position_m) <= max(1.0, OFF_PATH * mission.tracking_error_m):
-                lead = mission.speed_mps * (LEAD_S + mission.compute_latency_s)
-                lead = max(0.0, min(lead, self._breach_m - station_m, path.length_m - station_m))
-                prefix = between(path, station_m, station_m + lead)
-                pose, curvature = place_on(path, station_m + lead)
-        points = self._memory.points_m
-        ends = (pose, mission.goal_m)
-        room = [np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) - 1e-3 for end in ends]
-        return _Situation(request.position_m, pose, curvature, prefix, points, np.minimum(*room))
-
-    def _shortest(self, situation: _Situation, tracks: list[Track]) -> Route | None:
-        """Route optimisation of each of the n best tracks; the shortest that can be flown.
-
-        Args:
-            situation: what to work on.
-            tracks: the candidates that were looked at are added to it.
-        """
-        terrain = self._terrain(situation, self._margin_m)
-        for clearance, margin in self._attempts():
-            terrain = self._terrain(situation, margin)
-            for widening in (1, WIDER):
-                best: Route | None = None
-                for track in self._candidates(situation, clearance, margin, widening):
-                    tracks.append(track)
-                    if best is not None and track.cost_m >= best.path.length_m:
-                        break
-                    route = optimise(
-                        situation.pose,
-                        situation.curvature,
-                        track.nodes,
-                        self._limits,
-                        (1.0 - SEARCH_SHARE) * margin,
-                        terrain,
-                    )
-                    if route is not None and (best is None or route.path.length_m < best.path.length_m):
-                        best = route
-                if best is not None:
-                    return best
-                if tracks:
+        stuck: Course | None = None
+        if ahead is None or not serves or not self._is_best(ahead, request):
+            self._searched_with = len(self._memory.points_m)
+            for course in self._courses(start, ahead, tracks):
+                if (
+                    ahead is not None
+                    and serves
+                    and course.path.length_m > ahead.path.length_m * (1.0 - BETTER)
+                ):
                     break
-        return search_poses(situation.pose, situation.curvature, self._mission.goal_m, self._limits, terrain)
+                certified = self._certify(course, request)
+                if certified is not None and self._leads_on(certified, course):
+                    return self._found(request, start, course, certified, tracks)
+                stuck = stuck or course
+        if ahead is not None and effect is not None and serves:
+            certified = self._certify(ahead, request)
+            if certified is not None and certified.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m:
+                return self._found(request, start, ahead, certified, tracks)
+            return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
+        return self._no_way(request, effect, here, stuck)
 
-    def _attempts(self) -> list[tuple[float, float]]:
-        """Distances and margins to search with, in order, until a track can be flown.
+    def _is_best(self, ahead: Course, request: PlanRequest) -> bool:
+        """Whether no search can find a course that is better: nothing new is known, or it is straight."""
+        _, _, guide = guide_vector(request.position_m, self._mission.goal_m)
+        straight = ahead.path.length_m - guide < 1e-4 * guide + self._mission.tracking_error_m
+        return straight or len(self._memory.points_m) == self._searched_with
 
-        First as wanted. Then wide enough for a turn about the end of a wall at the turn radius. Last with what
-        of the margin there is room for.
-        """
-        clearance, margin, radius = self._mission.clearance_m, self._margin_m, self._mission.turn_radius_m
-        attempts = [(clearance, margin), (clearance, 0.2 * margin)]
-        if radius > clearance:
-            attempts.insert(1, (radius, margin))
-        return attempts
+    def _courses(self, start: Start, ahead: Course | None, tracks: list[Track]) -> Iterator[Course]:
+        """Ways to the goal, those that are wanted most first."""
+        known = len(self._memory.points_m)
+        for attempt in self._local.attempts():
+            route = self._local.route(start, attempt, ahead, tracks)
+            if route is not None:
+                yield _course(start, route, known)
+        route = self._local.tight_route(start)
+        if route is not None:
+            yield _course(start, route, known)
 
-    def _candidates(
-        self, situation: _Situation, clearance: float, margin: float, widening: int
-    ) -> islice[Track]:
-        """The n best tracks."""
-        keep = np.minimum(clearance + SEARCH_SHARE * margin, situation.room)
-        window = self._window(situation, keep)
-        found = search(
-            window,
-            self._mission.goal_m,
-            self._mission.bounds_m,
-            steps=self._config.steps * widening,
-            keep_best=self._config.candidates * widening,
-            outer_m=clearance + margin,
+    def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
+        certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
+        turn_keeps = TURN_SHARE * self._mission.clearance_m
+        return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps))
+
+    def _leads_on(self, certified: Certified, course: Course) -> bool:
+        """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
+        return certified.leaves_m >= min(self._least_m, course.path.length_m - self._mission.goal_radius_m)
+
+    def _found(
+        self, request: PlanRequest, start: Start, course: Course, certified: Certified, tracks: list[Track]
+    ) -> Plan:
+        plan = Plan(
+            PlanStatus.FOUND,
+            self._sentence(request, course.nodes),
+            waypoints_m=np.array([start.position, *course.nodes]),
+            path=certified.path,
+            picture=self._picture(start, course, tracks),
         )
-        return islice(found, self._config.candidates)
+        self._proposed = _Effect(plan, certified.path, course, certified.leaves_m)
+        return plan
 
-    def _window(self, situation: _Situation, keep: FloatArray) -> Window:
-        return Window(
-            situation.pose[:2],
-            self._window_m,
-            situation.points,
-            self._memory.labels,
-            self._memory.cell_m,
-            keep,
-        )
+    def _start(self, request: PlanRequest, effect: _Effect | None, here: float) -> Start:
+        """Where a new plan begins: a little ahead on the one in effect, or at the aircraft itself."""
+        if effect is not None:
+            nearest, _ = place_on(effect.path, here)
+            if math.dist(nearest[:2], request.position_m) <= max(
+                1.0, OFF_PATH * self._mission.tracking_error_m
+            ):
+                prefix = onward(effect.path, here, max(0.0, min(self._lead_m, self._cut_m - here)))
+                if prefix:
+                    last = prefix[-1]
+                    return Start(request.position_m, along(last, last[5]), last[4], prefix)
+        return Start(request.position_m, Pose(*request.position_m, *request.direction))
 
-    def _terrain(self, situation: _Situation, margin: float) -> Terrain:
-        keep = np.minimum(self._mission.clearance_m + PATH_SHARE * margin, situation.room)
-        return Terrain(situation.points, keep, self._mission.bounds_m)
+    def _no_way(
+        self, request: PlanRequest, effect: _Effect | None, here: float, stuck: Course | None
+    ) -> Plan:
+        """No new plan: prove that there is none, or leave the plan in effect to end in its turn."""
+        if stuck is None and self._is_closed(request):
+            return Plan(
+                PlanStatus.UNREACHABLE, "a closed chain of obstacles lies between the aircraft and the goal"
+            )
+        if effect is None or self._broken:
+            return self._turn_away(request, effect, here)
+        turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
+        if stuck is not None and turned > math.tau * self._mission.turn_radius_m:
+            # The whole turn has shown nothing more: what lies ahead there cannot be entered.
+            self._refused_at_m = request.station_m
+            certifier = Certifier(self._local.limits, self._mission.sensor_range_m, request.seen.spacing_m)
+            hidden = certifier.seen_free_to_m(stuck.path, request.seen)
+            self._memory.refuse(place_on(stuck.path, hidden)[0][:2])
+        return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
 
-    def _hold(self, request: PlanRequest, path: Path | None, station_m: float) -> Plan:
-        """No way on was found: the plan in effect goes on while it can, and then into a turn."""
-        if path is not None and (path.loiter or self._breach_m - station_m > self._urgent_m):
-            return Plan(PlanStatus.NO_PATH, "no track can be flown; the plan in effect goes on")
-        if path is None:
-            ahead = (*request.position_m, *request.direction, 0.0, self._limits.roll_m)
-            path, station_m = Path(np.array([ahead])), 0.0
-        points = self._memory.points_m
+    def _is_closed(self, request: PlanRequest) -> bool:
+        """Whether what has been seen proves that there is no way."""
+        genuine = self._memory.genuine_m
+        if self._barrier is None or self._barrier.count > len(genuine):
+            self._barrier = Barrier(
+                request.position_m, self._mission.goal_m, self._mission.bounds_m, self._mission.clearance_m
+            )
+        self._barrier.add(genuine[self._barrier.count :])
+        return self._barrier.closed
+
+    def _turn_away(self, request: PlanRequest, effect: _Effect | None, here: float) -> Plan:
+        """A turn that only keeps away from what is known, for want of one that is seen to be free."""
+        limits = self._local.limits
+        if effect is None:
+            straight = (*request.position_m, *request.direction, 0.0, limits.roll_m)
+            path, here, last = Path(np.array([straight])), 0.0, 0.0
+        else:
+            path, last = effect.path, min(self._cut_m, effect.leaves_m)
         for share in HOLD_SHARES:
-            keep = np.full(len(points), share * self._mission.clearance_m)
-            terrain = Terrain(points, keep, self._mission.bounds_m)
-            last = min(self._breach_m, path.length_m)
-            turn = hold(path, station_m, last, self._limits, terrain)
+            turn = hold(path, here, last, limits, self._local.terrain(share * self._mission.clearance_m))
             if turn is not None:
-                waypoints = np.array([request.position_m, *turn.segments[1:, :2].tolist()])
-                return Plan(PlanStatus.FOUND, "no track can be flown; holding", waypoints, turn)
-        return Plan(PlanStatus.NO_PATH, "no track can be flown and there is no room to hold")
+                reason = "no way on can be seen to be safe; turning away"
+                waypoints = np.array([request.position_m, turn.segments[-1, :2]])
+                plan = Plan(PlanStatus.FOUND, reason, waypoints, turn)
+                leaves = turn.length_m - float(turn.segments[-1, 5])
+                self._proposed = _Effect(plan, turn, Course(turn, (request.position_m,), 0), leaves)
+                return plan
+        if effect is None:
+            return Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start")
+        raise CertificateBroken(
+            f"something was seen at {request.time_s:.1f} s where the plan in effect was certified to be free, "
+            "and there is no room to turn away"
+        )
 
     def _sentence(self, request: PlanRequest, nodes: tuple[Point, ...]) -> str:
         ux, uy, left = guide_vector(request.position_m, self._mission.goal_m)
@@ -317,14 +364,19 @@ class RollingWindow:
         side = "left" if ux * y - uy * x > 0.0 else "right"
         return f"obstacle ahead, passing {side} at {math.hypot(x, y) / 1000:.1f} km"
 
-    def _picture(self, situation: _Situation, route: Route, tracks: list[Track]) -> PlanPicture:
-        window = self._window(situation, np.full(len(situation.points), self._mission.clearance_m))
+    def _picture(self, start: Start, course: Course, tracks: list[Track]) -> PlanPicture:
+        points = self._memory.points_m
+        window = self._local.window(start, np.full(len(points), self._mission.clearance_m))
         return PlanPicture(
-            guide_m=np.array([situation.position, self._mission.goal_m]),
+            guide_m=np.array([start.position, self._mission.goal_m]),
             window_m=self._window_m,
-            sectors=window.free_sectors(situation.position),
+            sectors=window.free_sectors(start.position),
             candidates=(
-                np.array([situation.position, *route.nodes]),
+                np.array([start.position, *course.nodes]),
                 *(np.array(track.nodes) for track in tracks),
             ),
         )
+
+
+def _course(start: Start, route: Route, known: int) -> Course:
+    return Course(Path(np.array([*start.prefix, *route.path.segments.tolist()])), route.nodes, known)

@@ -117,14 +117,14 @@ class TangentBug(Walker[State]):
         """The graph is looked at several times in a sensing range."""
         return self.mission.sensor_range_m / LOOKS
 
-    def prefers(self, new: tuple[Leg[State], ...], old: tuple[Leg[State], ...], left_m: float) -> bool:
-        """A change of behaviour, a way across a dent, or a shorter way to the goal."""
+    def prefers(self, new: tuple[Leg[State], ...], left_m: float) -> bool:
+        """A change of behaviour, a way across a dent, or a shorter or a free way to the goal."""
         state = new[0].state
         if isinstance(state, Following):
             return not state.on_boundary and length_of(new[0].segments) > self.look_again_m()
-        if any(isinstance(leg.state, Following) for leg in old):
-            return True
-        return sum(length_of(leg.segments) for leg in new) < (1.0 - BETTER) * left_m
+        was_caught = any(isinstance(leg.state, Following) for leg in self.legs)
+        shorter = sum(length_of(leg.segments) for leg in new) < (1.0 - BETTER) * left_m
+        return was_caught or shorter or math.isfinite(self.breach_m)
 
     def walk(self, place: Point, state: State) -> Iterator[Leg[State]]:
         """Steps 1 and 2 in turn."""
@@ -140,11 +140,12 @@ class TangentBug(Walker[State]):
                 return
             node = self._best(place, self._nodes(place), state.limit_m)
             slide = self._slide(place, node) if node is not None else ()
-            if length_of(slide) <= self._progress_m:
+            onto = mark_at(slide, math.inf).place if slide else place
+            if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self._progress_m:
                 state = self._caught(place, line)
             else:
                 yield Leg(state, slide)
-                place = mark_at(slide, math.inf).place
+                place = onto
         if isinstance(state, Following):
             yield from self._follow(place, state)
 
@@ -272,4 +273,3 @@ class TangentBug(Walker[State]):
             if self.known.first_hit(place, target)[0] > math.dist(place, target) - self._progress_m:
                 return station
         return 0.0
-

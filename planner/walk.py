@@ -133,8 +133,8 @@ class Walker(ABC, Generic[State]):
         self._near_m = 2.0 * self.keep_m + mission.speed_mps * (2.0 + mission.compute_latency_s)
         self._breach_keep_m = self.keep_m - BREACH_SHARE * config.margin_m
         self._plan: Plan | None = None
-        self._legs: tuple[Leg[State], ...] = ()
-        self._breach_m = math.inf
+        self.legs: tuple[Leg[State], ...] = ()
+        self.breach_m = math.inf
         self._look_at_m = math.inf
 
     @abstractmethod
@@ -157,8 +157,8 @@ class Walker(ABC, Generic[State]):
         """After how much of a walk the algorithm looks round although it can go on (m)."""
         return math.inf
 
-    def prefers(self, new: tuple[Leg[State], ...], old: tuple[Leg[State], ...], left_m: float) -> bool:
-        """Whether a new walk is better than what is left of the old one, which can go on."""
+    def prefers(self, new: tuple[Leg[State], ...], left_m: float) -> bool:
+        """Whether a new walk is better than the `left_m` that are left of the old one, which can go on."""
         return True
 
     def plan(self, request: PlanRequest) -> Plan:
@@ -167,17 +167,17 @@ class Walker(ABC, Generic[State]):
         path = request.flown.path if request.flown and request.flown is self._plan else None
         if path is None:
             return self._found(tuple(self.walk(request.position_m, self.begin(request.position_m))), request)
-        station, end = request.station_m, self._legs[-1].state
+        station, end = request.station_m, self.legs[-1].state
         left = path.length_m - station
         if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
             return Plan(PlanStatus.UNREACHABLE, end.sentence)
         if len(fresh):
             breach = first_breach(path, fresh, self._breach_keep_m, station)
-            self._breach_m = min(self._breach_m, breach)
+            self.breach_m = min(self.breach_m, breach)
         ends_early = not isinstance(end, Enclosed) and math.dist(end_of(path)[:2], self.goal) > 1.0
         must = (
             taken_back
-            or self._breach_m - station < self._near_m
+            or self.breach_m - station < self._near_m
             or (ends_early and left < max(self._near_m, 0.5 * self.horizon_m))
         )
         if not must and station < self._look_at_m:
@@ -186,7 +186,7 @@ class Walker(ABC, Generic[State]):
         if math.dist(place, request.position_m) > max(1.0, OFF_PATH * self.mission.tracking_error_m):
             place = request.position_m
         legs = tuple(self.walk(place, self._state_at(path, station)))
-        if not must and not self.prefers(legs, self._legs, left):
+        if not must and not self.prefers(legs, left):
             self._look_at_m = station + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._found(legs, request, place)
@@ -194,9 +194,9 @@ class Walker(ABC, Generic[State]):
     def _state_at(self, path: Path, station_m: float) -> State:
         """The state of the algorithm at a station of the path in effect."""
         begin = 0.0
-        for leg in self._legs:
+        for leg in self.legs:
             end = begin + length_of(leg.segments)
-            if station_m < end - SHORTEST_M or leg is self._legs[-1]:
+            if station_m < end - SHORTEST_M or leg is self.legs[-1]:
                 break
             begin = end
         return self.after(leg.state, between(path, begin, station_m))
@@ -210,7 +210,7 @@ class Walker(ABC, Generic[State]):
             return Plan(status, reason)
         here = place or request.position_m
         last = along(segments[-1], segments[-1][5])[:2]
-        self._legs, self._breach_m, self._look_at_m = legs, math.inf, self.look_again_m()
+        self.legs, self.breach_m, self._look_at_m = legs, math.inf, self.look_again_m()
         self._plan = Plan(
             PlanStatus.FOUND,
             self.says(legs[0].state),

@@ -109,6 +109,10 @@ def random_world(seed: int) -> World:
     return world_of(*shapes)
 
 
+MOST_IN_A_CELL = 1 + 4 * 4
+"""Points in a cell: one, and of a near outline one in every sixteenth of it."""
+
+
 @settings(deadline=None, max_examples=30)
 @given(seed=SEEDS)
 def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
@@ -125,7 +129,7 @@ def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
     between = np.zeros(len(points), dtype=np.bool_) if len(off) < 2 else off[1] < 2.0 * CLEARANCE
     assert off[0].max() <= CLEARANCE
     assert off[0, ~between].max(initial=0.0) < SPACING
-    assert len(cells(points)) == len(points)
+    assert len(points) <= MOST_IN_A_CELL * len(cells(points))
     tree = shapely.STRtree(shapely.points(points))
     for scan in taken:
         hit = np.isfinite(scan.ranges_m)
@@ -292,7 +296,7 @@ def test_points_never_outnumber_the_cells() -> None:
     for _ in range(300):
         tiny.update(replace(base, ranges_m=rng.uniform(0.0, RANGE, 720)))
     # The area and a border of twice the clearance and a cell, in cells of 50 m.
-    assert 0 < len(edges(tiny)) <= (1000 + 2 * 450) ** 2 / 50**2
+    assert 0 < len(edges(tiny)) <= MOST_IN_A_CELL * (1000 + 2 * 450) ** 2 / 50**2
     low, high = edges(tiny).min(), edges(tiny).max()
     assert low >= -500.0
     assert high <= 1500.0

@@ -1,0 +1,62 @@
+"""The whole way that a plan in effect is the beginning of, and on which side of things it passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.clearance import distances
+from planner.curves import Point, between
+from planner.interface import FloatArray, Path
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A path to the goal through what is known, unknown space taken as free.
+
+    Attributes:
+        path: from where the aircraft was when it was found.
+        nodes: its track points, the goal last.
+        known: how many of the remembered edge points it was found with.
+    """
+
+    path: Path
+    nodes: tuple[Point, ...]
+    known: int
+
+    def ahead(self, station_m: float) -> Course:
+        """What is left of it from a station on."""
+        segments = between(self.path, station_m, self.path.length_m)
+        if not segments:
+            return self
+        _, stations = distances(self.path, np.array(self.nodes))
+        left = tuple(
+            node for node, at in zip(self.nodes[:-1], stations[:-1].tolist(), strict=True) if at > station_m
+        )
+        return Course(Path(np.array(segments)), (*left, self.nodes[-1]), self.known)
+
+    def same_side(self, nodes: Sequence[Point], points_m: FloatArray) -> bool:
+        """Whether another way from here to the goal passes all that was known on the same side.
+
+        That is so where the two ways together go round none of it.
+
+        Args:
+            nodes: the other way, from the present track point to the goal.
+            points_m: all remembered edge points.
+        """
+        loop = np.array([*nodes, *self.nodes[-2::-1]])
+        return not encircled(loop, points_m[: self.known]).any()
+
+
+def encircled(loop_m: FloatArray, points_m: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(m,) whether a closed polyline (k, 2) goes round each of (m, 2) points an odd number of times."""
+    x, y = points_m[:, 0], points_m[:, 1]
+    x0, y0 = loop_m.T[:, :, None]
+    x1, y1 = np.roll(loop_m, -1, axis=0).T[:, :, None]
+    spans = (y0 <= y) != (y1 <= y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
+    odd: np.ndarray[tuple[int], np.dtype[np.bool_]] = (spans & (x < crossing)).sum(axis=0) % 2 == 1
+    return odd

@@ -1,0 +1,182 @@
+"""One rolling step of local planning: n-best search, route optimisation, the shortest of the n."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+
+from planner.course import Course
+from planner.curves import Limits, Point, Pose, Segment
+from planner.interface import FloatArray, Mission
+from planner.memory import ObstacleMemory
+from planner.multi_step_search import Track, search
+from planner.pose_search import search_poses
+from planner.route_optimisation import Route, Terrain, optimise
+from planner.window import Window
+
+SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
+"""Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
+
+WIDER = 4
+"""Where n tracks at every one of N steps find no way, this many times as many are tried."""
+
+SWITCH = 0.02
+"""The other way round is taken only where it saves this share of the distance left."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """How far from obstacles to search.
+
+    Attributes:
+        distance_m: kept from every edge point.
+        margin_m: more of it, of which shares are given up for straight steps and for curves.
+    """
+
+    distance_m: float
+    margin_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a new plan begins.
+
+    Attributes:
+        position: of the aircraft.
+        pose: where the new plan leaves the old one.
+        curvature: of the old one there, 1/m.
+        prefix: the stretch of the old one up to there.
+    """
+
+    position: Point
+    pose: Pose
+    curvature: float = 0.0
+    prefix: list[Segment] = field(default_factory=list)
+
+
+class LocalPlanning:
+    """Looks for the shortest flyable way to the goal through what is remembered.
+
+    Args:
+        mission: goal and limits.
+        memory: the edge points.
+        window_m: r_1.
+        margin_m: planned distance beyond the clearance.
+        steps: N.
+        candidates: n.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        memory: ObstacleMemory,
+        *,
+        window_m: float,
+        margin_m: float,
+        steps: int,
+        candidates: int,
+    ) -> None:
+        self._mission, self._memory = mission, memory
+        self._window_m, self._margin_m = window_m, margin_m
+        self._steps, self._candidates = steps, candidates
+        self.limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
+
+    @property
+    def path_keeps_m(self) -> float:
+        """What paths keep from every edge point where there is room."""
+        return self._mission.clearance_m + PATH_SHARE * self._margin_m
+
+    def attempts(self) -> list[Attempt]:
+        """Distances to search with, in order of preference.
+
+        First as wanted. Then with what of the margin there is room for. Then wide enough for a turn about the end of
+        a wall at the turn radius. Last so wide that a turn can be flown everywhere on the way: a way that
+        leads through no gap that would have to be entered before it can be seen to have an end.
+        """
+        clearance, margin, radius = self._mission.clearance_m, self._margin_m, self._mission.turn_radius_m
+        attempts = [Attempt(clearance, margin), Attempt(clearance, 0.2 * margin)]
+        if radius > clearance:
+            attempts.append(Attempt(radius, margin))
+        return [*attempts, Attempt(clearance + radius, margin)]
+
+    def route(
+        self, start: Start, attempt: Attempt, course: Course | None, tracks: list[Track]
+    ) -> Route | None:
+        """The shortest of the n best tracks, after route optimisation.
+
+        Args:
+            start: where it begins.
+            attempt: how far from obstacles.
+            course: what is flown now; the other side of something is taken only for a shorter way.
+            tracks: the candidates that were looked at are added to it.
+        """
+        room = self._room(start)
+        terrain = self._terrain(attempt, room)
+        window = self.window(start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room))
+        cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
+        best: Route | None = None
+        stays = False
+        for track in self._found(window, attempt):
+            switching = 0.0 if course is None or stays else SWITCH * track.cost_m
+            if best is not None and track.cost_m >= best.path.length_m + switching:
+                break
+            tracks.append(track)
+            same = course is None or course.same_side(track.nodes, self._memory.points_m)
+            if best is not None and track.cost_m >= best.path.length_m and not same:
+                continue
+            route = optimise(start.pose, start.curvature, track.nodes, self.limits, cut, terrain)
+            if route is not None and (
+                best is None
+                or (same and not stays)
+                or (same == stays and route.path.length_m < best.path.length_m)
+            ):
+                best, stays = route, same
+        return best
+
+    def tight_route(self, start: Start) -> Route | None:
+        """A way found by search over poses, where none through the free sectors can be flown."""
+        terrain = self._terrain(Attempt(self._mission.clearance_m, 0.2 * self._margin_m), self._room(start))
+        return search_poses(start.pose, start.curvature, self._mission.goal_m, self.limits, terrain)
+
+    def window(self, start: Start, keep_m: FloatArray) -> Window:
+        """The planning window about the start of a plan."""
+        memory = self._memory
+        return Window(start.pose[:2], self._window_m, memory.points_m, memory.labels, memory.cell_m, keep_m)
+
+    def terrain(self, keep_m: float) -> Terrain:
+        """Where a curve may lie that keeps one distance from all edge points."""
+        points = self._memory.points_m
+        return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m)
+
+    def _terrain(self, attempt: Attempt, room: FloatArray) -> Terrain:
+        keep = np.minimum(self._mission.clearance_m + PATH_SHARE * attempt.margin_m, room)
+        return Terrain(self._memory.points_m, keep, self._mission.bounds_m)
+
+    def _room(self, start: Start) -> FloatArray:
+        """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
+        points = self._memory.points_m
+        ends = (start.pose, self._mission.goal_m)
+        room = [np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) - 1e-3 for end in ends]
+        nearer: FloatArray = np.minimum(*room)
+        return nearer
+
+    def _found(self, window: Window, attempt: Attempt) -> Iterator[Track]:
+        """The n best tracks; where there is none, those of a wider search."""
+        found = 0
+        for widening in (1, WIDER):
+            tracks = search(
+                window,
+                self._mission.goal_m,
+                self._mission.bounds_m,
+                steps=self._steps * widening,
+                keep_best=self._candidates * widening,
+                outer_m=attempt.distance_m + attempt.margin_m,
+            )
+            for track in islice(tracks, self._candidates):
+                found += 1
+                yield track
+            if found:
+                return
