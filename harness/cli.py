@@ -157,6 +157,9 @@ def compare(
             )
     except RunFolderError as error:
         raise _bad_input(error) from error
+    except KeyboardInterrupt:
+        typer.echo(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
+        raise
     if as_json:
         _print_json(comparison.plain())
     else:

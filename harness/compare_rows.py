@@ -40,7 +40,7 @@ class Row:
         cross_track_p95_m: 95th percentile of the distance from the plan in effect.
         cross_track_max_m: its largest value.
         trackable: whether every leg of the plans was tracked; None where a point flew, which tracks anything.
-        planner_p50_ms: processor time of a search, median.
+        planner_p50_ms: wall-clock time of a search, median.
         planner_p99_ms: the same, 99th percentile.
         planner_max_ms: the same, largest.
         replans: plans accepted after the first.

@@ -89,8 +89,7 @@ class ObstacleMap:
         self._scans += 1
         hits = (scan.ranges_m < math.inf).nonzero()[0]
         if len(hits):
-            points, outline = self._joined(scan, hits)
-            self._add(points, outline, np.array([[scan.east_m], [scan.north_m]]))
+            self._take_in(scan, hits)
         if self._scans % LOOK_THROUGH_EVERY == 0 and self._count:
             self._look_through(scan)
         self._free.update(scan)
@@ -112,48 +111,59 @@ class ObstacleMap:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
         return self._free.contains(points_m)
 
-    def _joined(self, scan: RangeScan, hits: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-        """Where rays hit, and points between neighbours that leave no way; and near outlines among the hits.
+    def _take_in(self, scan: RangeScan, hits: NDArray[np.intp]) -> None:
+        """Counts hits; where they are news, also what lies between them; and near outlines in detail.
 
-        Returns:
-            (2, k) and (2, j) places, seen from the sensor.
+        Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
+        sensor = complex(scan.east_m, scan.north_m)
+        ranges = scan.ranges_m.take(hits)
+        places = scan.directions.view(np.complex128).take(hits) * ranges
+        cells = self._cells(places + sensor)
+        if not self._holds(scan):
+            inside = ((cells >= 0) & (cells < self._shape)).all(axis=1).nonzero()[0]
+            hits, ranges, places, cells = hits[inside], ranges[inside], places[inside], cells[inside]
+        keys = cells[:, 0] * self._ny + cells[:, 1]
+        news = self._score.take(keys) < CERTAIN
+        near = ranges < self._near_by
+        if not (np.count_nonzero(news) or np.count_nonzero(near)):
+            return
+        counted, found = [keys[news]], [places[news]]
         rays = len(scan.ranges_m)
         closed = _all_round(scan) and hits[0] + rays - hits[-1] <= 2
         if closed:
-            hits = np.append(hits, hits[0] + rays)
-        ranges = scan.ranges_m.take(hits, mode="wrap")
-        points = scan.directions.T.take(hits, axis=1, mode="wrap") * ranges
-        step = points[:, 1:] - points[:, :-1]
-        east, north = step
-        gap2 = east * east + north * north
+            hits = np.concatenate((hits, hits[:1] + rays))
+            places, news, near = (np.concatenate((each, each[:1])) for each in (places, news, near))
+        step = places[1:] - places[:-1]
+        gap = np.abs(step)
         # One ray may be missing between neighbours: a lost return does not open a wall.
-        joined = (gap2 < self._join * self._join) & (hits[1:] - hits[:-1] <= 2)
+        joined = (gap < self._join) & (hits[1:] - hits[:-1] <= 2)
+        wide = (joined & (gap > self._cell) & (news[1:] | news[:-1])).nonzero()[0]
+        if len(wide):
+            between = (places[wide, None] + step[wide, None] * BETWEEN).ravel()
+            cells = self._cells(between + sensor)
+            counted.append(cells[:, 0] * self._ny + cells[:, 1])
+            found.append(between)
         ends = (~joined).nonzero()[0]
         ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
-        outline = points[:, ends[ranges[ends] < self._near_by]]
-        wide = (joined & (gap2 > self._cell * self._cell)).nonzero()[0]
-        if len(wide):
-            between = points.take(wide, axis=1)[:, :, None] + step.take(wide, axis=1)[:, :, None] * BETWEEN
-            points = np.concatenate((points, between.reshape(2, -1)), axis=1)
-        return points, outline
+        outline = places[ends[near[ends]]]
+        if len(outline):
+            counted.append(self._fine_keys(outline + sensor))
+            found.append(outline)
+        self._count_hits(np.concatenate(counted), np.concatenate(found) + sensor)
 
-    def _add(self, points: FloatArray, outline: FloatArray, sensor: FloatArray) -> None:
-        """Counts hits: a cell gets a point with the first and is an edge from the second scan on.
+    def _cells(self, points: ComplexArray) -> NDArray[np.int64]:
+        """(k, 2) column and row of each point."""
+        return ((points - self._origin) / self._cell).view(np.float64).reshape(-1, 2).astype(np.int64)
 
-        Args:
-            points: (2, k) places, seen from the sensor.
-            outline: (2, j) those to be kept in detail.
-            sensor: (2, 1) where it is.
-        """
-        cells = ((points + (sensor - self._origin)) / self._cell).astype(np.int64)
-        if not (cells.view(np.uint64) < self._shape).all():  # unsigned, a negative number is a large one
-            inside = (cells.view(np.uint64) < self._shape).all(axis=0)
-            cells, points = cells[:, inside], points[:, inside]
-        keys = cells[0] * self._ny + cells[1]
-        if outline.size:
-            keys = np.concatenate((keys, self._fine_keys(outline + (sensor - self._origin))))
-            points = np.concatenate((points, outline), axis=1)
+    def _holds(self, scan: RangeScan) -> bool:
+        """Whether all that a scan can reach lies on the grid."""
+        reach, x, y = scan.max_range_m, scan.east_m - self._origin.real, scan.north_m - self._origin.imag
+        width, height = self._cell * self._shape
+        return reach < x < width - reach and reach < y < height - reach
+
+    def _count_hits(self, keys: NDArray[np.int64], points: ComplexArray) -> None:
+        """Counts hits: a cell gets a point with the first and is an edge from the second scan on."""
         score = self._score.take(keys)
         uncertain = (score < CERTAIN).nonzero()[0]
         if not len(uncertain):

@@ -8,6 +8,7 @@ only choose which rays are tried, with a margin. So a face that is not hit canno
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -88,9 +89,9 @@ class RangeSensor:
         self._spacing_rad = field_rad / config.rays
         self._first_rad = 0.5 * self._spacing_rad - field_rad / 2
         offsets = self._first_rad + self._spacing_rad * np.arange(config.rays)
-        # A face may begin in this turn and reach into the next: it is tried as it is, and one turn back.
-        self._turns = np.array([[0.0], [math.tau / self._spacing_rad]])
-        self._fan_sin, self._fan_cos = np.sin(offsets), np.cos(offsets)
+        self._turn = math.tau / self._spacing_rad
+        self._fan = np.array((np.sin(offsets), np.cos(offsets)))  # seen from the nose: to its right, ahead
+        self._fan_turned = self._fan[0] + 1j * self._fan[1]
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
         )
@@ -100,20 +101,16 @@ class RangeSensor:
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
         """Looks around from a place, at a time."""
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
-        rays = np.empty((2, self._config.rays))
-        rays[0] = sin * self._fan_cos + cos * self._fan_sin
-        rays[1] = cos * self._fan_cos - sin * self._fan_sin
-        start_rad = (heading_rad + self._first_rad) % math.tau
-        ranges = self._true_ranges(east_m, north_m, time_s, start_rad, rays)
+        directions = self._fan_turned * complex(cos, -sin)
         return RangeScan(
             time_s=time_s,
             available_s=time_s + self._config.latency_s,
             east_m=east_m,
             north_m=north_m,
-            start_rad=start_rad,
+            start_rad=(heading_rad + self._first_rad) % math.tau,
             spacing_rad=self._spacing_rad,
-            directions=rays.T,
-            ranges_m=self._degraded(ranges),
+            directions=directions.view(np.float64).reshape(-1, 2),
+            ranges_m=self._degraded(self._true_ranges(east_m, north_m, time_s, sin, cos)),
             max_range_m=self._config.range_m,
         )
 
@@ -128,79 +125,102 @@ class RangeSensor:
             self._listed_at = (east, north, time)
         return self._surroundings
 
-    def _true_ranges(
-        self, east: float, north: float, time: float, start_rad: float, rays: FloatArray
-    ) -> FloatArray:
-        """(n,) ranges to the nearest face, +inf beyond the range."""
+    def _true_ranges(self, east: float, north: float, time: float, sin: float, cos: float) -> FloatArray:
+        """(n,) ranges to the nearest face, +inf beyond the range; sine and cosine of the heading."""
         faces = self._near(east, north, time).faces(time)
-        ranges = np.full(rays.shape[1], math.inf)
+        ranges = np.full(self._config.rays, math.inf)
         if faces.circles_m.shape[1]:
-            self._hit_circles(ranges, rays, start_rad, faces.circles_m - np.array([[east], [north], [0.0]]))
+            circles = []
+            for circle_east, circle_north, radius in faces.circles_m.T.tolist():
+                away_east, away_north = circle_east - east, circle_north - north
+                circles.append(
+                    (cos * away_east - sin * away_north, sin * away_east + cos * away_north, radius)
+                )
+            self._hit_circles(ranges, circles)
         if faces.edges_m.shape[1]:
-            self._hit_edges(ranges, rays, start_rad, faces.edges_m - np.array([[east], [north]] * 2))
-        ranges[ranges > self._config.range_m] = math.inf
+            away_east, away_north = faces.edges_m[::2] - east, faces.edges_m[1::2] - north
+            self._hit_edges(ranges, cos * away_east - sin * away_north, sin * away_east + cos * away_north)
+        if faces.circles_m.size or faces.edges_m.size:
+            ranges[ranges > self._config.range_m] = math.inf
         return ranges
 
-    def _hit_circles(
-        self, ranges: FloatArray, rays: FloatArray, start_rad: float, circles: FloatArray
-    ) -> None:
-        """Lowers ranges to circles (3, c), centres relative to the sensor."""
-        east, north, radius = circles
-        away = np.sqrt(east * east + north * north)
-        outside = away > radius
-        half_rad = np.where(outside, np.arcsin(radius / np.maximum(away, radius)), math.pi)
-        ray, face = self._tried(np.arctan2(east, north) - half_rad - start_rad, 2 * half_rad)
-        ray_east, ray_north = rays.take(ray, axis=1)
-        east, north, radius = circles.take(face, axis=1)
-        along = east * ray_east + north * ray_north
-        across = east * ray_north - north * ray_east
-        under_root = radius * radius - across * across
-        half_chord = np.sqrt(np.maximum(under_root, 0.0))
-        distance = along + np.where(outside, -1.0, 1.0)[face] * half_chord
-        distance[(under_root < 0) | (distance < 0)] = math.inf
-        np.minimum.at(ranges, ray, distance)
+    def _hit_circles(self, ranges: FloatArray, circles: Iterable[tuple[float, float, float]]) -> None:
+        """Lowers ranges to circles: centre to the right and ahead, radius."""
+        tries, faces = [], []
+        for x, y, radius in circles:
+            away = math.hypot(x, y)
+            if away - radius > self._config.range_m:
+                continue
+            half_rad, sign = (math.asin(radius / away), -1.0) if away > radius else (math.pi, 1.0)
+            for span in self._tried(math.atan2(x, y) - half_rad, 2.0 * half_rad):
+                tries.append(span)
+                faces.append((x, y, (away - radius) * (away + radius), sign))
+        if not tries:
+            return
+        ray_right, ray_ahead, right, ahead, tangent2, sign = self._pairs(tries, np.array(faces).T)
+        # `tangent2` is the square of the tangent from the sensor, negative inside: the power of the point.
+        along = right * ray_right + ahead * ray_ahead
+        half_chord2 = along * along - tangent2
+        distance = along + sign * np.sqrt(np.maximum(half_chord2, 0.0))
+        distance[np.minimum(half_chord2, distance) < 0.0] = math.inf
+        _lower(ranges, tries, distance)
 
-    def _hit_edges(self, ranges: FloatArray, rays: FloatArray, start_rad: float, edges: FloatArray) -> None:
-        """Lowers ranges to edges (4, e), ends relative to the sensor.
+    def _hit_edges(self, ranges: FloatArray, right: FloatArray, ahead: FloatArray) -> None:
+        """Lowers ranges to edges; (2, e) where they start and end, to the right and ahead.
 
         A ray hits where the ends lie on different sides of it. Two edges that share a vertex agree about its
         side, so that no ray slips through between them.
         """
-        start_east, start_north, end_east, end_north = edges
-        turn = start_north * end_east - start_east * end_north
-        dot = start_east * end_east + start_north * end_north
+        (start_right, end_right), (start_ahead, end_ahead) = right, ahead
+        turn = start_ahead * end_right - start_right * end_ahead
+        dot = start_right * end_right + start_ahead * end_ahead
         width = np.arctan2(turn, dot)
-        first_east, first_north = np.where(width < 0, edges[2:], edges[:2])
-        ray, face = self._tried(np.arctan2(first_east, first_north) - start_rad, np.abs(width))
-        ray_east, ray_north = rays.take(ray, axis=1)
-        pair_start_east, pair_start_north, pair_end_east, pair_end_north = edges.take(face, axis=1)
-        start_side = ray_east * pair_start_north - ray_north * pair_start_east
-        end_side = ray_east * pair_end_north - ray_north * pair_end_east
-        hit = np.flatnonzero((start_side >= 0) != (end_side >= 0))
-        along_east, along_north = end_east - start_east, end_north - start_north
-        lever = start_east * along_north - start_north * along_east
-        distance = lever[face[hit]] / (end_side[hit] - start_side[hit])
+        backwards = width < 0.0
+        first = np.arctan2(
+            np.where(backwards, end_right, start_right), np.where(backwards, end_ahead, start_ahead)
+        )
+        tries, faces = [], []
+        for face, (bearing, wide) in enumerate(zip(first.tolist(), np.abs(width).tolist(), strict=True)):
+            for span in self._tried(bearing, wide):
+                tries.append(span)
+                faces.append(face)
+        if not tries:
+            return
+        along_right, along_ahead = end_right - start_right, end_ahead - start_ahead
+        lever = start_right * along_ahead - start_ahead * along_right
+        columns = np.array((start_right, start_ahead, end_right, end_ahead, lever))[:, faces]
+        ray_right, ray_ahead, start_right, start_ahead, end_right, end_ahead, lever = self._pairs(
+            tries, columns
+        )
+        start_side = ray_right * start_ahead - ray_ahead * start_right
+        end_side = ray_right * end_ahead - ray_ahead * end_right
+        hit = ((start_side >= 0) != (end_side >= 0)).nonzero()[0]
+        distance = np.full(len(lever), math.inf)
+        distance[hit] = lever[hit] / (end_side[hit] - start_side[hit])
         distance[distance < 0] = math.inf
-        np.minimum.at(ranges, ray[hit], distance)
+        _lower(ranges, tries, distance)
 
-    def _tried(self, first_rad: FloatArray, width_rad: FloatArray) -> tuple[IntArray, IntArray]:
-        """Rays between bearings.
+    def _tried(self, first_rad: float, width_rad: float) -> Iterable[tuple[int, int]]:
+        """Spans of rays (first, last + 1) that may meet a face.
 
         Args:
-            first_rad: (m,) where each face begins, clockwise from ray 0.
-            width_rad: (m,) how far it reaches clockwise from there.
-
-        Returns:
-            (p,) numbers of rays and (p,) numbers of faces: the pairs that may meet.
+            first_rad: bearing from the nose at which the face begins.
+            width_rad: how far it reaches clockwise from there.
         """
-        first = (first_rad % math.tau) / self._spacing_rad - self._turns
+        rays, first = self._config.rays, (first_rad - self._first_rad) % math.tau / self._spacing_rad
         last = first + width_rad / self._spacing_rad
-        lowest = np.maximum(np.ceil(first - _MARGIN_RAYS), 0.0).astype(np.intp).ravel()
-        highest = np.minimum(np.floor(last + _MARGIN_RAYS), self._config.rays - 1).astype(np.intp).ravel()
-        counts = np.maximum(highest - lowest + 1, 0)
-        pair = np.repeat(np.arange(len(counts)), counts)
-        ray = np.arange(len(pair)) + (lowest - counts.cumsum() + counts)[pair]
-        return ray, pair % len(first_rad)
+        low, high = math.ceil(first - _MARGIN_RAYS), math.floor(last + _MARGIN_RAYS) + 1
+        if high <= rays:
+            return ((low, high),) if low < high else ()
+        # It may begin in this turn and reach into the next: it is tried as it is, and one turn back.
+        again = min(math.floor(last - self._turn + _MARGIN_RAYS) + 1, rays)
+        return tuple(span for span in ((low, rays), (0, again)) if span[0] < span[1])
+
+    def _pairs(self, tries: Sequence[tuple[int, int]], faces: FloatArray) -> Iterator[FloatArray]:
+        """Rays and faces that may meet: (p,) directions to the right and ahead, and (p,) of each row of faces."""
+        counts = [high - low for low, high in tries]
+        yield from np.concatenate([self._fan[:, low:high] for low, high in tries], axis=1)
+        yield from np.repeat(faces, counts, axis=1)
 
     def _degraded(self, ranges: FloatArray) -> FloatArray:
         """Ranges with the imperfections of the sensor."""
@@ -214,6 +234,15 @@ class RangeSensor:
             chance, share = self._false_return.random((2, n))
             ranges = np.where(chance < config.false_return, config.range_m * (1.0 - share), ranges)
         return ranges
+
+
+def _lower(ranges: FloatArray, tries: Iterable[tuple[int, int]], distance: FloatArray) -> None:
+    """Lowers ranges to the distances of pairs of rays and faces."""
+    first = 0
+    for low, high in tries:
+        reached = ranges[low:high]
+        np.minimum(reached, distance[first : first + high - low], out=reached)
+        first += high - low
 
 
 def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:

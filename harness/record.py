@@ -222,7 +222,7 @@ class AcceptedPlan:
     Attributes:
         plan_index: 0 for the first; row of `plans.parquet`.
         time_s: in effect from this simulated time on.
-        compute_ms: processor time of the search that found it.
+        compute_ms: wall-clock time of the search that found it.
         plan: the planner's answer; its `path` is not None.
     """
 
@@ -256,10 +256,10 @@ class Flight:
         plans: the plans flown, in order; `plans[i].plan_index == i`.
         outcome: how it ended.
         reason: the same as one sentence.
-        compute_ms: processor time of every search, also of those that found nothing new.
+        compute_ms: wall-clock time of every search, also of those that found nothing new.
         sim_s: simulated time flown.
         wall_s: wall-clock time that took.
-        block_shares: share of the processor time each block of the loop took, by its name.
+        block_shares: share of the wall-clock time each block of the loop took, by its name.
     """
 
     track: Track

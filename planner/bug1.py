@@ -111,6 +111,8 @@ class Bug1(Walker[State]):
                 place = along(line[0], line[0][5])[:2] if line else place
                 state = self._met(place)
                 continue
+            if isinstance(state, Returning) and state.walked_m > LOST_SHARE * state.round_m:
+                state = self._met(place)
             side = state.side if isinstance(state, Returning) else self.side
             segments = self.boundary(place, side, left)
             if isinstance(state, Circling):

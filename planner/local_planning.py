@@ -23,7 +23,8 @@ SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 WIDER = 4
 """Where n tracks at every one of N steps find no way, this many times as many are tried."""
 
-SWITCH = 0.02
+
+SWITCH = 0.005
 """The other way round is taken only where it saves this share of the distance left."""
 
 

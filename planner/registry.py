@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any
 
-from planner import rolling_window
+from planner import bug1, bug2, dubins_tree, rolling_window, tangent_bug, vfh_plus
 from planner.interface import Mission, Planner
 
 GROUP = "wayproof.planners"
@@ -29,12 +29,16 @@ class PlannerKind:
             None is derived: `config.resolved(mission)` returns the config with no None left and raises
             ValueError, with a sentence, where keys contradict each other.
         make: the planner for one flight, from a resolved config.
+        point: its paths are those of a point that can turn on the spot: their direction jumps at joints.
+        needs: an optional package without which `config.resolved` raises ValueError.
     """
 
     kind: str
     summary: str
     config: type[Any]
     make: Callable[[Any, Mission], Planner]
+    point: bool = False
+    needs: str | None = None
 
 
 BUILT_IN = (
@@ -43,6 +47,40 @@ BUILT_IN = (
         summary="improved BUG: rolling window, fan sectors, n-best multi-step search, route optimisation",
         config=rolling_window.RollingWindowConfig,
         make=rolling_window.RollingWindow,
+    ),
+    PlannerKind(
+        kind="bug1",
+        summary="Bug1 (Lumelsky, Stepanov): round every obstacle, and on from its point nearest to the goal",
+        config=bug1.Bug1Config,
+        make=bug1.Bug1,
+        point=True,
+    ),
+    PlannerKind(
+        kind="bug2",
+        summary="Bug2 (Lumelsky, Stepanov): along the M-line, round obstacles until the line is met again",
+        config=bug2.Bug2Config,
+        make=bug2.Bug2,
+        point=True,
+    ),
+    PlannerKind(
+        kind="tangent_bug",
+        summary="TangentBug (Kamon, Rimon, Rivlin): by the edges in sight, along boundaries where caught",
+        config=tangent_bug.TangentBugConfig,
+        make=tangent_bug.TangentBug,
+        point=True,
+    ),
+    PlannerKind(
+        kind="vfh_plus",
+        summary="VFH+ (Ulrich, Borenstein): polar histogram masked by the turn radius; local, can be caught",
+        config=vfh_plus.VfhPlusConfig,
+        make=vfh_plus.VfhPlus,
+    ),
+    PlannerKind(
+        kind="dubins_tree",
+        summary="RRT* of Dubins curves (OMPL), grown anew when the way is blocked; needs wayproof[ompl]",
+        config=dubins_tree.DubinsTreeConfig,
+        make=dubins_tree.DubinsTree,
+        needs="ompl",
     ),
 )
 

@@ -231,8 +231,9 @@ class RollingWindow:
         serves = ahead is not None and math.isinf(self._cut_m) and not self._broken
         tracks: list[Track] = []
         stuck: Course | None = None
-        if ahead is None or not serves or not self._is_best(ahead, request):
-            self._searched_with = len(self._memory.points_m)
+        known = len(self._memory.points_m)
+        if ahead is None or not serves or not (ahead.shortest or known == self._searched_with):
+            self._searched_with = known
             for course in self._courses(start, ahead, tracks):
                 if (
                     ahead is not None
@@ -251,22 +252,16 @@ class RollingWindow:
             return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
         return self._no_way(request, effect, here, stuck)
 
-    def _is_best(self, ahead: Course, request: PlanRequest) -> bool:
-        """Whether no search can find a course that is better: nothing new is known, or it is straight."""
-        _, _, guide = guide_vector(request.position_m, self._mission.goal_m)
-        straight = ahead.path.length_m - guide < 1e-4 * guide + self._mission.tracking_error_m
-        return straight or len(self._memory.points_m) == self._searched_with
-
     def _courses(self, start: Start, ahead: Course | None, tracks: list[Track]) -> Iterator[Course]:
         """Ways to the goal, those that are wanted most first."""
         known = len(self._memory.points_m)
-        for attempt in self._local.attempts():
+        for i, attempt in enumerate(self._local.attempts()):
             route = self._local.route(start, attempt, ahead, tracks)
             if route is not None:
-                yield _course(start, route, known)
+                yield _course(start, route, known, shortest=i == 0)
         route = self._local.tight_route(start)
         if route is not None:
-            yield _course(start, route, known)
+            yield _course(start, route, known, shortest=False)
 
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
@@ -347,7 +342,9 @@ class RollingWindow:
                 waypoints = np.array([request.position_m, turn.segments[-1, :2]])
                 plan = Plan(PlanStatus.FOUND, reason, waypoints, turn)
                 leaves = turn.length_m - float(turn.segments[-1, 5])
-                self._proposed = _Effect(plan, turn, Course(turn, (request.position_m,), 0), leaves)
+                self._proposed = _Effect(
+                    plan, turn, Course(turn, (request.position_m,), 0, shortest=False), leaves
+                )
                 return plan
         if effect is None:
             return Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start")
@@ -378,5 +375,6 @@ class RollingWindow:
         )
 
 
-def _course(start: Start, route: Route, known: int) -> Course:
-    return Course(Path(np.array([*start.prefix, *route.path.segments.tolist()])), route.nodes, known)
+def _course(start: Start, route: Route, known: int, shortest: bool) -> Course:
+    path = Path(np.array([*start.prefix, *route.path.segments.tolist()]))
+    return Course(path, route.nodes, known, shortest)

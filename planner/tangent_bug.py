@@ -26,7 +26,7 @@ import numpy as np
 
 from planner.curves import Point, Segment, along
 from planner.interface import Mission
-from planner.walk import Enclosed, Leg, Mark, PointConfig, Walker, cut, length_of, mark_at, rest_of
+from planner.walk import Enclosed, Leg, Mark, PointConfig, Walker, cut, length_of, mark_at
 from planner.window import Window
 
 PROGRESS_SHARE = 0.05
@@ -241,26 +241,26 @@ class TangentBug(Walker[State]):
     def _follow(self, place: Point, state: Following) -> Iterator[Leg[State]]:
         """Along the boundary, the first part of it cut short by a way across a dent."""
         segments = self.boundary(state.anchor, state.side, self.horizon_m)
-        closed = self.passes(segments, state.hit, self.keep_m - state.walked_m)
-        station = 0.0
-        if not state.on_boundary or math.dist(place, state.anchor) > self._progress_m:
-            station = self._seen_from(place, segments, 0.0)
+        off = math.dist(place, state.anchor) > self._progress_m or not state.on_boundary
+        station = self._seen_from(place, segments, 0.0 if off else 2.0 * self.look_again_m())
+        if off or station > 0.0:
             onto = mark_at(segments, station).place
             way, _ = self.straight(place, onto)
-            yield Leg(replace(state, on_boundary=False), way)
-            place = onto
-        elif (dent := self._seen_from(place, segments, 2.0 * self.look_again_m())) > 0.0:
-            onto = mark_at(segments, dent).place
-            way, _ = self.straight(place, onto)
-            if length_of(way) < dent - self._progress_m:
-                station, place = dent, onto
+            if off or length_of(way) < station - self._progress_m:
                 yield Leg(replace(state, on_boundary=False), way)
-        walked = state.walked_m + station
-        rest = cut(segments, min(closed, length_of(segments)))
-        rest = rest_of(rest, station)
-        yield Leg(replace(state, anchor=place, walked_m=walked, on_boundary=True), rest)
+                skipped = cut(segments, station)
+                if math.isfinite(self.passes(skipped, state.hit, self.keep_m - state.walked_m)):
+                    yield Leg(self._gone_round())
+                    return
+                state = replace(state, anchor=onto, walked_m=state.walked_m + station)
+                segments = self.boundary(onto, state.side, self.horizon_m)
+        closed = self.passes(segments, state.hit, self.keep_m - state.walked_m)
+        yield Leg(replace(state, on_boundary=True), cut(segments, closed))
         if math.isfinite(closed):
-            yield Leg(Enclosed(f"{self.enclosed()}: its whole boundary has been gone round"))
+            yield Leg(self._gone_round())
+
+    def _gone_round(self) -> Enclosed:
+        return Enclosed(f"{self.enclosed()}: its whole boundary has been gone round")
 
     def _seen_from(self, place: Point, segments: Sequence[Segment], least_m: float) -> float:
         """The furthest station of a boundary in sight from a place; 0 where none is beyond the least."""

@@ -23,17 +23,10 @@ import numpy as np
 
 from planner.boundary import margin_of
 from planner.clearance import first_breach, inside_bounds
-from planner.curves import Limits, Point, Pose, Segment, along, between, place_on, turn_onto
-from planner.hold import hold
+from planner.curves import Limits, Point, Pose, Segment, turn_onto
 from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.joining import departure, stuck
 from planner.memory import ObstacleMemory
-from planner.route_optimisation import Terrain
-
-LEAD_S = 1.0
-"""A new plan leaves the old one this much flying time ahead."""
-
-OFF_PATH = 4.0
-"""Further off the path than this many times the tracking error, a plan begins at the aircraft itself."""
 
 WIDE_RAD = math.radians(80.0)
 """An opening as wide as this has two sides to choose from; of a narrower one the middle is taken."""
@@ -119,18 +112,13 @@ class VfhPlus:
         """One histogram, one direction; a path only where the direction is a new one."""
         self._memory.take_in(request.seen)
         mission, path = self._mission, request.flown.path if request.flown else None
-        pose, prefix = Pose(*request.position_m, *request.direction), list[Segment]()
-        if path is not None and not path.loiter:
-            here, _ = place_on(path, request.station_m)
-            if math.dist(here[:2], request.position_m) <= max(1.0, OFF_PATH * mission.tracking_error_m):
-                lead = mission.speed_mps * (LEAD_S + mission.compute_latency_s)
-                prefix = between(path, request.station_m, request.station_m + lead)
-                pose, _ = place_on(path, request.station_m + lead)
+        pose, prefix = departure(request, mission)
         near = self._near(pose)
         masked = self._masked(pose, near, self._binary(pose, near))
         choice = self._direction(pose, masked)
         if choice is None:
-            return self._stuck(request, path)
+            self._choice = None
+            return stuck("no direction is free", request, mission, self._memory.points_m)
         last, self._choice = self._choice, choice
         left = 0.0 if path is None or path.loiter else path.length_m - request.station_m
         if (
@@ -233,7 +221,7 @@ class VfhPlus:
             return Plan(PlanStatus.NO_PATH, "the goal is nearer than a turn")
         path = Path(np.array([*prefix, *turn]))
         if not inside_bounds(Path(np.array(turn[:1])), self._mission.bounds_m):
-            return self._stuck(request, request.flown.path if request.flown else None)
+            return stuck("no turn stays inside the area", request, self._mission, self._memory.points_m)
         free = self._bearings[~masked]
         half = 0.5 * self._width_rad
         return Plan(
@@ -249,26 +237,6 @@ class VfhPlus:
                 ),
             ),
         )
-
-    def _stuck(self, request: PlanRequest, path: Path | None) -> Plan:
-        """No direction is free: a turn that can be flown for ever, where there is room for one."""
-        if path is not None and path.loiter:
-            return Plan(PlanStatus.NO_PATH, "no direction is free; holding")
-        if path is None:
-            path = Path(np.array([(*request.position_m, *request.direction, 0.0, self._limits.roll_m)]))
-        points = self._memory.points_m
-        for share in (1.0, 0.5, 0.1):
-            keep = np.full(len(points), share * self._mission.clearance_m)
-            terrain = Terrain(points, keep, self._mission.bounds_m)
-            until = min(path.length_m, request.station_m + 4.0 * self._limits.radius_m)
-            turn = hold(path, request.station_m, until, self._limits, terrain)
-            if turn is not None:
-                self._choice = None
-                waypoints = np.array(
-                    [request.position_m, *turn.segments[1:, :2].tolist(), along(turn.segments[-1], 0.0)[:2]]
-                )
-                return Plan(PlanStatus.FOUND, "no direction is free; holding", waypoints, turn)
-        return Plan(PlanStatus.NO_PATH, "no direction is free and there is no room to hold")
 
 
 def _off(a: float | FloatArray, b: float | FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Generic, Literal, TypeVar
+from typing import Generic, Literal, Self, TypeVar
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class PointConfig:
         },
     )
 
-    def resolved(self, mission: Mission) -> Any:
+    def resolved(self, mission: Mission) -> Self:
         """This config with every None replaced by its default for the mission."""
         return replace(
             self,
@@ -282,11 +282,6 @@ def nearest(segment: Segment, place: Point) -> tuple[float, float]:
     """Distance of a place from a segment, and where along it (m)."""
     distance, station = distances(Path(np.array([segment])), np.array([place]))
     return float(distance[0]), float(station[0])
-
-
-def rest_of(segments: Sequence[Segment], station_m: float) -> tuple[Segment, ...]:
-    """The way from a station on."""
-    return tuple(between(Path(np.array(segments)), station_m, math.inf)) if segments else ()
 
 
 def cut(segments: Sequence[Segment], station_m: float) -> tuple[Segment, ...]:

@@ -98,7 +98,10 @@ def test_the_border_closes_the_side_where_the_clearance_does_not_fit() -> None:
     assert over.length_m is not None
     assert under.length_m is not None
     start, goal = (-50.0, 80.0), (50.0, 80.0)
-    near, far = way(wall, clearance=5.0, start=start, goal=goal), way(wall, clearance=7.0, start=start, goal=goal)
+    near, far = (
+        way(wall, clearance=5.0, start=start, goal=goal),
+        way(wall, clearance=7.0, start=start, goal=goal),
+    )
     assert near.length_m is not None
     assert far.length_m is not None
     assert near.points_m[:, 1].max() == pytest.approx(99.0)
@@ -135,7 +138,9 @@ ENDS = {"start": (-90.0, -5.0), "goal": (90.0, 5.0)}
 
 @given(field=fields, clearance=st.sampled_from([0.0, 3.0]))
 @settings(deadline=None, max_examples=60, derandomize=True)
-def test_the_drawn_path_keeps_the_clearance_and_has_the_length(field: list[Obstacle], clearance: float) -> None:
+def test_the_drawn_path_keeps_the_clearance_and_has_the_length(
+    field: list[Obstacle], clearance: float
+) -> None:
     found = way(*field, clearance=clearance, **ENDS)
     assert found.length_m is not None
     points = found.points_m

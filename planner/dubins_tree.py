@@ -1,0 +1,318 @@
+"""A tree of Dubins curves, grown anew whenever the way is blocked: RRT* of the Open Motion Planning Library.
+
+S. Karaman and E. Frazzoli, "Sampling-based algorithms for optimal motion planning", International Journal of
+Robotics Research 30(7), 2011 (RRT*); L. E. Dubins, "On curves of minimal length with a constraint on average
+curvature, and with prescribed initial and terminal positions and tangents", American Journal of
+Mathematics 79, 1957; I. A. Sucan, M. Moll and L. E. Kavraki, "The Open Motion Planning Library", IEEE Robotics and
+Automation Magazine 19(4), 2012.
+
+What has not been seen is taken to be free. The tree is grown for a number of iterations, not for a time, from a
+seed, so that the same flight is planned the same way. Its path is shortened by Dubins curves between its poses
+that keep the distance. OMPL is an optional dependency: `pip install wayproof[ompl]`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+
+import numpy as np
+
+from planner.boundary import margin_of
+from planner.clearance import first_breach
+from planner.curves import SHORTEST_M, Point, Pose, Segment, along
+from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.joining import departure, stuck
+from planner.memory import ObstacleMemory
+from planner.route_optimisation import Terrain
+
+GOAL_COURSES = 8
+"""The goal may be reached on this many courses."""
+
+ROLLS = 16.0
+"""A plan that is blocked further ahead is dropped after this share of the sensing range."""
+
+PATH_SHARE = 0.25
+"""Share of the margin that a path keeps; the tree keeps all of it."""
+
+WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
+
+
+@dataclass(frozen=True)
+class DubinsTreeConfig:
+    """Keys of `planner.kind: dubins_tree`."""
+
+    iterations: int = field(
+        default=300,
+        metadata={"doc": "how many times the tree is grown", "unit": "1", "minimum": 1, "maximum": 1_000_000},
+    )
+    tree_seed: int = field(
+        default=1, metadata={"doc": "seed of the samples", "unit": "1", "minimum": 1, "maximum": 1_000_000}
+    )
+    margin_m: float | None = field(
+        default=None,
+        metadata={
+            "doc": "planned distance beyond the clearance; "
+            "default: 0.1 of the clearance, at least twice the tracking error",
+            "unit": "m",
+            "minimum": 0.0,
+        },
+    )
+
+    def resolved(self, mission: Mission) -> DubinsTreeConfig:
+        """This config with every None replaced by its default for the mission.
+
+        Raises:
+            ValueError: OMPL is not installed.
+        """
+        if find_spec("ompl") is None:
+            raise ValueError(
+                "kind dubins_tree needs OMPL, which is not installed: pip install wayproof[ompl]"
+            )
+        return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
+
+
+class DubinsTree:
+    """The planner for one flight."""
+
+    def __init__(self, config: DubinsTreeConfig, mission: Mission) -> None:
+        config = config.resolved(mission)
+        assert config.margin_m is not None
+        self._config, self._mission, self._margin_m = config, mission, config.margin_m
+        self._memory = ObstacleMemory(mission.clearance_m)
+        self._urgent_m = 8.0 * mission.turn_radius_m + mission.speed_mps * (4.0 + mission.compute_latency_s)
+        self._searches = 0
+        self._flown: Plan | None = None
+        self._searched_at_m = 0.0
+        self._breach_m = (
+            math.inf
+        )  # where the plan in effect comes too near to something seen since it was made
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Keeps the plan in effect while nothing seen blocks it; grows a tree where something does."""
+        fresh = self._memory.take_in(request.seen)
+        path = request.flown.path if request.flown else None
+        keep = self._mission.clearance_m + 0.5 * PATH_SHARE * self._margin_m
+        if request.flown is not self._flown:
+            self._flown, self._breach_m, self._searched_at_m = request.flown, math.inf, 0.0
+        station = request.station_m
+        if path is not None and not path.loiter and path.length_m > station:
+            room = self._room(fresh, Pose(*path.segments[0, :4].tolist()), keep)
+            self._breach_m = min(self._breach_m, first_breach(path, fresh, room, station))
+            rolled = station - self._searched_at_m >= self._mission.sensor_range_m / ROLLS
+            if math.isinf(self._breach_m) or not (rolled or self._breach_m - station < self._urgent_m):
+                return Plan(PlanStatus.KEPT, "nothing near blocks the plan in effect")
+        self._searched_at_m = station
+        pose, prefix = departure(request, self._mission)
+        points = self._memory.points_m
+        terrain = Terrain(points, self._room(points, pose, keep), self._mission.bounds_m)
+        poses = self._poses(pose, terrain)
+        if poses is None:
+            return stuck("the tree found no way", request, self._mission, points)
+        ways = _shortened(poses, self._mission.turn_radius_m, terrain)
+        segments = [segment for way in ways for segment in way]
+        nodes = [way[-1] for way in ways]
+        return Plan(
+            PlanStatus.FOUND,
+            f"tree {self._searches}, {len(ways)} Dubins curves to the goal"
+            if len(ways) > 1
+            else "way to the goal in view",
+            np.array([request.position_m, *(along(node, node[5])[:2] for node in nodes)]),
+            Path(np.array([*prefix, *segments])),
+            PlanPicture(
+                np.array([request.position_m, self._mission.goal_m]),
+                self._mission.sensor_range_m,
+                np.zeros((0, 4)),
+                (np.array([each[:2] for each in poses]),),
+            ),
+        )
+
+    def _room(self, points: FloatArray, pose: Pose, keep: float) -> FloatArray:
+        room = [
+            np.hypot(points[:, 0] - x, points[:, 1] - y) - 1e-3 for x, y in (pose[:2], self._mission.goal_m)
+        ]
+        return np.minimum(keep, np.minimum(*room))
+
+    def _poses(self, pose: Pose, terrain: Terrain) -> list[Pose] | None:
+        """Poses from the start to the goal, to be joined by Dubins curves; None where none were found."""
+        goals = self._goals(pose, self._mission.goal_m)
+        radius = self._mission.turn_radius_m
+        direct = [(dubins(pose, goal, radius), goal) for goal in goals]
+        direct.sort(key=lambda each: sum(segment[5] for segment in each[0]))
+        for way, goal in direct:
+            if way and terrain.admits(Path(np.array(way))):
+                return [pose, goal]
+        free = _Free(terrain.points_m, self._mission, self._margin_m, pose)
+        beyond = self._beyond(pose, free)
+        ends = goals if beyond == self._mission.goal_m else self._goals(pose, beyond)
+        for attempt in (1, 4):
+            self._searches += 1
+            found = self._grown(pose, ends, free, attempt * self._config.iterations)
+            if found is not None:
+                return found if ends is goals else [*found, goals[0]]
+        return None
+
+    def _beyond(self, pose: Pose, free: _Free) -> Point:
+        """The first free place on the line to the goal that lies beyond the sensing range; else the goal."""
+        (x, y), (to_x, to_y) = pose[:2], self._mission.goal_m
+        whole, step = math.dist((x, y), (to_x, to_y)), self._mission.turn_radius_m
+        for i in range(math.ceil(self._mission.sensor_range_m / step), math.floor(whole / step) - 2):
+            share = i * step / whole
+            place = x + share * (to_x - x), y + share * (to_y - y)
+            if free.holds(*place):
+                return place
+        return self._mission.goal_m
+
+    def _goals(self, pose: Pose, place: Point) -> list[Pose]:
+        """A place to reach on several courses, the straight one first."""
+        x, y = place
+        straight = math.atan2(y - pose.north_m, x - pose.east_m)
+        courses = [straight + math.tau * i / GOAL_COURSES for i in range(GOAL_COURSES)]
+        return [Pose(x, y, math.cos(course), math.sin(course)) for course in courses]
+
+    def _grown(self, pose: Pose, goals: list[Pose], free: _Free, iterations: int) -> list[Pose] | None:
+        """The best path of a tree grown for some iterations."""
+        from ompl import base, geometric, util
+
+        util.setLogLevel(util.LogLevel.LOG_NONE)
+        util.RNG.setSeed(self._config.tree_seed + self._searches)
+        reach = self._mission.sensor_range_m
+        xmin, ymin, xmax, ymax = self._mission.bounds_m
+        (x, y), (to_x, to_y) = pose[:2], goals[0][:2]
+        space, box = base.DubinsStateSpace(self._mission.turn_radius_m), base.RealVectorBounds(2)
+        box.setLow(0, max(xmin, min(x, to_x) - reach))
+        box.setLow(1, max(ymin, min(y, to_y) - reach))
+        box.setHigh(0, min(xmax, max(x, to_x) + reach))
+        box.setHigh(1, min(ymax, max(y, to_y) + reach))
+        space.setBounds(box)
+        space.setup()
+        setup = base.SpaceInformation(space)
+        setup.setStateValidityChecker(lambda state: free.holds(state.getX(), state.getY()))
+        setup.setStateValidityCheckingResolution(2.0 * free.cell_m / space.getMaximumExtent())
+        setup.setup()
+
+        def state(place: Pose) -> object:
+            made = setup.allocState()
+            made.setXY(place.east_m, place.north_m)
+            made.setYaw(math.atan2(place.tangent_north, place.tangent_east))
+            return made
+
+        problem, goal = base.ProblemDefinition(setup), base.GoalStates(setup)
+        problem.addStartState(state(pose))
+        for each in goals:
+            goal.addState(state(each))
+        problem.setGoal(goal)
+        tree = geometric.RRTstar(setup)
+        tree.setRange(0.5 * reach)
+        tree.setProblemDefinition(problem)
+        tree.setup()
+        grown = 0
+
+        def enough() -> bool:
+            nonlocal grown
+            grown += 1
+            return grown > iterations
+
+        tree.solve(base.PlannerTerminationCondition(enough))
+        if not problem.hasExactSolution():
+            return None
+        states = problem.getSolutionPath().getStates()
+        return [pose] + [
+            Pose(s.getX(), s.getY(), math.cos(s.getYaw()), math.sin(s.getYaw())) for s in states[1:]
+        ]
+
+
+class _Free:
+    """A grid of what keeps its distance from everything seen."""
+
+    def __init__(self, points: FloatArray, mission: Mission, margin_m: float, pose: Pose) -> None:
+        keep = mission.clearance_m + margin_m
+        xmin, ymin, xmax, ymax = mission.bounds_m
+        self.cell_m = 0.25 * keep
+        self._x, self._y, self._pose, self._goal = xmin, ymin, pose, mission.goal_m
+        shape = math.ceil((xmax - xmin) / self.cell_m) + 1, math.ceil((ymax - ymin) / self.cell_m) + 1
+        self._blocked: BoolArray = np.zeros(shape, dtype=np.bool_)
+        steps = np.arange(-6, 7)
+        dx, dy = (each.ravel() for each in np.meshgrid(steps, steps))
+        cells = np.floor((points - (xmin, ymin)) / self.cell_m).astype(np.int64)
+        x, y = cells[:, :1] + dx, cells[:, 1:] + dy
+        center_x, center_y = xmin + (x + 0.5) * self.cell_m, ymin + (y + 0.5) * self.cell_m
+        near = np.hypot(center_x - points[:, :1], center_y - points[:, 1:]) < keep
+        near &= (x >= 0) & (y >= 0) & (x < shape[0]) & (y < shape[1])
+        self._blocked[x[near], y[near]] = True
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether a place is free; about the start and the goal all is."""
+        blocked = self._blocked[int((x - self._x) / self.cell_m), int((y - self._y) / self.cell_m)]
+        ends: tuple[Point, Point] = (self._pose[:2], self._goal)
+        return not blocked or any(abs(x - a) + abs(y - b) < 2.0 * self.cell_m for a, b in ends)
+
+
+def _shortened(poses: list[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]]:
+    """Dubins curves from pose to pose, each on to the furthest that one reaches."""
+    ways: list[list[Segment]] = []
+    i = 0
+    while i < len(poses) - 1:
+        for k in range(len(poses) - 1, i, -1):
+            way = dubins(poses[i], poses[k], radius_m)
+            if way and (k == i + 1 or terrain.admits(Path(np.array(way)))):
+                ways.append(way)
+                i = k
+                break
+        else:
+            i += 1
+    return ways
+
+
+def dubins(start: Pose, end: Pose, radius_m: float) -> list[Segment]:
+    """The shortest curve from pose to pose whose radius is nowhere smaller than a given one."""
+    best: list[Segment] = []
+    shortest = math.inf
+    for word in WORDS:
+        lengths = _word(word, start, end, radius_m)
+        if lengths is None or sum(lengths) >= shortest:
+            continue
+        shortest = sum(lengths)
+        best, pose = [], start
+        for letter, length in zip(word, lengths, strict=True):
+            curvature = {"L": 1.0, "S": 0.0, "R": -1.0}[letter] / radius_m
+            if length > SHORTEST_M:
+                best.append((*pose, curvature, length))
+                pose = along(best[-1], length)
+    return best
+
+
+def _word(word: str, start: Pose, end: Pose, radius: float) -> tuple[float, float, float] | None:
+    """Lengths of the three parts of a Dubins word; None where it does not join the poses."""
+    first, last = (1.0 if letter == "L" else -1.0 for letter in (word[0], word[2]))
+    (x, y, tx, ty), (ex, ey, etx, ety) = start, end
+    cx, cy = x - first * radius * ty, y + first * radius * tx
+    dx, dy = ex - last * radius * ety - cx, ey + last * radius * etx - cy
+    distance, bearing = math.hypot(dx, dy), math.atan2(dy, dx)
+    leaving, arriving = math.atan2(ty, tx), math.atan2(ety, etx)
+    if word[1] == "S":
+        if first != last and distance < 2.0 * radius:
+            return None
+        course = bearing + (first * math.asin(2.0 * radius / distance) if first != last else 0.0)
+        straight = math.sqrt(max(distance**2 - (2.0 * radius) ** 2, 0.0)) if first != last else distance
+        return _turn(first, leaving, course) * radius, straight, _turn(last, course, arriving) * radius
+    if distance >= 4.0 * radius:
+        return None
+    # Three circles that touch: the middle one's centre lies off the line between the others'.
+    off = math.acos(distance / (4.0 * radius))
+    to_middle = bearing - first * off
+    at_first = to_middle + first * 0.5 * math.pi
+    at_last = bearing + first * off + first * 0.5 * math.pi
+    middle = _turn(-first, at_first, at_last + math.pi)
+    return (
+        _turn(first, leaving, at_first) * radius,
+        middle * radius,
+        _turn(last, at_last + math.pi, arriving) * radius,
+    )
+
+
+def _turn(side: float, course: float, to_course: float) -> float:
+    """The angle by which a turn to one side leads from one course to another."""
+    turn = side * (to_course - course) % math.tau
+    return 0.0 if math.tau - turn < 1e-9 else turn
