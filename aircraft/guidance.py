@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aircraft.frames import wrap_pi
 from aircraft.interface import AircraftState, FloatArray, Route
 
 GRAVITY_MPS2 = 9.80665
@@ -54,6 +53,9 @@ class GuidanceLimits:
     bandwidth_radps: float
 
 
+_Row = tuple[float, float, float, float, float, float]
+
+
 class GuidanceOutput(NamedTuple):
     """One decision of the path follower."""
 
@@ -81,22 +83,22 @@ class PathFollower:
             limits: what may be asked of the aircraft.
             update_rate_hz: how often `update` will be called.
         """
-        self._limits = limits
         self._roll_step = limits.roll_rate_radps / update_rate_hz
         # The held command acts on average half an update late.
         self._lead_s = limits.roll_delay_s + 0.5 / update_rate_hz
         self._lead_updates = limits.roll_lag_s * update_rate_hz
         self._blend_s = max(TYPICAL_BANK_RAD / limits.roll_rate_radps, 1.0 / update_rate_hz)
-        self._omega2 = limits.bandwidth_radps**2
+        self._bank_limit = limits.bank_limit_rad
         self._two_zeta_omega = 2.0 * DAMPING * limits.bandwidth_radps
+        self._pull_per_s = limits.bandwidth_radps / (2.0 * DAMPING)
         self._roll = 0.0
-        self._rolling = False
-        self._rows: list[tuple[float, float, float, float, float, float]] = []
+        self._rows: list[_Row] = []
         self._starts: list[float] = []
+        self._stops: list[float] = []
         self._turned: list[float] = []
         self._loiter = False
         self._length = 0.0
-        self._index = 0
+        self._index = self._last = 0
         self._along = 0.0
 
     def follow(self, route: Route, station_m: float = 0.0) -> None:
@@ -116,8 +118,10 @@ class PathFollower:
             start += row[5]
             turned += row[4] * row[5]
         self._length = start
+        self._stops = [*self._starts[1:], math.inf if route.loiter else start]
+        self._last = len(self._rows) - 1
         self._index = 0
-        while self._index < len(self._rows) - 1 and self._starts[self._index + 1] <= station_m:
+        while self._index < self._last and self._starts[self._index + 1] <= station_m:
             self._index += 1
         self._along = station_m - self._starts[self._index]
 
@@ -137,26 +141,26 @@ class PathFollower:
             raise RuntimeError("follow() a route before update()")
         cross, tangent_east, tangent_north = self._project(state.east_m, state.north_m)
         station = self._starts[self._index] + self._along
-        limits = self._limits
         velocity_east, velocity_north = state.velocity_east_mps, state.velocity_north_mps
         speed = max(math.hypot(velocity_east, velocity_north), 1.0)
         along_mps = velocity_east * tangent_east + velocity_north * tangent_north
         cross_mps = velocity_east * tangent_north - velocity_north * tangent_east
 
-        bank_limit = limits.bank_limit_rad
+        bank_limit = self._bank_limit
         if along_mps <= 0.0:
             wanted = -bank_limit if cross_mps > 0.0 else bank_limit
         else:
-            drift = wrap_pi(math.atan2(velocity_east, velocity_north) - state.heading_rad)
-            curvature = self._curvature_ahead(station, speed)
+            heading = state.heading_rad
+            lift_share = (velocity_east * math.sin(heading) + velocity_north * math.cos(heading)) / speed
             approach = INTERCEPT_SINE * speed
-            pull = max(-approach, min(approach, cross * self._omega2 / self._two_zeta_omega))
+            pull = max(-approach, min(approach, cross * self._pull_per_s))
             # Lift acts across the course, the correction across the path.
             across = -self._two_zeta_omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
-            acceleration = across - curvature * speed * speed
-            wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(math.cos(drift), 0.2)))
+            acceleration = across - self._curvature_ahead(station, speed) * speed * speed
+            wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(lift_share, 0.2)))
         saturated = abs(wanted) > bank_limit
-        wanted = max(-bank_limit, min(bank_limit, wanted))
+        if saturated:
+            wanted = math.copysign(bank_limit, wanted)
         step = max(-self._roll_step, min(self._roll_step, wanted - self._roll))
         self._roll += step
         # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
@@ -166,57 +170,39 @@ class PathFollower:
 
     def _project(self, east: float, north: float) -> tuple[float, float, float]:
         """Moves to the nearest point; cross-track error and the unit tangent there."""
-        last = len(self._rows) - 1
         while True:
-            east0, north0, tangent_east, tangent_north, curvature, length = self._rows[self._index]
-            straight = curvature == 0.0 or (self._index == last and not self._loiter and self._along > length)
-            if straight and curvature != 0.0:
-                east0, north0, tangent_east, tangent_north = arc_point(self._rows[last], length)
-            offset_east, offset_north = east - east0, north - north0
-            if straight:
-                along = offset_east * tangent_east + offset_north * tangent_north
-                cross = offset_east * tangent_north - offset_north * tangent_east
-                if curvature != 0.0:
-                    along += length
+            row = self._rows[self._index]
+            length = row[5]
+            if row[4] == 0.0:
+                along, cross, tangent_east, tangent_north = _on_line(row, east, north)
+            elif self._index < self._last or self._loiter or self._along <= length:
+                along, cross, tangent_east, tangent_north = _on_arc(row, east, north, self._along)
             else:
-                # The centre lies 1/curvature to the left of the start; `swept` is counted along the flight.
-                radius = 1.0 / curvature
-                from_centre_east = offset_east + radius * tangent_north
-                from_centre_north = offset_north - radius * tangent_east
-                outward_east, outward_north = tangent_north * radius, -tangent_east * radius
-                angle = math.atan2(
-                    outward_east * from_centre_north - outward_north * from_centre_east,
-                    outward_east * from_centre_east + outward_north * from_centre_north,
-                )
-                expected = self._along * curvature
-                angle = expected + math.remainder(angle - expected, math.tau)
-                along = angle * radius
-                distance = math.hypot(from_centre_east, from_centre_north)
-                cross = distance - radius if radius > 0.0 else -radius - distance
-                sine, cosine = math.sin(angle), math.cos(angle)
-                tangent_east, tangent_north = (
-                    tangent_east * cosine - tangent_north * sine,
-                    tangent_east * sine + tangent_north * cosine,
-                )
-            if self._index < last and along > length:
-                self._index += 1
-                self._along = 0.0
-                continue
-            self._along = max(along, 0.0)
-            return cross, tangent_east, tangent_north
+                end = (*arc_point(row, length), 0.0, math.inf)
+                along, cross, tangent_east, tangent_north = _on_line(end, east, north)
+                along += length
+            if along <= length or self._index == self._last:
+                self._along = max(along, 0.0)
+                return cross, tangent_east, tangent_north
+            self._index += 1
+            self._along = 0.0
 
     def _curvature_ahead(self, station: float, speed: float) -> float:
         """Curvature where the aircraft will be when it has rolled, averaged over the way that takes."""
-        ahead = station + speed * self._lead_s
         blend = speed * self._blend_s
-        return (self._turn_at(ahead + 0.5 * blend) - self._turn_at(ahead - 0.5 * blend)) / blend
+        middle = station + speed * self._lead_s
+        low, high = middle - 0.5 * blend, middle + 0.5 * blend
+        index = self._index
+        if self._starts[index] <= low and high <= self._stops[index]:
+            return self._rows[index][4]
+        return (self._turn_at(high) - self._turn_at(low)) / blend
 
     def _turn_at(self, station: float) -> float:
         """Direction change of the route from its start to a station, rad, positive to the left."""
         index = self._index
         while index > 0 and station < self._starts[index]:
             index -= 1
-        last = len(self._rows) - 1
+        last = self._last
         while index < last and station >= self._starts[index + 1]:
             index += 1
         along = station - self._starts[index]
@@ -225,9 +211,38 @@ class PathFollower:
         return self._turned[index] + self._rows[index][4] * along
 
 
-def arc_point(
-    row: tuple[float, float, float, float, float, float], along_m: float
-) -> tuple[float, float, float, float]:
+def _on_line(row: _Row, east: float, north: float) -> tuple[float, float, float, float]:
+    """Where a point is along and to the right of a line, and the unit tangent there."""
+    east0, north0, tangent_east, tangent_north, _, _ = row
+    east, north = east - east0, north - north0
+    along = east * tangent_east + north * tangent_north
+    return along, east * tangent_north - north * tangent_east, tangent_east, tangent_north
+
+
+def _on_arc(row: _Row, east: float, north: float, near_m: float) -> tuple[float, float, float, float]:
+    """The same of an arc, on which the point is within half a turn of a place along it."""
+    east0, north0, tangent_east, tangent_north, curvature, _ = row
+    # The centre lies 1/curvature to the left of the start; angles are counted along the flight.
+    radius = 1.0 / curvature
+    east, north = east - east0 + radius * tangent_north, north - north0 - radius * tangent_east
+    outward_east, outward_north = tangent_north * radius, -tangent_east * radius
+    angle = math.atan2(
+        outward_east * north - outward_north * east, outward_east * east + outward_north * north
+    )
+    expected = near_m * curvature
+    angle = expected + math.remainder(angle - expected, math.tau)
+    distance = math.hypot(east, north)
+    cross = distance - radius if radius > 0.0 else -radius - distance
+    sine, cosine = math.sin(angle), math.cos(angle)
+    return (
+        angle * radius,
+        cross,
+        tangent_east * cosine - tangent_north * sine,
+        tangent_east * sine + tangent_north * cosine,
+    )
+
+
+def arc_point(row: _Row, along_m: float) -> tuple[float, float, float, float]:
     """Point and unit tangent on a segment of constant curvature.
 
     Args:

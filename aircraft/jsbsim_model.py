@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from contextlib import ExitStack
 from dataclasses import fields, replace
@@ -32,7 +33,7 @@ from aircraft.start import Atmosphere, StartConditions
 FOOT_M = 0.3048
 REFERENCE_ALTITUDE_M = 300.0
 STEP_RATE_HZ = 120
-GROUND_M = 2.0
+GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
 
 MAX_ROLL_RAD = math.radians(75.0)
@@ -93,6 +94,9 @@ class JsbsimModel:
             heading_rad = start.heading_rad(atmosphere)
         except ValueError as error:
             raise AircraftError(f"{name}: {error}") from None
+        self._stall_rad = math.radians(self.airframe.stall_angle_deg)
+        self._stall_fps = STALL_SPEED_SHARE * self.airframe.airspeed_range_mps[0] / FOOT_M
+        self._patch = plane.patch(*map(math.radians, plane.geodetic(start.east_m, start.north_m)))
         self._convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
         self._windy = atmosphere.wind_mps > 0.0
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
@@ -125,17 +129,16 @@ class JsbsimModel:
     def state(self) -> AircraftState:
         """The state now, in the local plane."""
         latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor = self._read
-        east_m, north_m, convergence = self._plane.project(latitude(), longitude())
+        place, convergence = self._place(latitude(), longitude())
         self._convergence_rad = convergence
-        sine, cosine = math.sin(convergence) * FOOT_M, math.cos(convergence) * FOOT_M
-        east_fps, north_fps = east(), north()
+        velocity = complex(east(), north()) * cmath.rect(FOOT_M, convergence)
         return AircraftState(
             self._step / self._step_rate_hz,
-            east_m,
-            north_m,
+            place.real,
+            place.imag,
             up() * FOOT_M,
-            east_fps * cosine - north_fps * sine,
-            east_fps * sine + north_fps * cosine,
+            velocity.real,
+            velocity.imag,
             climb() * FOOT_M,
             (heading() - convergence) % math.tau,
             roll(),
@@ -143,6 +146,15 @@ class JsbsimModel:
             airspeed() * FOOT_M,
             load_factor(),
         )
+
+    def _place(self, latitude_rad: float, longitude_rad: float) -> tuple[complex, float]:
+        """East + i north (m) and meridian convergence."""
+        near = self._patch.project(latitude_rad, longitude_rad)
+        if near is None:
+            self._patch = self._plane.patch(latitude_rad, longitude_rad)
+            east_m, north_m, convergence = self._plane.project(latitude_rad, longitude_rad)
+            return complex(east_m, north_m), convergence
+        return near
 
     def command(self, command: Command) -> None:
         """Sets what the inner loops hold.
@@ -166,22 +178,23 @@ class JsbsimModel:
     def fault(self) -> str | None:
         """A sentence if control is lost: not finite, at the ground, stalled or rolled over; else None."""
         roll, airspeed, altitude, alpha = self._roll(), self._airspeed(), self._altitude(), self._alpha()
+        if (
+            abs(alpha) <= self._stall_rad
+            and self._stall_fps <= airspeed < math.inf
+            and GROUND_FT < altitude < math.inf
+            and abs(roll) <= MAX_ROLL_RAD
+        ):
+            return None
         if not math.isfinite(roll + airspeed + altitude + alpha):
             return "the state is not finite"
-        if altitude * FOOT_M <= GROUND_M:
+        if altitude <= GROUND_FT:
             return f"the aircraft is at the ground ({altitude * FOOT_M:.1f} m above sea level)"
-        limits = self.airframe
-        alpha_deg = math.degrees(alpha)
-        if abs(alpha_deg) > limits.stall_angle_deg:
-            return f"stalled: angle of attack {alpha_deg:.1f} deg, limit {limits.stall_angle_deg:g} deg"
-        lowest = STALL_SPEED_SHARE * limits.airspeed_range_mps[0]
-        if airspeed * FOOT_M < lowest:
-            return f"stalled: airspeed {airspeed * FOOT_M:.1f} m/s, below {lowest:.1f} m/s"
-        if abs(roll) > MAX_ROLL_RAD:
-            return (
-                f"rolled over: roll {math.degrees(roll):.0f} deg, limit {math.degrees(MAX_ROLL_RAD):.0f} deg"
-            )
-        return None
+        if abs(alpha) > self._stall_rad:
+            limit_deg = self.airframe.stall_angle_deg
+            return f"stalled: angle of attack {math.degrees(alpha):.1f} deg, limit {limit_deg:g} deg"
+        if airspeed < self._stall_fps:
+            return f"stalled: airspeed {airspeed * FOOT_M:.1f} m/s, below {self._stall_fps * FOOT_M:.1f} m/s"
+        return f"rolled over: roll {math.degrees(roll):.0f} deg, limit {math.degrees(MAX_ROLL_RAD):.0f} deg"
 
     def engage(self, on: bool = True) -> None:
         """Switches the inner loops on, or off: the controls then stay where they are."""

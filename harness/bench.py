@@ -10,12 +10,14 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from harness.closed_loop import Progress, fly
+from harness.closed_loop import Loop, Progress, fly
 from harness.run import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop, start_conditions
 from harness.scenario import Scenario
+from harness.stopwatch import Stopwatch
 
 ROUNDS = 3
 """Each round is one bare run, one flight without and one with the recording."""
@@ -26,8 +28,8 @@ T = TypeVar("T")
 def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any]:
     """Measures one scenario, in this process.
 
-    First the loop is flown once alone: that gives the shares of the blocks, and loads what is loaded at its
-    first use. Then come `ROUNDS` rounds of three measurements:
+    First the loop is flown once alone, with a stopwatch on its blocks: that gives their shares, and loads
+    what is loaded at its first use. Then come `ROUNDS` rounds of three measurements:
 
     - bare: `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start
       in the same air, for as many steps as the flight takes; loading and trimming not counted;
@@ -50,8 +52,12 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         AircraftError: the aircraft cannot be loaded or trimmed.
         ValueError: the flight is over before anything was planned or flown, so there is nothing to compare.
     """
-    loop = make_loop(scenario)
+    watch = Stopwatch()
+    loop = watched(make_loop(scenario), watch)
     loop_s, flight = _cpu_s(lambda: fly(loop, (), progress))
+    cpu = loop_s / flight.wall_s
+    in_loop = {block: cpu * seconds for block, seconds in watch.seconds.items()}
+    in_loop["loop"] = loop_s - sum(in_loop.values())
     steps = round(flight.sim_s * loop.model.step_rate_hz)
     if not steps or not flight.compute_ms:
         raise ValueError(f"nothing to measure: {flight.reason}")
@@ -76,26 +82,38 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         "closed_loop_ratio": closed / bare,
         "closed_loop_recording_ratio": recording / bare,
         "planner_ms": {name: min(each[name] for each in searches) for name in ("p50", "p99", "max")},
-        "blocks": block_shares(flight.block_shares, min(loop_s, closed), closed, max(recording, closed)),
+        "blocks": block_shares(in_loop, closed, max(recording, closed)),
     }
 
 
-def block_shares(
-    in_loop: Mapping[str, float], loop_s: float, closed_s: float, recording_s: float
-) -> dict[str, float]:
+def watched(loop: Loop, watch: Stopwatch) -> Loop:
+    """A loop whose blocks are timed; what is left over is the loop itself: verdicts, log and turns."""
+    return replace(
+        loop,
+        world=watch.over(loop.world, "record", "clearance"),
+        sensor=watch.over(loop.sensor, "sensor", "scan"),
+        seen=watch.over(loop.seen, "map", "update"),
+        planner=watch.over(loop.planner, "planner", "plan"),
+        model=watch.over(loop.model, "dynamics", "state", "fault", "command", "advance"),
+        follower=watch.over(loop.follower, "guidance", "follow", "update"),
+    )
+
+
+def block_shares(in_loop: Mapping[str, float], closed_s: float, recording_s: float) -> dict[str, float]:
     """Share of each block in a whole flight with the recording; they sum to 1.
 
     What comes before and after the loop (loading, metrics, files) is booked to `record`, what the recording
     adds to `recording`.
 
     Args:
-        in_loop: share of each block in the loop alone.
-        loop_s: processor time of the loop alone.
-        closed_s: that of the whole flight without the recording, not less.
+        in_loop: seconds of each block in a flight of the loop alone.
+        closed_s: processor time of the whole flight without the recording.
         recording_s: that of the whole flight with it, not less.
     """
-    seconds = {block: share * loop_s for block, share in in_loop.items()}
-    seconds["record"] = seconds.get("record", 0.0) + closed_s - loop_s
+    loop_s = sum(in_loop.values())
+    scale = min(1.0, closed_s / loop_s)  # the lone flight may have been disturbed
+    seconds = {block: each * scale for block, each in in_loop.items()}
+    seconds["record"] = seconds.get("record", 0.0) + closed_s - scale * loop_s
     seconds["recording"] = recording_s - closed_s
     return {block: each / recording_s for block, each in seconds.items()}
 

@@ -15,13 +15,12 @@ from aircraft.interface import AircraftState, Command, FlightModel, Route
 from harness.obstacle_map import ObstacleMap
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
-from harness.stopwatch import Stopwatch
 from harness.world import World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
 LOG_RATE_HZ = 10
 PROGRESS_EVERY_S = 5.0
-LONGEST_UNCHECKED_S = 1.0
+LONGEST_UNCHECKED_S = 2.5
 """Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
 
 Progress = Callable[[float, float, str], None]
@@ -93,83 +92,74 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         ValueError: the scan rate does not divide the simulation rate.
     """
     begun = time.perf_counter()
-    watch = Stopwatch()
-    model, follower, seen = loop.model, loop.follower, loop.seen
-    steps = _Steps(model.step_rate_hz, loop.scan_rate_hz)
-    strides = itertools.cycle(steps.strides)
+    model, follower, seen, mission = loop.model, loop.follower, loop.seen, loop.mission
+    strides = itertools.cycle(_strides(model.step_rate_hz, loop.scan_rate_hz))
     log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
     plans = _Plans(loop, observers)
     judge = _Judge(loop)
     late: deque[RangeScan] = deque()
-    command = Command(0.0, loop.altitude_m, loop.mission.speed_mps)
-    cross_track, station = math.nan, math.nan
+    roll_command, cross_track, station = 0.0, math.nan, math.nan
     next_report = 0.0
-    step = 0
     while True:
+        scan_due, guide_due, log_due, steps = next(strides)
         state = model.state()
         verdict = judge.verdict(state)
-        watch.lap("dynamics")
-        if verdict is None and step % steps.scan == 0:
+        if verdict is not None:
+            break
+        if scan_due:
             scan = loop.sensor.scan(state.east_m, state.north_m, state.heading_rad, state.time_s)
             late.append(scan)
             for observer in observers:
                 observer.on_scan(scan, state)
-            watch.lap("sensor")
-        if verdict is None and late and late[0].available_s <= state.time_s + 1e-9:
+        if late and late[0].available_s <= state.time_s + 1e-9:
             seen.update(late.popleft())
-            watch.lap("map")
             verdict = plans.ask(state, station)
-            watch.lap("planner")
-        if verdict is None and step % steps.guide == 0:
+            if verdict is not None:
+                break
+        if guide_due:
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
             if plans.index >= 0:
-                guided = follower.update(state)
-                cross_track, station = guided.cross_track_m, guided.station_m
-                command = Command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps)
-            model.command(command)
-            watch.lap("guidance")
-        if verdict is not None or step % steps.log == 0:
-            log.add(state, command.roll_rad, cross_track, station, plans.index)
-            watch.lap("record")
-        if progress is not None and (verdict is not None or state.time_s >= next_report):
-            progress(state.time_s, judge.to_go_m(state), verdict[0].value if verdict else plans.state)
-            next_report = state.time_s + PROGRESS_EVERY_S
-        if verdict is not None:
-            break
-        ahead = next(strides)
-        model.advance(ahead)
-        step += ahead
+                roll_command, cross_track, station, _, _ = follower.update(state)
+            model.command(Command(roll_command, loop.altitude_m, mission.speed_mps))
+        if log_due:
+            log.add(state, roll_command, cross_track, station, plans.index)
+            if progress is not None and state.time_s >= next_report:
+                progress(state.time_s, judge.to_go_m(state), plans.state)
+                next_report = state.time_s + PROGRESS_EVERY_S
+        model.advance(steps)
+    log.add(state, roll_command, cross_track, station, plans.index)
     outcome, reason = verdict
+    if progress is not None:
+        progress(state.time_s, judge.to_go_m(state), outcome.value)
     for observer in observers:
         observer.on_event(state.time_s, f"{outcome.value}: {reason}")
-    track = log.close()
-    watch.lap("record")
     return Flight(
-        track,
+        log.close(),
         tuple(plans.accepted),
         outcome,
         reason,
         tuple(plans.compute_ms),
         sim_s=state.time_s,
         wall_s=time.perf_counter() - begun,
-        block_shares=watch.shares(),
     )
 
 
-class _Steps:
-    """The steps of the flight model at which something happens."""
+def _strides(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[bool, bool, bool, int]]:
+    """What happens at a step (scan, guidance, log), and how many steps of the flight model come after it.
 
-    def __init__(self, step_rate_hz: int, scan_rate_hz: float) -> None:
-        self.guide, self.log = (
-            _whole(step_rate_hz, rate, name)
-            for rate, name in ((UPDATE_RATE_HZ, "guidance"), (LOG_RATE_HZ, "log"))
-        )
-        self.scan = _whole(step_rate_hz, scan_rate_hz, "scan")
-        every = (self.guide, self.scan, self.log)
-        happens = sorted({step for rate in every for step in range(0, math.lcm(*every) + 1, rate)})
-        self.strides = tuple(after - before for before, after in itertools.pairwise(happens))
-        """Steps from each one at which something happens to the next, until all of it begins again."""
+    One tuple for every step at which something happens, until all of it begins again.
+    """
+    scan, guide, log = (
+        _whole(step_rate_hz, rate, name)
+        for rate, name in ((scan_rate_hz, "scan"), (UPDATE_RATE_HZ, "guidance"), (LOG_RATE_HZ, "log"))
+    )
+    again = math.lcm(scan, guide, log)
+    happens = sorted({step for rate in (scan, guide, log) for step in range(0, again + 1, rate)})
+    return [
+        (step % scan == 0, step % guide == 0, step % log == 0, after - step)
+        for step, after in itertools.pairwise(happens)
+    ]
 
 
 def _whole(step_rate_hz: int, rate_hz: float, name: str) -> int:
@@ -253,7 +243,7 @@ class _Judge:
     """Says when and how a flight is over."""
 
     def __init__(self, loop: Loop) -> None:
-        self._loop = loop
+        self._loop, self._fault = loop, loop.model.fault
         self._next_look_s = 0.0
         self._appears_s = -math.inf
 
@@ -264,12 +254,12 @@ class _Judge:
 
     def verdict(self, state: AircraftState) -> tuple[Outcome, str] | None:
         """How the flight ends now; None while it goes on."""
-        loop, mission = self._loop, self._loop.mission
-        fault = loop.model.fault()
+        fault = self._fault()
         if fault is not None:
             return Outcome.LOST_CONTROL, fault
         if state.time_s < self._next_look_s:
             return None
+        loop, mission = self._loop, self._loop.mission
         world, east, north = loop.world, state.east_m, state.north_m
         clearance = world.clearance_at(east, north, state.time_s)
         if clearance < 0.0:
@@ -283,10 +273,9 @@ class _Judge:
             return Outcome.TIMEOUT, f"time limit {loop.time_limit_s:g} s, {to_go:.0f} m from the goal"
         xmin, ymin, xmax, ymax = world.bounds_m
         room = min(to_go - mission.goal_radius_m, east - xmin, north - ymin, xmax - east, ymax - north)
-        fastest = 2.0 * state.groundspeed_mps
-        wait = min(
-            clearance / (fastest + world.max_obstacle_speed_mps), room / fastest, LONGEST_UNCHECKED_S
-        )
+        # Whatever it turns to: the wind is no faster than both speeds together.
+        fastest = state.groundspeed_mps + 2.0 * state.airspeed_mps
+        wait = min(clearance / (fastest + world.max_obstacle_speed_mps), room / fastest, LONGEST_UNCHECKED_S)
         if self._appears_s <= state.time_s:
             self._appears_s = world.next_appearance(state.time_s)
         self._next_look_s = min(state.time_s + wait, self._appears_s, loop.time_limit_s)

@@ -114,7 +114,7 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 
 def overview(scene: Scene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
-    with _styled(_map_height_in(scene) + LEGEND_ROW_IN * (2 + math.ceil(len(runs) / 2))) as figure:
+    with _styled(_map_height_in(scene) + LEGEND_ROW_IN * math.ceil((3 + len(runs)) / 2)) as figure:
         axes = figure.add_subplot()
         legend = _map(axes, scene)
         for index, run in runs:
@@ -200,7 +200,7 @@ def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
 @contextmanager
 def _styled(height_in: float) -> Iterator[Figure]:
     with mpl.rc_context(STYLE):
-        yield Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+        yield Figure(figsize=(WIDTH_IN, height_in), layout="compressed")
 
 
 def _map_height_in(scene: Scene) -> float:

@@ -2,10 +2,10 @@
 
 Edges are points on a square grid of cells, at most one a cell, each where a ray hit or between two such
 places. Near by, where the edge of an obstacle stands out against what is behind it, a finer grid keeps more of
-them: paths bend about such places. Evidence decides: a cell that was hit in two scans holds an edge; one that several scans looked
-through, with neighbouring rays agreeing, does not. So one false return makes no wall and one lost return
-opens none. Free space is a coarser grid, written from key scans. The grids cover the area, that of the
-edges with a border, so that the map cannot outgrow them.
+them: paths bend about such places. Evidence decides: a cell that was hit in two scans holds an edge; one that
+several scans looked through, with neighbouring rays agreeing, does not. So one false return makes no wall and
+one lost return opens none. Free space is a coarser grid, written from key scans. The grids cover the area,
+that of the edges with a border, so that the map cannot outgrow them.
 """
 
 from __future__ import annotations
@@ -18,10 +18,13 @@ from numpy.typing import NDArray
 from harness.range_sensor import RangeScan
 from planner.interface import BoolArray, FloatArray
 
+ComplexArray = NDArray[np.complex128]
+"""Points of the plane as east + i north: one number each."""
+
 MOST_CELLS = 4_000_000
 CONFIRMED = 2
 """An edge is believed from this score on; a hit adds one, a look through takes one."""
-CERTAIN = 8
+CERTAIN = 6
 """Scores do not rise above this."""
 BETWEEN = np.arange(1, 8) / 8.0
 """Where points are put between two hits that are joined: no more than a cell apart from each other."""
@@ -29,7 +32,7 @@ NEAR = 5.0
 """Outlines are kept in detail up to so many clearances away."""
 FINER = 4
 """Cells of the fine grid in one of the coarse one, along a side."""
-LOOK_THROUGH_EVERY = 4
+LOOK_THROUGH_EVERY = 6
 """Every so many scans the points in range are asked whether they were looked through."""
 
 
@@ -50,16 +53,17 @@ class ObstacleMap:
         span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
         self._cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
         border = 2.0 * clearance_m + self._cell
-        self._origin = np.array([[xmin], [ymin]]) - border
-        nx, self._ny = (
+        self._origin = complex(xmin - border, ymin - border)
+        self._nx, self._ny = (
             math.ceil((high - low + 2.0 * border) / self._cell) for low, high in ((xmin, xmax), (ymin, ymax))
         )
-        self._shape = np.array([[nx], [self._ny]], dtype=np.uint64)
-        self._coarse = nx * self._ny
-        self._fine: dict[tuple[int, int], int] = {}  # fine cells that were hit, numbered after the coarse ones
+        self._coarse = self._nx * self._ny
+        self._fine: dict[
+            tuple[int, int], int
+        ] = {}  # fine cells that were hit, numbered after the coarse ones
         self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # by cell
         self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
-        self._points = np.zeros((1024, 2))  # by slot
+        self._points = np.zeros(1024, dtype=np.complex128)  # by slot
         self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
         self._since = np.zeros(1024, dtype=np.int64)  # by slot: revision at which it last became an edge
         self._count = 0
@@ -70,7 +74,7 @@ class ObstacleMap:
         self._taken_back_at = 0
         self._scans = 0
         self._near = np.zeros(0, dtype=np.int32)
-        self._near_at = (math.inf, math.inf)
+        self._near_at = complex(math.inf, math.inf)
         self._near_count = 0
         self._free = _FreeSpace(bounds_m, clearance_m, range_m)
 
@@ -105,7 +109,7 @@ class ObstacleMap:
             return np.zeros((0, 2))
         slots = (self._since[: self._count] > revision).nonzero()[0]
         slots = slots[self._score[self._key[slots]] >= CONFIRMED]
-        return self._points[slots[np.argsort(self._since[slots], kind="stable")]]
+        return _pairs(self._points[slots[np.argsort(self._since[slots], kind="stable")]])
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
@@ -116,53 +120,55 @@ class ObstacleMap:
 
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
-        sensor = complex(scan.east_m, scan.north_m)
         ranges = scan.ranges_m.take(hits)
-        places = scan.directions.view(np.complex128).take(hits) * ranges
-        cells = self._cells(places + sensor)
+        directions: ComplexArray = scan.directions.view(np.complex128).ravel()
+        # Places are points seen from the corner of the grid.
+        places = directions.take(hits) * ranges + (complex(scan.east_m, scan.north_m) - self._origin)
+        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
+        column, row = cells[::2], cells[1::2]
         if not self._holds(scan):
-            inside = ((cells >= 0) & (cells < self._shape)).all(axis=1).nonzero()[0]
-            hits, ranges, places, cells = hits[inside], ranges[inside], places[inside], cells[inside]
-        keys = cells[:, 0] * self._ny + cells[:, 1]
+            on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
+            hits, ranges, places = hits[on_grid], ranges[on_grid], places[on_grid]
+            column, row = column[on_grid], row[on_grid]
+        keys = column * self._ny + row
         news = self._score.take(keys) < CERTAIN
         near = ranges < self._near_by
-        if not (np.count_nonzero(news) or np.count_nonzero(near)):
+        anything_new = np.count_nonzero(news) > 0
+        if not anything_new and not np.count_nonzero(near):
             return
-        counted, found = [keys[news]], [places[news]]
+        counted, found = keys[news], places[news]
         rays = len(scan.ranges_m)
         closed = _all_round(scan) and hits[0] + rays - hits[-1] <= 2
         if closed:
             hits = np.concatenate((hits, hits[:1] + rays))
-            places, news, near = (np.concatenate((each, each[:1])) for each in (places, news, near))
+            places = np.concatenate((places, places[:1]))
+            news, near = np.concatenate((news, news[:1])), np.concatenate((near, near[:1]))
         step = places[1:] - places[:-1]
         gap = np.abs(step)
         # One ray may be missing between neighbours: a lost return does not open a wall.
         joined = (gap < self._join) & (hits[1:] - hits[:-1] <= 2)
-        wide = (joined & (gap > self._cell) & (news[1:] | news[:-1])).nonzero()[0]
-        if len(wide):
+        if anything_new:
+            wide = (joined & (gap > self._cell) & (news[1:] | news[:-1])).nonzero()[0]
             between = (places[wide, None] + step[wide, None] * BETWEEN).ravel()
-            cells = self._cells(between + sensor)
-            counted.append(cells[:, 0] * self._ny + cells[:, 1])
-            found.append(between)
+            cells = (between.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
+            counted = np.concatenate((counted, cells[::2] * self._ny + cells[1::2]))
+            found = np.concatenate((found, between))
         ends = (~joined).nonzero()[0]
         ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
-        outline = places[ends[near[ends]]]
-        if len(outline):
-            counted.append(self._fine_keys(outline + sensor))
-            found.append(outline)
-        self._count_hits(np.concatenate(counted), np.concatenate(found) + sensor)
-
-    def _cells(self, points: ComplexArray) -> NDArray[np.int64]:
-        """(k, 2) column and row of each point."""
-        return ((points - self._origin) / self._cell).view(np.float64).reshape(-1, 2).astype(np.int64)
+        ends = ends[near[ends]]
+        if len(ends):
+            counted = np.concatenate((counted, self._fine_keys(places[ends])))
+            found = np.concatenate((found, places[ends]))
+        if len(counted):
+            self._count_hits(counted, found)
 
     def _holds(self, scan: RangeScan) -> bool:
         """Whether all that a scan can reach lies on the grid."""
         reach, x, y = scan.max_range_m, scan.east_m - self._origin.real, scan.north_m - self._origin.imag
-        width, height = self._cell * self._shape
+        width, height = self._nx * self._cell, self._ny * self._cell
         return reach < x < width - reach and reach < y < height - reach
 
-    def _count_hits(self, keys: NDArray[np.int64], points: ComplexArray) -> None:
+    def _count_hits(self, keys: NDArray[np.int64], places: ComplexArray) -> None:
         """Counts hits: a cell gets a point with the first and is an edge from the second scan on."""
         score = self._score.take(keys)
         uncertain = (score < CERTAIN).nonzero()[0]
@@ -177,18 +183,20 @@ class ObstacleMap:
         fresh = (score == 0).nonzero()[0]
         fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
         if len(fresh):
-            new_keys, first = np.unique(keys[fresh], return_index=True)
-            self._grow(len(new_keys))
-            new = np.arange(self._count, self._count + len(new_keys), dtype=np.int32)
-            self._slot[new_keys] = new
-            self._points[new] = (points[:, uncertain[fresh[first]]] + sensor).T
-            self._key[new] = new_keys
+            first: dict[int, int] = {}
+            for key, hit in zip(keys[fresh].tolist(), uncertain[fresh].tolist(), strict=True):
+                first.setdefault(key, hit)
+            self._grow(len(first))
+            new = slice(self._count, self._count + len(first))
+            self._key[new] = list(first)
+            self._slot[self._key[new]] = np.arange(new.start, new.stop)
+            self._points[new] = places[list(first.values())] + self._origin
             self._since[new] = 0
-            self._count += len(new_keys)
+            self._count = new.stop
 
-    def _fine_keys(self, places: FloatArray) -> NDArray[np.int64]:
-        """Numbers of the fine cells at (2, j) places, seen from the corner of the grid."""
-        cells = (places * (FINER / self._cell)).astype(np.int64).T.tolist()
+    def _fine_keys(self, places: ComplexArray) -> NDArray[np.int64]:
+        """Numbers of the fine cells at some places."""
+        cells = _pairs(places * (FINER / self._cell)).astype(np.int64).tolist()
         keys = [self._fine.setdefault((x, y), self._coarse + len(self._fine)) for x, y in cells]
         if self._coarse + len(self._fine) > len(self._score):
             size = self._coarse + 2 * len(self._fine)
@@ -201,42 +209,37 @@ class ObstacleMap:
         if self._count + more <= len(self._key):
             return
         size = max(2 * len(self._key), self._count + more)
-        self._points = np.resize(self._points, (size, 2))
+        self._points = np.resize(self._points, size)
         self._key = np.resize(self._key, size)
         self._since = np.resize(self._since, size)
 
     def _look_through(self, scan: RangeScan) -> None:
         """Takes a point off every known point that three neighbouring rays looked past."""
-        moved = math.hypot(scan.east_m - self._near_at[0], scan.north_m - self._near_at[1])
-        if not moved < self._range / 8.0:
-            near = self._points[: self._count] - (scan.east_m, scan.north_m)
-            reach = 1.125 * self._range
-            self._near = np.flatnonzero((near * near).sum(axis=1) < reach * reach).astype(np.int32)
-            self._near_at, self._near_count = (scan.east_m, scan.north_m), self._count
+        sensor = complex(scan.east_m, scan.north_m)
+        if not abs(sensor - self._near_at) < self._range / 8.0:
+            near = np.abs(self._points[: self._count] - sensor) < 1.125 * self._range
+            self._near = near.nonzero()[0].astype(np.int32)
+            self._near_at, self._near_count = sensor, self._count
         slots = self._near
         if self._near_count < self._count:
             slots = np.concatenate((slots, np.arange(self._near_count, self._count, dtype=np.int32)))
-        points = self._points[slots]
-        dx, dy = points[:, 0] - scan.east_m, points[:, 1] - scan.north_m
-        distance = np.sqrt(dx * dx + dy * dy)
+        offsets = self._points.take(slots) - sensor
+        distance = np.abs(offsets)
         rays = len(scan.ranges_m)
-        position = (np.arctan2(dx, dy) - scan.start_rad) % math.tau / scan.spacing_rad
+        position = _clockwise_from(scan.start_rad, offsets) / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
         # Only a ray that passes close by says anything about the point.
-        aimed = (
-            (np.abs(position - ray) * scan.spacing_rad * distance < 0.25 * self._cell)
-            & (distance < scan.max_range_m - 2.0 * self._cell)
-            & (self._score[self._key[slots]] > 0)
+        aimed = (np.abs(position - ray) * scan.spacing_rad * distance < 0.25 * self._cell) & (
+            distance < scan.max_range_m - 2.0 * self._cell
         )
-        if _all_round(scan):
-            ray %= rays
-        else:
+        if not _all_round(scan):
             aimed &= (ray >= 1) & (ray < rays - 1)
-        chosen = np.flatnonzero(aimed)
-        ray, past = ray[chosen], distance[chosen] + 1.5 * self._cell
-        ranges = scan.ranges_m
-        through = (ranges[ray] > past) & (ranges[ray - 1] > past) & (ranges[(ray + 1) % rays] > past)
+        chosen = aimed.nonzero()[0]
+        ring = np.concatenate((scan.ranges_m[-1:], scan.ranges_m, scan.ranges_m[:2]))
+        beside = np.minimum(np.minimum(ring[:-2], ring[1:-1]), ring[2:])
+        through = beside[ray[chosen]] > distance[chosen] + 1.5 * self._cell
         weaker = self._key[slots[chosen[through]]]
+        weaker = weaker[self._score[weaker] > 0]
         if len(weaker):
             self._score[weaker] -= 1
             if (self._score[weaker] == CONFIRMED - 1).any():
@@ -275,30 +278,22 @@ class _FreeSpace:
         y = self._y0 + (np.arange(y_low, y_high) + 0.5) * self._cell - scan.north_m
         square = (x * x)[:, None] + y * y
         # Most of what is in reach has been seen from the places before.
-        column, row = np.nonzero((square < reach * reach) & ~seen)
+        cell = ((square < reach * reach) & ~seen).ravel().nonzero()[0]
+        column = cell // seen.shape[1]
+        row = cell - column * seen.shape[1]
         distance = np.sqrt(square[column, row])
         rays = len(scan.ranges_m)
-        position = (np.arctan2(x[column], y[row]) - scan.start_rad) % math.tau / scan.spacing_rad
+        position = _clockwise_from(scan.start_rad, x[column] + 1j * y[row]) / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
         # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
         half = 0.75 * self._cell
-        level = np.ceil(half / np.maximum(distance, half) / scan.spacing_rad) + 1.0
-        if _all_round(scan):
-            ray %= rays
-            covered = np.ones(ray.shape, dtype=np.bool_)
-        else:
-            covered = (ray >= level) & (ray < rays - level)
-            ray = np.minimum(ray, rays - 1)
-        free_to = np.minimum(scan.ranges_m, reach) - half
-        free = np.zeros(ray.shape, dtype=np.bool_)
-        width = 1
-        while covered.any() and width <= rays:
-            free_to = _least(free_to, width, rays)
-            width *= 2
-            # After filters of width 1, 2, 4, ... the least of 2 width - 1 rays to either side is known.
-            enough = covered & (level <= width - 1)
-            free |= enough & (free_to[ray] > distance)
-            covered &= ~enough
+        level = np.ceil(half / np.maximum(distance, half) / scan.spacing_rad).astype(np.int64) + 1
+        if not _all_round(scan):
+            covered = ((ray >= level) & (ray < rays - level)).nonzero()[0]
+            column, row, distance, ray, level = (
+                each[covered] for each in (column, row, distance, ray, level)
+            )
+        free = _least_beside(np.minimum(scan.ranges_m, reach), ray, level) - half > distance
         seen[column[free], row[free]] = True
 
     def contains(self, points_m: FloatArray) -> BoolArray:
@@ -321,7 +316,31 @@ def _all_round(scan: RangeScan) -> bool:
     return len(scan.ranges_m) * scan.spacing_rad > math.tau - 1e-9
 
 
-def _least(ranges: FloatArray, width: int, rays: int) -> FloatArray:
-    """The least of each range and those `width` rays to either side; the ends of a fan are joined."""
-    width %= rays
-    return np.minimum(ranges, np.minimum(np.roll(ranges, width), np.roll(ranges, -width)))
+def _pairs(points: ComplexArray) -> FloatArray:
+    """(k, 2) east and north of points east + i north."""
+    return points.view(np.float64).reshape(-1, 2)
+
+
+def _clockwise_from(start_rad: float, offsets: ComplexArray) -> FloatArray:
+    """(k,) bearings of offsets, clockwise from a bearing, in [0, 2 pi]."""
+    turns = (np.arctan2(offsets.real, offsets.imag) - start_rad) * (1.0 / math.tau)
+    turned: FloatArray = (turns - np.floor(turns)) * math.tau
+    return turned
+
+
+def _least_beside(ranges: FloatArray, ray: NDArray[np.int64], level: NDArray[np.int64]) -> FloatArray:
+    """The least range of each of some rays and at least those `level` rays to either side.
+
+    The ends of the fan are joined. Windows are widened to 2^k - 1 rays to either side.
+    """
+    rays = len(ranges)
+    power = np.minimum(np.frexp(level)[1], rays.bit_length() - 1)
+    ring = np.concatenate((ranges, ranges, ranges))
+    least = [ranges]
+    for k in range(int(power.max(initial=0))):
+        wide = 2**k
+        ring = np.minimum(np.minimum(ring[: -2 * wide], ring[wide:-wide]), ring[2 * wide :])
+        first = rays + 1 - 2 * wide
+        least.append(ring[first : first + rays])
+    result: FloatArray = np.array(least)[power, ray % rays]
+    return result

@@ -58,7 +58,7 @@ class RangeScan:
 
     def __post_init__(self) -> None:
         for name in ("directions", "ranges_m"):
-            array = np.array(getattr(self, name), dtype=np.float64)
+            array = np.array(getattr(self, name), dtype=np.float64, order="C")
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
@@ -151,16 +151,16 @@ class RangeSensor:
             away = math.hypot(x, y)
             if away - radius > self._config.range_m:
                 continue
-            half_rad, sign = (math.asin(radius / away), -1.0) if away > radius else (math.pi, 1.0)
+            half_rad, near_side = (math.asin(radius / away), -1.0) if away > radius else (math.pi, 1.0)
             for span in self._tried(math.atan2(x, y) - half_rad, 2.0 * half_rad):
                 tries.append(span)
-                faces.append((x, y, (away - radius) * (away + radius), sign))
+                faces.append((x, y, (away - radius) * (away + radius), near_side))
         if not tries:
             return
-        ray_right, ray_ahead, right, ahead, tangent2, sign = self._pairs(tries, np.array(faces).T)
-        # `tangent2` is the square of the tangent from the sensor, negative inside: the power of the point.
+        # The power of the sensor's place: the square of its tangent to the circle, negative inside.
+        ray_right, ray_ahead, right, ahead, power, sign = self._pairs(tries, np.array(faces).T)
         along = right * ray_right + ahead * ray_ahead
-        half_chord2 = along * along - tangent2
+        half_chord2 = along * along - power
         distance = along + sign * np.sqrt(np.maximum(half_chord2, 0.0))
         distance[np.minimum(half_chord2, distance) < 0.0] = math.inf
         _lower(ranges, tries, distance)

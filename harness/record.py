@@ -7,8 +7,9 @@ x = east, y = north, z = up above mean sea level; course and heading clockwise f
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from array import array
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -42,7 +43,8 @@ COLUMNS = (
 )
 """Columns of `track.parquet` that the digest covers, in its order."""
 
-BLOCK_ROWS = 600
+BLOCK_ROWS = 1800
+ROW_VALUES = len(AircraftState._fields) + 4
 CHORD_ERROR_M = 0.5
 
 
@@ -154,8 +156,8 @@ class TrackLog:
     ) -> None:
         self._clearance = clearance
         self._sinks = tuple(sinks)
-        self._block_rows = block_rows
-        self._rows: list[tuple[float, ...]] = []
+        self._values = array("d")  # row by row: no more objects while flying than now
+        self._values_a_block = block_rows * ROW_VALUES
         self._blocks: list[Track] = []
 
     def add(
@@ -167,42 +169,32 @@ class TrackLog:
         plan_index: int,
     ) -> None:
         """Adds one row; without a plan, `cross_track_m` and `station_m` are NaN and `plan_index` is -1."""
-        self._rows.append(
-            (
-                *state,
-                state.course_rad,
-                state.groundspeed_mps,
-                roll_command_rad,
-                cross_track_m,
-                station_m,
-                plan_index,
-            )
-        )
-        if len(self._rows) == self._block_rows:
+        self._values.extend((*state, roll_command_rad, cross_track_m, station_m, plan_index))
+        if len(self._values) == self._values_a_block:
             self._cut()
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
-        if self._rows:
+        if self._values:
             self._cut()
         return Track.joined(self._blocks)
 
     def _cut(self) -> None:
-        rows = np.array(self._rows, dtype=np.float64).T
-        self._rows = []
-        time, east, north, up, _, _, _, heading, roll, pitch, airspeed, load_factor = rows[:12]
-        course, groundspeed, roll_command, cross_track, station, plan_index = rows[12:]
+        rows = np.array(self._values).reshape(-1, ROW_VALUES).T
+        self._values = array("d")
+        time, east, north, up, east_mps, north_mps, _, heading, roll, pitch, airspeed, load_factor = rows[:12]
+        roll_command, cross_track, station, plan_index = rows[12:]
         block = Track(
             time_s=time,
             east_m=east,
             north_m=north,
             up_m=up,
-            course_deg=np.degrees(course),
+            course_deg=np.degrees(np.arctan2(east_mps, north_mps)) % 360.0,
             heading_deg=np.degrees(heading) % 360.0,
             roll_deg=np.degrees(roll),
             pitch_deg=np.degrees(pitch),
             airspeed_mps=airspeed,
-            groundspeed_mps=groundspeed,
+            groundspeed_mps=np.hypot(east_mps, north_mps),
             load_factor=load_factor,
             roll_command_deg=np.degrees(roll_command),
             cross_track_m=cross_track,
@@ -259,7 +251,6 @@ class Flight:
         compute_ms: wall-clock time of every search, also of those that found nothing new.
         sim_s: simulated time flown.
         wall_s: wall-clock time that took.
-        block_shares: share of the wall-clock time each block of the loop took, by its name.
     """
 
     track: Track
@@ -269,7 +260,6 @@ class Flight:
     compute_ms: tuple[float, ...]
     sim_s: float
     wall_s: float
-    block_shares: Mapping[str, float] = field(default_factory=dict)
 
 
 def polyline(segments: FloatArray, chord_error_m: float = CHORD_ERROR_M) -> FloatArray:

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from planner.clearance import first_entry
 from planner.curves import SHORTEST_M, Point, Segment
-from planner.interface import FloatArray, Mission, SeenWorld
+from planner.interface import BoolArray, FloatArray, Mission, SeenWorld
 from planner.memory import IntArray, ObstacleMemory
 
 ANGLE_OFF_RAD = 1e-7
@@ -168,12 +169,10 @@ class GrownObstacles:
         off = across[:, None] * np.column_stack((-unit[:, 1], unit[:, 0]))
         return np.concatenate((foot + off, foot - off)), np.concatenate((i, i))
 
-    def _covered(self, places: FloatArray, discs: IntArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def _covered(self, places: FloatArray, discs: IntArray) -> BoolArray:
         dx = places[:, :1] - self.points_m[discs, 0]
         dy = places[:, 1:] - self.points_m[discs, 1]
-        inside: np.ndarray[tuple[int], np.dtype[np.bool_]] = (
-            np.hypot(dx, dy) < self.radii_m[discs] - ANGLE_OFF_RAD * self.keep_m
-        ).any(axis=1)
+        inside: BoolArray = (np.hypot(dx, dy) < self.radii_m[discs] - ANGLE_OFF_RAD * self.keep_m).any(axis=1)
         return inside
 
     def _around(self, place: Sequence[float]) -> list[list[int]]:
@@ -346,7 +345,7 @@ def _first_touch(
 def _joined(places: list[tuple[float, float, float, float]], side: float) -> list[Segment]:
     """Segments from place to place, each given with the curvature and the turn of the way to it."""
     out: list[Segment] = []
-    for (x, y, _, _), (to_x, to_y, curvature, turn) in zip(places, places[1:], strict=False):
+    for (x, y, _, _), (to_x, to_y, curvature, turn) in pairwise(places):
         chord = math.hypot(to_x - x, to_y - y)
         length = turn / curvature if curvature else chord
         if length <= SHORTEST_M:

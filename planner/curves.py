@@ -121,12 +121,12 @@ def sample(path: Path, spacing_m: float, deviation_m: float = math.inf) -> Float
     return np.concatenate(pieces)
 
 
-def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | None:
-    """The shortest turn from a pose onto a straight line that ends at a point, and that line.
+def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]]:
+    """Turns from a pose onto a straight line that ends at a point, each with that line, the shorter first.
 
-    Returns None where the point lies inside both turning circles or so near that neither turn leads to it.
+    There is one to the left and one to the right, except where the point lies inside the turning circle.
     """
-    best: list[Segment] | None = None
+    ways: list[tuple[float, list[Segment]]] = []
     for side in (1.0, -1.0):  # left, right
         cx, cy = (
             pose.east_m - side * radius_m * pose.tangent_north,
@@ -142,14 +142,23 @@ def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | Non
         turn = side * (heading - math.atan2(pose.tangent_north, pose.tangent_east)) % math.tau
         if math.tau - turn < 1e-9:
             turn = 0.0
-        length = turn * radius_m + straight
-        if best is not None and length >= sum(segment[5] for segment in best):
-            continue
         arc: Segment = (*pose, side / radius_m, turn * radius_m)
-        best = [arc] if arc[5] > SHORTEST_M else []
+        way = [arc] if arc[5] > SHORTEST_M else []
         if straight > SHORTEST_M:
-            best.append((*along(arc, arc[5]), 0.0, straight))
-    return best
+            way.append((*along(arc, arc[5]), 0.0, straight))
+        if way:
+            ways.append((turn * radius_m + straight, way))
+    return [way for _, way in sorted(ways, key=lambda each: each[0])]
+
+
+def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | None:
+    """The shorter of the turns from a pose onto a straight line that ends at a point, and that line.
+
+    Returns:
+        The segments; None for a point at the pose itself.
+    """
+    ways = turns_onto(pose, target, radius_m)
+    return ways[0] if ways else None
 
 
 class Limits(NamedTuple):
@@ -166,7 +175,12 @@ class Limits(NamedTuple):
 
 
 def fillet(
-    start: Pose, nodes: Sequence[Point], limits: Limits, cut_m: float, start_curvature: float = 0.0
+    start: Pose,
+    nodes: Sequence[Point],
+    limits: Limits,
+    cut_m: float,
+    start_curvature: float = 0.0,
+    longer_turn: bool = False,
 ) -> Path | None:
     """A path from a pose through the corners of a polyline, each corner rounded by one arc.
 
@@ -179,19 +193,21 @@ def fillet(
         limits: smallest radius and room to roll.
         cut_m: how far from a corner its arc may pass, where the smallest radius leaves the choice.
         start_curvature: curvature (1/m) flown on arrival at the start.
+        longer_turn: begin with the longer of the two turns towards the first corner.
 
     Returns:
         The path, or None where a corner cannot be rounded.
     """
-    first = turn_onto(start, nodes[0], limits.radius_m)
+    ways = turns_onto(start, nodes[0], limits.radius_m)[longer_turn:]
     segments: list[Segment] = []
-    if first and first[0][4] * start_curvature < 0.0:
+    if ways and ways[0][0][4] * start_curvature < 0.0:
         if limits.roll_m > SHORTEST_M:
             segments.append((*start, 0.0, limits.roll_m))
             start = along(segments[0], limits.roll_m)
-        first = turn_onto(start, nodes[0], limits.radius_m)
-    if not first:
+        ways = turns_onto(start, nodes[0], limits.radius_m)[longer_turn:]
+    if not ways:
         return None
+    first = ways[0]
     last_turn = 0.0 if segments else start_curvature
     segments += [segment for segment in first if segment[4]]
     corner = along(segments[-1], segments[-1][5]) if segments else start

@@ -301,9 +301,9 @@ def _word(word: str, start: Pose, end: Pose, radius: float) -> tuple[float, floa
         return None
     # Three circles that touch: the middle one's centre lies off the line between the others'.
     off = math.acos(distance / (4.0 * radius))
-    to_middle = bearing - first * off
+    to_middle = bearing + first * off
     at_first = to_middle + first * 0.5 * math.pi
-    at_last = bearing + first * off + first * 0.5 * math.pi
+    at_last = bearing - first * off + first * 0.5 * math.pi
     middle = _turn(-first, at_first, at_last + math.pi)
     return (
         _turn(first, leaving, at_first) * radius,

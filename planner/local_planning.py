@@ -24,7 +24,7 @@ WIDER = 4
 """Where n tracks at every one of N steps find no way, this many times as many are tried."""
 
 
-SWITCH = 0.005
+SWITCH = 0.01
 """The other way round is taken only where it saves this share of the distance left."""
 
 

@@ -18,7 +18,10 @@ from planner.curves import Point
 from planner.step_model import distance_left_m
 from planner.window import SectorEdge, Window, guide_vector
 
-APART = 0.3
+SHORT_OF = 0.005
+"""A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
+
+APART = 0.06
 """Track points nearer to each other than this share of the distance kept from obstacles are one."""
 
 
@@ -100,7 +103,7 @@ def search(
 def _step(window: Window, track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
     """One step along the edge of a free sector; None where it leads nowhere."""
     here = track.nodes[-1]
-    length = min(window.hugged_m(here, edge, outer_m), edge.clear_m)
+    length = min(window.hugged_m(here, edge, outer_m), edge.clear_m - SHORT_OF * outer_m)
     if length < 1e-2 * outer_m:
         return None
     x, y = here[0] + edge.ux * length, here[1] + edge.uy * length

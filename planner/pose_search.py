@@ -11,12 +11,12 @@ import math
 
 import numpy as np
 
-from planner.curves import Limits, Point, Pose, Segment, turn_onto
+from planner.curves import Limits, Point, Pose, Segment, turns_onto
 from planner.interface import Path
 from planner.route_optimisation import Route, Terrain
 from planner.step_model import distance_left_m, largest_course_change_rad, step
 
-EXPANSIONS = 200
+EXPANSIONS = 120
 """Poses looked at before the search gives up."""
 
 
@@ -54,10 +54,9 @@ def search_poses(
         seen.add(key)
         pose = Pose(x, y, math.cos(course), math.sin(course))
         turning = done[-1][4] if done else start_curvature
-        final = turn_onto(pose, goal, limits.radius_m)
-        if final and final[0][4] * turning >= 0.0:
-            path = Path(np.array([*done, *final]))
-            if terrain.admits(Path(np.array(final))):
+        for final in turns_onto(pose, goal, limits.radius_m):
+            if final[0][4] * turning >= 0.0 and terrain.admits(Path(np.array(final))):
+                path = Path(np.array([*done, *final]))
                 return Route((*((s[0], s[1]) for s in path.segments[1:].tolist()), goal), path)
         nearby = terrain.near(x, y, step_m)
         away = math.dist((x, y), goal)

@@ -44,8 +44,8 @@ OFF_PATH = 4.0
 BETTER = 0.005
 """A course that still serves is dropped only for one that is shorter by this share of what is left to fly."""
 
-TURN_SHARE = 0.99
-"""Share of the clearance that a certified turn keeps; not all of it, so that a turn may begin where one is."""
+BROKEN_SHARE = 0.99
+"""Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
 HOLD_SHARES = (1.0, 0.5, 0.1)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
@@ -77,7 +77,7 @@ class RollingWindowConfig:
         },
     )
     candidates: int = field(
-        default=6,
+        default=12,
         metadata={
             "doc": "n, how many tracks are kept at every step",
             "unit": "1",
@@ -220,7 +220,7 @@ class RollingWindow:
         if not effect.holds(here):
             self._cut_m = min(before, first_breach(effect.course.path, fresh, keep, here))
         turn = Path(effect.path.segments[-1:])
-        certain = self._mission.clearance_m * TURN_SHARE
+        certain = self._mission.clearance_m * BROKEN_SHARE
         self._broken |= self._cut_m < effect.leaves_m or first_breach(turn, fresh, certain) < math.inf
         return self._cut_m < before
 
@@ -255,17 +255,19 @@ class RollingWindow:
     def _courses(self, start: Start, ahead: Course | None, tracks: list[Track]) -> Iterator[Course]:
         """Ways to the goal, those that are wanted most first."""
         known = len(self._memory.points_m)
+        found = False
         for i, attempt in enumerate(self._local.attempts()):
             route = self._local.route(start, attempt, ahead, tracks)
             if route is not None:
+                found = True
                 yield _course(start, route, known, shortest=i == 0)
-        route = self._local.tight_route(start)
+        route = None if found else self._local.tight_route(start)
         if route is not None:
             yield _course(start, route, known, shortest=False)
 
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
-        turn_keeps = TURN_SHARE * self._mission.clearance_m
+        turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
         return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps))
 
     def _leads_on(self, certified: Certified, course: Course) -> bool:

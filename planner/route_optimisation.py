@@ -71,8 +71,8 @@ def optimise(
     """The curve through the shortcuts of a track, at the minimum turn radius.
 
     All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near
-    to something, one corner after the other is left out, then corners are rounded as tightly as may be,
-    and then the track is tried as it came.
+    to something, the first turn is flown the other way round, then one corner after the other is left out, then
+    corners are rounded as tightly as may be, and then the track is tried as it came.
 
     Args:
         start: pose at which the curve begins.
@@ -88,11 +88,11 @@ def optimise(
     if len(nodes) < 2:
         return None
     short = shortcut(nodes, terrain)[1:]
-    choices = [(short, cut_m)]
-    choices += [([*short[:i], *short[i + 1 :]], cut_m) for i in range(len(short) - 1)]
-    choices += [(short, 0.0), (list(nodes[1:]), 0.0)]
-    for choice, cut in choices:
-        path = fillet(start, choice, limits, cut, start_curvature)
+    choices = [(short, cut_m, False), (short, cut_m, True)]
+    choices += [([*short[:i], *short[i + 1 :]], cut_m, False) for i in range(len(short) - 1)]
+    choices += [(short, 0.0, False), (short, 0.0, True), (list(nodes[1:]), 0.0, False)]
+    for choice, cut, longer_turn in choices:
+        path = fillet(start, choice, limits, cut, start_curvature, longer_turn)
         if path is not None and terrain.admits(path):
             return Route(tuple(choice), path)
     return None

@@ -63,6 +63,7 @@ class Following:
         anchor: the place on the boundary from which it is followed on.
         walked_m: how much of it lies before the anchor.
         on_boundary: at the anchor, not on a way across a dent.
+        followed_m: d_followed, how near to the goal this boundary and all left before come.
     """
 
     hit: Mark
@@ -70,6 +71,7 @@ class Following:
     anchor: Point
     walked_m: float
     on_boundary: bool
+    followed_m: float
 
 
 State = Toward | Following | Enclosed
@@ -102,10 +104,13 @@ class TangentBug(Walker[State]):
 
     def after(self, state: State, flown: Sequence[Segment]) -> State:
         """Moves the anchor along with the aircraft."""
-        if isinstance(state, Following) and state.on_boundary and flown:
-            place = mark_at(flown, math.inf).place
-            return replace(state, anchor=place, walked_m=state.walked_m + length_of(flown))
-        return state
+        if not isinstance(state, Following):
+            return state
+        followed = min(state.followed_m, self._nearest_m(state.anchor))
+        if not state.on_boundary or not flown:
+            return replace(state, followed_m=followed)
+        place, walked = mark_at(flown, math.inf).place, state.walked_m + length_of(flown)
+        return replace(state, anchor=place, walked_m=walked, followed_m=followed)
 
     def says(self, state: State) -> str:
         """What the planner does."""
@@ -130,7 +135,7 @@ class TangentBug(Walker[State]):
         """Steps 1 and 2 in turn."""
         if isinstance(state, Following) and (node := self._leave(place, state)) is not None:
             way, _ = self.straight(place, node.place)
-            state = Toward(self._followed_m(state.anchor))
+            state = Toward(state.followed_m)
             yield Leg(state, way)
             place = node.place
         while isinstance(state, Toward):
@@ -142,7 +147,7 @@ class TangentBug(Walker[State]):
             slide = self._slide(place, node) if node is not None else ()
             onto = mark_at(slide, math.inf).place if slide else place
             if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self._progress_m:
-                state = self._caught(place, line)
+                state = self._caught(place, line, state.limit_m)
             else:
                 yield Leg(state, slide)
                 place = onto
@@ -216,16 +221,17 @@ class TangentBug(Walker[State]):
             station += segment[5]
         return cut(segments, station)
 
-    def _caught(self, place: Point, line: Sequence[Segment]) -> Following:
+    def _caught(self, place: Point, line: Sequence[Segment], limit_m: float) -> Following:
         """A local minimum: the boundary ahead is followed to the side of the better node."""
         nodes = [node for node in self._nodes(place) if node.side]
         side = min(nodes, key=lambda node: node.way_m).side if nodes else self.side
         hit = along(line[0], line[0][5])[:2] if line else place
         first = mark_at(self.boundary(hit, side, self.keep_m), 0.0)
-        return Following(first, side, hit, 0.0, math.dist(place, hit) < self._progress_m)
+        on_boundary = math.dist(place, hit) < self._progress_m
+        return Following(first, side, hit, 0.0, on_boundary, min(limit_m, self._nearest_m(hit)))
 
-    def _followed_m(self, anchor: Point) -> float:
-        """d_followed: how near to the goal the boundary comes, as far as it has been sensed."""
+    def _nearest_m(self, anchor: Point) -> float:
+        """How near to the goal the boundary at a place comes, as far as it has been sensed."""
         labels = self.known.labels
         mine = labels == labels[self.known.seat(anchor)[0]]
         east, north = self.goal
@@ -234,7 +240,7 @@ class TangentBug(Walker[State]):
 
     def _leave(self, place: Point, state: Following) -> Node | None:
         """The node to leave the boundary for: d_reach < d_followed."""
-        limit = self._followed_m(state.anchor) - self._progress_m
+        limit = state.followed_m - self._progress_m
         nearer = [node for node in self._nodes(place, state.anchor) if node.to_goal_m < limit]
         return min(nearer, key=lambda node: node.way_m, default=None)
 

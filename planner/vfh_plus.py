@@ -20,6 +20,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planner.boundary import margin_of
 from planner.clearance import first_breach, inside_bounds
@@ -239,6 +240,6 @@ class VfhPlus:
         )
 
 
-def _off(a: float | FloatArray, b: float | FloatArray) -> FloatArray:
+def _off(a: ArrayLike, b: ArrayLike) -> FloatArray:
     """The turn from direction b to direction a, in [-pi, pi)."""
-    return np.asarray((np.subtract(a, b) + math.pi) % math.tau - math.pi)
+    return np.asarray((np.subtract(a, b) + math.pi) % math.tau - math.pi, dtype=np.float64)

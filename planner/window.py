@@ -113,7 +113,8 @@ class Window:
     def sector_edges(self, origin: Point, label: int) -> list[SectorEdge]:
         """The edges M and N of the free sectors beside an obstacle, as seen from a track point.
 
-        Where something hides an edge, the edges of what hides it are taken as well.
+        Where something hides an edge, or closes it right behind the place where it touches, the edges of that are
+        taken as well.
         """
         edges: list[SectorEdge] = []
         pending, looked_at = [label], {label}
@@ -127,11 +128,15 @@ class Window:
             for row in zip(
                 ux.tolist(), uy.tolist(), touch.tolist(), clear.tolist(), met.tolist(), strict=True
             ):
-                if row[3] >= row[2]:
+                _, _, touches, clear_to, _ = row
+                if clear_to >= touches:
                     edges.append(SectorEdge(*row[:4], obstacle))
-                elif (other := int(self.labels[row[4]])) not in looked_at and len(looked_at) < MOST_HIDING:
-                    looked_at.add(other)
-                    pending.append(other)
+                if clear_to < touches + self.keep_m[row[4]]:
+                    # Hidden, or closed right behind: the way goes round what hides it.
+                    other = int(self.labels[row[4]])
+                    if other not in looked_at and len(looked_at) < MOST_HIDING:
+                        looked_at.add(other)
+                        pending.append(other)
         return edges
 
     def hugged_m(self, origin: Point, edge: SectorEdge, outer_m: float) -> float:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aircraft.frames import LocalPlane, wrap_pi
+from aircraft.frames import PATCH_M, LocalPlane, wrap_pi
 
 GEOD = pyproj.Geod(ellps="WGS84")
 FURTHEST_M = 142_000.0
@@ -63,6 +63,46 @@ def test_geodetic_is_the_inverse(lat: float, lon: float, bearing: float, distanc
     plane = LocalPlane(lat, lon)
     east, north = distance * math.sin(bearing), distance * math.cos(bearing)
     assert plane.plane(*plane.geodetic(east, north)) == pytest.approx((east, north), abs=1e-3)
+
+
+REACHES = st.floats(-1.0, 1.0)
+
+
+@given(latitudes, longitudes, bearings, distances, REACHES, REACHES)
+@settings(max_examples=300, deadline=None)
+def test_a_patch_agrees_with_the_plane_to_a_tenth_of_a_millimetre(
+    lat: float, lon: float, bearing: float, distance: float, up: float, right: float
+) -> None:
+    plane = LocalPlane(lat, lon)
+    middle = plane.geodetic(distance * math.sin(bearing), distance * math.cos(bearing))
+    patch = plane.patch(*map(math.radians, middle))
+    point = (
+        patch.latitude_rad + up * patch.latitude_reach_rad,
+        patch.longitude_rad + right * patch.longitude_reach_rad,
+    )
+    near = patch.project(*point)
+    if near is None:  # on the rim, by rounding
+        assert max(abs(up), abs(right)) > 1.0 - 1e-6
+        return
+    east, north, convergence = plane.project(*point)
+    assert abs(near[0] - complex(east, north)) < 1e-4
+    assert abs(math.degrees(near[1] - convergence)) < 1e-5
+
+
+def test_a_patch_ends_where_its_terms_no_longer_hold() -> None:
+    plane = LocalPlane(47.0, 8.0)
+    latitude, longitude = math.radians(47.3), math.radians(8.4)
+    patch = plane.patch(latitude, longitude)
+    for up, right in ((1.01, 0.0), (-1.01, 0.0), (0.0, 1.01), (0.0, -1.01), (math.nan, 0.0)):
+        assert (
+            patch.project(
+                latitude + up * patch.latitude_reach_rad, longitude + right * patch.longitude_reach_rad
+            )
+            is None
+        )
+    rim = patch.project(latitude + 0.99 * patch.latitude_reach_rad, longitude)
+    assert rim is not None
+    assert abs(rim[0] - patch.places[0]) == pytest.approx(0.99 * PATCH_M, rel=0.01)
 
 
 def test_the_origin_is_the_origin() -> None:

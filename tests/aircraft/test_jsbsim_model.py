@@ -168,6 +168,27 @@ def test_faults_name_the_cause() -> None:
     assert (stalling.fault() or "").startswith("stalled: ")
 
 
+@pytest.mark.parametrize(
+    ("reading", "good", "bad", "fault"),
+    [
+        ("_alpha", 0.2, 0.6, "stalled: angle of attack 34.4 deg, limit "),
+        ("_alpha", -0.2, -0.6, "stalled: angle of attack -34.4 deg, limit "),
+        ("_airspeed", 70.0, 10.0, "stalled: airspeed 3.0 m/s, below "),
+        ("_altitude", 7.0, 6.0, "the aircraft is at the ground (1.8 m above sea level)"),
+        ("_roll", -1.3, -1.4, "rolled over: roll -80 deg, limit 75 deg"),
+        ("_altitude", 1e9, math.inf, "the state is not finite"),
+        ("_airspeed", 1e9, math.inf, "the state is not finite"),
+        ("_roll", 0.0, math.nan, "the state is not finite"),
+    ],
+)
+def test_each_limit_is_a_fault_of_its_own(reading: str, good: float, bad: float, fault: str) -> None:
+    model = model_of("aerosonde")
+    setattr(model, reading, lambda: good)
+    assert model.fault() is None
+    setattr(model, reading, lambda: bad)
+    assert (model.fault() or "").startswith(fault)
+
+
 def test_a_state_that_is_not_finite_is_a_fault() -> None:
     model = model_of("aerosonde")
     model.command(Command(math.nan, 300.0, 25.0))

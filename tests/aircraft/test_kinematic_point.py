@@ -97,11 +97,13 @@ def test_goes_round_a_loiter_for_ever_and_counts_on() -> None:
     assert not guided.past_end
 
 
-def test_a_loiter_taken_up_half_way_round_is_still_a_whole_circle() -> None:
+@pytest.mark.parametrize("station_m", [200.0, 200.0 + 300.0 * math.pi])
+def test_a_loiter_taken_up_under_way_is_still_flown_round(station_m: float) -> None:
     point = KinematicPoint(NORTH)
     point.follow(LOITER)
     point.advance(10 * SECOND)
-    point.follow(LOITER, station_m=200.0)
+    point.follow(LOITER, station_m=station_m)
+    assert point.update(point.state()).station_m == pytest.approx(station_m)
     for _ in range(20):
         point.advance(SECOND)
         assert math.dist(place(point), (-50.0, 100.0)) == pytest.approx(50.0)

@@ -10,8 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import harness.bench
-from harness.bench import bench, block_shares
+from harness.bench import bench, block_shares, watched
+from harness.closed_loop import fly
+from harness.record import digest
+from harness.run import make_loop
 from harness.scenario import Scenario, parse_scenario
+from harness.stopwatch import Stopwatch
 from harness.terminal import bench_rows
 
 SHORT = """\
@@ -25,7 +29,7 @@ sensor: {range_m: 4000, rays: 360, rate_hz: 2}
 environment:
   wind: {speed_mps: 4.0, from_deg: 270}
 """
-BLOCKS = {"dynamics", "guidance", "sensor", "map", "planner", "record", "recording"}
+BLOCKS = {"dynamics", "guidance", "sensor", "map", "planner", "record", "loop", "recording"}
 
 
 def scenario() -> Scenario:
@@ -127,22 +131,32 @@ SECONDS = st.floats(0.01, 100.0)
 
 
 @given(
-    weights=st.dictionaries(
-        st.sampled_from(sorted(BLOCKS - {"recording"})), st.floats(0.001, 1.0), min_size=1
+    in_loop=st.dictionaries(
+        st.sampled_from(sorted(BLOCKS - {"recording"})), st.floats(0.001, 10.0), min_size=1
     ),
-    loop_s=SECONDS,
     files_s=SECONDS,
     recording_s=SECONDS,
 )
-def test_shares_of_blocks_sum_to_one(
-    weights: dict[str, float], loop_s: float, files_s: float, recording_s: float
-) -> None:
-    total = sum(weights.values())
-    in_loop = {block: weight / total for block, weight in weights.items()}
-    whole = loop_s + files_s + recording_s
-    shares = block_shares(in_loop, loop_s, loop_s + files_s, whole)
+def test_shares_of_blocks_sum_to_one(in_loop: dict[str, float], files_s: float, recording_s: float) -> None:
+    closed = sum(in_loop.values()) + files_s
+    whole = closed + recording_s
+    shares = block_shares(in_loop, closed, whole)
     assert math.isclose(sum(shares.values()), 1.0)
     assert math.isclose(shares["recording"], recording_s / whole)
-    assert math.isclose(shares["record"], (in_loop.get("record", 0.0) * loop_s + files_s) / whole)
+    assert math.isclose(shares["record"], (in_loop.get("record", 0.0) + files_s) / whole)
     for block in set(in_loop) - {"record"}:
-        assert math.isclose(shares[block], in_loop[block] * loop_s / whole)
+        assert math.isclose(shares[block], in_loop[block] / whole)
+
+
+def test_a_disturbed_lone_flight_leaves_the_shares_in_proportion() -> None:
+    shares = block_shares({"dynamics": 6.0, "map": 3.0, "record": 1.0}, closed_s=5.0, recording_s=5.0)
+    assert shares == pytest.approx({"dynamics": 0.6, "map": 0.3, "record": 0.1, "recording": 0.0})
+
+
+def test_a_watched_loop_flies_the_same_flight() -> None:
+    plain = fly(make_loop(scenario()))
+    watch = Stopwatch()
+    flown = fly(watched(make_loop(scenario()), watch))
+    assert digest(flown.track) == digest(plain.track)
+    assert set(watch.seconds) == BLOCKS - {"loop", "recording"}
+    assert min(watch.seconds.values()) > 0.0

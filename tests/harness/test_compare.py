@@ -22,7 +22,7 @@ import pytest
 from harness import figures
 from harness.cli import main
 from harness.compare_planned import PlannedRows, planned_rows
-from harness.compare_rows import Row, number, to_csv, to_markdown
+from harness.compare_rows import Row, number, row_of, to_csv, to_markdown
 from harness.compare_terminal import print_comparison
 from harness.obstacle import Circle, Obstacle
 from harness.record import AcceptedPlan, Track
@@ -171,6 +171,22 @@ def test_figures_are_those_of_the_runs(flown: Path) -> None:
         assert row["ratio"] == pytest.approx(said["flown_length_m"] / OPTIMUM_M, rel=1e-9)
 
 
+def test_there_is_no_ratio_of_a_flight_that_did_not_arrive(flown: Path) -> None:
+    said = load_run(flown / "ring" / "corner").metrics
+    row = row_of(
+        "ring",
+        "corner",
+        {**said, "outcome": "timeout"},
+        optimum_m=OPTIMUM_M,
+        turn_radius_m=100.0,
+        tightest_1pm=0.02,
+        kinematic=False,
+    )
+    assert row.ratio is None
+    assert row.flown_length_m == said["flown_length_m"]
+    assert row.tightest_turn == pytest.approx(2.0)
+
+
 def test_a_corner_is_tighter_than_the_aircraft_and_is_not_tracked(flown: Path) -> None:
     smooth, corner = rows_of(flown)[:2]
     assert smooth["tightest_turn"] == pytest.approx(1.0, abs=1e-6)
@@ -295,11 +311,28 @@ def test_a_folder_with_other_things_is_refused_and_left_alone(
     assert "is a file" in capsys.readouterr().err
 
 
+def alive(group: int) -> bool:
+    """Whether any process of a group is there."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place: Path) -> None:
     out = place / "interrupted"
+    arguments = [
+        "compare",
+        "paper_circles",
+        "--planners",
+        "rolling_window",
+        "--no-recording",
+        "--out",
+        str(out),
+    ]
     process = subprocess.Popen(
-        [sys.executable, "-m", "harness", "compare", "paper_circles", "--planners", "rolling_window"]
-        + ["--no-recording", "--out", str(out)],
+        [sys.executable, "-m", "harness", *arguments],
         cwd=place,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stderr=subprocess.PIPE,
@@ -320,8 +353,10 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
         json.loads((out / "paper_circles" / "rolling_window" / "manifest.json").read_text())["complete"]
         is False
     )
-    with pytest.raises(ProcessLookupError):
-        os.killpg(process.pid, 0)
+    until = time.monotonic() + 10.0
+    while alive(process.pid):
+        assert time.monotonic() < until, "a flight goes on"
+        time.sleep(0.05)
 
 
 def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:

@@ -87,6 +87,15 @@ def test_round_a_square(clearance: float) -> None:
     assert found.length_m == pytest.approx(exact, rel=1e-12)
 
 
+def test_a_wall_that_stands_on_a_circle_closes_its_rim() -> None:
+    away = math.hypot(50.0, 10.0)
+    below = math.pi + 2 * math.atan2(10.0, 50.0) - 2 * math.acos(20.0 / away)
+    exact = 2 * math.sqrt(away**2 - 20.0**2) + 20.0 * below
+    wall = block(-1.0, 0.0, 1.0, 100.0)
+    found = way(disc(0.0, 0.0, 20.0), wall, start=(-50.0, 10.0), goal=(50.0, 10.0))
+    assert found.length_m == pytest.approx(exact, rel=1e-12)
+
+
 def test_two_blocks_that_share_an_edge_leave_no_way_between_them() -> None:
     found = way(block(-15.0, -15.0, 15.0, 0.0), block(-15.0, 0.0, 15.0, 15.0))
     assert found.length_m == pytest.approx(way(block(-15.0, -15.0, 15.0, 15.0)).length_m, rel=1e-12)

@@ -1,0 +1,315 @@
+"""What every planner must be, as tests that its author can run.
+
+    from planner.contract import PlannerContract
+
+    class TestMine(PlannerContract):
+        kind = MY_KIND
+
+is a whole test module: pytest collects what the class inherits. The planner is flown without error through a few
+circles that come into view, by a sensor that sees everything within its range. What is asked of a planner here is what the
+closed loop counts on; that it is any good is not.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import FrozenInstanceError, fields, is_dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Any, ClassVar
+
+import numpy as np
+
+from planner.curves import Point, along, on_loiter, pose_at, sample
+from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus
+from planner.registry import PlannerKind
+
+Circle = tuple[float, float, float]
+"""East and north of the centre, and radius (m)."""
+
+MISSION = Mission(
+    goal_m=(18_000.0, 12_000.0),
+    goal_radius_m=300.0,
+    bounds_m=(0.0, 0.0, 20_000.0, 15_000.0),
+    clearance_m=200.0,
+    turn_radius_m=150.0,
+    speed_mps=25.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    sensor_range_m=6000.0,
+)
+START: Point = (1000.0, 1000.0)
+AHEAD: Point = (math.sqrt(0.5), math.sqrt(0.5))
+CIRCLES: tuple[Circle, ...] = ((7000.0, 5000.0, 1500.0), (12_000.0, 8200.0, 900.0), (15_500.0, 9000.0, 800.0))
+
+ASKED_EVERY_S = 0.5
+AMONG_CIRCLES_S, IN_THE_OPEN_S = 300.0, 1500.0
+SPACING_M = 50.0
+"""Distance between neighbouring edge points."""
+
+
+class InRange:
+    """A seen world in which everything within range of a place of the flight has been seen.
+
+    Args:
+        circles: the obstacles.
+        range_m: sensing range.
+    """
+
+    spacing_m = SPACING_M
+    taken_back_at = 0
+
+    def __init__(self, circles: Sequence[Circle], range_m: float) -> None:
+        self.revision = 0
+        self._circles, self._range = np.array(circles).reshape(-1, 3), range_m
+        self._hidden = np.concatenate([np.zeros((0, 2)), *(outline(*each) for each in circles)])
+        self._shown: list[FloatArray] = []
+        self._places = np.zeros((0, 2))
+
+    def look(self, place: Point) -> None:
+        """Takes a scan."""
+        if len(self._places) and math.dist(self._places[-1], place) < 0.01 * self._range:
+            return
+        self._places = np.concatenate((self._places, [place]))
+        near = np.hypot(*(self._hidden - place).T) < self._range
+        if near.any():
+            self.revision += 1
+            self._shown.append(self._hidden[near])
+            self._hidden = self._hidden[~near]
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) edge points that came in after a revision."""
+        return np.concatenate([np.zeros((0, 2)), *self._shown[max(revision, 0) :]])
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether points were within range once and lie in no obstacle."""
+        free = np.zeros(len(points_m), dtype=np.bool_)
+        for place in self._places:
+            free |= np.hypot(*(points_m - place).T) < self._range
+        for x, y, radius in self._circles:
+            free &= np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) > radius
+        return free
+
+
+class Given:
+    """A seen world of points given beforehand; everything else is free."""
+
+    spacing_m = SPACING_M
+    revision = 1
+    taken_back_at = 0
+
+    def __init__(self, points_m: FloatArray) -> None:
+        self._points = points_m
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """All points at first, then none."""
+        return self._points if revision < self.revision else np.zeros((0, 2))
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) true."""
+        return np.ones(len(points_m), dtype=np.bool_)
+
+
+class Flown:
+    """A planner in a closed loop, its paths flown without error.
+
+    Attributes:
+        answers: every request and what was answered.
+        closest_m: smallest distance to the goal.
+    """
+
+    def __init__(
+        self, kind: PlannerKind, mission: Mission, circles: Sequence[Circle], seconds: float
+    ) -> None:
+        planner, seen = make(kind, mission), InRange(circles, mission.sensor_range_m)
+        self.answers: list[tuple[PlanRequest, Plan]] = []
+        self.closest_m = math.inf
+        plan: Plan | None = None
+        station, position, direction = 0.0, START, AHEAD
+        for number in range(int(seconds / ASKED_EVERY_S)):
+            if plan is not None and plan.path is not None:
+                pose = pose_at(plan.path, on_loiter(plan.path, station))
+                position, direction = pose[:2], pose[2:]
+            self.closest_m = min(self.closest_m, math.dist(position, mission.goal_m))
+            if self.closest_m <= mission.goal_radius_m:
+                break
+            seen.look(position)
+            request = PlanRequest(ASKED_EVERY_S * number, position, direction, seen, plan, station)
+            answer = planner.plan(request)
+            self.answers.append((request, answer))
+            if answer.status is PlanStatus.FOUND:
+                plan, station = answer, 0.0
+            station += mission.speed_mps * ASKED_EVERY_S
+
+
+def outline(east_m: float, north_m: float, radius_m: float) -> FloatArray:
+    """(k, 2) edge points of a circle."""
+    angle = np.arange(0.0, math.tau, SPACING_M / radius_m)
+    return np.column_stack((east_m + radius_m * np.cos(angle), north_m + radius_m * np.sin(angle)))
+
+
+def make(kind: PlannerKind, mission: Mission) -> Planner:
+    """A planner for one flight, with the defaults of its keys."""
+    return kind.make(kind.config().resolved(mission), mission)
+
+
+@cache
+def _among_circles(kind: PlannerKind, mission: Mission) -> Flown:
+    return Flown(kind, mission, CIRCLES, AMONG_CIRCLES_S)
+
+
+def arrays_in(value: Any) -> list[FloatArray]:
+    """All arrays in a plan, through tuples and dataclasses."""
+    if isinstance(value, np.ndarray):
+        return [value]
+    if isinstance(value, tuple):
+        return [array for each in value for array in arrays_in(each)]
+    if is_dataclass(value):
+        return [array for field in fields(value) for array in arrays_in(getattr(value, field.name))]
+    return []
+
+
+def bits(plan: Plan) -> tuple[object, ...]:
+    """All that a plan says, to be compared bit for bit."""
+    return (plan.status, plan.reason, *((a.shape, a.tobytes()) for a in arrays_in(plan)))
+
+
+def _raises(error: type[Exception], action: Callable[[], object]) -> bool:
+    try:
+        action()
+    except error:
+        return True
+    return False
+
+
+class PlannerContract:
+    """Tests of one planner kind.
+
+    Attributes:
+        kind: the kind to be tested; set by a subclass.
+        mission: what it is asked to fly.
+    """
+
+    kind: ClassVar[PlannerKind]
+    mission: ClassVar[Mission] = MISSION
+
+    def test_conforms_to_the_protocol(self) -> None:
+        """A plan is asked for with one request; the kind has a summary."""
+        planner = make(self.kind, self.mission)
+        assert list(inspect.signature(planner.plan).parameters) == ["request"]
+        assert len(self.kind.summary) > 20, "say in the summary what it is"
+
+    def test_its_config_is_frozen_described_and_resolves_to_itself(self) -> None:
+        """Keys are documented, cannot be changed, and none is left to be derived."""
+        config = self.kind.config()
+        for field in fields(config):
+            assert field.metadata["doc"], field.name
+            assert _raises(FrozenInstanceError, lambda name=field.name: setattr(config, name, None))
+        resolved = config.resolved(self.mission)
+        assert all(getattr(resolved, field.name) is not None for field in fields(resolved))
+        assert resolved.resolved(self.mission) == resolved
+
+    def test_an_empty_world_is_flown_to_the_goal(self) -> None:
+        """With nothing in the way the goal is reached, and no plan says that there is no way."""
+        flown = Flown(self.kind, self.mission, (), IN_THE_OPEN_S)
+        assert flown.closest_m <= self.mission.goal_radius_m
+        statuses = {answer.status for _, answer in flown.answers}
+        assert not statuses & {PlanStatus.NO_PATH, PlanStatus.UNREACHABLE}
+
+    def test_never_raises_wherever_the_first_plan_begins(self) -> None:
+        """Whatever is seen, and on whatever course: in the open, in a ring, on an edge point, at the border."""
+        ring = outline(3000.0, 3000.0, 900.0)
+        seen = (np.zeros((0, 2)), ring, np.array([self.mission.goal_m]), np.array([START]))
+        for course in np.arange(6) * math.tau / 6:
+            direction = (math.sin(course), math.cos(course))
+            for points in seen:
+                for position in (START, (3000.0, 3000.0), (0.0, 0.0), self.mission.goal_m):
+                    request = PlanRequest(0.0, position, direction, Given(points))
+                    assert isinstance(make(self.kind, self.mission).plan(request).status, PlanStatus)
+
+    def test_two_instances_give_the_same_plans_bit_for_bit(self) -> None:
+        """No clock, no randomness of its own, nothing shared between planners."""
+        first = _among_circles(self.kind, self.mission)
+        again = Flown(self.kind, self.mission, CIRCLES, AMONG_CIRCLES_S)
+        assert [bits(answer) for _, answer in again.answers] == [bits(answer) for _, answer in first.answers]
+        assert len({answer.status for _, answer in first.answers}) > 1, "it never changes its answer"
+
+    def test_plans_are_complete(self) -> None:
+        """FOUND comes with a path and waypoints that begin at the aircraft; every other status with neither."""
+        found = 0
+        for request, plan in _among_circles(self.kind, self.mission).answers:
+            assert isinstance(plan.status, PlanStatus)
+            assert plan.reason
+            if plan.status is not PlanStatus.FOUND:
+                assert plan.path is None
+                assert len(plan.waypoints_m) == 0
+                continue
+            found += 1
+            assert plan.path is not None
+            assert len(plan.waypoints_m)
+            assert plan.waypoints_m.shape[1] == 2
+            np.testing.assert_allclose(plan.path.segments[0, :2], request.position_m, atol=1e-3)
+            if not self.kind.point:
+                np.testing.assert_allclose(plan.path.segments[0, 2:4], request.direction, atol=1e-5)
+        assert found, "no plan was found among a few circles"
+
+    def test_paths_are_joined_no_tighter_than_the_turn_radius_and_inside(self) -> None:
+        """Segments meet; those of an aircraft without a jump of direction, and none bends too tightly."""
+        xmin, ymin, xmax, ymax = self.mission.bounds_m
+        meet = 2 if self.kind.point else 4
+        for _, plan in _among_circles(self.kind, self.mission).answers:
+            if plan.path is None:
+                continue
+            rows = plan.path.segments
+            assert np.isfinite(rows).all()
+            np.testing.assert_allclose(np.hypot(rows[:, 2], rows[:, 3]), 1.0, atol=1e-6)
+            assert (rows[:, 5] > 0.0).all()
+            if not self.kind.point:
+                assert plan.path.max_curvature_1pm <= 1.0 / self.mission.turn_radius_m + 1e-9
+            for row, following in pairwise(rows):
+                np.testing.assert_allclose(along(row, float(row[5]))[:meet], following[:meet], atol=1e-4)
+            if plan.path.loiter:
+                turn = abs(rows[-1, 4]) * rows[-1, 5]
+                assert math.isclose(turn, math.tau, rel_tol=1e-6), "a loiter ends in one full turn"
+            points = sample(plan.path, 100.0, 0.1)
+            assert (points >= (xmin - 1e-6, ymin - 1e-6)).all()
+            assert (points <= (xmax + 1e-6, ymax + 1e-6)).all()
+
+    def test_what_it_is_given_stays_as_it_is(self) -> None:
+        """Neither the points given nor a plan handed out changes afterwards, and they share no memory."""
+        points = outline(5000.0, 4000.0, 900.0)
+        given = points.copy()
+        given.setflags(write=False)
+        planner, seen = make(self.kind, self.mission), Given(given)
+        plan = planner.plan(PlanRequest(0.0, START, AHEAD, seen))
+        assert plan.path is not None
+        before = bits(plan)
+        assert not any(np.shares_memory(array, given) for array in arrays_in(plan))
+        pose = pose_at(plan.path, 100.0)
+        planner.plan(PlanRequest(4.0, pose[:2], pose[2:], seen, plan, 100.0))
+        np.testing.assert_array_equal(given, points)
+        assert bits(plan) == before
+
+    def test_a_change_to_what_was_given_does_not_reach_the_planner(self) -> None:
+        """It remembers what it was shown, not the array that it was shown in."""
+        points = outline(5000.0, 4000.0, 900.0)
+        spoilt = points.copy()
+        answers = []
+        for given in (spoilt, points):
+            planner, seen = make(self.kind, self.mission), Given(given)
+            plan = planner.plan(PlanRequest(0.0, START, AHEAD, seen))
+            assert plan.path is not None
+            spoilt[:] = 0.0
+            station = 0.4 * plan.path.length_m
+            pose = pose_at(plan.path, station)
+            answers.append(bits(planner.plan(PlanRequest(400.0, pose[:2], pose[2:], seen, plan, station))))
+        assert answers[0] == answers[1]
+
+    def test_plans_cannot_be_changed(self) -> None:
+        """Plans are values."""
+        answers = (answer for _, answer in _among_circles(self.kind, self.mission).answers)
+        plan = next(answer for answer in answers if answer.path is not None)
+        assert _raises(FrozenInstanceError, lambda: setattr(plan, "status", PlanStatus.KEPT))  # noqa: B010
+        assert not any(array.flags.writeable for array in arrays_in(plan))

@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner import dubins_tree
+from planner.curves import Pose, along
+from planner.dubins_tree import DubinsTree, DubinsTreeConfig, dubins
+from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
+
+MakePoints = Callable[..., FloatArray]
+
+MISSION = Mission(
+    goal_m=(15_000.0, 5000.0),
+    goal_radius_m=300.0,
+    bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
+    clearance_m=200.0,
+    turn_radius_m=150.0,
+    speed_mps=25.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    sensor_range_m=6000.0,
+)
+START = (2000.0, 5000.0)
+
+poses = st.builds(
+    lambda x, y, course: Pose(x, y, math.cos(course), math.sin(course)),
+    st.floats(-6.0, 6.0),
+    st.floats(-6.0, 6.0),
+    st.floats(0.0, math.tau),
+)
+
+
+class Seen:
+    spacing_m = 50.0
+    revision = 1
+    taken_back_at = 0
+
+    def __init__(self, points: FloatArray) -> None:
+        self._points = points
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return self._points if revision < 1 else np.zeros((0, 2))
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.zeros(len(points_m), dtype=np.bool_)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(start=poses, end=poses)
+def test_a_dubins_curve_joins_its_poses(start: Pose, end: Pose) -> None:
+    way = dubins(start, end, 1.0)
+    pose = start
+    for segment in way:
+        np.testing.assert_allclose(segment[:4], pose, atol=1e-6)
+        assert abs(segment[4]) in (0.0, 1.0)
+        pose = along(segment, segment[5])
+    np.testing.assert_allclose(pose, end, atol=1e-5)
+    assert len(way) <= 3
+    # The same curve flown backwards joins the poses turned round.
+    turned = [Pose(p.east_m, p.north_m, -p.tangent_east, -p.tangent_north) for p in (end, start)]
+    back = dubins(turned[0], turned[1], 1.0)
+    assert sum(s[5] for s in back) == pytest.approx(sum(s[5] for s in way), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("end", "length"),
+    [
+        (Pose(10.0, 0.0, 1.0, 0.0), 10.0),  # straight on
+        (Pose(0.0, 2.0, -1.0, 0.0), math.pi),  # half a turn
+        (Pose(5.0, 2.0, -1.0, 0.0), 5.0 + math.pi),  # straight, half a turn; LSL
+        (Pose(0.0, 0.0, -1.0, 0.0), 7.0 * math.pi / 3.0),  # back where it was: three arcs, RLR
+    ],
+)
+def test_known_dubins_lengths(end: Pose, length: float) -> None:
+    assert sum(s[5] for s in dubins(Pose(0.0, 0.0, 1.0, 0.0), end, 1.0)) == pytest.approx(length, abs=1e-6)
+
+
+def test_without_ompl_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dubins_tree, "find_spec", lambda name: None)
+    with pytest.raises(ValueError, match=r"dubins_tree needs OMPL.*pip install wayproof\[ompl\]"):
+        DubinsTreeConfig().resolved(MISSION)
+
+
+if find_spec("ompl") is not None:
+
+    def first(points: FloatArray) -> Plan:
+        planner = DubinsTree(DubinsTreeConfig(), MISSION)
+        return planner.plan(PlanRequest(0.0, START, (1.0, 0.0), Seen(points)))
+
+    def test_a_tree_finds_a_way_round_twice_the_same(ring: MakePoints) -> None:
+        points = ring(5000.0, 5200.0, 1200.0, 50.0)
+        plan, again = first(points), first(points)
+        assert plan.status is PlanStatus.FOUND
+        assert plan.path is not None
+        assert again.path is not None
+        np.testing.assert_array_equal(plan.path.segments, again.path.segments)
+        assert plan.path.max_curvature_1pm <= 1.0 / MISSION.turn_radius_m + 1e-9
+        assert keeps(plan.path, points) > MISSION.clearance_m
+        assert plan.path.length_m < 1.3 * 13_000.0
+
+    def test_an_enclosed_start_holds(ring: MakePoints) -> None:
+        plan = first(ring(*START, 1500.0, 50.0))
+        assert plan.path is None or plan.path.loiter
+
+
+def keeps(path: Path, points: FloatArray) -> float:
+    """Smallest distance between a path and points."""
+    places = np.array(
+        [along(row, s)[:2] for row in path.segments.tolist() for s in np.arange(0.0, row[5], 20.0)]
+    )
+    return float(np.hypot(*(places[:, None] - points).transpose(2, 0, 1)).min())
