@@ -5,9 +5,9 @@
     class TestMine(PlannerContract):
         kind = MY_KIND
 
-is a whole test module: pytest collects what the class inherits. The planner is flown without error through a few
-circles that come into view, by a sensor that sees everything within its range. What is asked of a planner here is what the
-closed loop counts on; that it is any good is not.
+is a whole test module: pytest collects what the class inherits. The planner is flown without error among a few
+circles that come into view of a sensor that sees everything within its range. What is asked of a planner here is
+what the closed loop counts on; that it is any good is not.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import FrozenInstanceError, fields, is_dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -206,7 +206,7 @@ class PlannerContract:
         config = self.kind.config()
         for field in fields(config):
             assert field.metadata["doc"], field.name
-            assert _raises(FrozenInstanceError, lambda name=field.name: setattr(config, name, None))
+            assert _raises(FrozenInstanceError, partial(setattr, config, field.name, None))
         resolved = config.resolved(self.mission)
         assert all(getattr(resolved, field.name) is not None for field in fields(resolved))
         assert resolved.resolved(self.mission) == resolved
@@ -311,5 +311,5 @@ class PlannerContract:
         """Plans are values."""
         answers = (answer for _, answer in _among_circles(self.kind, self.mission).answers)
         plan = next(answer for answer in answers if answer.path is not None)
-        assert _raises(FrozenInstanceError, lambda: setattr(plan, "status", PlanStatus.KEPT))  # noqa: B010
+        assert _raises(FrozenInstanceError, lambda: setattr(plan, "status", PlanStatus.KEPT))
         assert not any(array.flags.writeable for array in arrays_in(plan))

@@ -20,6 +20,9 @@ from planner.window import Window
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
 
+LEAST_MARGIN = 0.2
+"""Share of the margin that is kept where there is no room for all of it."""
+
 WIDER = 4
 """Where n tracks at every one of N steps find no way, this many times as many are tried."""
 
@@ -90,6 +93,11 @@ class LocalPlanning:
         """What paths keep from every edge point where there is room."""
         return self._mission.clearance_m + PATH_SHARE * self._margin_m
 
+    @property
+    def least_keeps_m(self) -> float:
+        """What a way has to keep from every edge point to be found at all."""
+        return self._mission.clearance_m + SEARCH_SHARE * LEAST_MARGIN * self._margin_m
+
     def attempts(self) -> list[Attempt]:
         """Distances to search with, in order of preference.
 
@@ -98,7 +106,7 @@ class LocalPlanning:
         leads through no gap that would have to be entered before it can be seen to have an end.
         """
         clearance, margin, radius = self._mission.clearance_m, self._margin_m, self._mission.turn_radius_m
-        attempts = [Attempt(clearance, margin), Attempt(clearance, 0.2 * margin)]
+        attempts = [Attempt(clearance, margin), Attempt(clearance, LEAST_MARGIN * margin)]
         if radius > clearance:
             attempts.append(Attempt(radius, margin))
         return [*attempts, Attempt(clearance + radius, margin)]
@@ -139,7 +147,9 @@ class LocalPlanning:
 
     def tight_route(self, start: Start) -> Route | None:
         """A way found by search over poses, where none through the free sectors can be flown."""
-        terrain = self._terrain(Attempt(self._mission.clearance_m, 0.2 * self._margin_m), self._room(start))
+        terrain = self._terrain(
+            Attempt(self._mission.clearance_m, LEAST_MARGIN * self._margin_m), self._room(start)
+        )
         return search_poses(start.pose, start.curvature, self._mission.goal_m, self.limits, terrain)
 
     def window(self, start: Start, keep_m: FloatArray) -> Window:

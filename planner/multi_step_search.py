@@ -18,6 +18,9 @@ from planner.curves import Point
 from planner.step_model import distance_left_m
 from planner.window import SectorEdge, Window, guide_vector
 
+MOST_TRACKS = 500
+"""So many tracks at most are looked at in one search."""
+
 SHORT_OF = 0.005
 """A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
 
@@ -86,6 +89,8 @@ def search(
             continue
         visited.add(place)
         kept_at[depth] += 1
+        if len(visited) > MOST_TRACKS:
+            return
         _, hit = first_entry(here, goal, window.points_m, window.keep_m)
         count += 1
         if hit < 0:

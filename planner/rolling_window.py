@@ -47,6 +47,12 @@ BETTER = 0.005
 BROKEN_SHARE = 0.99
 """Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
+PROVED_AT_ONCE = 400
+"""So many edge points at most are taken into the proof in one call."""
+
+PROLONG = 0.6
+"""A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
+
 HOLD_SHARES = (1.0, 0.5, 0.1)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
 
@@ -184,6 +190,10 @@ class RollingWindow:
         self._effect: _Effect | None = None
         self._searched_at_m = 0.0  # station and number of edge points at the last search
         self._searched_with = 0
+        self._news_at_m = 0.0
+        self._patience_m = (
+            1.5 * math.tau * mission.turn_radius_m
+        )  # nothing new is seen in more of a turn than this
         self._refused_at_m = 0.0
         self._cut_m = math.inf  # where the course comes too near to something seen since it was found
         self._broken = False  # the certified part of it does, or its turn
@@ -197,9 +207,12 @@ class RollingWindow:
         here = on_loiter(effect.path, request.station_m)
         newly_cut = len(fresh) > 0 and self._watch(effect, here, fresh)
         since = request.station_m - self._searched_at_m
+        certified = effect.leaves_m - here
+        settled = effect.course.shortest and self._cut_m == math.inf
         due = since >= self._rolling_step_m
-        due |= newly_cut and min(self._cut_m, effect.leaves_m) - here < self._urgent_m
-        due |= since >= self._lead_m and min(self._cut_m, effect.leaves_m) - here < self._least_m
+        due &= not (settled and certified > PROLONG * self._mission.sensor_range_m)
+        due |= newly_cut and min(self._cut_m - here, certified) < self._urgent_m
+        due |= since >= self._lead_m and min(self._cut_m - here, certified) < self._least_m
         if not due and not self._broken:
             return Plan(PlanStatus.KEPT, "the plan in effect serves")
         self._searched_at_m = request.station_m
@@ -210,7 +223,7 @@ class RollingWindow:
         if self._proposed is not None and request.flown is self._proposed.plan:
             self._effect, self._proposed = self._proposed, None
             self._cut_m, self._broken = math.inf, False
-            self._searched_at_m = self._refused_at_m = 0.0
+            self._searched_at_m = self._refused_at_m = self._news_at_m = 0.0
         return self._effect
 
     def _watch(self, effect: _Effect, here: float, fresh: FloatArray) -> bool:
@@ -232,6 +245,15 @@ class RollingWindow:
         tracks: list[Track] = []
         stuck: Course | None = None
         known = len(self._memory.points_m)
+        if known != self._searched_with:
+            self._news_at_m = request.station_m
+        elif (
+            ahead is None
+            and effect is not None
+            and not self._broken
+            and request.station_m - self._news_at_m > self._patience_m
+        ):
+            return self._no_way(request, effect, here, None)
         if ahead is None or not serves or not (ahead.shortest or known == self._searched_with):
             self._searched_with = known
             for course in self._courses(start, ahead, tracks):
@@ -256,8 +278,14 @@ class RollingWindow:
         """Ways to the goal, those that are wanted most first."""
         known = len(self._memory.points_m)
         found = False
+        closed_m = math.inf
         for i, attempt in enumerate(self._local.attempts()):
+            if attempt.distance_m + attempt.margin_m >= closed_m:
+                continue  # what is closed to a narrow way is closed to a wide one
+            before = len(tracks)
             route = self._local.route(start, attempt, ahead, tracks)
+            if len(tracks) == before:
+                closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:
                 found = True
                 yield _course(start, route, known, shortest=i == 0)
@@ -305,8 +333,11 @@ class RollingWindow:
     ) -> Plan:
         """No new plan: prove that there is none, or leave the plan in effect to end in its turn."""
         if stuck is None and self._is_closed(request):
+            gap = 2.0 * self._local.least_keeps_m
             return Plan(
-                PlanStatus.UNREACHABLE, "a closed chain of obstacles lies between the aircraft and the goal"
+                PlanStatus.UNREACHABLE,
+                "a closed chain of obstacles lies between the aircraft and the goal: "
+                f"no gap in it is wider than {gap:.0f} m",
             )
         if effect is None or self._broken:
             return self._turn_away(request, effect, here)
@@ -324,9 +355,9 @@ class RollingWindow:
         genuine = self._memory.genuine_m
         if self._barrier is None or self._barrier.count > len(genuine):
             self._barrier = Barrier(
-                request.position_m, self._mission.goal_m, self._mission.bounds_m, self._mission.clearance_m
+                request.position_m, self._mission.goal_m, self._mission.bounds_m, self._local.least_keeps_m
             )
-        self._barrier.add(genuine[self._barrier.count :])
+        self._barrier.add(genuine[self._barrier.count :][:PROVED_AT_ONCE])
         return self._barrier.closed
 
     def _turn_away(self, request: PlanRequest, effect: _Effect | None, here: float) -> Plan:

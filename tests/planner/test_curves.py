@@ -22,10 +22,13 @@ from planner.curves import (
     fillet,
     full_turn,
     on_loiter,
+    onward,
     place_on,
     pose_at,
+    poses_at,
     sample,
     turn_onto,
+    turns_onto,
 )
 from planner.interface import FloatArray, Path
 
@@ -297,3 +300,80 @@ def test_stations_on_a_loiter_go_round_and_round() -> None:
         assert on_loiter(path, 450.0 + turns * turn) == pytest.approx(450.0)
     straight = Path(path.segments)
     assert on_loiter(straight, 400.0 + 2.5 * turn) == 400.0 + 2.5 * turn
+
+
+@settings(deadline=None, max_examples=60)
+@given(start=POSES, pieces=PIECES, shares=st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
+def test_poses_at_many_stations_are_those_of_integration(
+    start: Pose, pieces: list[tuple[float, float]], shares: list[float], integrated: Integrated
+) -> None:
+    path = Path(np.array(joined(start, pieces)))
+    stations = np.array(shares) * path.length_m
+    found = poses_at(path, stations)
+    assert found.shape == (len(shares), 4)
+    for station, pose in zip(stations.tolist(), found, strict=True):
+        kept = between(path, 0.0, station)
+        expected = integrated(start, kept, 0.5)[-1] if kept else np.array(start)
+        np.testing.assert_allclose(pose[:2], expected[:2], atol=5e-3)
+        np.testing.assert_allclose(pose[2:], expected[2:], atol=1e-6)
+        np.testing.assert_allclose(pose, pose_at(path, station), atol=1e-6)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    start=POSES,
+    pieces=PIECES,
+    side=st.sampled_from([1.0, -1.0]),
+    share=st.floats(0.0, 1.0),
+    further=st.floats(1.0, 4000.0),
+)
+def test_onward_goes_round_the_loiter_as_integration_does(
+    start: Pose,
+    pieces: list[tuple[float, float]],
+    side: float,
+    share: float,
+    further: float,
+    integrated: Integrated,
+) -> None:
+    before = joined(start, pieces)
+    turn = full_turn(along(before[-1], before[-1][5]), 150.0, side)
+    path = Path(np.array([*before, turn]), loiter=True)
+    station = share * path.length_m
+    stretch = onward(path, station, further)
+    assert sum(segment[5] for segment in stretch) == pytest.approx(further, abs=1e-4)
+    # The truth: the path with so many turns at its end that it cannot run out.
+    endless = Path(np.array([*before, *[turn] * 8]))
+    np.testing.assert_allclose(stretch[0][:4], pose_at(endless, station), atol=1e-5)
+    end = integrated(pose_at(endless, station), stretch, 0.5)[-1]
+    truth = integrated(start, between(endless, 0.0, station + further), 0.5)[-1]
+    np.testing.assert_allclose(end, truth, atol=2e-2)
+    np.testing.assert_allclose(
+        along(stretch[-1], stretch[-1][5]), pose_at(path, on_loiter(path, station + further)), atol=1e-4
+    )
+
+
+def test_onward_stops_at_the_end_of_a_path_without_loiter() -> None:
+    path = Path(np.array([(*EAST, 0.0, 100.0), (100.0, 0.0, 1.0, 0.0, 0.01, 50.0)]))
+    assert sum(segment[5] for segment in onward(path, 30.0, 1000.0)) == pytest.approx(120.0)
+
+
+@given(pose=POSES, away=st.floats(1.0, 3000.0), bearing=ANGLES, radius=st.floats(50.0, 800.0))
+@settings(deadline=None, max_examples=60)
+def test_turns_onto_are_one_to_each_side_the_shorter_first(
+    pose: Pose, away: float, bearing: float, radius: float, integrated: Integrated
+) -> None:
+    target = (pose.east_m + away * math.cos(bearing), pose.north_m + away * math.sin(bearing))
+    ways = turns_onto(pose, target, radius)
+    lengths = [sum(segment[5] for segment in way) for way in ways]
+    assert lengths == sorted(lengths)
+    for way in ways:
+        end = integrated(pose, way, 0.5)[-1]
+        assert math.dist(end[:2], target) < 1e-2
+    centres = [
+        (pose.east_m - s * radius * pose.tangent_north, pose.north_m + s * radius * pose.tangent_east)
+        for s in (1.0, -1.0)
+    ]
+    assert len(ways) == sum(math.dist(centre, target) > radius for centre in centres)
+    assert len({math.copysign(1.0, way[0][4]) for way in ways if way[0][4]}) == sum(
+        bool(way[0][4]) for way in ways
+    )

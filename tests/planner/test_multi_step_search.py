@@ -212,3 +212,33 @@ def test_a_wall_across_the_bounds_has_no_way_round(wall: MakePoints) -> None:
     window = window_of(wall((9000.0, -1000.0), (9000.0, 1000.0), SPACING))
     assert tracks_in(window)
     assert tracks_in(window, bounds=(-1000.0, -1000.0, 35_000.0, 1000.0)) == []
+
+
+CELL, CELLS = 1000.0, 4
+WITHIN = (-0.5 * CELL, -0.5 * CELL, (CELLS - 0.5) * CELL, (CELLS - 0.5) * CELL)
+CORNER = ((CELLS - 1) * CELL, (CELLS - 1) * CELL)
+
+
+def connected(points: FloatArray, keep_m: float) -> bool:
+    """Whether a point can get from corner to corner and keep a distance from all points."""
+    discs = shapely.union_all(shapely.buffer(shapely.points(points), keep_m, quad_segs=32))
+    parts = shapely.get_parts(shapely.box(*WITHIN).difference(discs))
+    return any(all(part.contains(shapely.Point(end)) for end in (START, CORNER)) for part in parts)
+
+
+@settings(deadline=None, max_examples=40)
+@given(walls=st.lists(st.booleans(), min_size=2 * CELLS * (CELLS - 1), max_size=2 * CELLS * (CELLS - 1)))
+def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(walls: list[bool], wall: MakePoints) -> None:
+    lines: list[tuple[Point, Point]] = []
+    for line in range(CELLS - 1):
+        for row in range(CELLS):
+            at, low = (line + 0.5) * CELL, (row - 0.5) * CELL
+            lines += [((at, low), (at, low + CELL)), ((low, at), (low + CELL, at))]
+    pieces = [wall(a, b, SPACING) for (a, b), there in zip(lines, walls, strict=True) if there]
+    window = window_of(*pieces)
+    tracks = tracks_in(window, steps=64, keep_best=48, bounds=WITHIN, goal=CORNER)
+    if connected(window.points_m, 1.1 * KEEP):
+        assert tracks
+        assert tracks[0].cost_m >= math.dist(START, CORNER) * (1.0 - 1e-9)
+    elif not connected(window.points_m, 0.97 * KEEP):
+        assert not tracks

@@ -13,7 +13,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.curves import end_of, pose_at, sample
+from planner.curves import end_of, pose_at, poses_at, sample
 from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.rolling_window import RollingWindow, RollingWindowConfig
 
@@ -126,14 +126,17 @@ def test_straight_in_the_open(assert_flyable: AssertFlyable) -> None:
     assert plan.status is PlanStatus.FOUND
     assert plan.path is not None
     assert_flyable(plan.path, MISSION.turn_radius_m)
-    assert plan.path.length_m == pytest.approx(20_000.0)
-    assert plan.path.max_curvature_1pm == 0.0
+    # Straight as far as the sensor sees, and then a turn that can be flown for ever.
+    assert plan.path.loiter
+    assert plan.path.segments[:-1, 4].tolist() == [0.0]
+    assert plan.path.segments[0, 5] == pytest.approx(MISSION.sensor_range_m)
+    assert plan.path.segments[1, 5] == pytest.approx(math.tau * MISSION.turn_radius_m)
     np.testing.assert_allclose(plan.waypoints_m, [(0.0, 0.0), MISSION.goal_m])
     assert "20.0 km to go" in plan.reason
 
 
 def test_passes_a_circle_at_the_wanted_clearance(ring: MakePoints, assert_flyable: AssertFlyable) -> None:
-    points = ring(9000.0, 500.0, 2000.0, SPACING)
+    points = ring(5000.0, 500.0, 2000.0, SPACING)
     plan = planner().plan(first_request(seen_at_once(points)))
     assert plan.status is PlanStatus.FOUND
     assert plan.path is not None
@@ -196,8 +199,21 @@ def test_a_plan_is_kept_while_nothing_changes(ring: MakePoints) -> None:
         assert answer.status is PlanStatus.KEPT
         assert answer.path is None
         assert len(answer.waypoints_m) == 0
-    for station in range(1000, 19_000, 1000):
-        assert pilot.plan(request_on(plan, station, seen)).status in (PlanStatus.KEPT, PlanStatus.NO_BETTER)
+    # From then on it is only prolonged: the same track points, the same way, as far as can be certified.
+    course, station, prolonged = plan.waypoints_m[1:].tolist(), 0.0, 0
+    while math.dist(pose_at(plan.path or Path(nothing()), station)[:2], MISSION.goal_m) > 500.0:
+        station += 250.0
+        answer = pilot.plan(request_on(plan, station, seen))
+        assert answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER, PlanStatus.FOUND)
+        if answer.path is None or plan.path is None:
+            continue
+        assert [node for node in answer.waypoints_m[1:].tolist() if node not in course] == []
+        overlap = np.linspace(0.0, 2000.0, 5)
+        np.testing.assert_allclose(
+            poses_at(answer.path, overlap), poses_at(plan.path, station + overlap), atol=1e-3
+        )
+        plan, station, prolonged = answer, 0.0, prolonged + 1
+    assert 1 <= prolonged <= 40
 
 
 def test_new_points_on_the_plan_bring_a_new_one(ring: MakePoints) -> None:

@@ -1,0 +1,310 @@
+"""Convergence: every goal that can be reached is reached, every other is proved to be out of reach, none is hit.
+
+Worlds are drawn from a seed and told apart by plane geometry that knows nothing of planners: `reach` where a disc
+in which the aircraft can turn can be moved from start to goal, `unreachable` where not even a point can that
+keeps the clearance. What lies between the two is drawn again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from aircraft.point_mass import PointMass
+from aircraft.start import Atmosphere, StartConditions
+from harness.closed_loop import fly
+from harness.record import FloatArray, Outcome
+from harness.run import make_loop
+from harness.scenario import Scenario, dump_scenario, mission_of, parse_scenario
+from harness.strict_yaml import dump
+
+SIDE_M, CLEARANCE_M, THICK_M = 5000.0, 40.0, 30.0
+GOAL_RADIUS_M, APART_M = 60.0, 2000.0
+DISC_RADII, START_RADII = 1.4, 2.1
+"""The disc of a `reach` world, and the room at its start, in turn radii beyond the clearance: a turn from there
+reaches two radii to the side."""
+
+START_ROOM_M = 280.0
+"""Scattered obstacles leave that much: more than the room at the start that is asked for."""
+
+MOST_CELLS = 8
+"""A maze's cells, along a side: more would leave no room for a start."""
+
+QUICK, ALL = 24, 500
+BLUR = 0.25
+"""What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
+
+Place = tuple[float, float]
+Obstacles = list[dict[str, Any]]
+Generator = np.random.Generator
+Geometry = Any
+"""Shapely has no types."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A world and what is true of it."""
+
+    scenario: Scenario
+    family: str
+    reachable: bool
+
+
+def circle(x: float, y: float, radius: float) -> dict[str, Any]:
+    return {"circle": {"center_m": [x, y], "radius_m": radius}}
+
+
+def polygon(ring: FloatArray) -> dict[str, Any]:
+    return {"polygon": {"vertices_m": ring.tolist()}}
+
+
+def wall(a: Place, b: Place) -> dict[str, Any]:
+    """A straight wall, longer by half its thickness at either end, so that walls that meet are joined."""
+    ux, uy = (b[0] - a[0]) / math.dist(a, b), (b[1] - a[1]) / math.dist(a, b)
+    half = 0.5 * THICK_M
+    corners = ((a, -1, -1), (b, 1, -1), (b, 1, 1), (a, -1, 1))
+    ring = [
+        (x + half * (along * ux - side * uy), y + half * (along * uy + side * ux))
+        for (x, y), along, side in corners
+    ]
+    return polygon(np.array(ring))
+
+
+def chain(places: list[Place], gap_m: float, gap_at: int) -> Obstacles:
+    """Walls along a polyline, one of them with a gap in its middle."""
+    walls = []
+    for i, (a, b) in enumerate(pairwise(places)):
+        length = math.dist(a, b)
+        share = 0.5 * (length - gap_m - THICK_M) / length
+        if i != gap_at or share <= 0.0 or gap_m <= 0.0:
+            walls += [] if i == gap_at and share <= 0.0 else [wall(a, b)]
+            continue
+        dx, dy = (b[0] - a[0]) * share, (b[1] - a[1]) * share
+        walls += [wall(a, (a[0] + dx, a[1] + dy)), wall((b[0] - dx, b[1] - dy), b)]
+    return walls
+
+
+def gap(rng: Generator) -> float:
+    """None, too narrow for a point, or wide enough for the aircraft."""
+    return float(rng.choice([0.0, rng.uniform(0.5, 1.9) * CLEARANCE_M, rng.uniform(420.0, 700.0)]))
+
+
+def scattered_circles(rng: Generator, most: int = 45) -> Obstacles:
+    return [
+        circle(
+            float(rng.uniform(0.0, SIDE_M)), float(rng.uniform(0.0, SIDE_M)), float(rng.uniform(20.0, 350.0))
+        )
+        for _ in range(rng.integers(5, most))
+    ]
+
+
+def scattered_polygons(rng: Generator, most: int = 30) -> Obstacles:
+    """Stars of any shape, and traps open to one side."""
+    found = []
+    for _ in range(rng.integers(4, most)):
+        (x, y), size, turn = rng.uniform(0.0, SIDE_M, 2), rng.uniform(60.0, 450.0), rng.uniform(0, math.tau)
+        if rng.random() < 0.25:
+            size *= 2.0
+            bends = turn + np.linspace(-0.8, 0.8, 5) * math.pi
+            found += chain([(x + size * math.cos(b), y + size * math.sin(b)) for b in bends], 0.0, -1)
+            continue
+        bearings = turn + np.arange(corners := int(rng.integers(3, 10))) * math.tau / corners
+        reach = size * rng.uniform(0.3, 1.0, corners)
+        ring = np.column_stack((x + reach * np.cos(bearings), y + reach * np.sin(bearings)))
+        found.append(polygon(ring))
+    return found
+
+
+def maze(rng: Generator) -> Obstacles:
+    """A tree of corridors, with some walls taken out; or one that is closed somewhere."""
+    count = int(rng.integers(4, MOST_CELLS + 1))
+    side = SIDE_M / count
+    open_walls, seen, way = set(), {(0, 0)}, [(0, 0)]
+    while way:
+        x, y = way[-1]
+        steps = [(x + i, y + j) for i, j in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+        steps = [s for s in steps if s not in seen and min(s) >= 0 and max(s) < count]
+        if not steps:
+            way.pop()
+            continue
+        step = steps[rng.integers(len(steps))]
+        seen.add(step)
+        way.append(step)
+        if rng.random() > 0.02:
+            open_walls.add(frozenset(((x, y), step)))
+    found = []
+    for x in range(count):
+        for y in range(count):
+            for other, a, b in (
+                ((x + 1, y), (x + 1, y), (x + 1, y + 1)),
+                ((x, y + 1), (x, y + 1), (x + 1, y + 1)),
+            ):
+                if max(other) == count or frozenset(((x, y), other)) in open_walls or rng.random() < 0.1:
+                    continue
+                found.append(wall((side * a[0], side * a[1]), (side * b[0], side * b[1])))
+    return found
+
+
+def spiral(rng: Generator) -> Obstacles:
+    """A wall that winds about the middle, now and then closed at its outer end."""
+    pitch = float(rng.uniform(450.0, 700.0))
+    turns = np.arange(0.0, 2150.0 / pitch * math.tau, 0.35)
+    turn, sense, middle = rng.uniform(0.0, math.tau), rng.choice([-1.0, 1.0]), 0.5 * SIDE_M
+    radius = 150.0 + pitch * turns / math.tau
+    bearing = turn + sense * turns
+    places = np.column_stack((middle + radius * np.cos(bearing), middle + radius * np.sin(bearing))).tolist()
+    if rng.random() < 0.3:
+        places.append(places[-18])
+    return chain([(x, y) for x, y in places], 0.0, -1)
+
+
+def enclosure(rng: Generator, middle: Place, gap_m: float) -> Obstacles:
+    count, radius, turn = int(rng.integers(4, 12)), rng.uniform(420.0, 900.0), rng.uniform(0.0, math.tau)
+    reach = radius * rng.uniform(0.9, 1.2, count)
+    places = [
+        (middle[0] + r * math.cos(b), middle[1] + r * math.sin(b))
+        for r, b in zip(reach, turn + np.arange(count) * math.tau / count, strict=True)
+    ]
+    return chain([*places, places[0]], gap_m, int(rng.integers(count)))
+
+
+def across(rng: Generator) -> Obstacles:
+    """A jagged wall from border to border."""
+    count = int(rng.integers(3, 9))
+    along = np.linspace(0.0, SIDE_M, count)
+    off = SIDE_M * rng.uniform(0.3, 0.7, count)
+    places = np.column_stack((along, off) if rng.random() < 0.5 else (off, along)).tolist()
+    return chain([(x, y) for x, y in places], gap(rng), int(rng.integers(count - 1)))
+
+
+def room_for(start: Place, goal: Place, obstacles: Obstacles) -> Obstacles:
+    """Those that leave a mission to be begun and a goal to be wanted."""
+    ends = shapely.points([start, goal])
+    kept = (shapely.distance(ends, shape(obstacle)) > (START_ROOM_M, 1.5 * CLEARANCE_M) for obstacle in obstacles)
+    return [obstacle for obstacle, keep in zip(obstacles, kept, strict=True) if keep.all()]
+
+
+FAMILIES: dict[str, Callable[[Generator, Place, Place], Obstacles]] = {
+    "circles": lambda rng, *ends: room_for(*ends, scattered_circles(rng, 220)),
+    "polygons": lambda rng, *ends: room_for(*ends, scattered_polygons(rng, 90)),
+    "maze": lambda rng, *_: maze(rng),
+    "spiral": lambda rng, *_: spiral(rng),
+    "enclosed_goal": lambda rng, _, goal: enclosure(rng, goal, gap(rng)) + scattered_circles(rng, 15),
+    "enclosed_start": lambda rng, start, _: enclosure(rng, start, gap(rng)) + scattered_polygons(rng, 10),
+    "across": lambda rng, *_: across(rng) + scattered_circles(rng, 12),
+}
+
+
+def shape(obstacle: dict[str, Any]) -> Geometry:
+    if "circle" in obstacle:
+        keys = obstacle["circle"]
+        return shapely.Point(keys["center_m"]).buffer(keys["radius_m"], quad_segs=64)
+    return shapely.Polygon(obstacle["polygon"]["vertices_m"])
+
+
+def part_of(start: Place, solid: Geometry, keep_m: float, inset_m: float) -> Geometry:
+    """What a point that keeps a distance from obstacles and borders can get to."""
+    free = shapely.box(inset_m, inset_m, SIDE_M - inset_m, SIDE_M - inset_m)
+    free = free.difference(solid.buffer(keep_m, quad_segs=32))
+    parts = (part for part in shapely.get_parts(free) if part.contains(shapely.Point(start)))
+    return next(parts, shapely.Point())
+
+
+def reachable(start: Place, goal: Place, obstacles: Obstacles, radius_m: float) -> bool | None:
+    """Whether the goal can be reached; None where that cannot be told, or the mission be begun."""
+    solid = shapely.union_all([shape(obstacle) for obstacle in obstacles])
+    if solid.distance(shapely.Point(goal)) <= CLEARANCE_M:
+        return None
+    room = min(*start, *(SIDE_M - each for each in start), solid.distance(shapely.Point(start)) - CLEARANCE_M)
+    if room < START_RADII * radius_m:
+        return None
+    disc = DISC_RADII * radius_m
+    if part_of(start, solid, CLEARANCE_M + disc, disc).contains(shapely.Point(goal)):
+        return True
+    for_a_point = part_of(start, solid, CLEARANCE_M, 0.0)
+    return None if for_a_point.distance(shapely.Point(goal)) <= GOAL_RADIUS_M else False
+
+
+def scenario_of(seed: int, family: str, start: Place, goal: Place, obstacles: Obstacles) -> Scenario:
+    plain = {
+        "schema": "wayproof/scenario/1",
+        "name": f"{family.replace('_', '-')}-{seed}",
+        "seed": seed,
+        "area": {"bounds_m": [0.0, 0.0, SIDE_M, SIDE_M]},
+        "obstacles": obstacles,
+        "mission": {
+            "start_m": list(start),
+            "goal_m": list(goal),
+            "goal_radius_m": GOAL_RADIUS_M,
+            "time_limit_s": 6000.0,
+        },
+        "sensor": {"range_m": 1000.0, "rays": 360},
+        "planner": {"kind": "rolling_window", "clearance_m": CLEARANCE_M},
+    }
+    return parse_scenario(dump(plain))
+
+
+def drawn(seed: int) -> Drawn:
+    """The world of a seed: families take turns, and in each of them both verdicts."""
+    rng = np.random.default_rng(seed)
+    family = list(FAMILIES)[seed % len(FAMILIES)]
+    radius = mission_of(scenario_of(seed, family, (0.0, 0.0), (SIDE_M, SIDE_M), [])).turn_radius_m
+    wanted = seed // len(FAMILIES) % 3 != 1
+    for _ in range(300):
+        start, goal = (tuple(each) for each in rng.uniform(0.0, SIDE_M, (2, 2)).round(1).tolist())
+        if math.dist(start, goal) < APART_M:
+            continue
+        obstacles = FAMILIES[family](rng, start, goal)
+        if reachable(start, goal, obstacles, radius) is wanted:
+            return Drawn(scenario_of(seed, family, start, goal, obstacles), family, wanted)
+    raise AssertionError(f"no world of the family {family} with verdict {wanted}")
+
+
+def fast(start: StartConditions, air: Atmosphere) -> PointMass:
+    """A point mass that counts in no finer steps than guidance does."""
+    return PointMass(start, air, step_rate_hz=20)
+
+
+def assert_converges(seed: int) -> None:
+    world = drawn(seed)
+    flight = fly(make_loop(world.scenario, fast))
+    wanted = Outcome.REACHED if world.reachable else Outcome.UNREACHABLE
+    assert flight.outcome is wanted, f"{flight.reason}\n{dump_scenario(world.scenario)}"
+    assert flight.track.clearance_m.min() >= (1.0 - BLUR) * CLEARANCE_M, dump_scenario(world.scenario)
+
+
+@pytest.mark.parametrize("seed", range(QUICK))
+def test_converges(seed: int) -> None:
+    assert_converges(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(QUICK, ALL))
+def test_converges_everywhere(seed: int) -> None:
+    assert_converges(seed)
+
+
+def verdicts(seeds: range) -> Iterator[tuple[str, bool]]:
+    for seed in seeds:
+        world = drawn(seed)
+        yield world.family, world.reachable
+
+
+def test_every_family_and_both_verdicts_are_drawn() -> None:
+    found = set(verdicts(range(QUICK)))
+    assert {family for family, _ in found} == set(FAMILIES)
+    assert {family for family, verdict in found if not verdict} == set(FAMILIES)
+    assert {family for family, verdict in found if verdict} == set(FAMILIES)
+
+
+@pytest.mark.parametrize(("gap_m", "verdict"), [(0.0, False), (79.0, False), (200.0, None), (500.0, True)])
+def test_a_world_is_told_apart_by_the_width_of_its_gap(gap_m: float, verdict: bool | None) -> None:
+    walls = chain([(0.0, 2500.0), (SIDE_M, 2500.0)], gap_m, 0)
+    assert reachable((2500.0, 1000.0), (2500.0, 4000.0), walls, 110.0) is verdict

@@ -1,0 +1,228 @@
+"""The safety invariant while flying: every plan put into effect could be flown for ever.
+
+Seen against the truth, which the planner does not have: in a world that stands still every accepted plan joins the
+flight, ends in a full turn, hits no true obstacle and stays inside the area all along, the turn included; so the
+aircraft is safe whatever it finds, and even if it were never asked again. What is flown keeps the clearance.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from aircraft.interface import AircraftState
+from aircraft.point_mass import PointMass
+from harness.cli import main
+from harness.closed_loop import fly
+from harness.range_sensor import RangeScan
+from harness.record import AcceptedPlan, Flight, Outcome, Track
+from harness.run import make_loop
+from harness.scenario import Scenario, dump_scenario
+from harness.world import World
+from planner.curves import on_loiter, pose_at, sample
+from planner.interface import Path
+
+SmallWorld = Callable[..., Scenario]
+Obstacles = list[dict[str, Any]]
+
+SIDE_M, CELLS = 4500.0, 6
+CLEARANCE_M, TURN_RADIUS_M = 40.0, 110.4
+BLUR = 0.25
+"""What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
+
+BOUNDED = settings(deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
+"""A flight takes seconds: a failure is shown as drawn, for shrinking it would take minutes."""
+
+
+class Invariant:
+    """Looks at every plan that takes effect, and at every step of the flight."""
+
+    def __init__(self, world: World, turn_radius_m: float, tracking_error_m: float) -> None:
+        self._world, self._radius, self._off = world, turn_radius_m, tracking_error_m
+        self.plans = 0
+        self.least_m = math.inf
+        """Smallest true clearance of an accepted plan."""
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        path = accepted.plan.path
+        assert path is not None
+        self.plans += 1
+        assert math.dist(pose_at(path, 0.0)[:2], (state.east_m, state.north_m)) <= 1.0 + 4.0 * self._off
+        ends, begins = path.segments[:-1], path.segments[1:]
+        for row, following in zip(ends, begins, strict=True):
+            met = pose_at(Path(row[None]), math.inf)
+            np.testing.assert_allclose(met, following[:4], atol=1e-3)
+        assert np.abs(path.segments[:, 4]).max() <= 1.0 / self._radius + 1e-9
+        assert path.loiter
+        turn = path.segments[-1]
+        assert abs(turn[4]) * turn[5] == pytest.approx(math.tau)
+        # Once round and a little on: the path closes upon itself.
+        on = pose_at(path, on_loiter(path, path.length_m + 10.0))
+        assert math.dist(on[:2], pose_at(path, path.length_m - turn[5] + 10.0)[:2]) < 1e-6
+        places = sample(path, 20.0, 0.2)
+        assert self._world.inside_bounds(*places.min(axis=0))
+        assert self._world.inside_bounds(*places.max(axis=0))
+        clearance = [self._world.clearance_at(x, y, state.time_s) for x, y in places.tolist()]
+        self.least_m = min(self.least_m, *clearance)
+        # It touches nothing. The clearance is kept from what had been seen; the last of an edge may come into
+        # sight later, and then the plan is replaced before it is flown that far.
+        assert min(clearance) > 0.0, f"plan {accepted.plan_index}"
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        pass
+
+    def on_block(self, block: Track) -> None:
+        pass
+
+    def on_event(self, time_s: float, text: str) -> None:
+        pass
+
+
+def watched(scenario: Scenario) -> tuple[Flight, Invariant]:
+    """A point-mass flight, every plan of which keeps the invariant."""
+    loop = make_loop(scenario, lambda start, air: PointMass(start, air, step_rate_hz=20))
+    invariant = Invariant(loop.world, loop.mission.turn_radius_m, loop.mission.tracking_error_m)
+    return fly(loop, [invariant]), invariant
+
+
+def polygon(*corners: tuple[float, float]) -> dict[str, Any]:
+    return {"polygon": {"vertices_m": [list(corner) for corner in corners]}}
+
+
+@st.composite
+def separate(draw: st.DrawFn) -> Obstacles:
+    """Circles and polygons on a grid, not far apart, that may touch each other."""
+    cell, found = SIDE_M / CELLS, []
+    for column in range(CELLS):
+        for row in range(CELLS):
+            if (column, row) in {(0, 0), (CELLS - 1, CELLS - 1)} or not draw(st.booleans()):
+                continue
+            x, y = (cell * (each + 0.5) + draw(st.integers(-150, 150)) for each in (column, row))
+            size, corners = draw(st.integers(30, 330)), draw(st.integers(2, 6))
+            if corners == 2:
+                found.append({"circle": {"center_m": [x, y], "radius_m": float(size)}})
+                continue
+            bearings = [math.tau * corner / corners for corner in range(corners)]
+            reach = [size * (1.0 if corner % 2 else 0.6) for corner in range(corners)]
+            found.append(
+                polygon(
+                    *(
+                        (x + r * math.cos(b), y + r * math.sin(b))
+                        for r, b in zip(reach, bearings, strict=True)
+                    )
+                )
+            )
+    return found
+
+
+@st.composite
+def mazes(draw: st.DrawFn) -> Obstacles:
+    """Walls on the lines of a grid, wherever it comes: corridors, dead ends, rooms that are closed."""
+    cell, half = SIDE_M / CELLS, 10.0
+    found = []
+    for line in range(1, CELLS):
+        for row in range(CELLS):
+            at, low, high = cell * line, cell * row - half, cell * (row + 1) + half
+            if draw(st.booleans()):
+                found.append(
+                    polygon((at - half, low), (at + half, low), (at + half, high), (at - half, high))
+                )
+            if draw(st.booleans()):
+                found.append(
+                    polygon((low, at - half), (high, at - half), (high, at + half), (low, at + half))
+                )
+    return found
+
+
+def scenario_with(small_world: SmallWorld, obstacles: Obstacles, **mission: Any) -> Scenario:
+    corner = 0.5 * SIDE_M / CELLS
+    return small_world(
+        *obstacles,
+        area={"bounds_m": [0.0, 0.0, SIDE_M, SIDE_M]},
+        mission={
+            "start_m": [corner, corner],
+            "goal_m": [SIDE_M - corner, SIDE_M - corner],
+            "time_limit_s": 500.0,
+            **mission,
+        },
+        sensor={"range_m": 1000.0, "rays": 360},
+        planner={"kind": "rolling_window", "clearance_m": CLEARANCE_M},
+    )
+
+
+@given(obstacles=separate() | mazes(), course_deg=st.integers(0, 359))
+@settings(BOUNDED, max_examples=12)
+def test_every_plan_in_effect_is_safe_for_ever(
+    small_world: SmallWorld, obstacles: Obstacles, course_deg: int
+) -> None:
+    flight, invariant = watched(scenario_with(small_world, obstacles, course_deg=float(course_deg)))
+    assert flight.outcome in (Outcome.REACHED, Outcome.UNREACHABLE, Outcome.TIMEOUT), flight.reason
+    assert invariant.plans == len(flight.plans)
+    assert flight.track.clearance_m.min() >= (1.0 - BLUR) * CLEARANCE_M
+
+
+def test_the_invariant_sees_a_plan_that_is_not_safe(small_world: SmallWorld) -> None:
+    # The same plans, but a world that has something the planner was never shown.
+    hidden = {"circle": {"center_m": [2000.0, 2250.0], "radius_m": 100.0}}
+    blind = make_loop(scenario_with(small_world, []), PointMass)
+    truth = make_loop(scenario_with(small_world, [hidden]), PointMass).world
+    invariant = Invariant(truth, blind.mission.turn_radius_m, blind.mission.tracking_error_m)
+    with pytest.raises(AssertionError, match="plan"):
+        fly(replace(blind, time_limit_s=120.0), [invariant])
+
+
+def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(small_world: SmallWorld) -> None:
+    # A ring appears that the aircraft has no room to turn in, within what was certified to be free. It is open
+    # behind the aircraft, so that nothing proves that there is no way.
+    at_s, count, radius, open_from, open_to = 20.0, 24, 75.0, 12, 19
+    start, along = 0.5 * SIDE_M / CELLS, 25.0 * at_s / math.sqrt(2.0)
+    middle = start + along
+    ring = [
+        {
+            "circle": {
+                "center_m": [
+                    middle + radius * math.cos(math.tau * i / count),
+                    middle + radius * math.sin(math.tau * i / count),
+                ],
+                "radius_m": 12.0,
+            },
+            "active_s": [at_s, 1000.0],
+        }
+        for i in range(count)
+        if not open_from <= i < open_to
+    ]
+    flight = fly(make_loop(scenario_with(small_world, ring), PointMass))
+    assert flight.outcome is Outcome.PLANNER_FAILED, flight.reason
+    assert "CertificateBroken" in flight.reason
+    assert "certified to be free" in flight.reason
+    assert at_s < flight.sim_s < at_s + 3.0
+
+
+@pytest.mark.parametrize(("range_m", "status"), [(300.0, 2), (315.0, 0)])
+def test_a_sensor_that_cannot_see_a_turn_is_refused_with_the_numbers(
+    small_world: SmallWorld,
+    tmp_path: FilePath,
+    capsys: pytest.CaptureFixture[str],
+    range_m: float,
+    status: int,
+) -> None:
+    text = dump_scenario(scenario_with(small_world, []))
+    text = re.sub(r"(planning_window_m|rolling_step_m): [\d.]+,?\s*", "", text).replace(", }", "}")
+    at = tmp_path / "short.yaml"
+    at.write_text(text.replace("range_m: 1000.0", f"range_m: {range_m:g}"))
+    assert main(["validate", str(at)]) == status
+    said = capsys.readouterr().err
+    assert ("too short for a turn radius of 110 m with a clearance of 40 m" in said) is (status == 2)
+    assert ("at least 311 is needed" in said) is (status == 2)
+    if status == 2:
+        assert main(["fly", str(at), "--out", str(tmp_path / "run")]) == 2
+        assert not (tmp_path / "run").exists()
