@@ -72,7 +72,7 @@ class Certifier:
         """
         free_to = self.seen_free_to_m(path, seen)
         step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
-        stations = free_to - step * np.arange(int(free_to / step) + 1)
+        stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
         poses = poses_at(path, stations)
         free: dict[float, list[bool]] = {}
         for side in (1.0, -1.0):  # left, right

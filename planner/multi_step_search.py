@@ -18,11 +18,14 @@ from planner.curves import Point
 from planner.step_model import distance_left_m
 from planner.window import SectorEdge, Window, guide_vector
 
-MOST_TRACKS = 500
+MOST_TRACKS = 300
 """So many tracks at most are looked at in one search."""
 
 SHORT_OF = 0.005
 """A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
+
+BACK_RAD, AWAY_RAD = 2.1, 0.8
+"""Largest turn from one step to the next, and largest one away from the obstacle that the last step hugged."""
 
 APART = 0.06
 """Track points nearer to each other than this share of the distance kept from obstacles are one."""
@@ -36,11 +39,13 @@ class Track:
         nodes: track points, from the present one on.
         flown_m: length of the steps.
         left_m: distance from the last track point to the goal.
+        last: the edge of the last step, where that ended by hugging it.
     """
 
     nodes: tuple[Point, ...]
     flown_m: float
     left_m: float
+    last: SectorEdge | None = None
 
     @property
     def cost_m(self) -> float:
@@ -108,13 +113,23 @@ def search(
 def _step(window: Window, track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
     """One step along the edge of a free sector; None where it leads nowhere."""
     here = track.nodes[-1]
-    length = min(window.hugged_m(here, edge, outer_m), edge.clear_m - SHORT_OF * outer_m)
+    if track.last is not None:
+        # A shortest way bends round what it hugs, not away from it and not back.
+        turn = math.atan2(
+            track.last.ux * edge.uy - track.last.uy * edge.ux,
+            track.last.ux * edge.ux + track.last.uy * edge.uy,
+        )
+        if abs(turn) > BACK_RAD or turn * track.last.side > AWAY_RAD:
+            return None
+    hugged = window.hugged_m(here, edge, outer_m)
+    length = min(hugged, edge.clear_m - SHORT_OF * outer_m)
     if length < 1e-2 * outer_m:
         return None
     x, y = here[0] + edge.ux * length, here[1] + edge.uy * length
     gx, gy, left = guide_vector(here, goal)
     off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
-    return Track((*track.nodes, (x, y)), track.flown_m + length, distance_left_m(left, length, off_guide))
+    left = distance_left_m(left, length, off_guide)
+    return Track((*track.nodes, (x, y)), track.flown_m + length, left, edge if length == hugged else None)
 
 
 def _inside(point: Point, bounds_m: tuple[float, float, float, float]) -> bool:

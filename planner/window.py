@@ -41,6 +41,7 @@ class SectorEdge(NamedTuple):
         touch_m: distance at which it touches the obstacle.
         clear_m: distance up to which the direction is free; infinite where nothing is met.
         obstacle: label of the obstacle.
+        side: 1 for M, -1 for N.
     """
 
     ux: float
@@ -48,6 +49,7 @@ class SectorEdge(NamedTuple):
     touch_m: float
     clear_m: float
     obstacle: int
+    side: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,19 +123,17 @@ class Window:
         dx, dy = self.points_m[:, 0] - origin[0], self.points_m[:, 1] - origin[1]
         while pending:
             obstacle = pending.pop()
-            ux, uy, touch = self._tangents(dx, dy, obstacle)
+            ux, uy, touch, sides = self._tangents(dx, dy, obstacle)
             if not len(ux):
                 continue
             clear, met = self._clear_along(dx, dy, ux, uy)
-            for row in zip(
-                ux.tolist(), uy.tolist(), touch.tolist(), clear.tolist(), met.tolist(), strict=True
-            ):
-                _, _, touches, clear_to, _ = row
-                if clear_to >= touches:
-                    edges.append(SectorEdge(*row[:4], obstacle))
-                if clear_to < touches + self.keep_m[row[4]]:
+            rows = np.column_stack((ux, uy, touch, clear)).tolist()
+            for (*row, clear_to), side, met_by in zip(rows, sides, met.tolist(), strict=True):
+                if clear_to >= row[2]:
+                    edges.append(SectorEdge(row[0], row[1], row[2], clear_to, obstacle, side))
+                if clear_to < row[2] + self.keep_m[met_by]:
                     # Hidden, or closed right behind: the way goes round what hides it.
-                    other = int(self.labels[row[4]])
+                    other = int(self.labels[met_by])
                     if other not in looked_at and len(looked_at) < MOST_HIDING:
                         looked_at.add(other)
                         pending.append(other)
@@ -155,15 +155,15 @@ class Window:
 
     def _tangents(
         self, dx: FloatArray, dy: FloatArray, label: int
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Unit vectors tangent to the ends of an obstacle's fan, and the distances at which they touch it."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray, list[float]]:
+        """Unit vectors tangent to the ends of an obstacle's fan, where they touch it, and which ends they are."""
         cells = self._obstacle(label)
         x, y = dx[cells.members], dy[cells.members]
         square = x * x + y * y
         keep = self.keep_m[cells.members]
         half = np.arcsin(np.minimum(keep / np.sqrt(np.maximum(square, 1e-12)), 1.0))
         middle = np.arctan2(y, x)
-        angles, touches = [], []
+        angles, touches, sides = [], [], []
         for side in (1.0, -1.0):  # M, N
             # Angles towards the side, relative to the first point of their cell: none is cut at pi.
             edge = side * middle + half
@@ -182,8 +182,9 @@ class Window:
                 if touch2 > 0.0:
                     angles.append(side * (edge[place] + EDGE_OFF_RAD))
                     touches.append(math.sqrt(touch2))
+                    sides.append(side)
         angle = np.array(angles)
-        return np.cos(angle), np.sin(angle), np.array(touches)
+        return np.cos(angle), np.sin(angle), np.array(touches), sides
 
     def _clear_along(
         self, dx: FloatArray, dy: FloatArray, ux: FloatArray, uy: FloatArray

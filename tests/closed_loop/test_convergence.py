@@ -187,13 +187,15 @@ def across(rng: Generator) -> Obstacles:
 def room_for(start: Place, goal: Place, obstacles: Obstacles) -> Obstacles:
     """Those that leave a mission to be begun and a goal to be wanted."""
     ends = shapely.points([start, goal])
-    kept = (shapely.distance(ends, shape(obstacle)) > (START_ROOM_M, 1.5 * CLEARANCE_M) for obstacle in obstacles)
+    kept = (
+        shapely.distance(ends, shape(obstacle)) > (START_ROOM_M, 1.5 * CLEARANCE_M) for obstacle in obstacles
+    )
     return [obstacle for obstacle, keep in zip(obstacles, kept, strict=True) if keep.all()]
 
 
 FAMILIES: dict[str, Callable[[Generator, Place, Place], Obstacles]] = {
-    "circles": lambda rng, *ends: room_for(*ends, scattered_circles(rng, 220)),
-    "polygons": lambda rng, *ends: room_for(*ends, scattered_polygons(rng, 90)),
+    "circles": lambda rng, start, goal: room_for(start, goal, scattered_circles(rng, 220)),
+    "polygons": lambda rng, start, goal: room_for(start, goal, scattered_polygons(rng, 90)),
     "maze": lambda rng, *_: maze(rng),
     "spiral": lambda rng, *_: spiral(rng),
     "enclosed_goal": lambda rng, _, goal: enclosure(rng, goal, gap(rng)) + scattered_circles(rng, 15),

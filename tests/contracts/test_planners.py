@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import math
 import types
+from dataclasses import dataclass
 from importlib.util import find_spec
 
 import numpy as np
@@ -17,8 +18,8 @@ from harness.scenario_sections import Sensor
 from harness.world import World
 from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
 from planner.curves import on_loiter, pose_at
-from planner.interface import Plan, PlanRequest, PlanStatus
-from planner.registry import planner_kinds
+from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.registry import PlannerKind, planner_kinds
 
 KINDS = {
     name: kind
@@ -79,6 +80,59 @@ def test_a_kind_that_is_left_out_needs_a_package_that_is_not_there() -> None:
         with pytest.raises(ValueError, match=f"(?i){kind.needs}"):
             kind.config().resolved(MISSION)
     assert len(KINDS) >= 5
+
+
+@dataclass(frozen=True)
+class NoKeys:
+    """Keys of the planners below: none."""
+
+    def resolved(self, mission: Mission) -> NoKeys:
+        return self
+
+
+class Faulty:
+    """Flies straight at the goal from wherever it is; does one thing that no planner may do."""
+
+    made = 0
+
+    def __init__(self, fault: str, mission: Mission) -> None:
+        Faulty.made += 1
+        self.fault, self.mission = fault, mission
+
+    def plan(self, request: PlanRequest) -> Plan:
+        (x, y), (gx, gy) = request.position_m, self.mission.goal_m
+        left = max(math.dist((x, y), (gx, gy)), 1.0)
+        if self.fault == "raises" and left < 2.0:
+            raise ZeroDivisionError
+        if request.flown is not None:
+            return Plan(PlanStatus.KEPT, "straight on")
+        ux, uy = ((gx - x) / left, (gy - y) / left) if self.fault == "turns at once" else request.direction
+        reason = f"plan {Faulty.made}" if self.fault == "shares" else "straight on"
+        bend = {"too tight": 1.0 / 50.0}.get(self.fault, 0.0)
+        length = {"leaves": 50_000.0, "too tight": 60.0}.get(self.fault, left)
+        path = Path(np.array([(x, y, ux, uy, bend, length)]))
+        return Plan(PlanStatus.FOUND, reason, np.array([(x, y), (gx, gy)]), path)
+
+
+@pytest.mark.parametrize(
+    ("fault", "test"),
+    [
+        ("raises", "test_never_raises_wherever_the_first_plan_begins"),
+        ("shares", "test_two_instances_give_the_same_plans_bit_for_bit"),
+        ("turns at once", "test_plans_are_complete"),
+        ("too tight", "test_paths_are_joined_no_tighter_than_the_turn_radius_and_inside"),
+        ("leaves", "test_paths_are_joined_no_tighter_than_the_turn_radius_and_inside"),
+        ("goes by", "test_an_empty_world_is_flown_to_the_goal"),
+    ],
+)
+def test_the_contract_sees_a_fault(fault: str, test: str) -> None:
+    def faulty(_: NoKeys, mission: Mission) -> Faulty:
+        return Faulty(fault, mission)
+
+    kind = PlannerKind("faulty", "does one thing that no planner may do", NoKeys, faulty)
+    tests = type("Broken", (PlannerContract,), {"kind": kind})()
+    with pytest.raises((AssertionError, ZeroDivisionError)):
+        getattr(tests, test)()
 
 
 def reachable(*roots: object) -> list[object]:

@@ -77,7 +77,8 @@ def filled_disc(path: Path, radius: float, spacing: float) -> FloatArray:
     axis = np.arange(-radius, radius + spacing, spacing)
     dx, dy = (each.ravel() for each in np.meshgrid(axis, axis))
     inside = dx * dx + dy * dy <= radius * radius
-    return np.column_stack((dx[inside], dy[inside])) + middle
+    places: FloatArray = np.column_stack((dx[inside], dy[inside])) + middle
+    return places
 
 
 def assert_certified(
