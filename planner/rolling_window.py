@@ -24,11 +24,11 @@ import numpy as np
 
 from planner.barrier import Barrier
 from planner.certificate import Certified, Certifier, least_sensor_range_m
-from planner.clearance import first_breach
 from planner.course import Course
 from planner.curves import Point, Pose, along, on_loiter, onward, place_on
+from planner.effect import Effect, Watch
 from planner.hold import hold
-from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track
@@ -142,27 +142,6 @@ class RollingWindowConfig:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Effect:
-    """A plan in effect, and what it is the beginning of.
-
-    Attributes:
-        plan: as it was given to the loop.
-        path: its path: along the course, then into the turn.
-        course: the whole way.
-        leaves_m: station at which the path leaves the course for the turn.
-    """
-
-    plan: Plan
-    path: Path
-    course: Course
-    leaves_m: float
-
-    def holds(self, station_m: float) -> bool:
-        """Whether an aircraft there is in the turn."""
-        return station_m >= self.leaves_m
-
-
 class RollingWindow:
     """The planner for one flight."""
 
@@ -186,8 +165,8 @@ class RollingWindow:
         self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
         self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.speed_mps
         self._barrier: Barrier | None = None
-        self._proposed: _Effect | None = None
-        self._effect: _Effect | None = None
+        self._proposed: Effect | None = None
+        self._effect: Effect | None = None
         self._searched_at_m = 0.0  # station and number of edge points at the last search
         self._searched_with = 0
         self._news_at_m = 0.0
@@ -195,8 +174,11 @@ class RollingWindow:
             1.5 * math.tau * mission.turn_radius_m
         )  # nothing new is seen in more of a turn than this
         self._refused_at_m = 0.0
-        self._cut_m = math.inf  # where the course comes too near to something seen since it was found
-        self._broken = False  # the certified part of it does, or its turn
+        self._watch = Watch(
+            keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
+            turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
+            urgent_m=self._urgent_m,
+        )
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
@@ -204,44 +186,35 @@ class RollingWindow:
         effect = self._in_effect(request)
         if effect is None:
             return self._roll(request, None, 0.0)
-        here = on_loiter(effect.path, request.station_m)
-        newly_cut = len(fresh) > 0 and self._watch(effect, here, fresh)
+        here = request.station_m
+        if effect.holds(here):
+            here = on_loiter(effect.path, here)
+        newly_cut = self._watch.look(effect, here, request.position_m, fresh)
         since = request.station_m - self._searched_at_m
         certified = effect.leaves_m - here
-        settled = effect.course.shortest and self._cut_m == math.inf
+        settled = effect.course.shortest and self._watch.cut_m == math.inf
         due = since >= self._rolling_step_m
         due &= not (settled and certified > PROLONG * self._mission.sensor_range_m)
-        due |= newly_cut and min(self._cut_m - here, certified) < self._urgent_m
-        due |= since >= self._lead_m and min(self._cut_m - here, certified) < self._least_m
-        if not due and not self._broken:
+        due |= newly_cut and min(self._watch.cut_m - here, certified) < self._urgent_m
+        due |= since >= self._lead_m and min(self._watch.cut_m - here, certified) < self._least_m
+        if not due and not self._watch.broken:
             return Plan(PlanStatus.KEPT, "the plan in effect serves")
         self._searched_at_m = request.station_m
         return self._roll(request, effect, here)
 
-    def _in_effect(self, request: PlanRequest) -> _Effect | None:
+    def _in_effect(self, request: PlanRequest) -> Effect | None:
         """The plan in effect; a new one begins uncut."""
         if self._proposed is not None and request.flown is self._proposed.plan:
             self._effect, self._proposed = self._proposed, None
-            self._cut_m, self._broken = math.inf, False
+            self._watch.begin()
             self._searched_at_m = self._refused_at_m = self._news_at_m = 0.0
         return self._effect
 
-    def _watch(self, effect: _Effect, here: float, fresh: FloatArray) -> bool:
-        """Looks whether what was seen just now is in the way; returns whether the course is cut anew."""
-        keep = 0.5 * (self._mission.clearance_m + self._local.path_keeps_m)
-        before = self._cut_m
-        if not effect.holds(here):
-            self._cut_m = min(before, first_breach(effect.course.path, fresh, keep, here))
-        turn = Path(effect.path.segments[-1:])
-        certain = self._mission.clearance_m * BROKEN_SHARE
-        self._broken |= self._cut_m < effect.leaves_m or first_breach(turn, fresh, certain) < math.inf
-        return self._cut_m < before
-
-    def _roll(self, request: PlanRequest, effect: _Effect | None, here: float) -> Plan:
+    def _roll(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
         start = self._start(request, effect, here)
         ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
-        serves = ahead is not None and math.isinf(self._cut_m) and not self._broken
+        serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
         tracks: list[Track] = []
         stuck: Course | None = None
         known = len(self._memory.points_m)
@@ -250,7 +223,7 @@ class RollingWindow:
         elif (
             ahead is None
             and effect is not None
-            and not self._broken
+            and not self._watch.broken
             and request.station_m - self._news_at_m > self._patience_m
         ):
             return self._no_way(request, effect, here, None)
@@ -312,25 +285,23 @@ class RollingWindow:
             path=certified.path,
             picture=self._picture(start, course, tracks),
         )
-        self._proposed = _Effect(plan, certified.path, course, certified.leaves_m)
+        self._proposed = Effect(plan, certified.path, course, certified.leaves_m)
         return plan
 
-    def _start(self, request: PlanRequest, effect: _Effect | None, here: float) -> Start:
+    def _start(self, request: PlanRequest, effect: Effect | None, here: float) -> Start:
         """Where a new plan begins: a little ahead on the one in effect, or at the aircraft itself."""
         if effect is not None:
             nearest, _ = place_on(effect.path, here)
             if math.dist(nearest[:2], request.position_m) <= max(
                 1.0, OFF_PATH * self._mission.tracking_error_m
             ):
-                prefix = onward(effect.path, here, max(0.0, min(self._lead_m, self._cut_m - here)))
+                prefix = onward(effect.path, here, max(0.0, min(self._lead_m, self._watch.cut_m - here)))
                 if prefix:
                     last = prefix[-1]
                     return Start(request.position_m, along(last, last[5]), last[4], prefix)
         return Start(request.position_m, Pose(*request.position_m, *request.direction))
 
-    def _no_way(
-        self, request: PlanRequest, effect: _Effect | None, here: float, stuck: Course | None
-    ) -> Plan:
+    def _no_way(self, request: PlanRequest, effect: Effect | None, here: float, stuck: Course | None) -> Plan:
         """No new plan: prove that there is none, or leave the plan in effect to end in its turn."""
         if stuck is None and self._is_closed(request):
             gap = 2.0 * self._local.least_keeps_m
@@ -339,7 +310,7 @@ class RollingWindow:
                 "a closed chain of obstacles lies between the aircraft and the goal: "
                 f"no gap in it is wider than {gap:.0f} m",
             )
-        if effect is None or self._broken:
+        if effect is None or self._watch.broken:
             return self._turn_away(request, effect, here)
         turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
         if stuck is not None and turned > math.tau * self._mission.turn_radius_m:
@@ -360,14 +331,14 @@ class RollingWindow:
         self._barrier.add(genuine[self._barrier.count :][:PROVED_AT_ONCE])
         return self._barrier.closed
 
-    def _turn_away(self, request: PlanRequest, effect: _Effect | None, here: float) -> Plan:
+    def _turn_away(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """A turn that only keeps away from what is known, for want of one that is seen to be free."""
         limits = self._local.limits
         if effect is None:
             straight = (*request.position_m, *request.direction, 0.0, limits.roll_m)
             path, here, last = Path(np.array([straight])), 0.0, 0.0
         else:
-            path, last = effect.path, min(self._cut_m, effect.leaves_m)
+            path, last = effect.path, min(self._watch.cut_m, effect.leaves_m)
         for share in HOLD_SHARES:
             turn = hold(path, here, last, limits, self._local.terrain(share * self._mission.clearance_m))
             if turn is not None:
@@ -375,7 +346,7 @@ class RollingWindow:
                 waypoints = np.array([request.position_m, turn.segments[-1, :2]])
                 plan = Plan(PlanStatus.FOUND, reason, waypoints, turn)
                 leaves = turn.length_m - float(turn.segments[-1, 5])
-                self._proposed = _Effect(
+                self._proposed = Effect(
                     plan, turn, Course(turn, (request.position_m,), 0, shortest=False), leaves
                 )
                 return plan

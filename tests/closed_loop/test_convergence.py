@@ -247,7 +247,7 @@ def scenario_of(seed: int, family: str, start: Place, goal: Place, obstacles: Ob
             "goal_radius_m": GOAL_RADIUS_M,
             "time_limit_s": 6000.0,
         },
-        "sensor": {"range_m": 1000.0, "rays": 360},
+        "sensor": {"range_m": 1000.0, "rays": 360, "rate_hz": 1.0},
         "planner": {"kind": "rolling_window", "clearance_m": CLEARANCE_M},
     }
     return parse_scenario(dump(plain))

@@ -1,0 +1,81 @@
+"""The plan in effect, and the watch over what is seen in its way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.clearance import first_breach
+from planner.course import Course
+from planner.curves import Point
+from planner.interface import FloatArray, Path, Plan
+
+WATCHED_TOGETHER = 4
+"""Edges that are not near are compared with the course when so many scans have brought some."""
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """A plan in effect, and what it is the beginning of.
+
+    Attributes:
+        plan: as it was given to the loop.
+        path: its path: along the course, then into the turn.
+        course: the whole way.
+        leaves_m: station at which the path leaves the course for the turn.
+    """
+
+    plan: Plan
+    path: Path
+    course: Course
+    leaves_m: float
+
+    def holds(self, station_m: float) -> bool:
+        """Whether an aircraft there is in the turn."""
+        return station_m >= self.leaves_m
+
+
+class Watch:
+    """Compares edges as they come in with the plan in effect.
+
+    Args:
+        keep_m: a course that comes nearer to an edge is cut there.
+        turn_keeps_m: a certified turn that comes nearer to one is broken.
+        urgent_m: edges nearer to the aircraft are compared at once.
+    """
+
+    def __init__(self, *, keep_m: float, turn_keeps_m: float, urgent_m: float) -> None:
+        self._keep, self._turn_keeps, self._urgent = keep_m, turn_keeps_m, urgent_m
+        self._waiting: list[FloatArray] = []
+        self._nearest_m = math.inf
+        self.begin()
+
+    def begin(self) -> None:
+        """A new plan is in effect: it begins uncut."""
+        self.cut_m = math.inf
+        """Station at which the course comes too near to an edge seen since it was found."""
+        self.broken = False
+        """Its certified part does so, or its turn."""
+
+    def look(self, effect: Effect, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
+        """Takes in new edges, (k, 2): compares them at once where one is near, else those of a few scans together.
+
+        Returns:
+            Whether the course is cut anew, or nearer than before.
+        """
+        if len(fresh_m):
+            self._waiting.append(fresh_m)
+            away = np.hypot(fresh_m[:, 0] - position[0], fresh_m[:, 1] - position[1])
+            self._nearest_m = min(self._nearest_m, float(away.min()))
+        if not self._waiting or (len(self._waiting) < WATCHED_TOGETHER and self._nearest_m > self._urgent):
+            return False
+        edges = np.concatenate(self._waiting)
+        self._waiting, self._nearest_m = [], math.inf
+        before = self.cut_m
+        if not effect.holds(here_m):
+            self.cut_m = min(before, first_breach(effect.course.path, edges, self._keep, here_m))
+        turn = Path(effect.path.segments[-1:])
+        self.broken |= self.cut_m < effect.leaves_m or first_breach(turn, edges, self._turn_keeps) < math.inf
+        return self.cut_m < before
