@@ -181,19 +181,22 @@ class _Plans:
         """When the plan on its way takes effect."""
         self.index = -1
         """Index of the plan in effect, -1 before the first."""
-        self._hold = False
+        self._station, self._turns_at = 0.0, math.inf
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
 
     @property
     def state(self) -> str:
         """One word for people."""
-        return "waiting" if not self.accepted else "holding" if self._hold else "following"
+        return (
+            "waiting" if not self.accepted else "holding" if self._station > self._turns_at else "following"
+        )
 
     def ask(self, state: AircraftState, station_m: float) -> tuple[Outcome, str] | None:
         """Asks the planner, unless it is still at work; returns how the flight ends if that is its answer."""
         if self._coming is not None:
             return None
+        self._station = station_m
         flown = self.accepted[-1].plan if self.accepted else None
         speed = max(state.groundspeed_mps, 1e-9)
         request = PlanRequest(
@@ -234,7 +237,8 @@ class _Plans:
         accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
         self.accepted.append(accepted)
         self.index = accepted.plan_index
-        self._hold = plan.path.loiter
+        turn = float(plan.path.segments[-1, 5]) if plan.path.loiter else -math.inf
+        self._station, self._turns_at = 0.0, plan.path.length_m - turn
         for observer in self._observers:
             observer.on_plan(accepted, state)
 

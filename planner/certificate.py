@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.curves import Limits, Segment, along, between, full_turn, place_on, poses_at
+from planner.curves import Limits, Segment, along, between, curvature_at, full_turn, place_on, poses_at
 from planner.interface import FloatArray, Path, SeenWorld
 from planner.route_optimisation import Terrain
 
@@ -73,12 +73,13 @@ class Certifier:
         free_to = self.seen_free_to_m(path, seen)
         step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
         stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
-        poses = poses_at(path, stations)
+        poses, bends = poses_at(path, stations), curvature_at(path, stations)
         free: dict[float, list[bool]] = {}
         for side in (1.0, -1.0):  # left, right
-            centres = poses[:, :2] + side * self._limits.radius_m * np.column_stack(
-                (-poses[:, 3], poses[:, 2])
-            )
+            # Where the path turns the other way, the turn begins after room to roll.
+            roll = np.where(side * bends < 0.0, self._limits.roll_m, 0.0)[:, None]
+            leftwards = np.column_stack((-poses[:, 3], poses[:, 2]))
+            centres = poses[:, :2] + roll * poses[:, 2:] + side * self._limits.radius_m * leftwards
             places = (centres[:, None] + self._disc).reshape(-1, 2)
             free[side] = np.all(seen.seen_free(places).reshape(len(stations), -1), axis=1).tolist()
         for i, station in enumerate(stations.tolist()):

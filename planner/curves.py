@@ -72,6 +72,14 @@ def poses_at(path: Path, stations_m: FloatArray) -> FloatArray:
     return np.column_stack((x + chord * cx, y + chord * cy, cx * c - cy * sn, cy * c + cx * sn))
 
 
+def curvature_at(path: Path, stations_m: FloatArray) -> FloatArray:
+    """(k,) curvature at (k,) stations along a path, 1/m."""
+    ends = np.cumsum(path.segments[:, 5])
+    which = np.minimum(np.searchsorted(ends, stations_m), len(ends) - 1)
+    curvature: FloatArray = path.segments[which, 4]
+    return curvature
+
+
 def pose_at(path: Path, station_m: float) -> Pose:
     """The pose `station_m` along a path, clamped to its ends."""
     return place_on(path, station_m)[0]

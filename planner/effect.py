@@ -9,11 +9,11 @@ import numpy as np
 
 from planner.clearance import first_breach
 from planner.course import Course
-from planner.curves import Point
+from planner.curves import Point, between
 from planner.interface import FloatArray, Path, Plan
 
 WATCHED_TOGETHER = 4
-"""Edges that are not near are compared with the course when so many scans have brought some."""
+"""Edges that are not near are compared with the course once in so many scans."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,11 @@ class Effect:
         """Whether an aircraft there is in the turn."""
         return station_m >= self.leaves_m
 
+    def left(self, station_m: float) -> Path:
+        """What is left of it: the way to its turn, and the turn."""
+        way = [] if self.holds(station_m) else between(self.path, station_m, self.leaves_m)
+        return Path(np.array([*way, *self.path.segments[-1:].tolist()]))
+
 
 class Watch:
     """Compares edges as they come in with the plan in effect.
@@ -50,6 +55,7 @@ class Watch:
         self._keep, self._turn_keeps, self._urgent = keep_m, turn_keeps_m, urgent_m
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
+        self._since = WATCHED_TOGETHER  # scans since edges were compared
         self.begin()
 
     def begin(self) -> None:
@@ -65,12 +71,14 @@ class Watch:
         Returns:
             Whether the course is cut anew, or nearer than before.
         """
+        self._since += 1
         if len(fresh_m):
             self._waiting.append(fresh_m)
             away = np.hypot(fresh_m[:, 0] - position[0], fresh_m[:, 1] - position[1])
             self._nearest_m = min(self._nearest_m, float(away.min()))
-        if not self._waiting or (len(self._waiting) < WATCHED_TOGETHER and self._nearest_m > self._urgent):
+        if not self._waiting or (self._since < WATCHED_TOGETHER and self._nearest_m > self._urgent):
             return False
+        self._since = 0
         edges = np.concatenate(self._waiting)
         self._waiting, self._nearest_m = [], math.inf
         before = self.cut_m

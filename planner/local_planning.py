@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -112,7 +112,12 @@ class LocalPlanning:
         return [*attempts, Attempt(clearance + radius, margin)]
 
     def route(
-        self, start: Start, attempt: Attempt, course: Course | None, tracks: list[Track]
+        self,
+        start: Start,
+        attempt: Attempt,
+        course: Course | None,
+        tracks: list[Track],
+        closed: Callable[[], bool],
     ) -> Route | None:
         """The shortest of the n best tracks, after route optimisation.
 
@@ -121,6 +126,7 @@ class LocalPlanning:
             attempt: how far from obstacles.
             course: what is flown now; the other side of something is taken only for a shorter way.
             tracks: the candidates that were looked at are added to it.
+            closed: whether it is proved that there is no way; asked before a wider search.
         """
         room = self._room(start)
         terrain = self._terrain(attempt, room)
@@ -128,7 +134,7 @@ class LocalPlanning:
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         best: Route | None = None
         stays = False
-        for track in self._found(window, attempt):
+        for track in self._found(window, attempt, closed):
             switching = 0.0 if course is None or stays else SWITCH * track.cost_m
             if best is not None and track.cost_m >= best.path.length_m + switching:
                 break
@@ -174,7 +180,7 @@ class LocalPlanning:
         nearer: FloatArray = np.minimum(*room)
         return nearer
 
-    def _found(self, window: Window, attempt: Attempt) -> Iterator[Track]:
+    def _found(self, window: Window, attempt: Attempt, closed: Callable[[], bool]) -> Iterator[Track]:
         """The n best tracks; where there is none, those of a wider search."""
         found = 0
         for widening in (1, WIDER):
@@ -189,5 +195,5 @@ class LocalPlanning:
             for track in islice(tracks, self._candidates):
                 found += 1
                 yield track
-            if found:
+            if found or closed():
                 return

@@ -47,13 +47,13 @@ BETTER = 0.005
 BROKEN_SHARE = 0.99
 """Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
-PROVED_AT_ONCE = 400
+PROVED_AT_ONCE = 1000
 """So many edge points at most are taken into the proof in one call."""
 
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-HOLD_SHARES = (1.0, 0.5, 0.1)
+HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
 
 
@@ -229,7 +229,7 @@ class RollingWindow:
             return self._no_way(request, effect, here, None)
         if ahead is None or not serves or not (ahead.shortest or known == self._searched_with):
             self._searched_with = known
-            for course in self._courses(start, ahead, tracks):
+            for course in self._courses(request, start, ahead, tracks):
                 if (
                     ahead is not None
                     and serves
@@ -247,7 +247,9 @@ class RollingWindow:
             return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
         return self._no_way(request, effect, here, stuck)
 
-    def _courses(self, start: Start, ahead: Course | None, tracks: list[Track]) -> Iterator[Course]:
+    def _courses(
+        self, request: PlanRequest, start: Start, ahead: Course | None, tracks: list[Track]
+    ) -> Iterator[Course]:
         """Ways to the goal, those that are wanted most first."""
         known = len(self._memory.points_m)
         found = False
@@ -256,7 +258,7 @@ class RollingWindow:
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
             before = len(tracks)
-            route = self._local.route(start, attempt, ahead, tracks)
+            route = self._local.route(start, attempt, ahead, tracks, lambda: self._is_closed(request))
             if len(tracks) == before:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:
@@ -303,6 +305,8 @@ class RollingWindow:
 
     def _no_way(self, request: PlanRequest, effect: Effect | None, here: float, stuck: Course | None) -> Plan:
         """No new plan: prove that there is none, or leave the plan in effect to end in its turn."""
+        if self._watch.broken and effect is not None:
+            return self._turn_away(request, effect, here)
         if stuck is None and self._is_closed(request):
             gap = 2.0 * self._local.least_keeps_m
             return Plan(
@@ -310,8 +314,8 @@ class RollingWindow:
                 "a closed chain of obstacles lies between the aircraft and the goal: "
                 f"no gap in it is wider than {gap:.0f} m",
             )
-        if effect is None or self._watch.broken:
-            return self._turn_away(request, effect, here)
+        if effect is None:
+            return self._turn_away(request, None, here)
         turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
         if stuck is not None and turned > math.tau * self._mission.turn_radius_m:
             # The whole turn has shown nothing more: what lies ahead there cannot be entered.
@@ -340,7 +344,14 @@ class RollingWindow:
         else:
             path, last = effect.path, min(self._watch.cut_m, effect.leaves_m)
         for share in HOLD_SHARES:
-            turn = hold(path, here, last, limits, self._local.terrain(share * self._mission.clearance_m))
+            terrain = self._local.terrain(share * self._mission.clearance_m)
+            if effect is not None and terrain.admits(effect.left(here)):
+                self._watch.broken = False
+                return Plan(
+                    PlanStatus.NO_PATH,
+                    "the plan in effect goes on into its turn, nearer to something than wanted",
+                )
+            turn = hold(path, here, last, limits, terrain)
             if turn is not None:
                 reason = "no way on can be seen to be safe; turning away"
                 waypoints = np.array([request.position_m, turn.segments[-1, :2]])

@@ -37,7 +37,7 @@ START_ROOM_M = 280.0
 MOST_CELLS = 8
 """A maze's cells, along a side: more would leave no room for a start."""
 
-QUICK, ALL = 24, 500
+QUICK, ALL = 7, 500
 BLUR = 0.25
 """What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
 

@@ -151,7 +151,7 @@ obstacle = st.fixed_dictionaries(
     altitude_m=st.floats(50, 20000),
     sensor=st.fixed_dictionaries(
         {},
-        optional={"range_m": st.floats(100, 1e5), "rays": st.integers(3, 9999), "dropout": st.floats(0, 1)},
+        optional={"range_m": st.floats(2e4, 1e5), "rays": st.integers(3, 9999), "dropout": st.floats(0, 1)},
     ),
 )
 def test_a_dump_loads_back_bit_for_bit(
