@@ -37,7 +37,9 @@ START_ROOM_M = 280.0
 MOST_CELLS = 8
 """A maze's cells, along a side: more would leave no room for a start."""
 
-QUICK, ALL = 7, 500
+ALL = range(500)
+QUICK = [seed for seed in range(24) if seed not in (7, 8)]
+"""The flights of 7 and 8 take minutes before they end: they are among the slow ones."""
 BLUR = 0.25
 """What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
 
@@ -282,13 +284,13 @@ def assert_converges(seed: int) -> None:
     assert flight.track.clearance_m.min() >= (1.0 - BLUR) * CLEARANCE_M, dump_scenario(world.scenario)
 
 
-@pytest.mark.parametrize("seed", range(QUICK))
+@pytest.mark.parametrize("seed", QUICK)
 def test_converges(seed: int) -> None:
     assert_converges(seed)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(QUICK, ALL))
+@pytest.mark.parametrize("seed", [seed for seed in ALL if seed not in QUICK])
 def test_converges_everywhere(seed: int) -> None:
     assert_converges(seed)
 
@@ -300,7 +302,7 @@ def verdicts(seeds: range) -> Iterator[tuple[str, bool]]:
 
 
 def test_every_family_and_both_verdicts_are_drawn() -> None:
-    found = set(verdicts(range(QUICK)))
+    found = set(verdicts(range(24)))
     assert {family for family, _ in found} == set(FAMILIES)
     assert {family for family, verdict in found if not verdict} == set(FAMILIES)
     assert {family for family, verdict in found if verdict} == set(FAMILIES)
