@@ -240,7 +240,7 @@ def fillet(
                 if need > min(free, out):
                     return None
                 # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
-                widest = cut_m / (1.0 / math.cos(0.5 * turn) - 1.0) * tangent
+                widest = cut_m * tangent / max(1.0 / math.cos(0.5 * turn) - 1.0, 1e-12)
                 wanted = min(widest, 0.5 * leg, out if i + 2 == len(nodes) else 0.5 * out)
                 trim = min(max(need, wanted), free)
                 radius = trim / tangent
