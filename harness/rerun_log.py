@@ -72,6 +72,7 @@ class RerunLog:
         self._moving = [each for each in enumerate(scene.obstacles) if not stands_for_ever(each[1])]
         log_scene(self._rec, scene)
         self._log_trail_style()
+        self.flush()
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Takes a scan; draws it when one is due. Cheap otherwise."""
