@@ -16,6 +16,7 @@ import pytest
 from aircraft.airframes import aircraft_names
 from harness import cli, scenario, shipped
 from harness.cli import main
+from harness.commands import flights
 from harness.record import RunFolderError
 from harness.strict_yaml import InputError
 from planner.registry import planner_kinds
@@ -240,7 +241,7 @@ def test_the_default_run_folder_is_that_of_the_contract(tmp_path: Path) -> None:
     text = shipped.shipped_scenarios()["paper_circles"].read_text()
     (tmp_path / "s.yaml").write_text(text.replace("name: paper_circles", "name: other"))
     loaded = scenario.load_scenario(tmp_path / "s.yaml", [("seed", "7")])
-    assert cli._default_folder(loaded) == Path("runs/other/rolling_window-aerosonde-7")
+    assert flights._default_folder(loaded) == Path("runs/other/rolling_window-aerosonde-7")
 
 
 @dataclass

@@ -1,0 +1,172 @@
+"""The commands that fly: `fly`, `compare`, `bench`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from harness.commands.options import (
+    FAILED,
+    JsonOption,
+    ScenarioArgument,
+    bad_input,
+    flag,
+    load,
+    print_json,
+    setting,
+    straight_m,
+)
+from harness.commands.review import open_viewer
+
+if TYPE_CHECKING:
+    from harness.scenario import Scenario
+
+FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
+"""Exit status of `fly` by outcome; FAILED for the others."""
+
+
+def fly(
+    scenario: ScenarioArgument,
+    planner: Annotated[str | None, typer.Option(metavar="KIND", help="Replaces planner.kind.")] = None,
+    aircraft: Annotated[str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/PLANNER-AIRCRAFT-SEED.")
+    ] = None,
+    no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
+    view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
+    as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
+) -> int:
+    """One closed-loop flight, headless, into a run folder.
+
+    Exit status:
+
+    0 goal reached with no collision and inside the area
+
+    1 flown, but not so
+
+    2 bad input or usage, nothing flown
+
+    3 the planner proved the goal unreachable and the aircraft is safe
+    """
+    if view and no_recording:
+        raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
+    overrides = [("planner.kind", planner), ("aircraft.model", aircraft), ("seed", seed)]
+    given = [(name, str(value)) for name, value in overrides if value is not None]
+    loaded = load(scenario, [*given, *map(setting, settings or ())])
+    folder = out or _default_folder(loaded)
+    metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
+    if as_json:
+        print_json(metrics)
+    elif not quiet:
+        from harness.terminal import flight_rows, print_table
+
+        print_table(f"{loaded.name}: {loaded.planner.kind}, {loaded.aircraft.model}", flight_rows(metrics))
+        typer.echo(f"run folder: {folder}")
+    if view:
+        open_viewer([folder])
+    return FLY_STATUS.get(metrics["outcome"], FAILED)
+
+
+def compare(
+    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Files or shipped names.")],
+    planners: Annotated[str, typer.Option(metavar="A,B,...", help="Kinds of planners, in order.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The comparison's folder.")] = Path(
+        "runs/comparison"
+    ),
+    kinematic: Annotated[
+        bool, flag("--kinematic", "Fly a point that follows every plan exactly, not the aircraft.")
+    ] = False,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
+    ] = None,
+    no_recording: Annotated[bool, flag("--no-recording", "Write no recordings and no overlay.")] = False,
+    as_json: Annotated[bool, flag("--json", "Print comparison.json, and nothing else.")] = False,
+) -> int:
+    """Every planner on every scenario, side by side: table, figures, report, overlay recordings.
+
+    For example: wayproof compare paper_circles --planners rolling_window,bug2
+
+    Exit status:
+
+    0 every planner reached every goal
+
+    1 one did not, or crashed
+
+    2 bad input or usage, nothing flown
+    """
+    kinds = [kind.strip() for kind in planners.split(",")]
+    loaded = [load(scenario, [("planner.kind", kind)]) for scenario in scenarios for kind in kinds]
+
+    from harness.compare import compare as fly_and_compare
+    from harness.compare_terminal import comparison_bar, print_comparison
+    from harness.record import RunFolderError
+
+    try:
+        with comparison_bar(loaded) as report:
+            comparison = fly_and_compare(
+                loaded,
+                out,
+                recording=not no_recording,
+                kinematic=kinematic,
+                workers=workers or os.cpu_count() or 1,
+                progress=report,
+            )
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    except KeyboardInterrupt:
+        typer.echo(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
+        raise
+    if as_json:
+        print_json(comparison.plain())
+    else:
+        print_comparison(comparison.rows)
+        typer.echo(f"report: {out / 'report.html'}")
+    return 0 if comparison.all_reached else FAILED
+
+
+def bench(scenario: ScenarioArgument = "paper_circles", as_json: JsonOption = False) -> int:
+    """What the loop costs on this machine against bare JSBSim, block by block."""
+    loaded = load(scenario)
+
+    from harness.bench import bench as measure
+    from harness.terminal import bench_rows, print_table, progress_bar
+
+    with progress_bar(straight_m(loaded)) as report:
+        result = measure(loaded, report)
+    if as_json:
+        print_json(result)
+    else:
+        print_table(f"bench of {loaded.name}", bench_rows(result))
+    return 0
+
+
+def _default_folder(scenario: Scenario) -> Path:
+    model = Path(scenario.aircraft.model).name
+    return Path("runs") / scenario.name / f"{scenario.planner.kind}-{model}-{scenario.seed}"
+
+
+def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:
+    """Flies into a folder, with a progress bar where a person looks on."""
+    from contextlib import nullcontext
+
+    from harness.record import RunFolderError
+    from harness.run import fly_to_folder
+    from harness.terminal import progress_bar
+
+    try:
+        with nullcontext() if silent else progress_bar(straight_m(scenario)) as report:
+            return fly_to_folder(scenario, folder, recording, report)
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    except KeyboardInterrupt:
+        typer.echo(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
+        raise

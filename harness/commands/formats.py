@@ -1,0 +1,62 @@
+"""The commands about what can be given: `validate`, `schema`, `list`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import typer
+
+from harness.commands.options import BAD_INPUT, load, print_json
+
+
+def validate(
+    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenario files or shipped names.")],
+) -> int:
+    """Checks scenario files without flying them."""
+    from harness.strict_yaml import InputError
+
+    status = 0
+    for file in files:
+        try:
+            loaded = load(file)
+        except InputError as error:
+            typer.echo(str(error), err=True)
+            status = BAD_INPUT
+        else:
+            typer.echo(f"{file}: {loaded.name}, {len(loaded.obstacles)} obstacles: valid")
+    return status
+
+
+def schema(
+    kind: Annotated[Literal["scenario"], typer.Argument(help="The file format.")] = "scenario",
+) -> int:
+    """Prints the JSON Schema of a file format, for editors."""
+    from harness.scenario import scenario_schema
+
+    print_json(scenario_schema())
+    return 0
+
+
+def list_names(
+    what: Annotated[Literal["planners", "aircraft", "scenarios"], typer.Argument(help="Of what.")],
+) -> int:
+    """Prints the names that a scenario or a command can use."""
+    from harness.terminal import print_columns
+
+    print_columns(_summaries(what))
+    return 0
+
+
+def _summaries(what: str) -> dict[str, str]:
+    """What there is, by name, with a line on each."""
+    if what == "planners":
+        from planner.registry import planner_kinds
+
+        return {name: kind.summary for name, kind in planner_kinds().items()}
+    if what == "aircraft":
+        from aircraft.airframes import aircraft_names, airframe
+
+        return {name: airframe(name).summary for name in aircraft_names()}
+    from harness.shipped import shipped_scenarios, summary
+
+    return {name: summary(path) for name, path in shipped_scenarios().items()}
