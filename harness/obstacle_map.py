@@ -32,6 +32,8 @@ NEAR = 5.0
 """Outlines are kept in detail up to so many clearances away."""
 FINER = 4
 """Cells of the fine grid in one of the coarse one, along a side."""
+SAME_PLACE = 1.0 / 32.0
+"""Hits that are seen from where others were seen, but for this share of the least range, tell nothing more."""
 LOOK_THROUGH_EVERY = 6
 """Every so many scans the points in range are asked whether they were looked through."""
 
@@ -73,6 +75,8 @@ class ObstacleMap:
         self._revision = 0
         self._taken_back_at = 0
         self._scans = 0
+        self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
+        self._taken_at = complex(math.inf, math.inf)
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
         self._near_count = 0
@@ -91,9 +95,12 @@ class ObstacleMap:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         self._scans += 1
-        hits = (scan.ranges_m < math.inf).nonzero()[0]
-        if len(hits):
-            self._take_in(scan, hits)
+        nearest = float(scan.ranges_m.min())
+        if nearest < math.inf:
+            sensor = complex(scan.east_m, scan.north_m)
+            if self._unconfirmed or not abs(sensor - self._taken_at) < min(SAME_PLACE * nearest, self._cell):
+                self._taken_at = sensor
+                self._take_in(scan, nearest)
         if self._scans % LOOK_THROUGH_EVERY == 0 and self._count:
             self._look_through(scan)
         self._free.update(scan)
@@ -115,11 +122,13 @@ class ObstacleMap:
         """(k,) whether each of (k, 2) points lies in space seen to be free."""
         return self._free.contains(points_m)
 
-    def _take_in(self, scan: RangeScan, hits: NDArray[np.intp]) -> None:
+    def _take_in(self, scan: RangeScan, nearest_m: float) -> None:
         """Counts hits; where they are news, also what lies between them; and near outlines in detail.
 
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
+        self._unconfirmed = False
+        hits = (scan.ranges_m < math.inf).nonzero()[0]
         ranges = scan.ranges_m.take(hits)
         directions: ComplexArray = scan.directions.view(np.complex128).ravel()
         # Places are points seen from the corner of the grid.
@@ -132,10 +141,10 @@ class ObstacleMap:
             column, row = column[on_grid], row[on_grid]
         keys = column * self._ny + row
         news = self._score.take(keys) < CERTAIN
-        near = ranges < self._near_by
         anything_new = np.count_nonzero(news) > 0
-        if not anything_new and not np.count_nonzero(near):
+        if not anything_new and not nearest_m < self._near_by:
             return
+        near = ranges < self._near_by
         counted, found = keys[news], places[news]
         rays = len(scan.ranges_m)
         closed = _all_round(scan) and hits[0] + rays - hits[-1] <= 2
@@ -176,6 +185,7 @@ class ObstacleMap:
             return
         keys, score = keys[uncertain], score[uncertain]
         self._score[keys] = score + 1  # duplicates of a cell count once a scan
+        self._unconfirmed = bool(score.min() < CONFIRMED - 1)
         raised = keys[score == CONFIRMED - 1]
         if len(raised):
             self._revision += 1
@@ -261,6 +271,8 @@ class _FreeSpace:
         self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
         self._clearance, self._every = clearance_m, range_m / 40.0
         self._last = (math.inf, math.inf)
+        self._reach = 0.0
+        self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
 
     def update(self, scan: RangeScan) -> None:
         """Marks what a scan looked through, if the sensor has moved on far enough since the last time."""
@@ -269,21 +281,28 @@ class _FreeSpace:
         self._last = (scan.east_m, scan.north_m)
         # Beyond this range the rays are further apart than what must not be missed between them.
         reach = min(scan.max_range_m, self._clearance / scan.spacing_rad)
-        x_low, x_high = self._cells(scan.east_m, reach, self._x0, self._nx)
-        y_low, y_high = self._cells(scan.north_m, reach, self._y0, self._ny)
+        if self._reach != reach:
+            self._reach, self._disc = reach, _disc(math.ceil(reach / self._cell) + 1)
+        # The disc's corner lies at this cell; some of it may lie outside the area.
+        across = len(self._disc) // 2
+        x_first = math.floor((scan.east_m - self._x0) / self._cell) - across
+        y_first = math.floor((scan.north_m - self._y0) / self._cell) - across
+        x_low, x_high = max(x_first, 0), min(x_first + len(self._disc), self._nx)
+        y_low, y_high = max(y_first, 0), min(y_first + len(self._disc), self._ny)
         if x_low >= x_high or y_low >= y_high:
             return
         seen = self._seen[x_low:x_high, y_low:y_high]
-        x = self._x0 + (np.arange(x_low, x_high) + 0.5) * self._cell - scan.east_m
-        y = self._y0 + (np.arange(y_low, y_high) + 0.5) * self._cell - scan.north_m
-        square = (x * x)[:, None] + y * y
+        disc = self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first]
         # Most of what is in reach has been seen from the places before.
-        cell = ((square < reach * reach) & ~seen).ravel().nonzero()[0]
+        cell = (disc > seen).ravel().nonzero()[0]
         column = cell // seen.shape[1]
         row = cell - column * seen.shape[1]
-        distance = np.sqrt(square[column, row])
+        # From the sensor to the middle of each cell.
+        x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
+        y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
+        distance = np.hypot(x, y)
         rays = len(scan.ranges_m)
-        position = _clockwise_from(scan.start_rad, x[column] + 1j * y[row]) / scan.spacing_rad
+        position = _clockwise_from(scan.start_rad, x + 1j * y) / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
         # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
         half = 0.75 * self._cell
@@ -305,10 +324,12 @@ class _FreeSpace:
         out[inside] = self._seen[ix[inside], iy[inside]]
         return out
 
-    def _cells(self, middle: float, reach: float, origin: float, count: int) -> tuple[int, int]:
-        low = math.floor((middle - reach - origin) / self._cell)
-        high = math.ceil((middle + reach - origin) / self._cell)
-        return max(low, 0), min(high, count)
+
+def _disc(cells: int) -> BoolArray:
+    """(2 k + 1, 2 k + 1) which cells lie within k cells of the middle one."""
+    away = np.arange(-cells, cells + 1) ** 2
+    disc: BoolArray = away[:, None] + away <= cells * cells
+    return disc
 
 
 def _all_round(scan: RangeScan) -> bool:

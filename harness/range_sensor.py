@@ -8,7 +8,7 @@ only choose which rays are tried, with a margin. So a face that is not hit canno
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -58,7 +58,7 @@ class RangeScan:
 
     def __post_init__(self) -> None:
         for name in ("directions", "ranges_m"):
-            array = np.array(getattr(self, name), dtype=np.float64, order="C")
+            array = getattr(self, name).copy()
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
@@ -92,6 +92,7 @@ class RangeSensor:
         self._turn = math.tau / self._spacing_rad
         self._fan = np.array((np.sin(offsets), np.cos(offsets)))  # seen from the nose: to its right, ahead
         self._fan_turned = self._fan[0] + 1j * self._fan[1]
+        self._nothing = np.full(config.rays, math.inf)
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
         )
@@ -128,41 +129,39 @@ class RangeSensor:
     def _true_ranges(self, east: float, north: float, time: float, sin: float, cos: float) -> FloatArray:
         """(n,) ranges to the nearest face, +inf beyond the range; sine and cosine of the heading."""
         faces = self._near(east, north, time).faces(time)
-        ranges = np.full(self._config.rays, math.inf)
+        ranges = self._nothing.copy()
         if faces.circles_m.shape[1]:
-            circles = []
-            for circle_east, circle_north, radius in faces.circles_m.T.tolist():
-                away_east, away_north = circle_east - east, circle_north - north
-                circles.append(
-                    (cos * away_east - sin * away_north, sin * away_east + cos * away_north, radius)
-                )
-            self._hit_circles(ranges, circles)
+            self._hit_circles(ranges, faces.circles_m.T.tolist(), complex(east, north), complex(cos, sin))
         if faces.edges_m.shape[1]:
             away_east, away_north = faces.edges_m[::2] - east, faces.edges_m[1::2] - north
             self._hit_edges(ranges, cos * away_east - sin * away_north, sin * away_east + cos * away_north)
         if faces.circles_m.size or faces.edges_m.size:
-            ranges[ranges > self._config.range_m] = math.inf
+            np.copyto(ranges, math.inf, where=ranges > self._config.range_m)
         return ranges
 
-    def _hit_circles(self, ranges: FloatArray, circles: Iterable[tuple[float, float, float]]) -> None:
-        """Lowers ranges to circles: centre to the right and ahead, radius."""
+    def _hit_circles(
+        self, ranges: FloatArray, circles: list[list[float]], place: complex, heading: complex
+    ) -> None:
+        """Lowers ranges to circles: centre east and north, radius; from a place, with a nose."""
         tries, faces = [], []
-        for x, y, radius in circles:
-            away = math.hypot(x, y)
+        for east, north, radius in circles:
+            centre = (complex(east, north) - place) * heading  # to the right + i ahead
+            away = abs(centre)
             if away - radius > self._config.range_m:
                 continue
             half_rad, near_side = (math.asin(radius / away), -1.0) if away > radius else (math.pi, 1.0)
+            x, y = centre.real, centre.imag
             for span in self._tried(math.atan2(x, y) - half_rad, 2.0 * half_rad):
                 tries.append(span)
                 faces.append((x, y, (away - radius) * (away + radius), near_side))
         if not tries:
             return
         # The power of the sensor's place: the square of its tangent to the circle, negative inside.
-        ray_right, ray_ahead, right, ahead, power, sign = self._pairs(tries, np.array(faces).T)
+        (ray_right, ray_ahead), (right, ahead, power, sign) = self._pairs(tries, np.array(faces).T)
         along = right * ray_right + ahead * ray_ahead
         half_chord2 = along * along - power
         distance = along + sign * np.sqrt(np.maximum(half_chord2, 0.0))
-        distance[np.minimum(half_chord2, distance) < 0.0] = math.inf
+        np.copyto(distance, math.inf, where=np.minimum(half_chord2, distance) < 0.0)
         _lower(ranges, tries, distance)
 
     def _hit_edges(self, ranges: FloatArray, right: FloatArray, ahead: FloatArray) -> None:
@@ -189,9 +188,8 @@ class RangeSensor:
         along_right, along_ahead = end_right - start_right, end_ahead - start_ahead
         lever = start_right * along_ahead - start_ahead * along_right
         columns = np.array((start_right, start_ahead, end_right, end_ahead, lever))[:, faces]
-        ray_right, ray_ahead, start_right, start_ahead, end_right, end_ahead, lever = self._pairs(
-            tries, columns
-        )
+        rays, (start_right, start_ahead, end_right, end_ahead, lever) = self._pairs(tries, columns)
+        ray_right, ray_ahead = rays
         start_side = ray_right * start_ahead - ray_ahead * start_right
         end_side = ray_right * end_ahead - ray_ahead * end_right
         hit = ((start_side >= 0) != (end_side >= 0)).nonzero()[0]
@@ -216,11 +214,11 @@ class RangeSensor:
         again = min(math.floor(last - self._turn + _MARGIN_RAYS) + 1, rays)
         return tuple(span for span in ((low, rays), (0, again)) if span[0] < span[1])
 
-    def _pairs(self, tries: Sequence[tuple[int, int]], faces: FloatArray) -> Iterator[FloatArray]:
-        """Rays and faces that may meet: (p,) directions to the right and ahead, and (p,) of each row of faces."""
+    def _pairs(self, tries: Sequence[tuple[int, int]], faces: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Rays and faces that may meet: (2, p) directions to the right and ahead, and (k, p) rows of faces."""
         counts = [high - low for low, high in tries]
-        yield from np.concatenate([self._fan[:, low:high] for low, high in tries], axis=1)
-        yield from np.repeat(faces, counts, axis=1)
+        rays = np.concatenate([self._fan[:, low:high] for low, high in tries], axis=1)
+        return rays, faces.repeat(counts, axis=1)
 
     def _degraded(self, ranges: FloatArray) -> FloatArray:
         """Ranges with the imperfections of the sensor."""

@@ -12,7 +12,7 @@ from planner.course import Course
 from planner.curves import Point, between
 from planner.interface import FloatArray, Path, Plan
 
-WATCHED_TOGETHER = 4
+WATCHED_TOGETHER = 16
 """Edges that are not near are compared with the course once in so many scans."""
 
 

@@ -53,8 +53,14 @@ PROVED_AT_ONCE = 1000
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
+UNHURRIED = 0.125
+"""The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step."""
+
 HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
+
+
+KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 
 
 class CertificateBroken(RuntimeError):
@@ -190,17 +196,32 @@ class RollingWindow:
         if effect.holds(here):
             here = on_loiter(effect.path, here)
         newly_cut = self._watch.look(effect, here, request.position_m, fresh)
-        since = request.station_m - self._searched_at_m
-        certified = effect.leaves_m - here
-        settled = effect.course.shortest and self._watch.cut_m == math.inf
-        due = since >= self._rolling_step_m
-        due &= not (settled and certified > PROLONG * self._mission.sensor_range_m)
-        due |= newly_cut and min(self._watch.cut_m - here, certified) < self._urgent_m
-        due |= since >= self._lead_m and min(self._watch.cut_m - here, certified) < self._least_m
-        if not due and not self._watch.broken:
-            return Plan(PlanStatus.KEPT, "the plan in effect serves")
+        if not self._is_due(effect, here, request.station_m - self._searched_at_m, newly_cut):
+            return KEPT
         self._searched_at_m = request.station_m
         return self._roll(request, effect, here)
+
+    def _is_due(self, effect: Effect, here: float, since: float, newly_cut: bool) -> bool:
+        """Whether to roll the window: the nearer ahead something is wrong with the plan in effect, the sooner.
+
+        Args:
+            effect: the plan in effect.
+            here: station of the aircraft on it, m.
+            since: flown since the last search, m.
+            newly_cut: its course was cut anew, or nearer than before.
+        """
+        watch = self._watch
+        wrong = min(watch.cut_m, effect.leaves_m) - here
+        if watch.broken and wrong < self._urgent_m:
+            return True
+        if newly_cut and wrong < self._urgent_m:
+            return True
+        if since >= self._lead_m and wrong < self._least_m:
+            return True
+        serves = effect.course.shortest and watch.cut_m == math.inf and not watch.broken
+        if serves and effect.leaves_m - here > PROLONG * self._mission.sensor_range_m:
+            return False
+        return since >= max(self._rolling_step_m, UNHURRIED * wrong)
 
     def _in_effect(self, request: PlanRequest) -> Effect | None:
         """The plan in effect; a new one begins uncut."""

@@ -391,7 +391,7 @@ def test_areas_may_lie_anywhere(bounds: tuple[float, float, float, float]) -> No
 
 def test_what_is_certain_is_forgotten_within_twenty_seconds_of_clear_sight() -> None:
     there = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 30.0))
-    taken = scans(sensor(World([there], BOUNDS)), [MIDDLE] * 61)
+    taken = scans(sensor(World([there], BOUNDS)), [(5000.0 + 15.0 * (i % 20), 5000.0) for i in range(61)])
     seen = fed(taken)
     assert len(edges(seen)) > 10
     nothing = replace(taken[0], ranges_m=np.full(len(taken[0].ranges_m), math.inf))
