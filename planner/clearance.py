@@ -11,24 +11,23 @@ from planner.interface import FloatArray, Path
 
 
 def _to_lines(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Distance of points to straight segments, (n, m), and how far along each the nearest place is."""
-    dx, dy = points[:, 0] - rows[:, :1], points[:, 1] - rows[:, 1:2]
-    tx, ty = rows[:, 2:3], rows[:, 3:4]
-    s = np.minimum(np.maximum(dx * tx + dy * ty, 0.0), rows[:, 5:6])
+    """(k,) distance of points to straight segments, one each, and how far along the nearest place is."""
+    x, y, tx, ty, _, length = rows.T
+    dx, dy = points[:, 0] - x, points[:, 1] - y
+    s = np.minimum(np.maximum(dx * tx + dy * ty, 0.0), length)
     dx -= s * tx
     dy -= s * ty
     return np.sqrt(dx * dx + dy * dy), s
 
 
 def _to_arcs(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Distance of points to arcs, (n, m), and how far along each the nearest place is."""
-    curvature, length = rows[:, 4:5], rows[:, 5:6]
+    """(k,) distance of points to arcs, one each, and how far along the nearest place is."""
+    x, y, tx, ty, curvature, length = rows.T
     side, radius = np.sign(curvature), 1.0 / np.abs(curvature)
     # Radial unit vector at the start, seen from the centre, and the tangent in the sense of travel.
-    rx, ry = side * rows[:, 3:4], -side * rows[:, 2:3]
-    dx = points[:, 0] - rows[:, :1] + radius * rx
-    dy = points[:, 1] - rows[:, 1:2] + radius * ry
-    tx, ty = rows[:, 2:3], rows[:, 3:4]
+    rx, ry = side * ty, -side * tx
+    dx = points[:, 0] - x + radius * rx
+    dy = points[:, 1] - y + radius * ry
     sweep = length / radius
     turn = np.arctan2(dx * tx + dy * ty, dx * rx + dy * ry) % math.tau
     # Beyond the end the nearer end counts: the middle of the part not swept parts the two.
@@ -40,16 +39,20 @@ def _to_arcs(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArr
     return np.hypot(dx - px, dy - py), turn * radius
 
 
-def _nearest(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(n, m) distance of points to each segment, how far along it and along the path the nearest place is."""
-    rows = path.segments
-    begin = np.cumsum(rows[:, 5]) - rows[:, 5]
+def _to_segments(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(k,) distance of points, (k, 2), to segments, (k, 6), and how far along the nearest place is."""
+    distance, along = np.empty((2, len(rows)))
     bent = np.abs(rows[:, 4]) > 1e-12
-    distance, along = np.empty((2, len(rows), len(points_m)))
     for which, measure in ((~bent, _to_lines), (bent, _to_arcs)):
         if which.any():
-            distance[which], along[which] = measure(rows[which], points_m)
-    return distance, along, along + begin[:, None]
+            distance[which], along[which] = measure(rows[which], points[which])
+    return distance, along
+
+
+def _begins(path: Path) -> FloatArray:
+    """(n,) station at which each segment begins."""
+    begins: FloatArray = np.cumsum(path.segments[:, 5]) - path.segments[:, 5]
+    return begins
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -62,10 +65,12 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
     Returns:
         (m,) distances in metres and (m,) stations along the path of the nearest places.
     """
-    distance, _, station = _nearest(path, points_m)
+    n, m = len(path.segments), len(points_m)
+    each = _to_segments(np.repeat(path.segments, m, axis=0), np.tile(points_m, (n, 1)))
+    distance, along = (values.reshape(n, m) for values in each)
     nearest = distance.argmin(axis=0)
-    column = np.arange(len(points_m))
-    return distance[nearest, column], station[nearest, column]
+    column = np.arange(m)
+    return distance[nearest, column], along[nearest, column] + _begins(path)[nearest]
 
 
 def first_breach(
@@ -84,11 +89,22 @@ def first_breach(
     """
     if not len(points_m):
         return math.inf
-    distance, along, station = _nearest(path, points_m)
+    rows = path.segments
+    radius = np.broadcast_to(np.asarray(radius_m, dtype=np.float64), (len(points_m),))
+    # No place of a segment is further from its middle than half its length: most points are out of reach.
+    half = 0.5 * rows[:, 5]
+    bend = 0.5 * rows[:, 4] * half
+    chord = half * np.sinc(bend / math.pi)
+    cos, sin = np.cos(bend), np.sin(bend)
+    east = rows[:, 0] + chord * (rows[:, 2] * cos - rows[:, 3] * sin)
+    north = rows[:, 1] + chord * (rows[:, 3] * cos + rows[:, 2] * sin)
+    dx, dy = points_m[:, 0] - east[:, None], points_m[:, 1] - north[:, None]
+    which, point = (dx * dx + dy * dy < np.square(half[:, None] + radius)).nonzero()
+    distance, along = _to_segments(rows[which], points_m[point])
+    station = along + _begins(path)[which]
     # Where a segment is nearest at its start, the path only leads away from there on.
-    approached = along > 0.0
-    approached[0] = True
-    near = (distance < radius_m) & approached & (station >= from_m)
+    approached = (along > 0.0) | (which == 0)
+    near = (distance < radius[point]) & approached & (station >= from_m)
     return float(station[near].min()) if near.any() else math.inf
 
 
@@ -111,12 +127,12 @@ def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bo
         )
         for x, y, r, row in zip(centre_x[out], centre_y[out], radius[out], bent[out], strict=True):
             extremes = np.array([[x - r, y], [x + r, y], [x, y - r], [x, y + r]])
-            distance, _ = _to_arcs(row[None], extremes)
-            passed = extremes[distance[0] < 1e-6 * r]
+            distance, _ = _to_arcs(np.tile(row, (4, 1)), extremes)
+            passed = extremes[distance < 1e-6 * r]
             if not _all_within(passed[:, 0], passed[:, 1], bounds_m):
                 return False
     end = end_of(path)
-    return xmin <= end.east_m <= xmax and ymin <= end.north_m <= ymax
+    return bool(xmin <= end.east_m <= xmax and ymin <= end.north_m <= ymax)
 
 
 def _all_within(x: FloatArray, y: FloatArray, bounds_m: tuple[float, float, float, float]) -> bool:

@@ -21,12 +21,14 @@ class Course:
         nodes: its track points, the goal last.
         known: how many of the remembered edge points it was found with.
         shortest: none shorter was known. That stays so while nothing cuts it: more obstacles shorten no way.
+        to_goal: it leads to the goal, not only into a turn.
     """
 
     path: Path
     nodes: tuple[Point, ...]
     known: int
     shortest: bool
+    to_goal: bool = True
 
     def ahead(self, station_m: float) -> Course:
         """What is left of it from a station on."""
@@ -37,7 +39,9 @@ class Course:
         left = tuple(
             node for node, at in zip(self.nodes[:-1], stations[:-1].tolist(), strict=True) if at > station_m
         )
-        return Course(Path(np.array(segments)), (*left, self.nodes[-1]), self.known, self.shortest)
+        return Course(
+            Path(np.array(segments)), (*left, self.nodes[-1]), self.known, self.shortest, self.to_goal
+        )
 
     def same_side(self, nodes: Sequence[Point], points_m: FloatArray) -> bool:
         """Whether another way from here to the goal passes all that was known on the same side.

@@ -17,7 +17,7 @@ def hold(path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrai
         from_m: station of the aircraft on it.
         to_m: station up to which it can still be flown.
         limits: smallest radius and room to roll.
-        terrain: where the turn may lie.
+        terrain: where the turn and the way there may lie.
 
     Returns:
         A path from `from_m` on that ends in a loiter circle; None where no place on it has room for one.
@@ -33,8 +33,9 @@ def hold(path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrai
                 roll = [(*pose, 0.0, limits.roll_m)]
                 start = _ahead(pose, limits.roll_m)
             turn = full_turn(start, limits.radius_m, side)
-            if terrain.admits(Path(np.array([*roll, turn]))):
-                return Path(np.array([*between(path, from_m, station), *roll, turn]), loiter=True)
+            held = Path(np.array([*between(path, from_m, station), *roll, turn]), loiter=True)
+            if terrain.admits(held):
+                return held
     return None
 
 

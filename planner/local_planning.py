@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 
 import numpy as np
 
@@ -26,6 +25,9 @@ LEAST_MARGIN = 0.2
 WIDER = 4
 """Where n tracks at every one of N steps find no way, this many times as many are tried."""
 
+
+OPTIMISING = 3
+"""Optimising a route is as much work as so many steps of the search."""
 
 SWITCH = 0.01
 """The other way round is taken only where it saves this share of the distance left."""
@@ -59,6 +61,10 @@ class Start:
     pose: Pose
     curvature: float = 0.0
     prefix: list[Segment] = field(default_factory=list)
+
+
+Now = Callable[[], tuple[Start, Course | None]]
+"""Tells where a plan would begin now, and the course that is flown."""
 
 
 class LocalPlanning:
@@ -112,29 +118,33 @@ class LocalPlanning:
         return [*attempts, Attempt(clearance + radius, margin)]
 
     def route(
-        self,
-        start: Start,
-        attempt: Attempt,
-        course: Course | None,
-        tracks: list[Track],
-        closed: Callable[[], bool],
-    ) -> Route | None:
+        self, attempt: Attempt, now: Now, tracks: list[Track], closed: Callable[[], bool]
+    ) -> Generator[None, None, Route | None]:
         """The shortest of the n best tracks, after route optimisation.
 
         Args:
-            start: where it begins.
             attempt: how far from obstacles.
-            course: what is flown now; the other side of something is taken only for a shorter way.
+            now: tells where a plan would begin, and what is flown: the other side of something is taken only for
+                a shorter way.
             tracks: the candidates that were looked at are added to it.
             closed: whether it is proved that there is no way; asked before a wider search.
+
+        Yields:
+            None after each step of work.
         """
-        room = self._room(start)
-        terrain = self._terrain(attempt, room)
-        window = self.window(start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room))
-        cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
+        start, _ = now()
+        window = self.window(
+            start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, self._room(start))
+        )
+        begun = start
         best: Route | None = None
         stays = False
+        fitted: list[tuple[bool, float, Route]] = []
         for track in self._found(window, attempt, closed):
+            if track is None:
+                yield
+                continue
+            start, course = now()
             switching = 0.0 if course is None or stays else SWITCH * track.cost_m
             if best is not None and track.cost_m >= best.path.length_m + switching:
                 break
@@ -142,14 +152,28 @@ class LocalPlanning:
             same = course is None or course.same_side(track.nodes, self._memory.points_m)
             if best is not None and track.cost_m >= best.path.length_m and not same:
                 continue
-            route = optimise(start.pose, start.curvature, track.nodes, self.limits, cut, terrain)
-            if route is not None and (
-                best is None
-                or (same and not stays)
-                or (same == stays and route.path.length_m < best.path.length_m)
-            ):
-                best, stays = route, same
-        return best
+            route = self._fit(start, attempt, track.nodes)
+            if route is not None:
+                fitted.append((not same, route.path.length_m, route))
+                _, _, best = min(fitted, key=lambda each: each[:2])
+                stays |= same
+            for _ in range(OPTIMISING):
+                yield
+        start, _ = now()
+        if start is begun:
+            return best
+        # The aircraft has flown on meanwhile.
+        routes = (
+            self._fit(start, attempt, (start.pose[:2], *route.nodes))
+            for _, _, route in sorted(fitted, key=lambda each: each[:2])
+        )
+        return next((route for route in routes if route is not None), None)
+
+    def _fit(self, start: Start, attempt: Attempt, nodes: Sequence[Point]) -> Route | None:
+        """The curve along a track, from where a plan would begin now."""
+        cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
+        terrain = self._terrain(attempt, self._room(start))
+        return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
 
     def tight_route(self, start: Start) -> Route | None:
         """A way found by search over poses, where none through the free sectors can be flown."""
@@ -180,8 +204,8 @@ class LocalPlanning:
         nearer: FloatArray = np.minimum(*room)
         return nearer
 
-    def _found(self, window: Window, attempt: Attempt, closed: Callable[[], bool]) -> Iterator[Track]:
-        """The n best tracks; where there is none, those of a wider search."""
+    def _found(self, window: Window, attempt: Attempt, closed: Callable[[], bool]) -> Iterator[Track | None]:
+        """The n best tracks; where there is none, those of a wider search. None after each step of work."""
         found = 0
         for widening in (1, WIDER):
             tracks = search(
@@ -192,8 +216,10 @@ class LocalPlanning:
                 keep_best=self._candidates * widening,
                 outer_m=attempt.distance_m + attempt.margin_m,
             )
-            for track in islice(tracks, self._candidates):
-                found += 1
+            for track in tracks:
                 yield track
+                found += track is not None
+                if found == self._candidates:
+                    break
             if found or closed():
                 return

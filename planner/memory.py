@@ -57,6 +57,11 @@ class ObstacleMemory:
         """Remembers a place as if there were an edge: it is not to be gone to again."""
         self._add(np.array([place]), genuine=False)
 
+    def forgive(self) -> None:
+        """Forgets what was refused: at the next call of `take_in` all that was seen is learnt anew."""
+        if not self._genuine[: self._count].all():
+            self._forget()
+
     def take_in(self, seen: SeenWorld) -> FloatArray:
         """Remembers what has come in since the last call, and returns it: (k, 2).
 

@@ -61,7 +61,7 @@ def search(
     steps: int,
     keep_best: int,
     outer_m: float,
-) -> Iterator[Track]:
+) -> Iterator[Track | None]:
     """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
 
     Args:
@@ -75,7 +75,7 @@ def search(
 
     Yields:
         Tracks that see the goal from their last track point but one; none where n tracks at every one
-        of N steps were not enough.
+        of N steps were not enough. None after each step looked at.
     """
     start = window.center_m
     _, _, straight = guide_vector(start, goal)
@@ -96,6 +96,7 @@ def search(
         kept_at[depth] += 1
         if len(visited) > MOST_TRACKS:
             return
+        yield None
         _, hit = first_entry(here, goal, window.points_m, window.keep_m)
         count += 1
         if hit < 0:

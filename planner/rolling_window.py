@@ -17,7 +17,6 @@ finitely many as well. Where no way is left, a closed chain of edges proves it (
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,13 +25,14 @@ from planner.barrier import Barrier
 from planner.certificate import Certified, Certifier, least_sensor_range_m
 from planner.course import Course
 from planner.curves import Point, Pose, along, on_loiter, onward, place_on
+from planner.dead_ends import DeadEnds
+from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
 from planner.hold import hold
-from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track
-from planner.route_optimisation import Route
 from planner.window import guide_vector
 
 LEAD_S = 1.0
@@ -47,11 +47,17 @@ BETTER = 0.005
 BROKEN_SHARE = 0.99
 """Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
-PROVED_AT_ONCE = 1000
+PROVED_AT_ONCE = 300
 """So many edge points at most are taken into the proof in one call."""
 
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
+
+PORTION = 40
+"""Steps of the search at one time, while a plan is in effect that ends in a safe turn."""
+
+PRESSED = 4
+"""Without such a plan so many portions are taken at once."""
 
 UNHURRIED = 0.125
 """The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step."""
@@ -171,6 +177,9 @@ class RollingWindow:
         self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
         self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.speed_mps
         self._barrier: Barrier | None = None
+        self._thinking: Deliberation | None = None
+        self._dead_ends = DeadEnds(2.0 * mission.clearance_m)
+        self._turning: Effect | None = None  # the last plan that was flown into its turn
         self._proposed: Effect | None = None
         self._effect: Effect | None = None
         self._searched_at_m = 0.0  # station and number of edge points at the last search
@@ -195,6 +204,7 @@ class RollingWindow:
         here = request.station_m
         if effect.holds(here):
             here = on_loiter(effect.path, here)
+            self._note_turn(effect, request.seen)
         newly_cut = self._watch.look(effect, here, request.position_m, fresh)
         if not self._is_due(effect, here, request.station_m - self._searched_at_m, newly_cut):
             return KEPT
@@ -211,17 +221,17 @@ class RollingWindow:
             newly_cut: its course was cut anew, or nearer than before.
         """
         watch = self._watch
+        if self._thinking is not None:
+            return True
         wrong = min(watch.cut_m, effect.leaves_m) - here
-        if watch.broken and wrong < self._urgent_m:
-            return True
-        if newly_cut and wrong < self._urgent_m:
-            return True
-        if since >= self._lead_m and wrong < self._least_m:
+        near = wrong < self._urgent_m
+        if near and (watch.broken or newly_cut):
             return True
         serves = effect.course.shortest and watch.cut_m == math.inf and not watch.broken
-        if serves and effect.leaves_m - here > PROLONG * self._mission.sensor_range_m:
+        whole = effect.leaves_m >= effect.course.path.length_m - self._mission.goal_radius_m
+        if serves and (whole or effect.leaves_m - here > PROLONG * self._mission.sensor_range_m):
             return False
-        return since >= max(self._rolling_step_m, UNHURRIED * wrong)
+        return since >= max(self._lead_m if near else self._rolling_step_m, UNHURRIED * wrong)
 
     def _in_effect(self, request: PlanRequest) -> Effect | None:
         """The plan in effect; a new one begins uncut."""
@@ -236,8 +246,6 @@ class RollingWindow:
         start = self._start(request, effect, here)
         ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
         serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
-        tracks: list[Track] = []
-        stuck: Course | None = None
         known = len(self._memory.points_m)
         if known != self._searched_with:
             self._news_at_m = request.station_m
@@ -248,46 +256,44 @@ class RollingWindow:
             and request.station_m - self._news_at_m > self._patience_m
         ):
             return self._no_way(request, effect, here, None)
-        if ahead is None or not serves or not (ahead.shortest or known == self._searched_with):
-            self._searched_with = known
-            for course in self._courses(request, start, ahead, tracks):
+        if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
+            self._thinking = None
+        else:
+            thinking = self._thinking
+            if thinking is None or thinking.known > known:
+                thinking = self._thinking = Deliberation(
+                    self._local, known, lambda: self._is_closed(request.position_m)
+                )
+            for course in thinking.courses(start, ahead, self._work(effect, here)):
                 if (
                     ahead is not None
                     and serves
                     and course.path.length_m > ahead.path.length_m * (1.0 - BETTER)
                 ):
+                    thinking.done = True
                     break
                 certified = self._certify(course, request)
                 if certified is not None and self._leads_on(certified, course):
-                    return self._found(request, start, course, certified, tracks)
-                stuck = stuck or course
-        if ahead is not None and effect is not None and serves:
-            certified = self._certify(ahead, request)
-            if certified is not None and certified.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m:
-                return self._found(request, start, ahead, certified, tracks)
-            return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
-        return self._no_way(request, effect, here, stuck)
+                    self._thinking, self._searched_with = None, thinking.known
+                    return self._found(request, start, course, certified, thinking.tracks)
+                thinking.stuck = thinking.stuck or course
+            if thinking.done:
+                self._thinking, self._searched_with = None, thinking.known
+            if not serves:
+                return self._no_way(request, effect, here, thinking)
+        assert ahead is not None
+        assert effect is not None
+        certified = self._certify(ahead, request)
+        if certified is not None and certified.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m:
+            return self._found(request, start, ahead, certified, [])
+        return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
 
-    def _courses(
-        self, request: PlanRequest, start: Start, ahead: Course | None, tracks: list[Track]
-    ) -> Iterator[Course]:
-        """Ways to the goal, those that are wanted most first."""
-        known = len(self._memory.points_m)
-        found = False
-        closed_m = math.inf
-        for i, attempt in enumerate(self._local.attempts()):
-            if attempt.distance_m + attempt.margin_m >= closed_m:
-                continue  # what is closed to a narrow way is closed to a wide one
-            before = len(tracks)
-            route = self._local.route(start, attempt, ahead, tracks, lambda: self._is_closed(request))
-            if len(tracks) == before:
-                closed_m = attempt.distance_m + attempt.margin_m
-            if route is not None:
-                found = True
-                yield _course(start, route, known, shortest=i == 0)
-        route = None if found else self._local.tight_route(start)
-        if route is not None:
-            yield _course(start, route, known, shortest=False)
+    def _work(self, effect: Effect | None, here: float) -> int:
+        """How much to think at once: more where there is no safe plan in effect to think on."""
+        pressed = effect is None or (
+            self._watch.broken and min(self._watch.cut_m, effect.leaves_m) - here < self._urgent_m
+        )
+        return PRESSED * PORTION if pressed else PORTION
 
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
@@ -324,11 +330,16 @@ class RollingWindow:
                     return Start(request.position_m, along(last, last[5]), last[4], prefix)
         return Start(request.position_m, Pose(*request.position_m, *request.direction))
 
-    def _no_way(self, request: PlanRequest, effect: Effect | None, here: float, stuck: Course | None) -> Plan:
-        """No new plan: prove that there is none, or leave the plan in effect to end in its turn."""
+    def _no_way(
+        self, request: PlanRequest, effect: Effect | None, here: float, thinking: Deliberation | None
+    ) -> Plan:
+        """No new plan yet: think on, prove that there is none, or let the plan in effect end in its turn."""
         if self._watch.broken and effect is not None:
             return self._turn_away(request, effect, here)
-        if stuck is None and self._is_closed(request):
+        if thinking is not None and not thinking.done and effect is not None:
+            return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
+        stuck = None if thinking is None else thinking.stuck
+        if stuck is None and self._is_closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
             return Plan(
                 PlanStatus.UNREACHABLE,
@@ -341,17 +352,32 @@ class RollingWindow:
         if stuck is not None and turned > math.tau * self._mission.turn_radius_m:
             # The whole turn has shown nothing more: what lies ahead there cannot be entered.
             self._refused_at_m = request.station_m
-            certifier = Certifier(self._local.limits, self._mission.sensor_range_m, request.seen.spacing_m)
-            hidden = certifier.seen_free_to_m(stuck.path, request.seen)
-            self._memory.refuse(place_on(stuck.path, hidden)[0][:2])
+            self._memory.refuse(self._unseen(stuck, request.seen))
+        if stuck is None and thinking is not None:
+            self._memory.forgive()  # no way is left but those given up
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
 
-    def _is_closed(self, request: PlanRequest) -> bool:
+    def _note_turn(self, effect: Effect, seen: SeenWorld) -> None:
+        """Gives up the place that a course could not be seen to enter, if it is the same again."""
+        if effect is self._turning or not effect.course.to_goal:
+            return
+        self._turning = effect
+        place = self._unseen(effect.course, seen)
+        if self._dead_ends.turned_before(place):
+            self._memory.refuse(place)
+
+    def _unseen(self, course: Course, seen: SeenWorld) -> Point:
+        """The first place of a course that has not been seen to be free."""
+        certifier = Certifier(self._local.limits, self._mission.sensor_range_m, seen.spacing_m)
+        x, y, _, _ = place_on(course.path, certifier.seen_free_to_m(course.path, seen))[0]
+        return x, y
+
+    def _is_closed(self, position: Point) -> bool:
         """Whether what has been seen proves that there is no way."""
         genuine = self._memory.genuine_m
         if self._barrier is None or self._barrier.count > len(genuine):
             self._barrier = Barrier(
-                request.position_m, self._mission.goal_m, self._mission.bounds_m, self._local.least_keeps_m
+                position, self._mission.goal_m, self._mission.bounds_m, self._local.least_keeps_m
             )
         self._barrier.add(genuine[self._barrier.count :][:PROVED_AT_ONCE])
         return self._barrier.closed
@@ -365,7 +391,7 @@ class RollingWindow:
         else:
             path, last = effect.path, min(self._watch.cut_m, effect.leaves_m)
         for share in HOLD_SHARES:
-            terrain = self._local.terrain(share * self._mission.clearance_m)
+            terrain = self._local.terrain(share * self._local.path_keeps_m)
             if effect is not None and terrain.admits(effect.left(here)):
                 self._watch.broken = False
                 return Plan(
@@ -379,7 +405,7 @@ class RollingWindow:
                 plan = Plan(PlanStatus.FOUND, reason, waypoints, turn)
                 leaves = turn.length_m - float(turn.segments[-1, 5])
                 self._proposed = Effect(
-                    plan, turn, Course(turn, (request.position_m,), 0, shortest=False), leaves
+                    plan, turn, Course(turn, (request.position_m,), 0, shortest=False, to_goal=False), leaves
                 )
                 return plan
         if effect is None:
@@ -409,8 +435,3 @@ class RollingWindow:
                 *(np.array(track.nodes) for track in tracks),
             ),
         )
-
-
-def _course(start: Start, route: Route, known: int, shortest: bool) -> Course:
-    path = Path(np.array([*start.prefix, *route.path.segments.tolist()]))
-    return Course(path, route.nodes, known, shortest)

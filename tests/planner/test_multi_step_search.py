@@ -55,7 +55,8 @@ def tracks_in(
     goal: Point = GOAL,
 ) -> list[Track]:
     """The first dozen tracks, after a look at what is promised of each."""
-    tracks = list(islice(search(window, goal, bounds, steps=steps, keep_best=keep_best, outer_m=OUTER), 12))
+    found = search(window, goal, bounds, steps=steps, keep_best=keep_best, outer_m=OUTER)
+    tracks = list(islice((track for track in found if track is not None), 12))
     points = shapely.points(window.points_m)
     for track in tracks:
         assert track.nodes[0] == START

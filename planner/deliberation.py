@@ -1,0 +1,90 @@
+"""Thinking about the way to the goal in portions of work, while the plan in effect is flown.
+
+The plan in effect ends in a turn that is seen to be free, so that there is time to think: a search that is not done
+within its portion goes on with the next scan. How much is done in a portion is counted, never timed. What
+is found is fitted to where the aircraft has got to by then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator
+
+import numpy as np
+
+from planner.course import Course
+from planner.interface import Path
+from planner.local_planning import LocalPlanning, Start
+from planner.multi_step_search import Track
+from planner.route_optimisation import Route
+
+
+class Deliberation:
+    """One search for ways to the goal, those that are wanted most first.
+
+    Args:
+        local: does the work.
+        known: number of edge points that it begins with.
+        closed: asked before more work than usual: whether it is proved that there is no way.
+
+    Attributes:
+        known: number of edge points that it began with.
+        done: whether all ways have been looked for.
+        stuck: the first way that was found and could not be taken.
+        tracks: candidates looked at so far.
+    """
+
+    def __init__(self, local: LocalPlanning, known: int, closed: Callable[[], bool]) -> None:
+        self._local, self._closed = local, closed
+        self._start: Start | None = None
+        self._flown: Course | None = None
+        self._thoughts = self._think()
+        self.known = known
+        self.done = False
+        self.stuck: Course | None = None
+        self.tracks: list[Track] = []
+
+    def courses(self, start: Start, flown: Course | None, work: int) -> Iterator[Course]:
+        """Ways found with one more portion of work.
+
+        Args:
+            start: where a plan would begin now.
+            flown: what is flown now.
+            work: how much may be done, in steps of the multi-step search.
+        """
+        self._start, self._flown = start, flown
+        for thought in self._thoughts:
+            if thought is not None:
+                yield thought
+            else:
+                work -= 1
+                if work <= 0:
+                    return
+        self.done = True
+
+    def _now(self) -> tuple[Start, Course | None]:
+        assert self._start is not None
+        return self._start, self._flown
+
+    def _think(self) -> Generator[Course | None, None, None]:
+        """Ways as they are found; None after each step of work."""
+        found = False
+        closed_m = math.inf
+        for i, attempt in enumerate(self._local.attempts()):
+            if attempt.distance_m + attempt.margin_m >= closed_m:
+                continue  # what is closed to a narrow way is closed to a wide one
+            before = len(self.tracks)
+            route = yield from self._local.route(attempt, self._now, self.tracks, self._closed)
+            if len(self.tracks) == before:
+                closed_m = attempt.distance_m + attempt.margin_m
+            if route is not None:
+                found = True
+                yield self._course(route, shortest=i == 0)
+        if not found:
+            route = self._local.tight_route(self._now()[0])
+            if route is not None:
+                yield self._course(route, shortest=False)
+
+    def _course(self, route: Route, shortest: bool) -> Course:
+        path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
+        return Course(path, route.nodes, self.known, shortest)
