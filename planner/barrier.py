@@ -15,10 +15,14 @@ import math
 import numpy as np
 
 from planner.curves import Point
-from planner.interface import FloatArray
+from planner.interface import FloatArray, Mission
+from planner.memory import ObstacleMemory
 
 OUTSIDE = 0
 """Node of the world outside of the area."""
+
+PROVED_AT_ONCE = 300
+"""So many edge points at most are taken into a proof in one call."""
 
 THIN = 0.1
 """Points nearer to one that was taken in than this share of the clearance are left out. Fewer points prove less,
@@ -107,3 +111,25 @@ class Barrier:
         share = side_a / (side_a - side_b)
         x, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
         return 0.0 <= (x - sx) * dx + (y - sy) * dy < dx * dx + dy * dy
+
+
+class Proof:
+    """Asks what a planner remembers, again and again, whether it leaves no way to the goal.
+
+    Args:
+        mission: goal and bounds.
+        memory: the edge points; those refused prove nothing.
+        keeps_m: what a way has to keep from every point.
+    """
+
+    def __init__(self, mission: Mission, memory: ObstacleMemory, keeps_m: float) -> None:
+        self._mission, self._memory, self._keeps_m = mission, memory, keeps_m
+        self._barrier: Barrier | None = None
+
+    def closed(self, position: Point) -> bool:
+        """Takes in some more of the points and says whether they close all ways from a position."""
+        genuine = self._memory.genuine_m
+        if self._barrier is None or self._barrier.count > len(genuine):
+            self._barrier = Barrier(position, self._mission.goal_m, self._mission.bounds_m, self._keeps_m)
+        self._barrier.add(genuine[self._barrier.count :][:PROVED_AT_ONCE])
+        return self._barrier.closed

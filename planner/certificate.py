@@ -24,6 +24,10 @@ DISC = 1.04
 MOST_STATIONS = 32
 
 
+class CertificateBroken(RuntimeError):
+    """Something was seen where the plan in effect was certified to be free, and there is no way out."""
+
+
 @dataclass(frozen=True)
 class Certified:
     """The part of a path that may be flown.

@@ -21,19 +21,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from planner.barrier import Barrier
-from planner.certificate import Certified, Certifier, least_sensor_range_m
+from planner.barrier import Proof
+from planner.certificate import CertificateBroken, Certified, Certifier, least_sensor_range_m
 from planner.course import Course
 from planner.curves import Point, Pose, along, on_loiter, onward, place_on
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
 from planner.hold import hold
-from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus, SeenWorld
+from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track
-from planner.window import guide_vector
+from planner.telling import picture, sentence
 
 LEAD_S = 1.0
 """A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
@@ -47,8 +47,8 @@ BETTER = 0.005
 BROKEN_SHARE = 0.99
 """Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
-PROVED_AT_ONCE = 300
-"""So many edge points at most are taken into the proof in one call."""
+TURNS_ENOUGH = 1.5
+"""Nothing new is seen in more of a turn than this."""
 
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
@@ -67,10 +67,6 @@ HOLD_SHARES = (1.0, 0.5, 0.25)
 
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
-
-
-class CertificateBroken(RuntimeError):
-    """Something was seen where the plan in effect was certified to be free, and there is no way out."""
 
 
 @dataclass(frozen=True)
@@ -162,7 +158,7 @@ class RollingWindow:
         assert config.planning_window_m is not None
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
-        self._mission, self._window_m = mission, config.planning_window_m
+        self._mission = mission
         self._rolling_step_m = config.rolling_step_m
         self._memory = ObstacleMemory(mission.clearance_m)
         self._local = LocalPlanning(
@@ -176,7 +172,7 @@ class RollingWindow:
         self._lead_m = mission.speed_mps * (LEAD_S + mission.compute_latency_s)
         self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
         self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.speed_mps
-        self._barrier: Barrier | None = None
+        self._proof = Proof(mission, self._memory, self._local.least_keeps_m)
         self._thinking: Deliberation | None = None
         self._dead_ends = DeadEnds(2.0 * mission.clearance_m)
         self._turning: Effect | None = None  # the last plan that was flown into its turn
@@ -185,9 +181,7 @@ class RollingWindow:
         self._searched_at_m = 0.0  # station and number of edge points at the last search
         self._searched_with = 0
         self._news_at_m = 0.0
-        self._patience_m = (
-            1.5 * math.tau * mission.turn_radius_m
-        )  # nothing new is seen in more of a turn than this
+        self._patience_m = TURNS_ENOUGH * math.tau * mission.turn_radius_m
         self._refused_at_m = 0.0
         self._watch = Watch(
             keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
@@ -256,20 +250,17 @@ class RollingWindow:
             and request.station_m - self._news_at_m > self._patience_m
         ):
             return self._no_way(request, effect, here, None)
+        worth_m = math.inf if ahead is None else ahead.path.length_m * (1.0 - BETTER)
         if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
             self._thinking = None
         else:
             thinking = self._thinking
             if thinking is None or thinking.known > known:
                 thinking = self._thinking = Deliberation(
-                    self._local, known, lambda: self._is_closed(request.position_m)
+                    self._local, known, lambda: self._proof.closed(request.position_m)
                 )
             for course in thinking.courses(start, ahead, self._work(effect, here)):
-                if (
-                    ahead is not None
-                    and serves
-                    and course.path.length_m > ahead.path.length_m * (1.0 - BETTER)
-                ):
+                if serves and course.path.length_m > worth_m:
                     thinking.done = True
                     break
                 certified = self._certify(course, request)
@@ -307,12 +298,13 @@ class RollingWindow:
     def _found(
         self, request: PlanRequest, start: Start, course: Course, certified: Certified, tracks: list[Track]
     ) -> Plan:
+        goal, keep = self._mission.goal_m, np.full(len(self._memory.points_m), self._mission.clearance_m)
         plan = Plan(
             PlanStatus.FOUND,
-            self._sentence(request, course.nodes),
+            sentence(request.position_m, goal, course.nodes),
             waypoints_m=np.array([start.position, *course.nodes]),
             path=certified.path,
-            picture=self._picture(start, course, tracks),
+            picture=picture(start.position, goal, course.nodes, tracks, self._local.window(start, keep)),
         )
         self._proposed = Effect(plan, certified.path, course, certified.leaves_m)
         return plan
@@ -339,7 +331,7 @@ class RollingWindow:
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
         stuck = None if thinking is None else thinking.stuck
-        if stuck is None and self._is_closed(request.position_m):
+        if stuck is None and self._proof.closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
             return Plan(
                 PlanStatus.UNREACHABLE,
@@ -369,18 +361,8 @@ class RollingWindow:
     def _unseen(self, course: Course, seen: SeenWorld) -> Point:
         """The first place of a course that has not been seen to be free."""
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, seen.spacing_m)
-        x, y, _, _ = place_on(course.path, certifier.seen_free_to_m(course.path, seen))[0]
-        return x, y
-
-    def _is_closed(self, position: Point) -> bool:
-        """Whether what has been seen proves that there is no way."""
-        genuine = self._memory.genuine_m
-        if self._barrier is None or self._barrier.count > len(genuine):
-            self._barrier = Barrier(
-                position, self._mission.goal_m, self._mission.bounds_m, self._local.least_keeps_m
-            )
-        self._barrier.add(genuine[self._barrier.count :][:PROVED_AT_ONCE])
-        return self._barrier.closed
+        east, north, _, _ = place_on(course.path, certifier.seen_free_to_m(course.path, seen))[0]
+        return east, north
 
     def _turn_away(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """A turn that only keeps away from what is known, for want of one that is seen to be free."""
@@ -413,25 +395,4 @@ class RollingWindow:
         raise CertificateBroken(
             f"something was seen at {request.time_s:.1f} s where the plan in effect was certified to be free, "
             "and there is no room to turn away"
-        )
-
-    def _sentence(self, request: PlanRequest, nodes: tuple[Point, ...]) -> str:
-        ux, uy, left = guide_vector(request.position_m, self._mission.goal_m)
-        if len(nodes) < 2:
-            return f"way to the goal in view, {left / 1000:.1f} km to go"
-        x, y = nodes[0][0] - request.position_m[0], nodes[0][1] - request.position_m[1]
-        side = "left" if ux * y - uy * x > 0.0 else "right"
-        return f"obstacle ahead, passing {side} at {math.hypot(x, y) / 1000:.1f} km"
-
-    def _picture(self, start: Start, course: Course, tracks: list[Track]) -> PlanPicture:
-        points = self._memory.points_m
-        window = self._local.window(start, np.full(len(points), self._mission.clearance_m))
-        return PlanPicture(
-            guide_m=np.array([start.position, self._mission.goal_m]),
-            window_m=self._window_m,
-            sectors=window.free_sectors(start.position),
-            candidates=(
-                np.array([start.position, *course.nodes]),
-                *(np.array(track.nodes) for track in tracks),
-            ),
         )

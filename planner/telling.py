@@ -1,0 +1,41 @@
+"""What a person is told of a plan: a sentence, and what a picture of it needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from planner.curves import Point
+from planner.interface import PlanPicture
+from planner.multi_step_search import Track
+from planner.window import Window, guide_vector
+
+
+def sentence(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
+    """What is ahead of the aircraft, and on which side it is passed.
+
+    Args:
+        position: of the aircraft.
+        goal: of the mission.
+        nodes: track points of the course, the goal last.
+    """
+    ux, uy, left = guide_vector(position, goal)
+    if len(nodes) < 2:
+        return f"way to the goal in view, {left / 1000:.1f} km to go"
+    x, y = nodes[0][0] - position[0], nodes[0][1] - position[1]
+    side = "left" if ux * y - uy * x > 0.0 else "right"
+    return f"obstacle ahead, passing {side} at {math.hypot(x, y) / 1000:.1f} km"
+
+
+def picture(
+    position: Point, goal: Point, nodes: Sequence[Point], tracks: Iterable[Track], window: Window
+) -> PlanPicture:
+    """Guide vector, planning window with its free sectors, and what was compared, the chosen course first."""
+    return PlanPicture(
+        guide_m=np.array([position, goal]),
+        window_m=window.radius_m,
+        sectors=window.free_sectors(position),
+        candidates=(np.array([position, *nodes]), *(np.array(track.nodes) for track in tracks)),
+    )
