@@ -25,6 +25,7 @@ class Deliberation:
     Args:
         local: does the work.
         known: number of edge points that it begins with.
+        effort: how often the work of a wide search is doubled.
         closed: asked before more work than usual: whether it is proved that there is no way.
 
     Attributes:
@@ -34,8 +35,8 @@ class Deliberation:
         tracks: candidates looked at so far.
     """
 
-    def __init__(self, local: LocalPlanning, known: int, closed: Callable[[], bool]) -> None:
-        self._local, self._closed = local, closed
+    def __init__(self, local: LocalPlanning, known: int, effort: int, closed: Callable[[], bool]) -> None:
+        self._local, self._effort, self._closed = local, effort, closed
         self._start: Start | None = None
         self._flown: Course | None = None
         self._thoughts = self._think()
@@ -74,7 +75,7 @@ class Deliberation:
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
             before = len(self.tracks)
-            route = yield from self._local.route(attempt, self._now, self.tracks, self._closed)
+            route = yield from self._local.route(attempt, self._effort, self._now, self.tracks, self._closed)
             if len(self.tracks) == before:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from planner.clearance import first_breach
 from planner.curves import Limits, Pose, Segment, between, full_turn, place_on
 from planner.interface import Path
 from planner.route_optimisation import Terrain
@@ -22,6 +25,11 @@ def hold(path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrai
     Returns:
         A path from `from_m` on that ends in a loiter circle; None where no place on it has room for one.
     """
+    # Where the way there comes too near to something, it is left before.
+    way = between(path, from_m, to_m)
+    breach = first_breach(Path(np.array(way)), terrain.points_m, terrain.keep_m) if way else math.inf
+    if breach < math.inf:
+        to_m = max(from_m, from_m + breach - float(terrain.keep_m.max()))
     count = max(int((to_m - from_m) / (0.25 * limits.radius_m)), 0)
     for i in range(count, -1, -1):
         station = from_m + i * 0.25 * limits.radius_m
@@ -33,9 +41,8 @@ def hold(path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrai
                 roll = [(*pose, 0.0, limits.roll_m)]
                 start = _ahead(pose, limits.roll_m)
             turn = full_turn(start, limits.radius_m, side)
-            held = Path(np.array([*between(path, from_m, station), *roll, turn]), loiter=True)
-            if terrain.admits(held):
-                return held
+            if terrain.admits(Path(np.array([*roll, turn]))):
+                return Path(np.array([*between(path, from_m, station), *roll, turn]), loiter=True)
     return None
 
 

@@ -22,6 +22,9 @@ SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 LEAST_MARGIN = 0.2
 """Share of the margin that is kept where there is no room for all of it."""
 
+MOST_TRACKS = 300
+"""So many tracks at most are looked at in one search."""
+
 WIDER = 4
 """Where n tracks at every one of N steps find no way, this many times as many are tried."""
 
@@ -118,12 +121,13 @@ class LocalPlanning:
         return [*attempts, Attempt(clearance + radius, margin)]
 
     def route(
-        self, attempt: Attempt, now: Now, tracks: list[Track], closed: Callable[[], bool]
+        self, attempt: Attempt, effort: int, now: Now, tracks: list[Track], closed: Callable[[], bool]
     ) -> Generator[None, None, Route | None]:
         """The shortest of the n best tracks, after route optimisation.
 
         Args:
             attempt: how far from obstacles.
+            effort: how often the work of a wide search is doubled.
             now: tells where a plan would begin, and what is flown: the other side of something is taken only for
                 a shorter way.
             tracks: the candidates that were looked at are added to it.
@@ -140,7 +144,7 @@ class LocalPlanning:
         best: Route | None = None
         stays = False
         fitted: list[tuple[bool, float, Route]] = []
-        for track in self._found(window, attempt, closed):
+        for track in self._found(window, attempt, effort, closed):
             if track is None:
                 yield
                 continue
@@ -204,10 +208,12 @@ class LocalPlanning:
         nearer: FloatArray = np.minimum(*room)
         return nearer
 
-    def _found(self, window: Window, attempt: Attempt, closed: Callable[[], bool]) -> Iterator[Track | None]:
+    def _found(
+        self, window: Window, attempt: Attempt, effort: int, closed: Callable[[], bool]
+    ) -> Iterator[Track | None]:
         """The n best tracks; where there is none, those of a wider search. None after each step of work."""
         found = 0
-        for widening in (1, WIDER):
+        for widening in (1, WIDER * 2**effort):
             tracks = search(
                 window,
                 self._mission.goal_m,
@@ -215,6 +221,8 @@ class LocalPlanning:
                 steps=self._steps * widening,
                 keep_best=self._candidates * widening,
                 outer_m=attempt.distance_m + attempt.margin_m,
+                most_tracks=MOST_TRACKS * widening,
+                wide=widening > 1,
             )
             for track in tracks:
                 yield track

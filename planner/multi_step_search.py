@@ -18,9 +18,6 @@ from planner.curves import Point
 from planner.step_model import distance_left_m
 from planner.window import SectorEdge, Window, guide_vector
 
-MOST_TRACKS = 300
-"""So many tracks at most are looked at in one search."""
-
 SHORT_OF = 0.005
 """A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
 
@@ -61,6 +58,8 @@ def search(
     steps: int,
     keep_best: int,
     outer_m: float,
+    most_tracks: int,
+    wide: bool = False,
 ) -> Iterator[Track | None]:
     """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
 
@@ -72,6 +71,8 @@ def search(
         keep_best: n, how many tracks are kept at every step.
         outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`,
             so that steps around a round obstacle are long.
+        most_tracks: so many are looked at.
+        wide: also take steps that hardly ever belong to a shortest way.
 
     Yields:
         Tracks that see the goal from their last track point but one; none where n tracks at every one
@@ -94,7 +95,7 @@ def search(
             continue
         visited.add(place)
         kept_at[depth] += 1
-        if len(visited) > MOST_TRACKS:
+        if len(visited) > most_tracks:
             return
         yield None
         _, hit = first_entry(here, goal, window.points_m, window.keep_m)
@@ -105,23 +106,28 @@ def search(
         if depth == steps:
             continue
         for edge in window.sector_edges(here, int(window.labels[hit])):
+            if not wide and _leads_away(track, edge):
+                continue
             child = _step(window, track, edge, goal, outer_m)
             if child is not None and _inside(child.nodes[-1], bounds_m):
                 count += 1
                 heapq.heappush(queue, (child.cost_m, count, depth + 1, child))
 
 
+def _leads_away(track: Track, edge: SectorEdge) -> bool:
+    """Whether a step leads away from what the last one hugged, or back: a shortest way bends round it."""
+    if track.last is None:
+        return False
+    turn = math.atan2(
+        track.last.ux * edge.uy - track.last.uy * edge.ux,
+        track.last.ux * edge.ux + track.last.uy * edge.uy,
+    )
+    return abs(turn) > BACK_RAD or turn * track.last.side > AWAY_RAD
+
+
 def _step(window: Window, track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
     """One step along the edge of a free sector; None where it leads nowhere."""
     here = track.nodes[-1]
-    if track.last is not None:
-        # A shortest way bends round what it hugs, not away from it and not back.
-        turn = math.atan2(
-            track.last.ux * edge.uy - track.last.uy * edge.ux,
-            track.last.ux * edge.ux + track.last.uy * edge.uy,
-        )
-        if abs(turn) > BACK_RAD or turn * track.last.side > AWAY_RAD:
-            return None
     hugged = window.hugged_m(here, edge, outer_m)
     length = min(hugged, edge.clear_m - SHORT_OF * outer_m)
     if length < 1e-2 * outer_m:

@@ -16,7 +16,7 @@ from planner.interface import Path
 from planner.route_optimisation import Route, Terrain
 from planner.step_model import distance_left_m, largest_course_change_rad, step
 
-EXPANSIONS = 120
+EXPANSIONS = 60
 """Poses looked at before the search gives up."""
 
 

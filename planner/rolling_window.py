@@ -47,14 +47,14 @@ BETTER = 0.005
 BROKEN_SHARE = 0.99
 """Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
-TURNS_ENOUGH = 1.5
-"""Nothing new is seen in more of a turn than this."""
-
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
 PORTION = 40
 """Steps of the search at one time, while a plan is in effect that ends in a safe turn."""
+
+MOST_EFFORT = 4
+"""Searches in vain are repeated with twice the effort each, so many times."""
 
 PRESSED = 4
 """Without such a plan so many portions are taken at once."""
@@ -180,8 +180,7 @@ class RollingWindow:
         self._effect: Effect | None = None
         self._searched_at_m = 0.0  # station and number of edge points at the last search
         self._searched_with = 0
-        self._news_at_m = 0.0
-        self._patience_m = TURNS_ENOUGH * math.tau * mission.turn_radius_m
+        self._effort = 0  # grows with every search that was in vain
         self._refused_at_m = 0.0
         self._watch = Watch(
             keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
@@ -232,7 +231,7 @@ class RollingWindow:
         if self._proposed is not None and request.flown is self._proposed.plan:
             self._effect, self._proposed = self._proposed, None
             self._watch.begin()
-            self._searched_at_m = self._refused_at_m = self._news_at_m = 0.0
+            self._searched_at_m = self._refused_at_m = 0.0
         return self._effect
 
     def _roll(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
@@ -241,15 +240,6 @@ class RollingWindow:
         ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
         serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
         known = len(self._memory.points_m)
-        if known != self._searched_with:
-            self._news_at_m = request.station_m
-        elif (
-            ahead is None
-            and effect is not None
-            and not self._watch.broken
-            and request.station_m - self._news_at_m > self._patience_m
-        ):
-            return self._no_way(request, effect, here, None)
         worth_m = math.inf if ahead is None else ahead.path.length_m * (1.0 - BETTER)
         if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
             self._thinking = None
@@ -257,7 +247,7 @@ class RollingWindow:
             thinking = self._thinking
             if thinking is None or thinking.known > known:
                 thinking = self._thinking = Deliberation(
-                    self._local, known, lambda: self._proof.closed(request.position_m)
+                    self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
                 )
             for course in thinking.courses(start, ahead, self._work(effect, here)):
                 if serves and course.path.length_m > worth_m:
@@ -265,7 +255,7 @@ class RollingWindow:
                     break
                 certified = self._certify(course, request)
                 if certified is not None and self._leads_on(certified, course):
-                    self._thinking, self._searched_with = None, thinking.known
+                    self._thinking, self._searched_with, self._effort = None, thinking.known, 0
                     return self._found(request, start, course, certified, thinking.tracks)
                 thinking.stuck = thinking.stuck or course
             if thinking.done:
@@ -346,7 +336,9 @@ class RollingWindow:
             self._refused_at_m = request.station_m
             self._memory.refuse(self._unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
-            self._memory.forgive()  # no way is left but those given up
+            # No way is left but those given up, or one that takes more looking for.
+            self._memory.forgive()
+            self._effort = min(self._effort + 1, MOST_EFFORT)
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
 
     def _note_turn(self, effect: Effect, seen: SeenWorld) -> None:

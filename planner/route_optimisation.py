@@ -12,6 +12,9 @@ from planner.clearance import first_breach, inside_bounds, line_is_clear
 from planner.curves import Limits, Point, Pose, fillet
 from planner.interface import FloatArray, Path
 
+MOST_LEFT_OUT = 6
+"""So many corners at most, from the first on, are tried to be left out."""
+
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
@@ -89,7 +92,9 @@ def optimise(
         return None
     short = shortcut(nodes, terrain)[1:]
     choices = [(short, cut_m, False), (short, cut_m, True)]
-    choices += [([*short[:i], *short[i + 1 :]], cut_m, False) for i in range(len(short) - 1)]
+    choices += [
+        ([*short[:i], *short[i + 1 :]], cut_m, False) for i in range(min(len(short) - 1, MOST_LEFT_OUT))
+    ]
     choices += [(short, 0.0, False), (short, 0.0, True), (list(nodes[1:]), 0.0, False)]
     for choice, cut, longer_turn in choices:
         path = fillet(start, choice, limits, cut, start_curvature, longer_turn)

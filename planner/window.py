@@ -103,7 +103,11 @@ class Window:
     labels: IntArray
     cell_m: float
     keep_m: FloatArray
+    _keep2: FloatArray = field(init=False, repr=False)
     _cells: dict[int, _Cells] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_keep2", self.keep_m * self.keep_m)
 
     def _obstacle(self, label: int) -> _Cells:
         """The points of an obstacle, gathered once."""
@@ -190,14 +194,18 @@ class Window:
         self, dx: FloatArray, dy: FloatArray, ux: FloatArray, uy: FloatArray
     ) -> tuple[FloatArray, IntArray]:
         """How far (k,) directions lead before they come too near to a point, and to which; infinite: never."""
-        ahead = ux[:, None] * dx + uy[:, None] * dy
-        beside = uy[:, None] * dx - ux[:, None] * dy
-        room = self.keep_m * self.keep_m - beside * beside
-        hit = (room > 0.0) & (ahead > 0.0)
-        entry = np.full(room.shape, math.inf)
-        entry[hit] = ahead[hit] - np.sqrt(room[hit])
-        met = entry.argmin(axis=1)
-        return np.maximum(entry[np.arange(len(met)), met], 0.0), met
+        beside = uy[:, None] * dx
+        beside -= ux[:, None] * dy
+        room = self._keep2 - np.square(beside, out=beside)
+        # Few points lie near any of the directions.
+        which, point = (room > 0.0).nonzero()
+        ahead = ux[which] * dx[point] + uy[which] * dy[point]
+        entry = np.where(ahead > 0.0, ahead - np.sqrt(room[which, point]), math.inf)
+        clear, met = np.full(len(ux), math.inf), np.zeros(len(ux), dtype=np.intp)
+        order = np.lexsort((entry, which))
+        directions, first = np.unique(which, return_index=True)
+        clear[directions], met[directions] = entry[order[first]], point[order[first]]
+        return np.maximum(clear, 0.0), met
 
     def free_sectors(self, origin: Point) -> FloatArray:
         """(k, 4) free sectors at a track point: unit vectors of the right and the left edge of each.

@@ -53,9 +53,12 @@ def tracks_in(
     keep_best: int = 6,
     bounds: tuple[float, float, float, float] = BOUNDS,
     goal: Point = GOAL,
+    wide: bool = False,
 ) -> list[Track]:
     """The first dozen tracks, after a look at what is promised of each."""
-    found = search(window, goal, bounds, steps=steps, keep_best=keep_best, outer_m=OUTER)
+    found = search(
+        window, goal, bounds, steps=steps, keep_best=keep_best, outer_m=OUTER, most_tracks=1200, wide=wide
+    )
     tracks = list(islice((track for track in found if track is not None), 12))
     points = shapely.points(window.points_m)
     for track in tracks:
@@ -237,7 +240,7 @@ def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(walls: list[bool],
             lines += [((at, low), (at, low + CELL)), ((low, at), (low + CELL, at))]
     pieces = [wall(a, b, SPACING) for (a, b), there in zip(lines, walls, strict=True) if there]
     window = window_of(*pieces)
-    tracks = tracks_in(window, steps=64, keep_best=48, bounds=WITHIN, goal=CORNER)
+    tracks = tracks_in(window, steps=64, keep_best=48, bounds=WITHIN, goal=CORNER, wide=True)
     if connected(window.points_m, 1.1 * KEEP):
         assert tracks
         assert tracks[0].cost_m >= math.dist(START, CORNER) * (1.0 - 1e-9)
