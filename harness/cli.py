@@ -16,12 +16,12 @@ import typer
 from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
 from harness.commands.options import BAD_INPUT, FAILED, flag
-from harness.commands.review import view
+from harness.commands.review import report, view
 
 INTERRUPTED: Final = 130
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-for command in (fly, compare, validate, schema, view, bench):
+for command in (fly, compare, validate, schema, view, report, bench):
     app.command()(command)
 app.command("list")(list_names)
 
