@@ -73,6 +73,10 @@ AXES: tuple[Colour, ...] = ((255, 84, 84), (96, 211, 130), (92, 148, 255))
 ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 84))
 """Of the flown track: on the plan, half the way, and at or beyond the error from which on it is not tracked."""
 
+TOLD_PLAN: Colour = (58, 150, 214)
+TOLD: Colour = (134, 142, 156)
+"""Of the lines of the event log: legible on black and on white."""
+
 SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "cross_track/flown": ("cross-track error", TRACK, 1.5),
     "clearance/flown": ("clearance", TRACK, 1.5),

@@ -99,11 +99,11 @@ class RerunLog:
         self._plans.append(accepted)
         self._states.on_plan(accepted)
         text = f"{accepted.plan.reason} (plan {accepted.plan_index}, {accepted.compute_ms:.1f} ms)"
-        self._events.append((accepted.time_s, text, look.CHOSEN))
+        self._events.append((accepted.time_s, text, look.TOLD_PLAN))
 
     def on_event(self, time_s: float, text: str) -> None:
         """Adds a line to the log of events."""
-        self._events.append((time_s, text, look.START))
+        self._events.append((time_s, text, look.TOLD))
 
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and what happened meanwhile."""
@@ -212,7 +212,7 @@ class RerunLog:
             self._set_time(time_s)
             log_obstacle(self._rec, self._scene, index)
             text = f"obstacle {index} comes into view, {away_m / 1e3:.1f} km away"
-            self._events.append((time_s, text, look.EDGE))
+            self._events.append((time_s, text, look.TOLD))
         rows, counts = np.unique(news.scans, return_counts=True)
         if not len(rows):
             return

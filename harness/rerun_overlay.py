@@ -41,9 +41,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
     chunks = [_chunks(recording) for recording in recordings]
     runs = [f"runs/{place}/" for place in range(len(recordings))]
     title = ", ".join(names)
-    with rr.RecordingStream("wayproof", recording_id=f"overlay: {title}") as rec:
-        rec.set_log_time_enabled(False)
-        rec.set_log_tick_enabled(False)
+    with _stream(f"overlay: {title}") as rec:
         rec.save(path, default_blueprint=look.blueprint(_frame(chunks[0], recordings[0]), runs))
         rec.send_recording_name(title)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
@@ -53,6 +51,33 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             _style(rec, run, place, name)
         summary = _summary(names, [_metrics(own) for own in chunks])
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def send_recording(recording: Path, runs: int, address: str) -> None:
+    """Sends a recording, or an overlay, with its layout to a viewer that listens.
+
+    Args:
+        recording: the file.
+        runs: how many it overlays; 1 for the recording of a run.
+        address: of the viewer, `rerun+http://...`.
+
+    Raises:
+        RunFolderError: the recording cannot be read.
+    """
+    chunks = _chunks(recording)
+    names = [f"runs/{place}/" for place in range(runs)] if runs > 1 else [""]
+    with _stream(str(recording)) as rec:
+        rec.connect_grpc(address, default_blueprint=look.blueprint(_frame(chunks, recording), names))
+        rec.send_chunks(chunks)
+        rec.flush()
+        rec.disconnect()
+
+
+def _stream(recording_id: str) -> rr.RecordingStream:
+    rec = rr.RecordingStream("wayproof", recording_id=recording_id)
+    rec.set_log_time_enabled(False)
+    rec.set_log_tick_enabled(False)
+    return rec
 
 
 def _chunks(recording: Path) -> list[rr.chunk.Chunk]:
@@ -78,6 +103,8 @@ def _frame(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
 
 
 def _is_shared(entity: str) -> bool:
+    if entity == f"/__properties/{look.FRAME}":
+        return True
     parts = entity.strip("/").split("/")
     if parts[0] not in (look.PLAN, look.WORLD) or look.SENSED in parts:
         return False

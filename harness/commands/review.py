@@ -49,7 +49,7 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
     from harness.rerun_viewer import ViewerError, open_viewer
 
     try:
-        open_viewer(runs, web)
+        open_viewer(runs, web, lambda address: typer.echo(f"{address} (Ctrl-C ends it)", err=True))
     except RunFolderError as error:
         raise bad_input(error) from error
     except ViewerError as error:

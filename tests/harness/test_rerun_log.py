@@ -4,9 +4,10 @@ import json
 import math
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from harness.rerun_log import RerunLog
 from harness.rerun_overlay import write_overlay
 from harness.rerun_scene import quaternions
 from harness.rerun_states import mode_of
-from harness.rerun_viewer import NO_DRIVER, ViewerError, _executable, open_viewer, screenshot
+from harness.rerun_viewer import NO_DRIVER, ViewerError, _executable, open_viewer, screenshot, served
 from harness.trackability import FlightLimits
 from planner.interface import Mission, Plan, PlanPicture, PlanStatus
 from planner.interface import Path as PlannedPath
@@ -433,6 +434,20 @@ def test_view_says_that_there_is_no_screen(
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(ViewerError, match="no screen"):
         open_viewer([recording[0].parent])
+
+
+def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
+    recording: tuple[Path, Flight], tmp_path: Path
+) -> None:
+    with served(recording[0], 1, tmp_path) as (viewer, address):
+        assert address.startswith("http://127.0.0.1:")
+        assert "rerun%2Bhttp%3A%2F%2F127.0.0.1" in address
+        with urllib.request.urlopen(address, timeout=10) as answer:
+            assert b"re_viewer" in answer.read()
+        command = [str(part) for part in cast(list[str], viewer.args)]
+        assert command[command.index("--bind") + 1] == "127.0.0.1"
+        assert viewer.poll() is None
+    assert viewer.poll() is not None
 
 
 def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
