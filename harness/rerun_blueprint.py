@@ -195,7 +195,7 @@ def blueprint(frame: Frame, runs: Sequence[str] = ("",)) -> rrb.Blueprint:
                 rrb.Horizontal(plan_view(frame, runs), flight_view(frame, runs), column_shares=[1, 1]),
                 states,
                 rrb.Horizontal(*below, column_shares=[5, 4, 3][: len(below)]),
-                row_shares=[12, 1.2 + 0.8 * (3 if len(runs) == 1 else 2 * len(runs)), 5],
+                row_shares=[12, 1.5 + 0.85 * (3 if len(runs) == 1 else 2 * len(runs)), 5],
             ),
             rrb.Vertical(*series_views(frame, runs)),
             column_shares=[13, 6],

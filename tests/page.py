@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 NO_BROWSER = "no Chromium: install Debian's package chromium, or run `playwright install chromium`"
 SETTLE_MS = 200
+
+
+class NoBrowserError(RuntimeError):
+    """There is no browser to show a page in."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,11 @@ class Shown:
 
 @contextmanager
 def browser() -> Iterator[Any]:
-    """Chromium, or a skip that says what is missing."""
+    """Chromium without a screen.
+
+    Raises:
+        NoBrowserError: there is none.
+    """
     from playwright.sync_api import Error, sync_playwright
 
     with sync_playwright() as playwright:
@@ -46,7 +52,7 @@ def browser() -> Iterator[Any]:
         except Error as error:
             if "Executable doesn't exist" not in str(error):
                 raise
-            pytest.skip(NO_BROWSER)
+            raise NoBrowserError(NO_BROWSER) from error
         try:
             yield chromium
         finally:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from harness.cli import main
 from harness.run_folder import REPORT_FILES, load_run
-from tests.page import browser, shown
+from tests.page import shown
 
 SCENARIO = """
 schema: wayproof/scenario/1
@@ -74,22 +75,20 @@ def test_a_folder_without_a_complete_run_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_browser_shows_the_report_on_phone_and_screen(run: Path) -> None:
-    with browser() as chromium:
-        for width_px in (390, 1280):
-            page = shown(chromium, run / "report.html", width_px)
-            assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
-            assert (page.figures, page.missing) == (2, 0)
+def test_a_browser_shows_the_report_on_phone_and_screen(run: Path, chromium: Any) -> None:
+    for width_px in (390, 1280):
+        page = shown(chromium, run / "report.html", width_px)
+        assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
+        assert (page.figures, page.missing) == (2, 0)
 
 
-def test_a_browser_would_tell_what_is_wrong(tmp_path: Path) -> None:
+def test_a_browser_would_tell_what_is_wrong(tmp_path: Path, chromium: Any) -> None:
     page = tmp_path / "bad.html"
     page.write_text(
         "<link rel=icon href='data:,'><div style='width:800px'>wide</div><img src='none.png'>"
         "<script>console.log('hm')</script>"
     )
-    with browser() as chromium:
-        bad = shown(chromium, page, 390)
+    bad = shown(chromium, page, 390)
     assert bad.overflow_px > 0
     assert bad.missing == bad.figures == 1
     assert bad.asked_for == ((tmp_path / "none.png").as_uri(),)
