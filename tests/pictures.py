@@ -31,12 +31,10 @@ RECORDINGS = {
     "aerosonde_forest": ("forest/flight.rrd", 100.0),
 }
 """Name of a picture: recording, and time of the cursor in s."""
-PAGES = {
-    "comparison": ("report.html", 1100),
-    "report": ("paper_circles/bug2/report.html", 1100),
-    "report-phone": ("paper_circles/bug2/report.html", 390),
-}
-"""Name of a picture: page, and width of the window in px."""
+PAGES = {"comparison": "report.html", "report": "paper_circles/bug2/report.html"}
+"""Name of a picture: page."""
+WIDTHS_PX = (390, 1100)
+"""Windows that a page is looked at in; the picture is of the last."""
 
 
 def make(out: Path, work: Path) -> Iterator[str]:
@@ -62,11 +60,12 @@ def make(out: Path, work: Path) -> Iterator[str]:
         print(f"skipped the recordings: {NO_DRIVER}")
     try:
         with browser() as chromium:
-            for name, (page, width_px) in PAGES.items():
+            for name, page in PAGES.items():
                 png = work / f"{name}.png"
-                seen = shown(chromium, work / page, width_px, png)
-                if seen.said or seen.asked_for or seen.missing or seen.overflow_px or not seen.figures:
-                    yield f"{page}, {width_px} px wide: {seen}"
+                for width_px in WIDTHS_PX:
+                    seen = shown(chromium, work / page, width_px, png)
+                    if seen.said or seen.asked_for or seen.missing or seen.overflow_px or not seen.figures:
+                        yield f"{page}, {width_px} px wide: {seen}"
                 _keep(png, out)
     except NoBrowserError as error:
         print(f"skipped the pages: {error}")
@@ -77,7 +76,9 @@ def _keep(png: Path, out: Path) -> None:
     with Image.open(png) as picture:
         width, height = picture.size
         begin = picture.convert("RGB").crop((0, 0, width, min(height, int(PAGE_RATIO * width))))
-        begin.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(out / png.name, optimize=True)
+        begin.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
+            out / png.name, optimize=True
+        )
 
 
 def main(arguments: list[str]) -> int:
