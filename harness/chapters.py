@@ -105,10 +105,9 @@ def run_chapter(scenario: Scenario, flight: Entry, optimum: Optimum) -> Chapter:
     folder = flight.run.folder
     path = figures.planner_figure(scene, drawn, 0)
     strips = figures.profiles(scene, [(0, drawn)])
+    turn = ", and its tightest planned turn" if drawn.planned.tightest is not None else ""
     pictures = [
-        _picture(
-            folder / "path", path, f"The track from S to G in {scene.name}, and its tightest planned turn."
-        ),
+        _picture(folder / "path", path, f"The track from S to G in {scene.name}{turn}."),
         _picture(folder / "profiles", strips, PROFILES),
     ]
     return Chapter(scene.name, _facts(scene, optimum), [flight.row], pictures, optimum.reason)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from harness.compare_rows import escaped
+from harness.compare_rows import escaped, number
 
 if TYPE_CHECKING:
     from harness.rerun_blueprint import Scene
@@ -65,7 +65,7 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
     return {
         "outcome": f"{metrics['outcome']}: {metrics['reason']}",
         "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
-        "least clearance": f"{_text(metrics['min_clearance_m'], 0)} m of {scene.mission.clearance_m:g} m; "
+        "least clearance": f"{number(metrics['min_clearance_m']) or 'none'} m of {scene.mission.clearance_m:g} m; "
         f"{_text(metrics['clearance_violation_s'], 1)} s below",
         "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
         "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",

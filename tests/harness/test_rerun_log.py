@@ -210,13 +210,15 @@ def test_obstacles_appear_as_they_are_sensed(tmp_path: Path, make_track: Callabl
 
 
 def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path, make_track: Callable[..., Track]) -> None:
-    error = np.where(np.arange(101) < 50, 0.0, -2.0 * LIMITS.cross_track_threshold_m)
+    row = np.arange(101)
+    error = np.where((row < 50) & (row != 20), 0.0, -2.0 * LIMITS.cross_track_threshold_m)
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
     log.on_block(make_track(101, cross_track_m=error, plan_index=-1))
     log.close()
     colours = [rgba >> 8 for (rgba,) in column(read(tmp_path / "a.rrd"), "/plan/flown", "colors")]
     on, _, off = ((red << 16) + (green << 8) + blue for red, green, blue in ERROR_COLOURS)
-    assert set(colours[:25]) == {on}
+    assert [place for place, colour in enumerate(colours[:25]) if colour != on] == [10]
+    assert colours[10] == off, "the worst of a piece counts"
     assert set(colours[25:]) == {off}
 
 
