@@ -158,13 +158,17 @@ def screenshot(
     ):
         if not _answers(port, viewer):
             raise ViewerError(NO_DRIVER)
-        client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
-        client.open(str(rrd.resolve()))
-        if time_s is not None:
-            client.set_time(TIMELINE, duration=time_s, play_state="paused")
-        time.sleep(SETTLE_S)
-        client.save_screenshot(str(png.resolve()))
-        return [str(report) for view in client.get_state().views for report in view.reports]
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
+            client.open(str(rrd.resolve()))
+            if time_s is not None:
+                client.set_time(TIMELINE, duration=time_s, play_state="paused")
+            time.sleep(SETTLE_S)
+            client.save_screenshot(str(png.resolve()))
+            return [str(report) for view in client.get_state().views for report in view.reports]
+        except ConnectionError as error:
+            # Without a driver it listens for a moment before it gives up.
+            raise ViewerError(NO_DRIVER) from error
 
 
 def _executable() -> str:

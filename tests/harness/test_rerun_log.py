@@ -465,6 +465,13 @@ def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
     assert int.from_bytes(png.read_bytes()[16:20]) == 1200
 
 
+def test_a_missing_driver_is_said(recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+        monkeypatch.setenv(name, "/nowhere")
+    with pytest.raises(ViewerError, match="mesa-vulkan-drivers"):
+        screenshot(recording[0], recording[0].with_suffix(".png"))
+
+
 @given(heading=st.floats(0.0, 360.0), pitch=st.floats(-80.0, 80.0), roll=st.floats(-180.0, 180.0))
 def test_attitude_points_nose_and_wing_the_right_way(heading: float, pitch: float, roll: float) -> None:
     """Nose: heading from north and pitch up. Left wing: up by sin(roll) cos(pitch) in a right bank."""
