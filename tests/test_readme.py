@@ -99,6 +99,7 @@ def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_pat
 
 def test_ones_own_planner_is_found_and_flown(tmp_path: Path) -> None:
     (planner,), (project,), (scenario,) = blocks("python"), blocks("toml"), blocks("yaml")
+    assert len([line for line in planner.splitlines() if line.strip()]) < 30
     (tmp_path / "my_planner.py").write_text(planner)
     (tmp_path / "pyproject.toml").write_text(project)
     (tmp_path / "my_world.yaml").write_text(scenario)
