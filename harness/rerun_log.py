@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 SCAN_SHARE = 0.004
 """A scan is drawn after every flight of this share of the area, and before every plan."""
+LEAST_PERIOD_S = 2.0
+"""Scans are not drawn more often than this, but before plans: an hour has to stay small in any area."""
 CELL_SHARE = 0.0015
 """Side of the cells in which sensed places are kept, as a share of the area."""
 PIECE_SHARE = 0.001
@@ -68,8 +70,8 @@ class RerunLog:
         self._rec.send_recording_name(scene.name)
         span_m = scene.frame.span_m
         self._chord_error_m = 1e-5 * span_m
-        self._scan_period_s = SCAN_SHARE * span_m / scene.mission.speed_mps
-        self._piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 2), 100)
+        self._scan_period_s = max(SCAN_SHARE * span_m / scene.mission.speed_mps, LEAST_PERIOD_S)
+        self._piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 10), 100)
         self._scan: RangeScan | None = None
         self._scan_drawn_s = -math.inf
         self._scans: list[RangeScan] = []

@@ -68,7 +68,7 @@ def open_viewer(
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
-            write_overlay(recordings, [folder.resolve().name for folder in run_dirs], shown)
+            write_overlay(recordings, run_names(run_dirs), shown)
         if web:
             with (
                 contextlib.suppress(KeyboardInterrupt),
@@ -112,6 +112,17 @@ def served(rrd: Path, runs: int, scratch: Path) -> Iterator[tuple[subprocess.Pop
 def _last_words(scratch: str) -> str:
     lines = (Path(scratch) / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
     return lines[-1] if lines else "it gave no reason"
+
+
+def run_names(run_dirs: Sequence[Path]) -> list[str]:
+    """Names of runs: as much of the end of each path as tells them apart, and a number where nothing does."""
+    paths = [folder.resolve().parts for folder in run_dirs]
+    longest = max(map(len, paths))
+    length = next((n for n in range(1, longest) if len({path[-n:] for path in paths}) == len(paths)), 1)
+    names = ["/".join(path[-length:]) for path in paths]
+    return [
+        name if names.count(name) == 1 else f"{name} ({place})" for place, name in enumerate(names, start=1)
+    ]
 
 
 def recording_of(run_dir: Path) -> Path:

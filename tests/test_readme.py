@@ -53,6 +53,7 @@ def test_the_first_command_flies_the_papers_scenario_and_prints_what_readme_show
     assert [line[:20].strip() for line in flown.stdout.splitlines()] == names
     folder = shown.splitlines()[-1].removeprefix("run folder: ")
     assert load_run(tmp_path / folder).metrics["outcome"] == "reached"
+    assert (tmp_path / folder / "flight.rrd").stat().st_size < 25e6, "an hour's flight"
     assert f"`wayproof view {folder}`" in README
 
 

@@ -25,7 +25,15 @@ from harness.rerun_log import RerunLog
 from harness.rerun_overlay import write_overlay
 from harness.rerun_scene import quaternions
 from harness.rerun_states import mode_of
-from harness.rerun_viewer import NO_DRIVER, ViewerError, _executable, open_viewer, screenshot, served
+from harness.rerun_viewer import (
+    NO_DRIVER,
+    ViewerError,
+    _executable,
+    open_viewer,
+    run_names,
+    screenshot,
+    served,
+)
 from harness.trackability import FlightLimits
 from planner.interface import Mission, Plan, PlanPicture, PlanStatus
 from planner.interface import Path as PlannedPath
@@ -168,7 +176,7 @@ def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None
     times = seconds(entities, "/plan/flown")
     pieces = column(entities, "/plan/flown", "strips")
     assert times[-1] == 100.0
-    assert max(np.diff([0.0, *times])) <= 0.2 + 1e-9, "a thousandth of 4 km at 25 m/s"
+    assert max(np.diff([0.0, *times])) <= 1.0 + 1e-9
     ends = [strip[-1] for (strip,) in pieces]
     starts = [strip[0] for (strip,) in pieces]
     np.testing.assert_allclose(ends, [(0.0, 25.0 * time) for time in times], atol=1e-3)
@@ -178,7 +186,7 @@ def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None
 def test_scans_are_drawn_as_the_aircraft_goes_on(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     times = seconds(entities, "/plan/scan")
-    assert times[:3] == [0.0, 1.0, 2.0], "every 0.4 % of 4 km at 25 m/s: 0.64 s, scans come every 0.5 s"
+    assert times[:3] == [0.0, 2.0, 4.0]
     assert 50.0 in times
     np.testing.assert_array_equal(
         column(entities, "/plan/scan", "positions")[0], [[105.0, 7.0], [-195.0, 7.0]]
@@ -217,9 +225,9 @@ def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path, make_track: Cal
     log.close()
     colours = [rgba >> 8 for (rgba,) in column(read(tmp_path / "a.rrd"), "/plan/flown", "colors")]
     on, _, off = ((red << 16) + (green << 8) + blue for red, green, blue in ERROR_COLOURS)
-    assert [place for place, colour in enumerate(colours[:25]) if colour != on] == [10]
-    assert colours[10] == off, "the worst of a piece counts"
-    assert set(colours[25:]) == {off}
+    assert [colour == off for colour in colours[:5]] == [False, False, True, False, False], "the worst counts"
+    assert {colours[0], colours[4]} == {on}
+    assert set(colours[5:]) == {off}
 
 
 def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Callable[..., Track]) -> None:
@@ -416,6 +424,19 @@ def test_overlay_keeps_every_track_and_one_world(
     assert "/states/1-first/planner" in entities
     colours = [column(entities, f"/plan/runs/{number}/flown", "colors")[-1] for number in (0, 1)]
     assert colours[0] != colours[1]
+
+
+@pytest.mark.parametrize(
+    ("folders", "names"),
+    [
+        (["runs/a", "runs/b"], ["a", "b"]),
+        (["one/bug2-1", "two/bug2-1"], ["one/bug2-1", "two/bug2-1"]),
+        (["one/x/run", "two/x/run", "two/y/run"], ["one/x/run", "two/x/run", "two/y/run"]),
+        (["a", "a"], ["a (1)", "a (2)"]),
+    ],
+)
+def test_overlaid_runs_have_names_of_their_own(folders: list[str], names: list[str]) -> None:
+    assert run_names([Path(folder) for folder in folders]) == names
 
 
 def test_view_says_what_is_missing(tmp_path: Path) -> None:
