@@ -1,6 +1,7 @@
 """Looking at recordings: the rerun viewer of the installed wheel, in a window, a browser or without a screen.
 
-The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics.
+The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics. The page that it
+serves to a browser asks rerun.io and others for fonts, examples and versions, and needs none of their answers.
 """
 
 from __future__ import annotations
