@@ -15,15 +15,15 @@ import typer
 
 from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
-from harness.commands.options import BAD_INPUT, FAILED, flag
-from harness.commands.review import view
+from harness.commands.options import BAD_INPUT, FAILED, Command, Group, flag
+from harness.commands.review import report, view
 
 INTERRUPTED: Final = 130
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-for command in (fly, compare, validate, schema, view, bench):
-    app.command()(command)
-app.command("list")(list_names)
+app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
+for command in (fly, compare, validate, schema, view, report, bench):
+    app.command(cls=Command)(command)
+app.command("list", cls=Command)(list_names)
 
 
 def _print_version(wanted: bool) -> None:
@@ -41,13 +41,14 @@ def _print_version(wanted: bool) -> None:
 def wayproof(
     version: Annotated[
         bool,
-        typer.Option(
-            "--version", metavar=" ", help="Print the version.", callback=_print_version, is_eager=True
-        ),
+        typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True),
     ] = False,
     debug: Annotated[bool, flag("--debug", "Show the traceback of an error.")] = False,
 ) -> None:
-    """Flies a path planner's waypoints with a JSBSim aircraft, in a closed loop, in an unknown world."""
+    """Flies a path planner's waypoints with a JSBSim aircraft, in a closed loop, in an unknown world.
+
+    For example: wayproof fly paper_circles
+    """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

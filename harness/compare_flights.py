@@ -13,12 +13,7 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from harness.compare_planned import PlannedRows, planned_rows
-
 if TYPE_CHECKING:
-    from aircraft.interface import AircraftState
-    from harness.range_sensor import RangeScan
-    from harness.record import AcceptedPlan, Track
     from harness.scenario import Scenario
 
 
@@ -44,11 +39,9 @@ class Answer:
     """What a flight's process sent back.
 
     Attributes:
-        planned: the plans row by row of the track; None if it crashed.
         crash: why the flight did not come to an end, a sentence; empty if it did.
     """
 
-    planned: PlannedRows | None
     crash: str = ""
 
 
@@ -70,7 +63,7 @@ def fly_all(jobs: Sequence[Job], workers: int, progress: Progress | None = None)
         The answers, in the order of the jobs.
     """
     context = multiprocessing.get_context("spawn")
-    answers: list[Answer] = [Answer(None)] * len(jobs)
+    answers: list[Answer] = [Answer()] * len(jobs)
     waiting = deque(range(len(jobs)))
     flying: dict[Connection, tuple[int, SpawnProcess]] = {}
     try:
@@ -107,7 +100,7 @@ def _receive(ours: Connection, process: SpawnProcess) -> Message:
         message: Message = ours.recv()
     except (EOFError, OSError):
         process.join()
-        return Answer(None, f"its process ended with {_ending(process.exitcode or 0)} before the flight did")
+        return Answer(f"its process ended with {_ending(process.exitcode or 0)} before the flight did")
     return message
 
 
@@ -124,45 +117,22 @@ def _fly(job: Job, theirs: Connection) -> None:
     # Standard output is the parent's alone: what a planner prints goes to standard error.
     os.dup2(2, 1)
     try:
-        theirs.send(Answer(_flown(job, theirs)))
+        _write(job, theirs)
+        theirs.send(Answer())
     except Exception as error:
         text = " ".join(str(error).split())
-        theirs.send(Answer(None, f"{type(error).__name__}: {text}" if text else type(error).__name__))
+        theirs.send(Answer(f"{type(error).__name__}: {text}" if text else type(error).__name__))
     finally:
         theirs.close()
 
 
-def _flown(job: Job, theirs: Connection) -> PlannedRows:
-    from harness.record import Track
+def _write(job: Job, theirs: Connection) -> None:
     from harness.run import fly_to_folder, kinematic_loop, make_loop
 
-    kept = _Keeper()
     fly_to_folder(
         job.scenario,
         job.folder,
         job.recording,
         lambda time_s, to_go_m, state: theirs.send((time_s, to_go_m, state)),
         make=kinematic_loop if job.kinematic else make_loop,
-        watching=[kept],
     )
-    return planned_rows(Track.joined(kept.blocks), kept.plans)
-
-
-class _Keeper:
-    """Keeps the plans as they were made; the run folder holds only points of them."""
-
-    def __init__(self) -> None:
-        self.blocks: list[Track] = []
-        self.plans: list[AcceptedPlan] = []
-
-    def on_block(self, block: Track) -> None:
-        self.blocks.append(block)
-
-    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        self.plans.append(accepted)
-
-    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
-        """Scans are not compared."""
-
-    def on_event(self, time_s: float, text: str) -> None:
-        """Events belong to the recording."""

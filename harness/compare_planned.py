@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.record import AcceptedPlan, FloatArray, Track
 from harness.smoothness import CORNER_RAD, window_m
+
+if TYPE_CHECKING:
+    from harness.run_folder import PlanRow
 
 SAME_TURN = 1e-3
 """Curvatures that differ by no more than this share of them are equal."""
@@ -48,7 +52,7 @@ class PlannedRows:
         return int(first[longest] + stop[longest] - 1) // 2
 
 
-def planned_rows(track: Track, plans: Sequence[AcceptedPlan]) -> PlannedRows:
+def planned_rows(track: Track, plans: Sequence[AcceptedPlan | PlanRow]) -> PlannedRows:
     """Looks up the plan in effect at every row.
 
     Args:
@@ -75,7 +79,7 @@ def _asked_for(track: Track, row: int, direction_rad: float) -> float:
 
 
 def _along(
-    accepted: AcceptedPlan, station_m: FloatArray, corner_m: float
+    accepted: AcceptedPlan | PlanRow, station_m: FloatArray, corner_m: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A plan at stations: (2, k) places, (k,) curvatures, (k,) directions, counter-clockwise from east.
 

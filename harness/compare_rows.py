@@ -208,16 +208,16 @@ def to_markdown(rows: Sequence[Row]) -> str:
         lines = [f"## {name}", "", _line(["", *(row.planner for row in own)])]
         lines.append(_line(["---", *("---:" for _ in own)]))
         lines += [_line([figure.label, *(figure.text(row) or DASH for row in own)]) for figure in FIGURES]
-        lines += ["", *(f"- {_escaped(row.planner)}: {_escaped(row.reason)}" for row in own), ""]
+        lines += ["", *(f"- {escaped(row.planner)}: {escaped(row.reason)}" for row in own), ""]
         parts.append("\n".join(lines))
     return "\n".join(parts)
 
 
 def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(map(_escaped, cells))} |"
+    return f"| {' | '.join(map(escaped, cells))} |"
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
     """Text that Markdown takes for nothing else."""
     for mark in "\\|<>`*":
         text = text.replace(mark, f"\\{mark}")

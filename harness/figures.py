@@ -213,10 +213,9 @@ def _map(axes: Axes, scene: Scene) -> list[Any]:
     """Obstacles, area, start, goal, straight line and optimum; returns what the legend begins with."""
     xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
     for obstacle in scene.obstacles:
-        stands = obstacle.velocity_mps == (0.0, 0.0) and obstacle.active_s is None
         for grown, style in (
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.5, "ls": ":"}),
-            (0.0, {"fc": "0.85", "ec": "0.45", "lw": 0.7, "ls": "-" if stands else "--"}),
+            (0.0, {"fc": "0.85", "ec": "0.45", "lw": 0.7, "ls": "-" if obstacle.stands_for_ever else "--"}),
         ):
             axes.add_patch(_outline(obstacle, grown, **style))
     (east, north), (goal_east, goal_north) = np.array(scene.start_m) / 1e3, np.array(scene.goal_m) / 1e3

@@ -123,6 +123,11 @@ class Obstacle:
         return self.active_s[0] if self.active_s else 0.0
 
     @property
+    def stands_for_ever(self) -> bool:
+        """Whether it neither moves nor comes or goes."""
+        return self.active_s is None and self.velocity_mps == (0.0, 0.0)
+
+    @property
     def interval_s(self) -> tuple[float, float]:
         """First and last time at which it is there, infinite if it always is."""
         return self.active_s or (-math.inf, math.inf)

@@ -79,12 +79,15 @@ def _own_keys(kind: PlannerKind) -> type[Section]:
 
 def _kind_schema(common: dict[str, Any], kind: PlannerKind) -> dict[str, Any]:
     own = _own_keys(kind).model_json_schema()["properties"]
+    default = common["properties"]["kind"]["default"]
     named = {**common["properties"]["kind"], "const": kind.kind}
+    if kind.kind != default:
+        del named["default"]
     return {
         "title": kind.kind,
         "description": kind.summary,
         "type": "object",
         "additionalProperties": False,
         "properties": {**common["properties"], "kind": named, **own},
-        "required": [] if kind.kind == common["properties"]["kind"]["default"] else ["kind"],
+        "required": [] if kind.kind == default else ["kind"],
     }

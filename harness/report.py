@@ -1,16 +1,15 @@
-"""The report of a comparison: one HTML file that needs nothing but itself."""
+"""Reports, of a comparison and of a single run: one HTML file that needs nothing but itself."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import jinja2
 
 from harness.compare_rows import DASH, FIGURES, Row
-
-TEMPLATE = "comparison.html"
 
 
 @dataclass(frozen=True)
@@ -64,6 +63,55 @@ def report_html(
         written: date and time.
         kinematic: a point flew instead of the aircraft.
     """
+    return _rendered(
+        "comparison.html",
+        chapters=chapters,
+        command=command,
+        versions=versions,
+        written=written,
+        kinematic=kinematic,
+    )
+
+
+def run_html(
+    chapter: Chapter,
+    legs: Sequence[Mapping[str, Any]],
+    *,
+    aircraft: str,
+    scenario_yaml: str,
+    command: str,
+    versions: Mapping[str, str],
+    platform: str,
+    written: str,
+) -> str:
+    """The text of a single run's `report.html`.
+
+    Args:
+        chapter: with one row, and the figures of the path and of its profiles.
+        legs: `trackability` of `metrics.json`.
+        aircraft: its name.
+        scenario_yaml: the scenario as flown.
+        command: the command line that flew it.
+        versions: what flew, by name.
+        platform: what it flew on.
+        written: date and time of the flight.
+    """
+    return _rendered(
+        "run.html",
+        chapter=chapter,
+        row=chapter.rows[0],
+        legs=legs,
+        lost=[leg for leg in legs if not leg["trackable"]],
+        aircraft=aircraft,
+        scenario_yaml=scenario_yaml,
+        command=command,
+        versions=versions,
+        platform=platform,
+        written=written,
+    )
+
+
+def _rendered(template: str, **values: Any) -> str:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("harness"),
         autoescape=True,
@@ -71,12 +119,5 @@ def report_html(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(TEMPLATE).render(
-        chapters=chapters,
-        figures=[figure for figure in FIGURES if figure.short != "digest"],
-        command=command,
-        versions=versions,
-        written=written,
-        kinematic=kinematic,
-        dash=DASH,
-    )
+    shown = [figure for figure in FIGURES if figure.short != "digest"]
+    return environment.get_template(template).render(figures=shown, dash=DASH, **values)

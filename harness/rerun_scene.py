@@ -14,13 +14,25 @@ import numpy as np
 import rerun as rr
 
 from harness import rerun_blueprint as look
-from harness.obstacle import Circle, Obstacle, Polygon
+from harness.obstacle import Circle, Polygon
 from harness.record import FloatArray
 from harness.rerun_blueprint import Colour, Scene
+from harness.rerun_summary import summary
 
 CIRCLE_POINTS = 72
 AIRCRAFT_SHARE = 0.022
 """Wing span of the drawn aircraft as a share of the area: its true size could not be seen."""
+
+SHAPE = np.array(
+    [
+        [(1.1, 0, 0), (-1.1, 0.10, 0), (-1.1, -0.10, 0)],
+        [(0.35, 0, 0.06), (-0.05, 1, 0.06), (-0.30, 0, 0.06)],
+        [(0.35, 0, 0.06), (-0.30, 0, 0.06), (-0.05, -1, 0.06)],
+        [(-0.8, 0, 0), (-1.1, 0.40, 0), (-1.1, -0.40, 0)],
+        [(-0.75, 0, 0), (-1.15, 0, 0), (-1.15, 0, 0.35)],
+    ]
+)
+"""(5, 3, 3) triangles of the drawn aircraft, of half span 1: body, wings, tailplane, fin."""
 
 
 def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
@@ -33,10 +45,13 @@ def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
     rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
     _log_area(rec, scene)
-    standing = [obstacle.shape for obstacle in scene.obstacles if stands_for_ever(obstacle)]
+    standing = [obstacle.shape for obstacle in scene.obstacles if obstacle.stands_for_ever]
     if standing:
-        rec.log(f"{look.PLAN}/obstacles", _outlines(standing, look.OBSTACLE), static=True)
-        log_solids(rec, f"{look.WORLD}/obstacles", standing, scene.obstacle_top_m, look.OBSTACLE)
+        outlines = lines_2d([_outline(shape) for shape in standing], look.OUTLINE, 1.5, 10)
+        rec.log(f"{look.PLAN}/outlines", outlines, static=True)
+        rims = _rims(standing, scene.obstacle_top_m, look.OUTLINE)
+        rec.log(f"{look.WORLD}/outlines", rims, static=True)
+        log_solids(rec, f"{look.WORLD}/{look.TRUE}", standing, scene.obstacle_top_m, look.OBSTACLE)
     _log_aircraft(rec, scene)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
         style = rr.SeriesLines(names=[name], colors=[colour], widths=[width])
@@ -44,16 +59,25 @@ def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
     log_summary(rec, scene, None)
 
 
-def stands_for_ever(obstacle: Obstacle) -> bool:
-    """Whether an obstacle neither moves nor comes or goes."""
-    return obstacle.active_s is None and obstacle.velocity_mps == (0.0, 0.0)
+def log_obstacle(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
+    """Shows an obstacle that has come into view: a solid from the current time on."""
+    obstacle = scene.obstacles[index]
+    top_m = scene.obstacle_top_m
+    if obstacle.stands_for_ever:
+        log_solids(
+            rec, f"{look.WORLD}/obstacles/{index}", [obstacle.shape], top_m, look.OBSTACLE, static=False
+        )
+        return
+    place = f"moving/{index}/{look.SENSED}"
+    rec.log(f"{look.PLAN}/{place}", lines_2d([_outline(obstacle.shape)], look.MOVING, 2.5, 11))
+    log_solids(rec, f"{look.WORLD}/{place}", [obstacle.shape], top_m, look.MOVING, static=False)
 
 
 def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
-    """Shows a moving or timed obstacle from the current time on, where it is at its epoch."""
+    """Outlines a moving or timed obstacle from the current time on, where it is at its epoch."""
     shape = scene.obstacles[index].shape
-    rec.log(f"{look.PLAN}/moving/{index}", _outlines([shape], look.MOVING))
-    log_solids(rec, f"{look.WORLD}/moving/{index}", [shape], scene.obstacle_top_m, look.MOVING, static=False)
+    rec.log(f"{look.PLAN}/moving/{index}", lines_2d([_outline(shape)], look.MOVING_DIM, 1.5, 10))
+    rec.log(f"{look.WORLD}/moving/{index}", _rims([shape], scene.obstacle_top_m, look.MOVING_DIM))
 
 
 def log_solids(
@@ -102,40 +126,6 @@ def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any
         rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN),
         static=True,
     )
-
-
-def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
-    """The summary as Markdown."""
-    mission = scene.mission
-    distance = math.dist(scene.start_m, mission.goal_m)
-    lines = [f"### {scene.name}", ""]
-    if metrics is None:
-        lines += ["Still flying, or stopped before the end.", ""]
-    else:
-        cross, altitude = metrics["cross_track_m"], metrics["altitude_error_m"]
-        table = {
-            "outcome": f"{metrics['outcome']}: {metrics['reason']}",
-            "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
-            "smallest clearance": f"{_text(metrics['min_clearance_m'], 0)} m of {mission.clearance_m:g} m",
-            "time below it": f"{_text(metrics['clearance_violation_s'], 1)} s",
-            "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
-            "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
-            "trackable": "yes" if metrics["trackable"] else "no",
-            "replans": str(metrics["replans"]),
-        }
-        rows = [f"| {name} | {value} |" for name, value in table.items()]
-        lines += [rows[0], "|---|---|", *rows[1:], ""]
-    lines += [
-        f"Straight line {distance:.0f} m at {mission.speed_mps:g} m/s and {scene.altitude_m:g} m above sea "
-        f"level; smallest turn radius {mission.turn_radius_m:.0f} m; "
-        f"sensing range {mission.sensor_range_m:g} m.",
-        "",
-        look.LEGEND,
-        "",
-        "The aircraft is drawn larger than it is; obstacles have no top.",
-        "",
-    ]
-    return "\n".join(lines)
 
 
 def lines_2d(
@@ -193,12 +183,14 @@ def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatA
     )
 
 
-def _text(value: float | None, digits: int) -> str:
-    return "none" if value is None else f"{value:.{digits}f}"
-
-
-def _outlines(shapes: Sequence[Circle | Polygon], colour: Colour) -> rr.LineStrips2D:
-    return lines_2d([_outline(shape) for shape in shapes], colour, 1.5, 10)
+def _rims(shapes: Sequence[Circle | Polygon], top_m: float, colour: Colour) -> rr.LineStrips3D:
+    """Outlines on the ground and at the top."""
+    rims = [
+        np.column_stack((ring, np.full(len(ring), height)))
+        for ring in map(_outline, shapes)
+        for height in (0.0, top_m)
+    ]
+    return rr.LineStrips3D(rims, colors=[colour], radii=rr.Radius.ui_points(0.5))
 
 
 def _outline(shape: Circle | Polygon) -> FloatArray:
@@ -276,27 +268,30 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
 
 
 def _log_aircraft(rec: rr.RecordingStream, scene: Scene) -> None:
-    """The aircraft as a mesh (x forward, y left, z up) and as an arrowhead within the sensing range."""
+    """The aircraft as a mesh (x forward, y left, z up), and as an arrowhead within the sensing range."""
     half = 0.5 * AIRCRAFT_SHARE * scene.frame.span_m
-    corners = np.array(
-        [
-            [(1.1, 0, 0), (-1.1, 0.10, 0), (-1.1, -0.10, 0)],
-            [(0.35, 0, 0.06), (-0.05, 1, 0.06), (-0.30, 0, 0.06)],
-            [(0.35, 0, 0.06), (-0.30, 0, 0.06), (-0.05, -1, 0.06)],
-            [(-0.8, 0, 0), (-1.1, 0.40, 0), (-1.1, -0.40, 0)],
-            [(-0.75, 0, 0), (-1.15, 0, 0), (-1.15, 0, 0.35)],
-        ]
-    ).reshape(-1, 3)
-    rec.log(
-        f"{look.WORLD}/aircraft/shape",
-        rr.Mesh3D(
-            vertex_positions=half * corners,
-            triangle_indices=np.arange(len(corners)).reshape(-1, 3),
-            albedo_factor=look.AIRCRAFT,
-            face_rendering="DoubleSided",
-        ),
-        static=True,
+    for entity, size in ((f"{look.WORLD}/aircraft", half), (f"{look.ATTITUDE}/aircraft", 1.0)):
+        corners = size * SHAPE.reshape(-1, 3)
+        rec.log(
+            f"{entity}/shape",
+            rr.Mesh3D(
+                vertex_positions=corners,
+                triangle_indices=np.arange(len(corners)).reshape(-1, 3),
+                albedo_factor=look.AIRCRAFT,
+                face_rendering="DoubleSided",
+            ),
+            static=True,
+        )
+        rec.log(
+            f"{entity}/axes",
+            rr.Arrows3D(vectors=1.5 * size * np.eye(3), colors=look.AXES, radii=rr.Radius.ui_points(1.0)),
+            static=True,
+        )
+    level = np.column_stack((circle((0.0, 0.0), 1.6), np.zeros(CIRCLE_POINTS + 1)))
+    horizon = rr.LineStrips3D(
+        [level, [(-1.6, 0.0, 0.0), (1.6, 0.0, 0.0)]], colors=[look.BOUNDS], radii=rr.Radius.ui_points(0.75)
     )
+    rec.log(f"{look.ATTITUDE}/level", horizon, static=True)
     arrowhead = half * np.array([(1.0, 0.0), (-0.8, 0.65), (-0.4, 0.0), (-0.8, -0.65), (1.0, 0.0)])
     rec.log(f"{look.PLAN}/aircraft/shape", lines_2d([arrowhead], look.AIRCRAFT, 2.5, 60), static=True)
     rec.log(

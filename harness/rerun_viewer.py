@@ -1,6 +1,7 @@
 """Looking at recordings: the rerun viewer of the installed wheel, in a window, a browser or without a screen.
 
-The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics.
+The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics. The page that it
+serves to a browser asks rerun.io and others for fonts, examples and versions, and needs none of their answers.
 """
 
 from __future__ import annotations
@@ -8,18 +9,22 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Iterator, Sequence
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import quote
 
 from harness.record import RunFolderError
 from harness.rerun_blueprint import TIMELINE
-from harness.rerun_overlay import write_overlay
+from harness.rerun_overlay import send_recording, write_overlay
 from harness.run_folder import RECORDING
 
 LOCALHOST = "127.0.0.1"
@@ -43,12 +48,15 @@ class ViewerError(RuntimeError):
     """The viewer cannot be run; the message says why and what helps."""
 
 
-def open_viewer(run_dirs: Sequence[Path], web: bool = False) -> None:
+def open_viewer(
+    run_dirs: Sequence[Path], web: bool = False, tell: Callable[[str], None] = lambda address: None
+) -> None:
     """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
 
     Args:
         run_dirs: run folders; incomplete ones may be looked at too.
-        web: in a browser instead of a window.
+        web: in a browser instead of a window; served until interrupted.
+        tell: is told the address for the browser.
 
     Raises:
         RunFolderError: a folder has no recording.
@@ -61,19 +69,61 @@ def open_viewer(run_dirs: Sequence[Path], web: bool = False) -> None:
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
-            write_overlay(recordings, [folder.resolve().name for folder in run_dirs], shown)
-        command = [_executable(), str(shown), "--bind", LOCALHOST, "--port", str(_free_port())]
+            write_overlay(recordings, run_names(run_dirs), shown)
         if web:
-            command += ["--web-viewer", "--web-viewer-port", str(_free_port())]
+            with (
+                contextlib.suppress(KeyboardInterrupt),
+                served(shown, len(recordings), Path(scratch)) as (viewer, address),
+            ):
+                tell(address)
+                webbrowser.open(address)
+                viewer.wait()
+            return
+        command = [_executable(), str(shown), "--bind", LOCALHOST, "--port", str(_free_port())]
         with _viewer(command, Path(scratch)) as viewer:
-            status = viewer.wait()
-        if status != 0:
-            last = (
-                (Path(scratch) / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()[-1:]
-            )
-            raise ViewerError(
-                f"the viewer ended with status {status}: {' '.join(last) or 'it gave no reason'}"
-            )
+            if viewer.wait() != 0:
+                raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_words(scratch)}")
+
+
+@contextlib.contextmanager
+def served(rrd: Path, runs: int, scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Serves a recording to browsers of this machine; gives the server and the address to open.
+
+    Args:
+        rrd: the recording.
+        runs: how many it overlays.
+        scratch: an empty folder for the viewer's settings.
+
+    Raises:
+        ViewerError: the server does not start.
+    """
+    port, web_port = _free_port(), _free_port()
+    # A viewer that serves a file keeps a processor busy; one that is sent it does not.
+    command = [_executable(), "--serve-web", "--bind", LOCALHOST]
+    command += ["--port", str(port), "--web-viewer-port", str(web_port)]
+    source = f"rerun+http://{LOCALHOST}:{port}/proxy"
+    with _viewer(command, scratch) as viewer:
+        for each in (port, web_port):
+            if not _answers(each, viewer):
+                raise ViewerError(f"the viewer does not start: {_last_words(str(scratch))}")
+        send_recording(rrd, runs, source)
+        yield viewer, f"http://{LOCALHOST}:{web_port}/?url={quote(source, safe='')}"
+
+
+def _last_words(scratch: str) -> str:
+    lines = (Path(scratch) / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1] if lines else "it gave no reason"
+
+
+def run_names(run_dirs: Sequence[Path]) -> list[str]:
+    """Names of runs: as much of the end of each path as tells them apart, and a number where nothing does."""
+    paths = [folder.resolve().parts for folder in run_dirs]
+    longest = max(map(len, paths))
+    length = next((n for n in range(1, longest) if len({path[-n:] for path in paths}) == len(paths)), 1)
+    names = ["/".join(path[-length:]) for path in paths]
+    return [
+        name if names.count(name) == 1 else f"{name} ({place})" for place, name in enumerate(names, start=1)
+    ]
 
 
 def recording_of(run_dir: Path) -> Path:
@@ -118,14 +168,19 @@ def screenshot(
         tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch,
         _viewer(command, Path(scratch)) as viewer,
     ):
-        _wait_for(port, viewer)
-        client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
-        client.open(str(rrd.resolve()))
-        if time_s is not None:
-            client.set_time(TIMELINE, duration=time_s, play_state="paused")
-        time.sleep(SETTLE_S)
-        client.save_screenshot(str(png.resolve()))
-        return [str(report) for view in client.get_state().views for report in view.reports]
+        if not _answers(port, viewer):
+            raise ViewerError(NO_DRIVER)
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
+            client.open(str(rrd.resolve()))
+            if time_s is not None:
+                client.set_time(TIMELINE, duration=time_s, play_state="paused")
+            time.sleep(SETTLE_S)
+            client.save_screenshot(str(png.resolve()))
+            return [str(report) for view in client.get_state().views for report in view.reports]
+        except ConnectionError as error:
+            # Without a driver it listens for a moment before it gives up.
+            raise ViewerError(NO_DRIVER) from error
 
 
 def _executable() -> str:
@@ -165,10 +220,24 @@ def _viewer(command: list[str], scratch: Path) -> Iterator[subprocess.Popen[str]
         ) as viewer,
     ):
         try:
-            yield viewer
+            with _terminated_as_interrupted():
+                yield viewer
         finally:
             if viewer.poll() is None:
                 viewer.kill()
+
+
+@contextlib.contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Lets SIGTERM end the block like Ctrl-C, so that no viewer is left behind."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _free_port() -> int:
@@ -178,10 +247,11 @@ def _free_port() -> int:
         return port
 
 
-def _wait_for(port: int, viewer: subprocess.Popen[str]) -> None:
+def _answers(port: int, viewer: subprocess.Popen[str]) -> bool:
+    """Whether a viewer comes to listen on a port."""
     until = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < until and viewer.poll() is None:
         with contextlib.suppress(OSError), socket.create_connection((LOCALHOST, port), timeout=1.0):
-            return
+            return True
         time.sleep(0.05)
-    raise ViewerError(NO_DRIVER)
+    return False

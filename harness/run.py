@@ -180,7 +180,14 @@ def _recording(scenario: Scenario, loop: Loop, folder: RunFolder) -> Any:
     from harness.rerun_log import RerunLog
 
     title = f"{scenario.name}, {scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}"
-    scene = Scene(title, loop.mission, scenario.mission.start_m, loop.altitude_m, tuple(loop.world.obstacles))
+    scene = Scene(
+        title,
+        loop.mission,
+        scenario.mission.start_m,
+        flight_limits(scenario),
+        tuple(loop.world.obstacles),
+        dump_scenario(scenario),
+    )
     return RerunLog(folder.recording_path, scene, recording_id=title)
 
 

@@ -34,6 +34,16 @@ PLANS = "plans.parquet"
 METRICS = "metrics.json"
 RECORDING = "flight.rrd"
 REPORT = "report.html"
+REPORT_FILES = tuple(
+    f"{stem}.{kind}"
+    for stem, kinds in {
+        "report": ("html", "csv", "md"),
+        "path": ("svg", "png"),
+        "profiles": ("svg", "png"),
+    }.items()
+    for kind in kinds
+)
+"""What `wayproof report` adds to a run folder."""
 PARTIAL = ".partial"
 
 SCHEMA = "wayproof/run/1"
@@ -52,6 +62,8 @@ class PlanRow:
         compute_ms: wall-clock time of the search.
         waypoints_m: (k, 2) east, north.
         path_m: (m, 2) dense polyline, east, north.
+        segments: (n, 6) the same path exactly, as in `planner.interface.Path`.
+        loiter: whether its last segment is a full circle, flown for ever.
         length_m: length of the path.
         max_curvature_1pm: its largest absolute curvature.
     """
@@ -62,6 +74,8 @@ class PlanRow:
     compute_ms: float
     waypoints_m: FloatArray
     path_m: FloatArray
+    segments: FloatArray
+    loiter: bool
     length_m: float
     max_curvature_1pm: float
 
@@ -129,7 +143,7 @@ class RunFolder:
         try:
             _claim(path)
             _replace(path / MANIFEST, _json(manifest))
-            for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, REPORT):
+            for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, *REPORT_FILES):
                 (path / name).unlink(missing_ok=True)
                 (path / (name + PARTIAL)).unlink(missing_ok=True)
             _replace(path / SCENARIO, scenario_yaml)
@@ -267,20 +281,22 @@ def _plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
         "compute_ms": pa.array([accepted.compute_ms for accepted in plans], pa.float64()),
         "waypoints": _points_column([accepted.plan.waypoints_m for accepted in plans]),
         "path": _points_column([polyline(accepted.segments) for accepted in plans]),
+        "segments": _points_column([accepted.segments for accepted in plans], 6),
+        "loiter": pa.array([accepted.loiter for accepted in plans], pa.bool_()),
         "length_m": pa.array([path.length_m for path in paths if path], pa.float64()),
         "max_curvature_1pm": pa.array([path.max_curvature_1pm for path in paths if path], pa.float64()),
     }
     return pa.table(columns)
 
 
-def _points_column(polylines: Sequence[FloatArray]) -> pa.Array:
-    """A column of lists of [east_m, north_m]."""
+def _points_column(rows: Sequence[FloatArray], width: int = 2) -> pa.Array:
+    """A column of lists of rows: by default of [east_m, north_m]."""
     import pyarrow as pa
 
-    flat = np.concatenate([np.zeros((0, 2)), *polylines]).ravel()
-    offsets = np.cumsum([0, *(len(points) for points in polylines)])
-    pairs = pa.FixedSizeListArray.from_arrays(pa.array(flat), 2)
-    return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), pairs)
+    flat = np.concatenate([np.zeros((0, width)), *rows]).ravel()
+    offsets = np.cumsum([0, *(len(each) for each in rows)])
+    values = pa.FixedSizeListArray.from_arrays(pa.array(flat), width)
+    return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), values)
 
 
 def _plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
@@ -288,5 +304,6 @@ def _plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
     for row in table.to_pylist():
         row["waypoints_m"] = np.array(row.pop("waypoints"), dtype=np.float64).reshape(-1, 2)
         row["path_m"] = np.array(row.pop("path"), dtype=np.float64).reshape(-1, 2)
+        row["segments"] = np.array(row["segments"], dtype=np.float64).reshape(-1, 6)
         rows.append(PlanRow(**row))
     return tuple(rows)

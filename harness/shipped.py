@@ -35,6 +35,7 @@ def scenario_path(text: str) -> Path:
 
 
 def summary(path: Path) -> str:
-    """What a scenario is for: the first line of the comment it begins with."""
+    """What a scenario is for: the first line of the comment it begins with, the one for editors left out."""
     with path.open(encoding="utf-8") as file:
-        return file.readline().lstrip("# ").rstrip()
+        line = next(line for line in file if not line.startswith("# yaml-language-server:"))
+        return line.lstrip("# ").rstrip()

@@ -82,7 +82,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         f"below the wanted one for {_number(metrics['clearance_violation_s'])} s",
         "cross-track error": f"{_spread(metrics['cross_track_m'])} m",
         "altitude error": f"{_spread(metrics['altitude_error_m'])} m",
-        "trackable": "yes" if metrics["trackable"] else "no",
+        "trackable": _tracked(metrics),
         "plans": f"{metrics['replans']}, p99 {_number(compute['p99'])} ms, max {_number(compute['max'])} ms",
         "speed": f"{_number(timing['realtime_factor'])} x real time, {_number(timing['wall_s'])} s",
     }
@@ -97,6 +97,17 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
         "planner": ", ".join(f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")),
     }
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
+
+
+def _tracked(metrics: Mapping[str, Any]) -> str:
+    """Whether all legs were tracked, and why some were not."""
+    if metrics["trackable"]:
+        return "yes"
+    legs = metrics["trackability"]
+    causes = [str(leg["cause"]) for leg in legs if not leg["trackable"]]
+    if not causes:
+        return "no: no plan was flown"
+    return f"no: {len(causes)} of {len(legs)} legs, {_plain(', '.join(dict.fromkeys(causes)))}"
 
 
 def _plain(text: str) -> str:

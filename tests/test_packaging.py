@@ -53,7 +53,7 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
         for path in (ROOT / room).rglob("*")
         if path.is_file() and "__pycache__" not in path.parts
     }
-    scenarios = {f"harness/scenarios/{path.name}" for path in (ROOT / "scenarios").glob("*.yaml")}
+    scenarios = {f"harness/scenarios/{path.name}" for path in (ROOT / "scenarios").iterdir()}
     assert held == sources | scenarios
     assert {"aircraft/systems/autopilot.xml", "aircraft/airframes.yaml", "planner/py.typed"} <= held
     assert {"LICENSE", "entry_points.txt", "METADATA"} <= notes

@@ -53,6 +53,7 @@ def test_the_first_command_flies_the_papers_scenario_and_prints_what_readme_show
     assert [line[:20].strip() for line in flown.stdout.splitlines()] == names
     folder = shown.splitlines()[-1].removeprefix("run folder: ")
     assert load_run(tmp_path / folder).metrics["outcome"] == "reached"
+    assert (tmp_path / folder / "flight.rrd").stat().st_size < 25e6, "an hour's flight"
     assert f"`wayproof view {folder}`" in README
 
 
@@ -70,6 +71,20 @@ def test_a_command_shown_ends_well(command: str, tmp_path: Path) -> None:
     assert shown.returncode == 0, shown.stderr
 
 
+def test_the_tour_can_be_gone_in_order(tmp_path: Path) -> None:
+    (tour,) = blocks("bash")
+    commands = [line.partition("#")[0].removeprefix("wayproof ").split() for line in tour.splitlines()]
+    assert [command[0] for command in commands] == ["fly", "view", "report", "compare", "view"]
+    for command, *arguments in commands:
+        if command == "view":
+            assert [(tmp_path / run / "flight.rrd").is_file() for run in arguments] == [True] * len(arguments)
+        else:
+            done = wayproof(shlex.join([command, *arguments]), tmp_path)
+            assert done.returncode == 0, done.stderr
+    for page in ("aerosonde_forest/rolling_window-aerosonde-1", "comparison"):
+        assert (tmp_path / "runs" / page / "report.html").is_file()
+
+
 def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_path: Path) -> None:
     (text,) = blocks("yaml")
     (tmp_path / "my_world.yaml").write_text(text)
@@ -85,6 +100,7 @@ def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_pat
 
 def test_ones_own_planner_is_found_and_flown(tmp_path: Path) -> None:
     (planner,), (project,), (scenario,) = blocks("python"), blocks("toml"), blocks("yaml")
+    assert len([line for line in planner.splitlines() if line.strip()]) < 30
     (tmp_path / "my_planner.py").write_text(planner)
     (tmp_path / "pyproject.toml").write_text(project)
     (tmp_path / "my_world.yaml").write_text(scenario)
@@ -119,7 +135,11 @@ def test_files_and_pictures_named_are_there() -> None:
     ]
     assert len(named) > 8
     assert [name for name in named if not (ROOT / name).exists()] == []
-    assert (ROOT / ".pictures" / "paper_circles.png").stat().st_size < 200 * 1024
+    pictures = list((ROOT / ".pictures").iterdir())
+    assert [each.name for each in pictures if each.stat().st_size >= 150 * 1024] == []
+    assert {f".pictures/{each.name}" for each in pictures} <= {
+        *re.findall(r"\]\((\.pictures/[^)]+)\)", README)
+    }
 
 
 def test_readme_keeps_a_mistake_off_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

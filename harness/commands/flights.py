@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from harness.commands import options
 from harness.commands.options import (
     FAILED,
     JsonOption,
@@ -30,8 +31,14 @@ FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 
 def fly(
     scenario: ScenarioArgument,
-    planner: Annotated[str | None, typer.Option(metavar="KIND", help="Replaces planner.kind.")] = None,
-    aircraft: Annotated[str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.")] = None,
+    planner: Annotated[
+        str | None,
+        typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=options.planners),
+    ] = None,
+    aircraft: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=options.aircraft),
+    ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")] = None,
     settings: Annotated[
         list[str] | None,
@@ -46,6 +53,8 @@ def fly(
     as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
 ) -> int:
     """One closed-loop flight, headless, into a run folder.
+
+    For example: wayproof fly paper_circles --seed 3 --set planner.clearance_m=400
 
     Exit status:
 
@@ -134,7 +143,10 @@ def compare(
 
 
 def bench(scenario: ScenarioArgument = "paper_circles", as_json: JsonOption = False) -> int:
-    """What the loop costs on this machine against bare JSBSim, block by block."""
+    """What the loop costs on this machine against bare JSBSim, block by block.
+
+    For example: wayproof bench aerosonde_forest --json
+    """
     loaded = load(scenario)
 
     from harness.bench import bench as measure

@@ -12,7 +12,10 @@ from harness.commands.options import BAD_INPUT, load, print_json
 def validate(
     files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenario files or shipped names.")],
 ) -> int:
-    """Checks scenario files without flying them."""
+    """Checks scenario files without flying them.
+
+    For example: wayproof validate my_world.yaml paper_circles
+    """
     from harness.strict_yaml import InputError
 
     status = 0
@@ -30,7 +33,10 @@ def validate(
 def schema(
     kind: Annotated[Literal["scenario"], typer.Argument(help="The file format.")] = "scenario",
 ) -> int:
-    """Prints the JSON Schema of a file format, for editors."""
+    """Prints the JSON Schema of a file format, for editors.
+
+    For example: wayproof schema > scenario.schema.json
+    """
     from harness.scenario import scenario_schema
 
     print_json(scenario_schema())
@@ -40,7 +46,10 @@ def schema(
 def list_names(
     what: Annotated[Literal["planners", "aircraft", "scenarios"], typer.Argument(help="Of what.")],
 ) -> int:
-    """Prints the names that a scenario or a command can use."""
+    """Prints the names that a scenario or a command can use.
+
+    For example: wayproof list planners
+    """
     from harness.terminal import print_columns
 
     print_columns(_summaries(what))

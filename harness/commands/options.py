@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 if TYPE_CHECKING:
     from harness.scenario import Scenario
@@ -14,13 +15,62 @@ FAILED: Final = 1
 BAD_INPUT: Final = 2
 
 
+class Command(TyperCommand):
+    """A command whose help shows no type for what takes no value."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Its parameters."""
+        return _tidied(super().get_params(ctx))
+
+
+class Group(TyperGroup):
+    """The same for the program itself."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Its parameters."""
+        return _tidied(super().get_params(ctx))
+
+
+def _tidied(parameters: list[Any]) -> list[Any]:
+    for each in parameters:
+        if getattr(each, "is_flag", False):
+            each.metavar = " "
+    return parameters
+
+
 def flag(name: str, text: str) -> Any:
-    """An option without a value; the empty metavar keeps the help from showing a type for it."""
-    return typer.Option(name, metavar=" ", help=text)
+    """An option without a value."""
+    return typer.Option(name, help=text)
+
+
+def _shipped(incomplete: str) -> list[str]:
+    """Names for the shell to complete a scenario with; files it finds itself."""
+    from harness.shipped import shipped_scenarios
+
+    return [name for name in shipped_scenarios() if name.startswith(incomplete)]
+
+
+def planners(incomplete: str) -> list[str]:
+    """Kinds for the shell to complete a planner with."""
+    from planner.registry import planner_kinds
+
+    return [kind for kind in planner_kinds() if kind.startswith(incomplete)]
+
+
+def aircraft(incomplete: str) -> list[str]:
+    """Names for the shell to complete an aircraft with."""
+    from aircraft.airframes import aircraft_names
+
+    return [name for name in aircraft_names() if name.startswith(incomplete)]
 
 
 ScenarioArgument = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="A file, or a name that `wayproof list scenarios` prints.")
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="A file, or a name that `wayproof list scenarios` prints.",
+        autocompletion=_shipped,
+    ),
 ]
 JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
 

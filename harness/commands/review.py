@@ -1,4 +1,4 @@
-"""The commands that show what was flown: `view`."""
+"""The commands that show what was flown: `view`, `report`."""
 
 from __future__ import annotations
 
@@ -8,25 +8,48 @@ from typing import Annotated
 
 import typer
 
-from harness.commands.options import FAILED, bad_input
+from harness.commands.options import FAILED, bad_input, flag
 
 
 def view(
     runs: Annotated[
         list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders; several are overlaid.")
     ],
+    web: Annotated[bool, flag("--web", "In a browser, served on 127.0.0.1, instead of a window.")] = False,
 ) -> int:
-    """Opens recordings in the rerun viewer."""
-    return 0 if open_viewer(runs) else FAILED
+    """Opens recordings in the rerun viewer.
+
+    For example: wayproof view runs/paper_circles/rolling_window-aerosonde-1
+    """
+    return 0 if open_viewer(runs, web) else FAILED
 
 
-def open_viewer(runs: Sequence[Path]) -> bool:
+def report(
+    run: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="The folder of a complete run.")],
+) -> int:
+    """Writes report.html, one self-contained page, into a run folder.
+
+    The figures are there as SVG and PNG too, the table as CSV and Markdown.
+
+    For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
+    """
+    from harness.record import RunFolderError
+    from harness.run_report import write_report
+
+    try:
+        typer.echo(f"report: {write_report(run)}")
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    return 0
+
+
+def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
     """Shows recordings until the viewer is closed; says on standard error why, if it cannot start."""
     from harness.record import RunFolderError
     from harness.rerun_viewer import ViewerError, open_viewer
 
     try:
-        open_viewer(runs)
+        open_viewer(runs, web, lambda address: typer.echo(f"{address} (Ctrl-C ends it)", err=True))
     except RunFolderError as error:
         raise bad_input(error) from error
     except ViewerError as error:

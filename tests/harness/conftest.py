@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from typing import Any
 
 import numpy as np
 import pytest
 
 from harness.record import AcceptedPlan, FloatArray, Track
 from planner.interface import Path, Plan, PlanPicture, PlanStatus
+from tests.page import NoBrowserError, browser
 
 MakeTrack = Callable[..., Track]
 MakePlan = Callable[..., AcceptedPlan]
@@ -64,6 +67,17 @@ def circle_track(radius_m: float, seconds: float, speed_mps: float = 25.0) -> Tr
         groundspeed_mps=speed_mps,
         station_m=speed_mps * time_s,
     )
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """A browser without a screen."""
+    with ExitStack() as stack:
+        try:
+            opened = stack.enter_context(browser())
+        except NoBrowserError as error:
+            pytest.skip(str(error))
+        yield opened
 
 
 @pytest.fixture

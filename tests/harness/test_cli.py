@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -23,7 +24,7 @@ from planner.registry import planner_kinds
 
 ROOT = Path(__file__).parents[2]
 SLOW = {"jsbsim", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "yaml"}
-COMMANDS = ("fly", "validate", "schema", "list", "view", "bench")
+COMMANDS = ("fly", "compare", "validate", "schema", "list", "view", "report", "bench")
 FLY_OPTIONS = (
     *("--planner", "--aircraft", "--seed", "--set", "--out"),
     *("--no-recording", "--view", "--quiet", "--json"),
@@ -40,6 +41,12 @@ METRICS: dict[str, Any] = {
     "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
     "altitude_error_m": {"rms": None, "p95": None, "max": None},
     "trackable": False,
+    "trackability": [
+        {"trackable": True, "cause": None},
+        {"trackable": False, "cause": "wind drift"},
+        {"trackable": False, "cause": "bank limit"},
+        {"trackable": False, "cause": "wind drift"},
+    ],
     "replans": 41,
     "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
     "timing": {"sim_s": 3772.9, "wall_s": 6.12, "realtime_factor": 616.5},
@@ -71,6 +78,41 @@ def test_help_of_fly_has_every_option_of_the_contract(capsys: pytest.CaptureFixt
     assert main(["fly", "--help"]) == 0
     shown = capsys.readouterr().out
     assert [option for option in FLY_OPTIONS if f" {option} " not in shown] == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_a_command_has_an_example_that_is_one(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    (example,) = re.findall(r"For example: wayproof (.*)", shown)
+    assert example.split()[0] == command
+    assert "<bool>" not in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("wayproof be", {"bench"}),
+        ("wayproof fly paper_b", {"paper_bug_trap"}),
+        ("wayproof fly x --planner tangent", {"tangent_bug"}),
+        ("wayproof fly x --aircraft aero", {"aerosonde"}),
+    ],
+)
+def test_the_shell_completes_commands_and_names(words: str, offered: set[str], tmp_path: Path) -> None:
+    completing = {
+        "_WAYPROOF_COMPLETE": "complete_bash",
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+    }
+    assert set(wayproof(folder=tmp_path, **completing).stdout.split()) == offered
+
+
+def test_the_script_for_the_shell_is_printed(tmp_path: Path) -> None:
+    by_name = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    shown = wayproof("--show-completion", "bash", folder=tmp_path, **by_name)
+    assert "_WAYPROOF_COMPLETE=complete_bash" in shown.stdout
 
 
 def test_help_imports_nothing_slow(tmp_path: Path) -> None:
@@ -131,6 +173,7 @@ print(sorted({"jsbsim", "rerun", "pyarrow"} & set(sys.modules)), file=sys.stderr
         (["validate"], "FILE"),
         (["view"], "RUN_DIR"),
         (["view", "no-such-run"], "no-such-run"),
+        (["report", "no-such-run"], "no-such-run is not a run folder"),
         (["bench", "nowhere.yaml"], "nowhere.yaml: no such file"),
     ],
 )

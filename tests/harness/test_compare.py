@@ -29,6 +29,7 @@ from harness.record import AcceptedPlan, Track
 from harness.run_folder import load_run
 from planner.interface import Path as PlanPath
 from planner.interface import Plan, PlanStatus
+from tests.page import shown
 
 ROOT = Path(__file__).parents[2]
 PLUGIN = '''
@@ -235,6 +236,13 @@ def test_the_report_needs_nothing_but_itself_and_escapes_what_it_is_told(flown: 
     assert "ValueError: <script>alert(1)</script> | *not* to be run" in page.text
     for row in rows_of(flown)[:2]:
         assert row["digest"] in page.text
+
+
+def test_a_browser_shows_the_report_on_phone_and_screen(flown: Path, chromium: Any) -> None:
+    for width_px in (390, 1280):
+        page = shown(chromium, flown / "report.html", width_px)
+        assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
+        assert (page.figures, page.missing) == (4, 0)
 
 
 def test_the_report_says_how_to_repeat_it(

@@ -4,9 +4,10 @@ import json
 import math
 import subprocess
 import sys
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -19,13 +20,23 @@ from harness.metrics import metrics
 from harness.obstacle import Circle, Obstacle, Polygon
 from harness.range_sensor import RangeScan
 from harness.record import AcceptedPlan, Flight, Outcome, RunFolderError, Track
-from harness.rerun_blueprint import Scene
+from harness.rerun_blueprint import ERROR_COLOURS, Scene
 from harness.rerun_log import RerunLog
 from harness.rerun_overlay import write_overlay
 from harness.rerun_scene import quaternions
-from harness.rerun_viewer import NO_DRIVER, ViewerError, _executable, open_viewer, screenshot
+from harness.rerun_states import mode_of
+from harness.rerun_viewer import (
+    NO_DRIVER,
+    ViewerError,
+    _executable,
+    open_viewer,
+    run_names,
+    screenshot,
+    served,
+)
 from harness.trackability import FlightLimits
-from planner.interface import Mission, PlanPicture
+from planner.interface import Mission, Plan, PlanPicture, PlanStatus
+from planner.interface import Path as PlannedPath
 
 MISSION = Mission(
     goal_m=(0.0, 2500.0),
@@ -44,7 +55,8 @@ OBSTACLES = (
     Obstacle(Circle((1000.0, 2500.0), 100.0), velocity_mps=(-2.0, 0.0)),
     Obstacle(Circle((-1000.0, 2500.0), 100.0), active_s=(20.0, 60.0)),
 )
-SCENE = Scene("straight, none, aerosonde, seed 1", MISSION, (0.0, 0.0), 300.0, OBSTACLES)
+LIMITS = FlightLimits(300.0, 100.0, 0.78, 110.0, 0.5)
+SCENE = Scene("straight, none, aerosonde, seed 1", MISSION, (0.0, 0.0), LIMITS, OBSTACLES, "name: straight\n")
 PICTURE = PlanPicture(
     guide_m=np.array([[0.0, 0.0], [0.0, 800.0]]),
     window_m=700.0,
@@ -85,7 +97,7 @@ def record(
     for start in range(0, 1001, 300):
         log.on_block(Track(**{name: column[start : start + 300] for name, column in vars(track).items()}))
     flight = Flight(track, (first, second), Outcome.REACHED, "in the goal's circle", (2.5, 2.5), 100.0, 0.1)
-    log.close(metrics(flight, FlightLimits(300.0, 100.0, 0.78, 110.0, 0.5)))
+    log.close(metrics(flight, LIMITS))
     return flight
 
 
@@ -131,7 +143,7 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
     entities = read(path)
     for entity, values in {
         "cross_track/flown": flight.track.cross_track_m,
-        "clearance/wanted": np.full(1001, 100.0),
+        "bank/pitch": flight.track.pitch_deg,
         "bank/commanded": flight.track.roll_command_deg,
         "bank/flown": flight.track.roll_deg,
         "speed/ground": flight.track.groundspeed_mps,
@@ -140,6 +152,14 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
     }.items():
         logged = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
         np.testing.assert_array_equal(logged[-1001:], values)
+    for entity, value in {"clearance/wanted": 100.0, "bank/limit_left": -math.degrees(0.78)}.items():
+        level = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
+        np.testing.assert_allclose(level, value)
+        assert (seconds(entities, f"/series/{entity}")[0], seconds(entities, f"/series/{entity}")[-1]) == (
+            0,
+            100,
+        )
+    np.testing.assert_array_equal(np.ravel(column(entities, "/series/search/flown", "scalars")), [2.5, 2.5])
     clearance = np.array(column(entities, "/series/clearance/flown", "scalars"), dtype=np.float64).ravel()
     assert np.isnan(clearance[:200]).all()
     assert (clearance[200:] == 150.0).all()
@@ -156,19 +176,108 @@ def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None
     times = seconds(entities, "/plan/flown")
     pieces = column(entities, "/plan/flown", "strips")
     assert times[-1] == 100.0
-    assert max(np.diff([0.0, *times])) <= 2.0 + 1e-9
+    assert max(np.diff([0.0, *times])) <= 1.0 + 1e-9
     ends = [strip[-1] for (strip,) in pieces]
     starts = [strip[0] for (strip,) in pieces]
     np.testing.assert_allclose(ends, [(0.0, 25.0 * time) for time in times], atol=1e-3)
     np.testing.assert_array_equal(starts[1:], ends[:-1])
 
 
-def test_scans_are_drawn_for_plans_and_every_ten_seconds(recording: tuple[Path, Flight]) -> None:
+def test_scans_are_drawn_as_the_aircraft_goes_on(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
-    assert seconds(entities, "/plan/scan") == [10.0 * i for i in range(10)]
+    times = seconds(entities, "/plan/scan")
+    assert times[:3] == [0.0, 2.0, 4.0]
+    assert 50.0 in times
     np.testing.assert_array_equal(
         column(entities, "/plan/scan", "positions")[0], [[105.0, 7.0], [-195.0, 7.0]]
     )
+
+
+def test_obstacles_appear_as_they_are_sensed(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    """Sees the near edge of the circle from 5 s on, and something that is not there."""
+    near, false = (300.0, 1250.0), (-300.0, 0.0)
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    for time_s, points in ((0.0, [false]), (5.0, [near, false]), (10.0, [near])):
+        away = np.array(points)
+        ranges = np.hypot(*away.T)
+        log.on_scan(
+            RangeScan(time_s, time_s, 0.0, 0.0, 0.0, 0.1, away / ranges[:, None], ranges, 2000.0), STATE
+        )
+    log.on_block(make_track(201, plan_index=-1))
+    log.close()
+    entities = read(tmp_path / "a.rrd")
+    assert seconds(entities, "/world/obstacles/0/circles") == [5.0]
+    assert "/world/obstacles/1/polygons" not in entities
+    assert seconds(entities, "/plan/sensed") == seconds(entities, "/world/sensed") == [5.0]
+    np.testing.assert_array_equal(column(entities, "/plan/sensed", "positions"), [[near]])
+    ((post,),) = column(entities, "/world/sensed", "strips")
+    np.testing.assert_allclose(post, [(*near, 0.0), (*near, SCENE.obstacle_top_m)], rtol=1e-6)
+    assert [str(text) for (text,) in column(entities, "/events", "text")] == [
+        "t = 5 s: obstacle 0 comes into view, 1.3 km away"
+    ]
+
+
+def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    row = np.arange(101)
+    error = np.where((row < 50) & (row != 20), 0.0, -2.0 * LIMITS.cross_track_threshold_m)
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    log.on_block(make_track(101, cross_track_m=error, plan_index=-1))
+    log.close()
+    colours = [rgba >> 8 for (rgba,) in column(read(tmp_path / "a.rrd"), "/plan/flown", "colors")]
+    on, _, off = ((red << 16) + (green << 8) + blue for red, green, blue in ERROR_COLOURS)
+    assert [colour == off for colour in colours[:5]] == [False, False, True, False, False], "the worst counts"
+    assert {colours[0], colours[4]} == {on}
+    assert set(colours[5:]) == {off}
+
+
+def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    """A plan to 5 s of flight, then its closing circle; at the bank limit from 8 s on."""
+    circle = (0, 125.0, 0, 1, 0.01, 200 * math.pi)
+    straight = (0, 0, 0, 1, 0.0, 125.0)
+    path = PlannedPath(np.array([straight, circle]), loiter=True)
+    plan = Plan(PlanStatus.FOUND, "obstacle ahead, passing left at 9.8 km", path=path)
+    rows = np.arange(101)
+    track = make_track(
+        101,
+        plan_index=np.where(rows < 10, -1, 0),
+        station_m=np.where(rows < 10, np.nan, 2.5 * rows),
+        roll_command_deg=np.where(rows < 80, 0.0, math.degrees(LIMITS.bank_limit_rad)),
+        cross_track_m=np.where(rows < 90, 0.0, 25.0),
+    )
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    accepted = AcceptedPlan(0, 1.0, 2.5, plan)
+    log.on_plan(accepted, STATE)
+    log.on_block(track)
+    flight = Flight(track, (accepted,), Outcome.TIMEOUT, "late", (2.5,), 10.0, 0.1)
+    log.close(metrics(flight, LIMITS))
+    entities = read(tmp_path / "a.rrd")
+    lanes = {
+        lane: list(zip(seconds(entities, f"/states/{lane}")[-len(states) :], states, strict=True))
+        for lane in ("planner", "saturation", "tracking")
+        for states in [[str(cell[0]) for cell in column(entities, f"/states/{lane}", "state") if cell]]
+    }
+    assert lanes["planner"] == [
+        (0.0, "waiting for a plan"),
+        (1.0, "obstacle ahead, passing left"),
+        (5.1, "holding"),
+    ]
+    assert lanes["saturation"] == [(0.0, "bank command below its limit"), (8.0, "bank command at its limit")]
+    ((start, cause),) = lanes["tracking"]
+    assert (start, cause == "trackable") == (1.0, False)
+
+
+@pytest.mark.parametrize(
+    ("reason", "mode"),
+    [
+        ("obstacle ahead, passing left at 9.8 km", "obstacle ahead, passing left"),
+        ("way to the goal in view, 56.2 km to go", "way to the goal in view"),
+        ("following a boundary, 1.3 km from the hit point", "following a boundary"),
+        ("turning away", "turning away"),
+        ("3 ways", "3 ways"),
+    ],
+)
+def test_a_mode_is_a_reason_without_its_numbers(reason: str, mode: str) -> None:
+    assert mode_of(reason) == mode
 
 
 def test_scan_before_a_plan_is_drawn(tmp_path: Path, make_plan: Callable[..., AcceptedPlan]) -> None:
@@ -177,7 +286,7 @@ def test_scan_before_a_plan_is_drawn(tmp_path: Path, make_plan: Callable[..., Ac
         log.on_scan(scan(time_s), STATE)
     log.on_plan(make_plan([(0, 0, 0, 1, 0.0, 100.0)], time_s=3.7), STATE)
     log.close()
-    assert seconds(read(tmp_path / "a.rrd"), "/plan/scan") == [0.0, 3.5]
+    assert seconds(read(tmp_path / "a.rrd"), "/plan/scan") == [0.0, 3.0, 3.5]
 
 
 def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) -> None:
@@ -191,31 +300,40 @@ def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) ->
     np.testing.assert_array_equal(
         column(entities, "/plan/candidates", "strips")[0], [[[0.0, 0.0], [200.0, 600.0]]]
     )
-    window, sector = column(entities, "/plan/window", "strips")[0]
+    (window,), (sector,) = (column(entities, f"/plan/{name}", "strips")[0] for name in ("window", "sectors"))
     np.testing.assert_allclose(np.hypot(*np.array(window).T), 700.0, rtol=1e-6)
     np.testing.assert_allclose([sector[0], sector[1], sector[-2]], [[0, 0], [700, 0], [0, 700]], atol=1e-3)
-    for entity in ("guide", "window", "candidates"):
-        assert seconds(entities, f"/plan/{entity}") == [0.0, 50.0], "cleared where the planner shows nothing"
+    for entity, part in (
+        ("guide", "vectors"),
+        *((each, "strips") for each in ("window", "candidates", "sectors")),
+    ):
+        assert seconds(entities, f"/plan/{entity}") == [0.0, 50.0]
+        assert column(entities, f"/plan/{entity}", part)[1] == [], "cleared where the planner shows nothing"
 
 
 def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     texts = [str(text) for (text,) in column(entities, "/events", "text")]
-    assert texts == ["plan 0: a way was found", "plan 1: a way was found", "goal reached"]
+    assert texts == [
+        "t = 0 s: a way was found (plan 0, 2.5 ms)",
+        "t = 50 s: a way was found (plan 1, 2.5 ms)",
+        "t = 100 s: goal reached",
+    ]
     documents = [str(text) for (text,) in column(entities, "/summary", "text")]
     assert "stopped before the end" in documents[0]
     assert "reached: in the goal's circle" in documents[-1]
     assert "2500 m in 100 s" in documents[-1]
+    assert "name: straight" in documents[-1]
     figures = json.loads(column(entities, "/__properties/metrics", "json")[0][0])
     assert figures["outcome"] == "reached"
 
 
 def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
-    (centre,) = column(entities, "/world/obstacles/circles", "centers")[0]
+    (centre,) = column(entities, "/world/true_obstacles/circles", "centers")[0]
     assert tuple(centre[:2]) == (600.0, 1250.0)
-    faces = np.array(column(entities, "/world/obstacles/polygons", "triangle_indices")[0])
-    corners = np.array(column(entities, "/world/obstacles/polygons", "vertex_positions")[0])
+    faces = np.array(column(entities, "/world/true_obstacles/polygons", "triangle_indices")[0])
+    corners = np.array(column(entities, "/world/true_obstacles/polygons", "vertex_positions")[0])
     edge = corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]]
     cross = 0.5 * np.cross(*edge)
     assert cross[:, 2].sum() == pytest.approx(400000.0, rel=1e-5), "roof: the polygon's area, seen from above"
@@ -236,7 +354,7 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
     assert len(reader.blueprints()) == 1
     assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
     layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
-    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 9
+    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 12
 
 
 def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight]) -> None:
@@ -256,7 +374,7 @@ from conftest import track
 from test_rerun_log import SCENE
 from harness.rerun_log import RerunLog
 log = RerunLog(Path({str(tmp_path / "a.rrd")!r}), SCENE, "a")
-log.on_block(track(600))
+log.on_block(track(600, plan_index=-1))
 log.flush()
 os._exit(9)
 """
@@ -296,10 +414,29 @@ def test_overlay_keeps_every_track_and_one_world(
         position = column(entities, f"/world/runs/{number}/aircraft", "translation")[0]
         assert position[0][0] == east_m
         assert len(column(entities, f"/series/bank/flown/{number}", "scalars")) >= 1001
-    assert "/world/obstacles/circles" in entities
+    assert "/world/true_obstacles/circles" in entities
     assert "/plan/chosen" not in entities
+    told = [str(text) for (text,) in column(entities, "/events", "text")]
+    assert "first, t = 100 s: goal reached" in told
+    assert "second, t = 100 s: goal reached" in told
+    (((summary,),)) = (column(entities, "/summary", "text")[-1],)
+    assert "| outcome | reached | reached |" in str(summary)
+    assert "/states/1-first/planner" in entities
     colours = [column(entities, f"/plan/runs/{number}/flown", "colors")[-1] for number in (0, 1)]
     assert colours[0] != colours[1]
+
+
+@pytest.mark.parametrize(
+    ("folders", "names"),
+    [
+        (["runs/a", "runs/b"], ["a", "b"]),
+        (["one/bug2-1", "two/bug2-1"], ["one/bug2-1", "two/bug2-1"]),
+        (["one/x/run", "two/x/run", "two/y/run"], ["one/x/run", "two/x/run", "two/y/run"]),
+        (["a", "a"], ["a (1)", "a (2)"]),
+    ],
+)
+def test_overlaid_runs_have_names_of_their_own(folders: list[str], names: list[str]) -> None:
+    assert run_names([Path(folder) for folder in folders]) == names
 
 
 def test_view_says_what_is_missing(tmp_path: Path) -> None:
@@ -322,6 +459,20 @@ def test_view_says_that_there_is_no_screen(
         open_viewer([recording[0].parent])
 
 
+def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
+    recording: tuple[Path, Flight], tmp_path: Path
+) -> None:
+    with served(recording[0], 1, tmp_path) as (viewer, address):
+        assert address.startswith("http://127.0.0.1:")
+        assert "rerun%2Bhttp%3A%2F%2F127.0.0.1" in address
+        with urllib.request.urlopen(address, timeout=10) as answer:
+            assert b"re_viewer" in answer.read()
+        command = [str(part) for part in cast(list[str], viewer.args)]
+        assert command[command.index("--bind") + 1] == "127.0.0.1"
+        assert viewer.poll() is None
+    assert viewer.poll() is not None
+
+
 def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
     path, _ = recording
     png = path.with_suffix(".png")
@@ -333,6 +484,13 @@ def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
     assert complaints == []
     assert png.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert int.from_bytes(png.read_bytes()[16:20]) == 1200
+
+
+def test_a_missing_driver_is_said(recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+        monkeypatch.setenv(name, "/nowhere")
+    with pytest.raises(ViewerError, match="mesa-vulkan-drivers"):
+        screenshot(recording[0], recording[0].with_suffix(".png"))
 
 
 @given(heading=st.floats(0.0, 360.0), pitch=st.floats(-80.0, 80.0), roll=st.floats(-180.0, 180.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -242,3 +243,60 @@ def test_the_schema_describes_every_key_with_its_unit() -> None:
         if name.endswith(("_m", "_mps", "_s", "_deg", "_hz")):
             assert key["unit"] == {"mps": "m/s", "hz": "Hz"}.get(name.rsplit("_")[-1], name.rsplit("_")[-1])
     assert schema["required"] == ["schema", "name", "area", "mission"]
+
+
+def bounded(key: dict[str, Any]) -> bool:
+    """Whether a key's schema, or that of each of its items, says what it may be."""
+    limits = {
+        "minimum",
+        "exclusiveMinimum",
+        "maximum",
+        "exclusiveMaximum",
+        "enum",
+        "const",
+        "pattern",
+        "minLength",
+    }
+    choices = [choice for choice in key.get("anyOf", [key]) if choice.get("type") != "null"]
+    inner = [item for choice in choices for item in choice.get("prefixItems", [choice.get("items", choice)])]
+    return all(limits & item.keys() or bounded_items(item) for item in inner)
+
+
+def bounded_items(key: dict[str, Any]) -> bool:
+    return "prefixItems" in key and bounded(key)
+
+
+def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
+    schema = scenario_schema()
+    keys = described_keys(schema, schema["$defs"])
+    holders = {"area", "origin", "obstacles", "circle", "polygon", "mission", "aircraft", "sensor", "planner"}
+    values = [
+        (name, key) for name, key in keys if name not in holders | {"environment", "wind", "turbulence"}
+    ]
+    required = {
+        "schema",
+        "name",
+        "bounds_m",
+        "center_m",
+        "radius_m",
+        "vertices_m",
+        "start_m",
+        "goal_m",
+        "kind",
+    }
+    words = {"schema", "name", "kind", "model", "turn", "intensity"}
+    assert len(values) > 40
+    for name, key in values:
+        assert bounded(key), name
+        assert name in words or key.get("unit"), name
+        told = key.get("default") is not None or "default:" in key["description"].lower()
+        assert told or name in required, name
+
+
+def test_editors_find_the_schema_beside_the_scenarios() -> None:
+    folder = Path(__file__).parents[2] / "scenarios"
+    assert json.loads((folder / "scenario.schema.json").read_text()) == scenario_schema()
+    for path in folder.glob("*.yaml"):
+        first, second = path.read_text().splitlines()[:2]
+        assert first == "# yaml-language-server: $schema=scenario.schema.json"
+        assert second.startswith("# ")

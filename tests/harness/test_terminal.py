@@ -20,6 +20,12 @@ METRICS: dict[str, Any] = {
     "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
     "altitude_error_m": {"rms": None, "p95": None, "max": None},
     "trackable": False,
+    "trackability": [
+        {"trackable": True, "cause": None},
+        {"trackable": False, "cause": "wind drift"},
+        {"trackable": False, "cause": "bank limit"},
+        {"trackable": False, "cause": "wind drift"},
+    ],
     "replans": 41,
     "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
     "timing": {"sim_s": 3772.9, "wall_s": 6.12, "realtime_factor": 616.5},
@@ -35,9 +41,15 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
     assert max(map(len, shown.splitlines())) <= 80
     assert "collision: hit obstacle [3] at 812.3 s" in shown
     assert "94,322 m, planned - m" in shown
+    assert "no: 3 of 4 legs, wind drift, bank limit" in shown
     assert "rms 0.04 / p95 0.09 / max 0.18 m" in shown
     assert "rms - / p95 - / max - m" in shown
     assert "\x1b" not in shown
+
+
+def test_a_flight_without_a_plan_was_not_tracked() -> None:
+    assert flight_rows({**METRICS, "trackability": []})["trackable"] == "no: no plan was flown"
+    assert flight_rows({**METRICS, "trackable": True})["trackable"] == "yes"
 
 
 @pytest.mark.parametrize(("no_color", "coloured"), [("", True), ("1", False)])

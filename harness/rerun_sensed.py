@@ -1,0 +1,82 @@
+"""What the sensor has shown of the true obstacles so far, for the recording: which are in view, which parts of them.
+
+A drawing aid with the truth at hand; nothing here reaches the planner. Frame: local ENU plane, metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from harness.obstacle import Obstacle
+    from harness.range_sensor import RangeScan
+    from harness.record import FloatArray
+
+NEAR_CELLS = 2.0
+"""A return further than this many cells from every edge shows no obstacle: it is a false one."""
+
+
+@dataclass(frozen=True, eq=False)
+class News:
+    """What some scans have shown for the first time.
+
+    Attributes:
+        points_m: (k, 2) places on the edges of standing obstacles, no two in one cell.
+        scans: (k,) index of the scan that showed each, ascending.
+        first: index of an obstacle -> index of the scan that showed it first, and how far away.
+    """
+
+    points_m: FloatArray
+    scans: np.ndarray[tuple[int], np.dtype[np.intp]]
+    first: dict[int, tuple[int, float]]
+
+
+class Sensed:
+    """Gathers what has been sensed, in cells of a square grid.
+
+    Args:
+        obstacles: the true ones.
+        cell_m: side of a cell.
+    """
+
+    def __init__(self, obstacles: Sequence[Obstacle], cell_m: float) -> None:
+        self._obstacles, self._cell_m = obstacles, cell_m
+        self._stands = np.array([each.stands_for_ever for each in obstacles], dtype=bool)
+        self._known = np.zeros(0, dtype=np.int64)
+        self._seen: set[int] = set()
+
+    def take(self, scans: Sequence[RangeScan]) -> News:
+        """Takes consecutive scans; returns what none before them had shown."""
+        points = [returns_m(scan) for scan in scans]
+        scan = np.repeat(np.arange(len(points)), [len(each) for each in points])
+        where = np.concatenate([np.zeros((0, 2)), *points])
+        cells = np.round(where / self._cell_m).astype(np.int64) @ (1 << 32, 1)
+        new = np.sort(np.unique(cells, return_index=True)[1])
+        new = new[~np.isin(cells[new], self._known)]
+        if not len(self._obstacles) or not len(new):
+            return News(np.zeros((0, 2)), np.zeros(0, dtype=np.intp), {})
+        times = np.array([each.time_s for each in scans])[scan[new]]
+        away = np.abs([each.distance(where[new], times) for each in self._obstacles])
+        nearest = away.argmin(axis=0)
+        near = away.min(axis=0) <= NEAR_CELLS * self._cell_m
+        kept = new[near & self._stands[nearest]]
+        self._known = np.append(self._known, cells[kept])
+        first: dict[int, tuple[int, float]] = {}
+        for row, index in zip(new[near], nearest[near].tolist(), strict=True):
+            if index not in self._seen:
+                self._seen.add(index)
+                seen_by = scans[scan[row]]
+                away_m = np.hypot(*(where[row] - (seen_by.east_m, seen_by.north_m)))
+                first[index] = int(scan[row]), float(away_m)
+        return News(where[kept], scan[kept], first)
+
+
+def returns_m(scan: RangeScan) -> FloatArray:
+    """(k, 2) places from which something came back."""
+    hit = np.isfinite(scan.ranges_m)
+    places: FloatArray = scan.directions[hit] * scan.ranges_m[hit, None] + (scan.east_m, scan.north_m)
+    return places

@@ -1,0 +1,48 @@
+"""The report of a single run, written into its folder: page, figures as SVG and PNG, table as CSV and Markdown."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from harness.chapters import entry, optimum_of, run_chapter
+from harness.compare_rows import to_csv, to_markdown
+from harness.record import RunFolderError
+from harness.report import run_html
+from harness.run_folder import REPORT, SCENARIO, load_run
+from harness.scenario import parse_scenario
+
+
+def write_report(folder: Path) -> Path:
+    """Writes the report of a complete run and returns the path of its page.
+
+    Raises:
+        InputError: the scenario in the folder is none.
+        RunFolderError: the folder holds no complete run, or cannot be written.
+    """
+    run = load_run(folder)
+    scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO))
+    optimum = optimum_of(scenario)
+    flight = entry(scenario, run, optimum)
+    page, manifest = folder / REPORT, run.manifest
+    _, *arguments = shlex.split(manifest["command"][0])
+    command = shlex.join(["wayproof", *arguments])
+    versions = {name: version for name, version in manifest["versions"].items() if version}
+    try:
+        text = run_html(
+            run_chapter(scenario, flight, optimum),
+            run.metrics["trackability"],
+            aircraft=Path(scenario.aircraft.model).name,
+            scenario_yaml=run.scenario_yaml,
+            command=command,
+            versions=versions,
+            platform=manifest["platform"]["system"],
+            written=manifest["started_utc"],
+        )
+        page.with_suffix(".csv").write_text(to_csv([flight.row]), encoding="utf-8")
+        repeat = f"## How to repeat it\n\n    {command}\n\nDigest of the track: `{flight.row.digest}`\n"
+        page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
+        page.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RunFolderError(f"cannot write the report in {folder}: {error.strerror or error}") from error
+    return page

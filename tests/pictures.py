@@ -1,0 +1,98 @@
+"""Makes README's pictures and looks at them as CI can: `python -m tests.pictures [FOLDER]`.
+
+Flies, compares and writes a report with the commands that people use; draws recording and overlay without a
+screen, the report in a browser; and fails where a view complains, the page reaches for the network, hides a
+figure or scrolls sideways.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from PIL import Image
+
+from harness.cli import main as wayproof
+from harness.rerun_viewer import NO_DRIVER, ViewerError, screenshot
+from tests.page import NoBrowserError, browser, shown
+
+ROOT = Path(__file__).parents[1]
+SIZE = (1800, 1040)
+COLOURS = 160
+PAGE_RATIO = 1.45
+"""Height over width of what is kept of a page: its beginning."""
+
+RECORDINGS = {
+    "paper_circles": ("paper_circles/rolling_window/flight.rrd", 2346.0),
+    "overlay": ("paper_circles/overlay.rrd", 2500.0),
+    "aerosonde_forest": ("forest/flight.rrd", 100.0),
+}
+"""Name of a picture: recording, and time of the cursor in s."""
+PAGES = {"comparison": "report.html", "report": "paper_circles/bug2/report.html"}
+"""Name of a picture: page."""
+WIDTHS_PX = (390, 1100)
+"""Windows that a page is looked at in; the picture is of the last."""
+
+
+def make(out: Path, work: Path) -> Iterator[str]:
+    """Makes all pictures; gives the faults that it sees.
+
+    Args:
+        out: folder of the pictures.
+        work: an empty folder for the flights.
+    """
+    flights = ["compare", "paper_circles", "--planners", "rolling_window,bug2", "--out", str(work)]
+    if wayproof(flights) or wayproof(["report", str(work / "paper_circles" / "bug2")]):
+        yield "a flight or a report failed"
+    wayproof(["fly", "aerosonde_forest", "--out", str(work / "forest"), "--quiet"])
+    try:
+        for name, (recording, time_s) in RECORDINGS.items():
+            png = work / f"{name}.png"
+            complaints = screenshot(work / recording, png, time_s, SIZE)
+            yield from (f"{recording}: {complaint}" for complaint in complaints)
+            _keep(png, out)
+    except ViewerError as error:
+        if str(error) != NO_DRIVER:
+            raise
+        print(f"skipped the recordings: {NO_DRIVER}")
+    try:
+        with browser() as chromium:
+            for name, page in PAGES.items():
+                png = work / f"{name}.png"
+                for width_px in WIDTHS_PX:
+                    seen = shown(chromium, work / page, width_px, png)
+                    if seen.said or seen.asked_for or seen.missing or seen.overflow_px or not seen.figures:
+                        yield f"{page}, {width_px} px wide: {seen}"
+                _keep(png, out)
+    except NoBrowserError as error:
+        print(f"skipped the pages: {error}")
+
+
+def _keep(png: Path, out: Path) -> None:
+    """Puts a picture into the folder, small: few colours, and the beginning of what is long."""
+    with Image.open(png) as picture:
+        width, height = picture.size
+        begin = picture.convert("RGB").crop((0, 0, width, min(height, int(PAGE_RATIO * width))))
+        begin.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(
+            out / png.name, optimize=True
+        )
+
+
+def main(arguments: list[str]) -> int:
+    """Makes the pictures in the folder given, by default README's; returns the exit status."""
+    out = Path(arguments[0]) if arguments else ROOT / ".pictures"
+    out.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(prefix="wayproof-pictures-"))
+    try:
+        faults = list(make(out, work / "flown"))
+    finally:
+        shutil.rmtree(work)
+    print("\n".join(faults or [f"pictures in {out}: no complaint"]))
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
