@@ -54,7 +54,7 @@ def metrics(flight: Flight, limits: FlightLimits) -> dict[str, Any]:
         "cross_track_m": error_figures(followed),
         "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
         "smoothness": {
-            "planned": dataclasses.asdict(smoothness(planned, window)),
+            "planned": dataclasses.asdict(smoothness(planned, window, planned_length_m(flight))),
             "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
         },
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),
