@@ -15,7 +15,7 @@ import numpy as np
 
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
-from aircraft.guidance import PathFollower
+from aircraft.guidance import GRAVITY_MPS2, PathFollower
 from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, StartConditions
@@ -27,6 +27,7 @@ from harness.range_sensor import RangeSensor
 from harness.record import AcceptedPlan, Track
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
+from harness.scenario_sections import Environment
 from harness.trackability import FlightLimits
 from harness.world import World
 from planner.registry import planner_kinds
@@ -108,13 +109,29 @@ def jsbsim_aircraft(scenario: Scenario, start: StartConditions, air: Atmosphere)
 
 def flight_limits(scenario: Scenario) -> FlightLimits:
     """What a scenario's flight is measured against."""
-    performance = performance_of(scenario)
+    performance, limits = performance_of(scenario), scenario.trackability
+    calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
+    guidance = airframe(scenario.aircraft.model).guidance_limits
+    speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
+    wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
+    sensor = scenario.sensor
+    blind_s = scenario.planner.compute_latency_s + sensor.latency_s + 1.0 / sensor.rate_hz
     return FlightLimits(
         altitude_m=scenario.mission.altitude_m,
-        clearance_m=_given(scenario.planner.clearance_m),
-        bank_limit_rad=airframe(scenario.aircraft.model).guidance_limits.bank_limit_rad,
+        clearance_m=clearance,
+        bank_limit_rad=guidance.bank_limit_rad,
         turn_radius_m=performance.turn_radius_m,
         tracking_error_m=performance.tracking_error_m,
+        airspeed_mps=speed,
+        calm_radius_m=calm.turn_radius_m,
+        tightest_radius_m=speed * speed / (GRAVITY_MPS2 * math.tan(guidance.bank_limit_rad)),
+        roll_rate_radps=guidance.roll_rate_radps,
+        sensor_range_m=_given(sensor.range_m),
+        horizon_m=performance.turn_radius_m + clearance + (speed + wind) * (blind_s + performance.roll_in_s),
+        max_cross_track_m=_given(limits.cross_track_m),
+        max_altitude_error_m=_given(limits.altitude_m),
+        max_airspeed_error_mps=_given(limits.airspeed_mps),
+        max_load_factor=_given(limits.load_factor),
     )
 
 

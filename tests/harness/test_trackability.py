@@ -28,7 +28,8 @@ def test_threshold_is_the_margin_planners_keep() -> None:
 def test_leg_is_trackable_up_to_the_threshold(
     make_track: Callable[..., Track], straight_plan: AcceptedPlan, error_m: float, trackable: bool
 ) -> None:
-    (leg,) = legs(make_track(201, cross_track_m=error_m), [straight_plan], LIMITS)
+    error = np.minimum(np.arange(201) / 100.0, 1.0) * error_m
+    (leg,) = legs(make_track(201, cross_track_m=error), [straight_plan], LIMITS)
     assert (leg.start_s, leg.end_s, leg.max_cross_track_m) == (0.0, 20.0, abs(error_m))
     assert leg.trackable is trackable
     assert leg.cause == (None if trackable else "tracking error")
