@@ -24,7 +24,7 @@ from harness.metrics import metrics
 from harness.obstacle_map import ObstacleMap
 from harness.planner_keys import config_of
 from harness.range_sensor import RangeSensor
-from harness.record import AcceptedPlan, Track
+from harness.record import AcceptedPlan, Flight, Track
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.scenario_sections import Environment
@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
+
+
+Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
 
 
 def make_loop(
@@ -143,6 +146,8 @@ def fly_to_folder(
     *,
     make: Callable[[Scenario], Loop] = make_loop,
     watching: Sequence[Observer] = (),
+    flown_by: Fly = fly,
+    measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
 ) -> dict[str, Any]:
     """Flies a scenario into a run folder and returns the content of its `metrics.json`.
 
@@ -153,6 +158,8 @@ def fly_to_folder(
         progress: told of the flight as it goes on.
         make: makes the parts of the flight.
         watching: look on besides those that write the folder.
+        flown_by: flies the parts to an end.
+        measured_by: gives the content of `metrics.json`.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
@@ -165,8 +172,8 @@ def fly_to_folder(
         log = _recording(scenario, loop, folder) if recording else None
         if log is not None:
             observers.append(log)
-        flight = fly(loop, observers, progress)
-        figures = metrics(flight, flight_limits(scenario))
+        flight = flown_by(loop, observers, progress)
+        figures = measured_by(flight, flight_limits(scenario))
         if log is not None:
             log.close(figures)
         folder.finish(flight.plans, figures)

@@ -7,7 +7,7 @@ other have been refused.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -125,6 +125,22 @@ def parse_scenario(text: str, source: str = "scenario") -> Scenario:
         InputError: it is not a scenario.
     """
     return _validated(strict_yaml.parse(text, source), source)
+
+
+def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """A scenario from keys that a command has put together, every default filled in.
+
+    Args:
+        keys: as in a file; plain values.
+        overrides: as `load_scenario` takes them.
+
+    Raises:
+        InputError: it is not a scenario; its faults name the command line.
+    """
+    root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
+    for name, text in overrides:
+        root = _overridden(root, name, text)
+    return _validated(root, "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:

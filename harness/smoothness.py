@@ -157,6 +157,31 @@ def planned_profile(track: Track, plans: Sequence[AcceptedPlan], window_m: float
     return Profile(length[length > 0], curvature[length > 0])
 
 
+def polyline_profile(points_m: FloatArray, window_m: float) -> Profile:
+    """Curvature profile of a polyline.
+
+    The turn at a vertex is spread over half of the legs on either side of it, but over no more than
+    `window_m`: vertices that sample a curve get its curvature, a corner between long legs that of a corner.
+
+    Args:
+        points_m: (n, 2) vertices, no two neighbours in one place.
+        window_m: length over which a corner is taken to be turned.
+    """
+    legs = np.diff(points_m[:, 0]) + 1j * np.diff(points_m[:, 1])
+    length = np.abs(legs)
+    turn = np.angle(legs[1:] / legs[:-1])
+    half = np.minimum(0.5 * length, 0.5 * window_m)
+    bent = half[:-1] + half[1:]
+    lengths = np.zeros(2 * len(legs) - 1)
+    curvatures = np.zeros_like(lengths)
+    lengths[1::2] = bent
+    lengths[::2] = length
+    lengths[2::2] -= half[1:]
+    lengths[:-1:2] -= half[:-1]
+    curvatures[1::2] = turn / bent
+    return Profile(lengths, curvatures)
+
+
 def stations_in_effect(track: Track) -> list[tuple[int, float, float]]:
     """Which part of which plan was flown: (plan_index, first station, last station), in order of time.
 

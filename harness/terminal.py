@@ -74,7 +74,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     style = _OUTCOME_STYLE.get(metrics["outcome"], "bold red")
     compute, timing = metrics["compute_ms"], metrics["timing"]
     return {
-        "outcome": f"[{style}]{metrics['outcome']}[/]: {_plain(metrics['reason'])}",
+        "outcome": f"[{style}]{metrics['outcome']}[/]: {plain(metrics['reason'])}",
         "length flown": f"{_number(metrics['flown_length_m'])} m, "
         f"planned {_number(metrics['planned_length_m'])} m",
         "flight time": f"{_number(metrics['flight_time_s'])} s",
@@ -99,7 +99,7 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """`text` with nothing in it that rich would take for markup."""
     return text.replace("[", "\\[")
 

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from harness.record import AcceptedPlan, FloatArray, Track
+from harness.record import AcceptedPlan, FloatArray, IntArray, Track
 from harness.smoothness import planned_profile, window_m
 
 SHORTEST_LEG_S = 5.0
@@ -132,7 +132,8 @@ class Leg:
             stop while altitude is lost;
             "wind drift": the bank is used up in a turn that only the wind makes too tight, or the aircraft is
             off downwind in a cross-wind;
-            "bank limit": the guidance asked for all the bank there is;
+            "bank limit": the guidance asked for all the bank there is, for longer than the aircraft rolled as
+            fast as it may;
             "roll rate": the aircraft rolled as fast as it may;
             "load factor": it is larger than it may be;
             "tracking error": none of these.
@@ -171,15 +172,16 @@ def legs(
     """
     ends = np.array([corner.station_m for corner in corners])
     stretches = _stretches(track, track.plan_index + np.searchsorted(ends, track.station_m))
+    reached = np.searchsorted(np.maximum.accumulate(track.station_m), ends) - 1
     judged = []
     for first, last in stretches:
-        passed = [c.cut_m for c in corners if track.station_m[first] <= c.station_m <= track.station_m[last]]
+        passed = [c.cut_m for c, row in zip(corners, reached, strict=True) if first <= row <= last]
         lost = lost_control and last == len(track) - 1
         judged.append(_judge(track, first, last, plans, limits, lost, max(passed, default=0.0)))
     return tuple(judged)
 
 
-def _stretches(track: Track, leg: FloatArray) -> list[tuple[int, int]]:
+def _stretches(track: Track, leg: IntArray) -> list[tuple[int, int]]:
     """First and last row of every leg; a short one joins the next, a short last one the one before.
 
     Args:
@@ -268,14 +270,16 @@ def _cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: Fli
     too_slow = abs(float(lead.airspeed_mps.mean()) - limits.airspeed_mps) > limits.max_airspeed_error_mps
     if too_slow:
         return "speed or throttle saturation"
-    if saturated(lead, limits.bank_limit_rad).mean() >= SATURATED_SHARE:
+    banked = float(saturated(lead, limits.bank_limit_rad).mean())
+    rolling = float(_rolling(lead, limits.roll_rate_radps).mean()) if len(lead) > 1 else 0.0
+    if banked >= max(SATURATED_SHARE, rolling):
         calm_m = limits.turn_radius_m if limits.calm_radius_m is None else limits.calm_radius_m
         only_in_wind = bend * calm_m <= ROUNDING < bend * limits.turn_radius_m
         return "wind drift" if only_in_wind else "bank limit"
     drift = _wind_from_left_mps(lead)
     if abs(drift) >= WIND_SHARE * lead.airspeed_mps.mean() and drift * lead.cross_track_m[-1] > 0:
         return "wind drift"
-    if _rolling(lead, limits.roll_rate_radps).mean() >= SATURATED_SHARE:
+    if rolling >= SATURATED_SHARE:
         return "roll rate"
     if _averaged(lead.load_factor, lead, LOAD_S).max() > limits.max_load_factor:
         return "load factor"
@@ -292,13 +296,12 @@ def saturated(track: Track, bank_limit_rad: float) -> np.ndarray[tuple[int], np.
 def _rolling(track: Track, roll_rate_radps: float) -> FloatArray:
     """(n - 1,) 1 where the aircraft rolls about as fast as it may, else 0."""
     rate = np.abs(np.diff(track.roll_deg)) / np.maximum(np.diff(track.time_s), 1e-9)
-    return (rate >= ROLL_RATE_SHARE * math.degrees(roll_rate_radps)).astype(np.float64)
+    return np.where(rate >= ROLL_RATE_SHARE * math.degrees(roll_rate_radps), 1.0, 0.0)
 
 
 def _at_a_stop(track: Track) -> FloatArray:
     """(n,) 1 where the throttle is full or idle, else 0; 0 without an engine."""
-    at_a_stop = (track.throttle >= FULL_THROTTLE) | (track.throttle <= IDLE_THROTTLE)
-    return at_a_stop.astype(np.float64)
+    return np.where((track.throttle >= FULL_THROTTLE) | (track.throttle <= IDLE_THROTTLE), 1.0, 0.0)
 
 
 def _averaged(values: FloatArray, track: Track, over_s: float) -> FloatArray:
@@ -306,7 +309,8 @@ def _averaged(values: FloatArray, track: Track, over_s: float) -> FloatArray:
     span = float(track.time_s[-1] - track.time_s[0])
     rows = 1 + round(over_s * (len(values) - 1) / span) if span > over_s else len(values)
     total = np.append(0.0, np.cumsum(values))
-    return (total[rows:] - total[:-rows]) / rows
+    mean: FloatArray = (total[rows:] - total[:-rows]) / rows
+    return mean
 
 
 def _wind_from_left_mps(track: Track) -> float:
