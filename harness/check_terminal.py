@@ -24,7 +24,8 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     rows = {
         "trackable": f"[{style}]{word}[/]" + (f": {', '.join(_causes(bad))}" if bad else ""),
         "flown": plain(f"{metrics['outcome']}: {metrics['reason']}"),
-        "path": f"{check['points']} points, {metrics['planned_length_m']:,.0f} m, {len(legs)} legs",
+        "path": f"{check['points']} points, {metrics['planned_length_m']:,.0f} m, "
+        f"{len(legs)} {'legs' if len(legs) > 1 else 'leg'}",
         "cross-track error": f"rms {cross['rms']:.3g} / p95 {cross['p95']:.3g} / max {cross['max']:.3g} m, "
         f"allowed {legs[0]['threshold_m']:.3g} m",
     }

@@ -14,6 +14,7 @@ from typing import Annotated, Final
 import typer
 
 from harness.commands.check import check
+from harness.commands.export import export
 from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
 from harness.commands.options import BAD_INPUT, FAILED, flag
@@ -22,7 +23,7 @@ from harness.commands.review import view
 INTERRUPTED: Final = 130
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-for command in (fly, check, compare, validate, schema, view, bench):
+for command in (fly, check, compare, validate, schema, view, export, bench):
     app.command()(command)
 app.command("list")(list_names)
 
@@ -85,7 +86,8 @@ def _report(error: Exception) -> int:
         typer.echo(str(error), err=True)
         return BAD_INPUT
     if isinstance(error, typer.TyperException):
-        typer.echo(f"wayproof: {error.format_message()} (see wayproof --help)", err=True)
+        text = " ".join(error.format_message().split())
+        typer.echo(f"wayproof: {text} (see wayproof --help)", err=True)
         return BAD_INPUT
     if isinstance(error, OSError):
         typer.echo(f"wayproof: {error}", err=True)
