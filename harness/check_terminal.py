@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from harness.terminal import plain
+from harness.terminal import causes, plain
 
 SHOWN = 6
 """So many corners and legs are listed; the others are counted."""
@@ -22,7 +22,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     cross = metrics["cross_track_m"]
     style, word = ("bold green", "yes") if metrics["trackable"] else ("bold red", "no")
     rows = {
-        "trackable": f"[{style}]{word}[/]" + (f": {', '.join(_causes(bad))}" if bad else ""),
+        "trackable": f"[{style}]{word}[/]" + (f": {causes(bad)}" if bad else ""),
         "flown": plain(f"{metrics['outcome']}: {metrics['reason']}"),
         "path": f"{check['points']} points, {metrics['planned_length_m']:,.0f} m, "
         f"{len(legs)} {'legs' if len(legs) > 1 else 'leg'}",
@@ -47,13 +47,6 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
             f"tightest {_radius(figures['max_curvature_1pm'])}"
         )
     return rows
-
-
-def _causes(bad: list[Any]) -> list[str]:
-    """Every cause once, in order, with the number of legs."""
-    causes = [leg["cause"] for leg in bad]
-    times = {cause: causes.count(cause) for cause in dict.fromkeys(causes)}
-    return [f"{cause} ({count} legs)" if count > 1 else cause for cause, count in times.items()]
 
 
 def _listed(entries: list[Any], title: str, rows: dict[str, str]) -> list[Any]:

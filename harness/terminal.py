@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
@@ -73,6 +73,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     """The rows of the table at the end of a flight, from the content of `metrics.json`."""
     style = _OUTCOME_STYLE.get(metrics["outcome"], "bold red")
     compute, timing = metrics["compute_ms"], metrics["timing"]
+    bad = [leg for leg in metrics["trackability"] if not leg["trackable"]]
     return {
         "outcome": f"[{style}]{metrics['outcome']}[/]: {plain(metrics['reason'])}",
         "length flown": f"{_number(metrics['flown_length_m'])} m, "
@@ -82,7 +83,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         f"below the wanted one for {_number(metrics['clearance_violation_s'])} s",
         "cross-track error": f"{_spread(metrics['cross_track_m'])} m",
         "altitude error": f"{_spread(metrics['altitude_error_m'])} m",
-        "trackable": "yes" if metrics["trackable"] else "no",
+        "trackable": "yes" if metrics["trackable"] else f"no{': ' * bool(bad)}{causes(bad)}",
         "plans": f"{metrics['replans']}, p99 {_number(compute['p99'])} ms, max {_number(compute['max'])} ms",
         "speed": f"{_number(timing['realtime_factor'])} x real time, {_number(timing['wall_s'])} s",
     }
@@ -97,6 +98,13 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
         "planner": ", ".join(f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")),
     }
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
+
+
+def causes(bad: Sequence[Mapping[str, Any]]) -> str:
+    """The causes of legs that are not trackable, each once, with the number of legs."""
+    every = [leg["cause"] for leg in bad]
+    times = {cause: every.count(cause) for cause in dict.fromkeys(every)}
+    return ", ".join(f"{cause} ({count} legs)" if count > 1 else cause for cause, count in times.items())
 
 
 def plain(text: str) -> str:

@@ -20,6 +20,12 @@ METRICS: dict[str, Any] = {
     "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
     "altitude_error_m": {"rms": None, "p95": None, "max": None},
     "trackable": False,
+    "trackability": [
+        {"trackable": False, "cause": "bank limit"},
+        {"trackable": True, "cause": None},
+        {"trackable": False, "cause": "wind drift"},
+        {"trackable": False, "cause": "bank limit"},
+    ],
     "replans": 41,
     "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
     "timing": {"sim_s": 3772.9, "wall_s": 6.12, "realtime_factor": 616.5},
@@ -36,6 +42,7 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
     assert "collision: hit obstacle [3] at 812.3 s" in shown
     assert "94,322 m, planned - m" in shown
     assert "rms 0.04 / p95 0.09 / max 0.18 m" in shown
+    assert "no: bank limit (2 legs), wind drift" in shown
     assert "rms - / p95 - / max - m" in shown
     assert "\x1b" not in shown
 
