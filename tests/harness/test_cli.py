@@ -40,6 +40,7 @@ METRICS: dict[str, Any] = {
     "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
     "altitude_error_m": {"rms": None, "p95": None, "max": None},
     "trackable": False,
+    "trackability": [],
     "replans": 41,
     "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
     "timing": {"sim_s": 3772.9, "wall_s": 6.12, "realtime_factor": 616.5},
