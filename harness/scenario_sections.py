@@ -292,7 +292,7 @@ class TrackabilitySpec(Section):
         le=MAX_COORDINATE_M,
     )
     airspeed_mps: float = key(
-        "Error of the true airspeed, averaged over 5 s.",
+        "Error of the true airspeed, averaged over 20 s.",
         unit="m/s",
         derived="a tenth of aircraft.airspeed_mps",
         gt=0,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -22,7 +22,10 @@ SHORTEST_LEG_S = 5.0
 """A plan flown for less time is judged together with its successor."""
 
 LEAD_S = 5.0
-"""The cause is looked for in this time before the largest error; also what airspeed is averaged over."""
+"""The cause is looked for from this time before the error became too large up to where it is largest."""
+
+SPEED_S = 20.0
+"""Airspeed is averaged over this, so that it is what the engine can hold and not what a gust adds."""
 
 LOAD_S = 1.0
 """Load factor is averaged over this, so that it is that of the manoeuvre and not that of a gust."""
@@ -65,7 +68,7 @@ class FlightLimits:
         max_cross_track_m: largest cross-track error; None: the larger of a tenth of the clearance and two
             tracking errors.
         max_altitude_error_m: largest altitude error.
-        max_airspeed_error_mps: largest error of the airspeed averaged over `LEAD_S`.
+        max_airspeed_error_mps: largest error of the airspeed averaged over `SPEED_S`.
         max_load_factor: largest load factor averaged over `LOAD_S`.
     """
 
@@ -117,7 +120,7 @@ class Leg:
         max_cross_track_m: largest absolute cross-track error.
         threshold_m: what it may be.
         max_altitude_error_m: largest absolute altitude error.
-        max_airspeed_error_mps: largest absolute error of the airspeed, averaged over `LEAD_S`; None where the
+        max_airspeed_error_mps: largest absolute error of the airspeed, averaged over `SPEED_S`; None where the
             airspeed is not judged.
         max_load_factor: largest load factor, averaged over `LOAD_S`.
         corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
@@ -218,11 +221,13 @@ def _judge(
     leg = _rows(track, first, last + 1)
     off = np.nan_to_num(np.abs(leg.cross_track_m))
     high = np.abs(leg.up_m - limits.altitude_m)
-    slow = np.abs(_averaged(leg.airspeed_mps - limits.airspeed_mps, leg, LEAD_S))
+    slow = np.abs(_averaged(leg.airspeed_mps - limits.airspeed_mps, leg, SPEED_S))
     load = float(_averaged(leg.load_factor, leg, LOAD_S).max())
     peak = first + int(off.argmax())
-    lead = _rows(track, max(int(np.searchsorted(track.time_s, track.time_s[peak] - LEAD_S)), 0), peak + 1)
     threshold = limits.cross_track_threshold_m
+    within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= threshold)
+    grows = int(within[-1]) if len(within) else 0
+    lead = _rows(track, int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S)), peak + 1)
     cause = None
     if lost_control:
         cause = "lost control"
@@ -236,7 +241,7 @@ def _judge(
         cause = "speed or throttle saturation"
     elif high.max() > limits.max_altitude_error_m:
         sinking = max(int(high.argmax()), 1)
-        before = _rows(leg, max(int(np.searchsorted(leg.time_s, leg.time_s[sinking] - LEAD_S)), 0), sinking)
+        before = _rows(leg, int(np.searchsorted(leg.time_s, leg.time_s[sinking] - LEAD_S)), sinking)
         stopped = _at_a_stop(before).mean() >= SATURATED_SHARE
         cause = "speed or throttle saturation" if stopped else "tracking error"
     return Leg(
@@ -260,8 +265,7 @@ def _cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: Fli
     at_start = abs(float(track.cross_track_m[begins]))
     if at_start > limits.cross_track_threshold_m and at_start >= LATE_SHARE * error[-1]:
         return "planner too late"
-    planned = planned_profile(lead, plans, window_m(lead))
-    bend = float(np.abs(planned.curvature_1pm).max(initial=0.0))
+    bend = _tightest_1pm(lead, plans)
     tightest_m = limits.turn_radius_m if limits.tightest_radius_m is None else limits.tightest_radius_m
     if bend * tightest_m > ROUNDING:
         seen_late = limits.sensor_range_m < limits.horizon_m
@@ -284,6 +288,18 @@ def _cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: Fli
     if _averaged(lead.load_factor, lead, LOAD_S).max() > limits.max_load_factor:
         return "load factor"
     return "tracking error"
+
+
+def _tightest_1pm(lead: Track, plans: Sequence[AcceptedPlan]) -> float:
+    """Largest curvature of what was planned, up to a window beyond the last station.
+
+    An aircraft that overshoots a corner stays at its station.
+    """
+    window = window_m(lead)
+    reach = lead.station_m.copy()
+    reach[-1] += window
+    planned = planned_profile(replace(lead, station_m=reach), plans, window)
+    return float(np.abs(planned.curvature_1pm).max(initial=0.0))
 
 
 def saturated(track: Track, bank_limit_rad: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
