@@ -179,6 +179,16 @@ def test_kml_is_read_by_fastkml(what: str, export: Export, run: Run) -> None:
     assert np.array(altitude) == pytest.approx(450.0, abs=1.0)
 
 
+def test_planned_path_goes_on_where_one_plan_takes_over_from_another(run: Run) -> None:
+    assert len(run.plans) > 5
+    steps = np.diff(planned_points(run), axis=0)
+    length = np.hypot(*steps.T)
+    assert length.min() > 0.5
+    assert length.max() < 10.0
+    turn = np.arccos(np.clip((steps[1:] * steps[:-1]).sum(axis=1) / (length[1:] * length[:-1]), -1.0, 1.0))
+    assert turn.max() < math.radians(20.0)
+
+
 def test_acmi_has_every_row_with_true_heading(export: Export, run: Run) -> None:
     """Read after Tacview's documentation of the format, version 2.2."""
     text = Path(export("acmi")).read_bytes().decode("utf-8-sig")

@@ -14,6 +14,7 @@ from harness.smoothness import (
     Smoothness,
     flown_profile,
     planned_profile,
+    polyline_profile,
     smoothness,
     stations_in_effect,
     window_m,
@@ -132,6 +133,28 @@ def test_angle_over_length_of_a_polyline_takes_the_length_of_the_polyline() -> N
     """A right angle in 500 m, turned over a window that makes the profile longer than the path."""
     bent = profile((100.0, 0.0), (25.0, math.pi / 2 / 25.0), (400.0, 0.0))
     assert smoothness(bent, 25.0, 500.0).angle_over_length_radpm == pytest.approx(math.pi / 2 / 500.0)
+
+
+@given(radius=st.floats(50.0, 1e4), chords=st.integers(8, 200))
+def test_polyline_in_a_circle_has_nearly_its_curvature(radius: float, chords: int) -> None:
+    """With a turn of a = 2 pi / n at each vertex and chords of 2 r sin(a / 2), the curvature is a over a chord."""
+    angle = np.linspace(0.0, math.tau, chords + 1)
+    points = radius * np.column_stack((np.cos(angle), np.sin(angle)))
+    chord, turn = 2.0 * radius * math.sin(math.pi / chords), math.tau / chords
+    bent = polyline_profile(points, 2.0 * chord)
+    figures = smoothness(bent, 2.0 * chord)
+    assert bent.length_m.sum() == pytest.approx(chords * chord)
+    assert figures.max_curvature_1pm == pytest.approx(turn / chord)
+    assert figures.heading_change_deg == pytest.approx(math.degrees(turn * (chords - 1)))
+    assert figures.bending_energy_1pm == pytest.approx(turn**2 / chord * (chords - 1))
+
+
+def test_polyline_with_a_corner_turns_it_over_the_window() -> None:
+    bent = polyline_profile(np.array([(0.0, 0.0), (0.0, 100.0), (-400.0, 100.0)]), 25.0)
+    assert bent.length_m == pytest.approx([87.5, 25.0, 387.5])
+    assert bent.curvature_1pm == pytest.approx([0.0, math.pi / 2 / 25.0, 0.0])
+    line = polyline_profile(np.array([(0.0, 0.0), (30.0, 40.0)]), 25.0)
+    assert (line.length_m.tolist(), line.curvature_1pm.tolist()) == ([50.0], [0.0])
 
 
 @pytest.mark.parametrize("end_turn", [0.0, 0.3])

@@ -114,6 +114,23 @@ def test_altitude_airspeed_and_load_factor_have_limits_too(
     assert leg.trackable is (cause is None)
 
 
+def test_cause_is_what_was_at_its_limit_for_longer(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    """Rolling at 50 of 60 deg/s all the time, the command at its limit for a part of it."""
+    limits = replace(LIMITS, roll_rate_radps=math.radians(60.0))
+    back_and_forth = 5.0 * np.abs(np.arange(201) % 16 - 8)
+    track = make_track(
+        201,
+        cross_track_m=OFF,
+        roll_deg=back_and_forth,
+        roll_command_deg=np.where(np.arange(201) % 3, 0.0, 45.0),
+    )
+    assert legs(track, [straight_plan], limits)[0].cause == "roll rate"
+    still = replace(track, roll_deg=np.zeros(201))
+    assert legs(still, [straight_plan], limits)[0].cause == "bank limit"
+
+
 def test_thresholds_can_be_given() -> None:
     assert replace(LIMITS, max_cross_track_m=1.5).cross_track_threshold_m == 1.5
 
