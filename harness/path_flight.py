@@ -27,8 +27,8 @@ from planner.interface import Path, Plan, PlanStatus
 FREE_SHARE = 0.25
 """Share of the cross-track threshold by which a corner may be passed off only to make its arc wider."""
 
-MARGIN_M = 5000.0
-"""The area of a checked path reaches this far beyond it."""
+MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
+"""The area of a checked path reaches this far beyond it: so much, and so much of its span."""
 
 PROGRESS_EVERY_S = 5.0
 
@@ -56,7 +56,8 @@ def scenario_for(
     far = np.hypot(*(points_m - start).T)
     goal_radius = min(100.0, float(0.25 * far.max()))
     goal = points_m[-1] if far[-1] > 2.0 * goal_radius else points_m[int(far.argmax())]
-    lowest, highest = points_m.min(axis=0) - MARGIN_M, points_m.max(axis=0) + MARGIN_M
+    lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
+    margin = MARGIN_M + MARGIN_SHARE * float((highest - lowest).max())
     out = points_m[1] - start
     mission = {
         "start_m": start.tolist(),
@@ -68,7 +69,10 @@ def scenario_for(
         "schema": "wayproof/scenario/1",
         "name": name,
         **{key: dict(section) for key, section in sections.items()},
-        "area": {"bounds_m": [*lowest.tolist(), *highest.tolist()], **sections.get("area", {})},
+        "area": {
+            "bounds_m": [*(lowest - margin).tolist(), *(highest + margin).tolist()],
+            **sections.get("area", {}),
+        },
         "mission": {**mission, **sections.get("mission", {})},
     }
     return scenario_of(keys, overrides)
@@ -104,6 +108,7 @@ def check_path(
         out,
         recording,
         progress,
+        pilot="path as given",
         flown_by=partial(fly_along, way),
         measured_by=partial(_measured, points_m, way),
     )

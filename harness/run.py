@@ -146,6 +146,7 @@ def fly_to_folder(
     *,
     make: Callable[[Scenario], Loop] = make_loop,
     watching: Sequence[Observer] = (),
+    pilot: str | None = None,
     flown_by: Fly = fly,
     measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
 ) -> dict[str, Any]:
@@ -158,6 +159,7 @@ def fly_to_folder(
         progress: told of the flight as it goes on.
         make: makes the parts of the flight.
         watching: look on besides those that write the folder.
+        pilot: stands in the recording's name; default: the planner's kind.
         flown_by: flies the parts to an end.
         measured_by: gives the content of `metrics.json`.
 
@@ -169,7 +171,7 @@ def fly_to_folder(
     with ExitStack() as stack:
         folder = stack.enter_context(RunFolder.create(out, dump_scenario(scenario), [shlex.join(sys.argv)]))
         observers: list[Observer] = [_Writer(folder), *watching]
-        log = _recording(scenario, loop, folder) if recording else None
+        log = _recording(scenario, loop, folder, pilot or scenario.planner.kind) if recording else None
         if log is not None:
             observers.append(log)
         flight = flown_by(loop, observers, progress)
@@ -199,11 +201,11 @@ class _Writer:
         """Events belong to the recording."""
 
 
-def _recording(scenario: Scenario, loop: Loop, folder: RunFolder) -> Any:
+def _recording(scenario: Scenario, loop: Loop, folder: RunFolder, pilot: str) -> Any:
     from harness.rerun_blueprint import Scene
     from harness.rerun_log import RerunLog
 
-    title = f"{scenario.name}, {scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}"
+    title = f"{scenario.name}, {pilot}, {scenario.aircraft.model}, seed {scenario.seed}"
     scene = Scene(title, loop.mission, scenario.mission.start_m, loop.altitude_m, tuple(loop.world.obstacles))
     return RerunLog(folder.recording_path, scene, recording_id=title)
 
