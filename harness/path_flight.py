@@ -41,7 +41,8 @@ def scenario_for(
 ) -> Scenario:
     """The mission of a path as a scenario without obstacles: from its start to its end.
 
-    A path that ends about where it begins has its furthest point as the goal.
+    A path that ends about where it begins has its furthest point as the goal. What the aircraft may be off is by
+    default what it may be in calm air: the room about a path does not grow with the wind.
 
     Args:
         name: of the scenario.
@@ -75,7 +76,11 @@ def scenario_for(
         },
         "mission": {**mission, **sections.get("mission", {})},
     }
-    return scenario_of(keys, overrides)
+    calm = scenario_of(
+        {**keys, "environment": {}}, [each for each in overrides if not each[0].startswith("environment")]
+    )
+    limits = {"cross_track_m": calm.trackability.cross_track_m, **sections.get("trackability", {})}
+    return scenario_of({**keys, "trackability": limits}, overrides)
 
 
 def check_path(

@@ -37,7 +37,8 @@ def check(
         float | None, typer.Option(metavar="C", help="Free room about the path. Default: one turn radius.")
     ] = None,
     tolerance_m: Annotated[
-        float | None, typer.Option(metavar="T", help="Allowed cross-track error. Default: a tenth of C.")
+        float | None,
+        typer.Option(metavar="T", help="Allowed cross-track error. Default: a tenth of C in calm air."),
     ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Of the turbulence.")] = None,
     settings: Annotated[
