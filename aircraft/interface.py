@@ -34,6 +34,8 @@ class AircraftState(NamedTuple):
     """True airspeed."""
     load_factor: float
     """Normal load factor, 1 in level flight."""
+    throttle: float = math.nan
+    """Throttle command, 0 to 1; NaN for a model without an engine."""
 
     @property
     def groundspeed_mps(self) -> float:

@@ -128,7 +128,9 @@ class JsbsimModel:
 
     def state(self) -> AircraftState:
         """The state now, in the local plane."""
-        latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor = self._read
+        latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor, throttle = (
+            self._read
+        )
         place, convergence = self._place(latitude(), longitude())
         self._convergence_rad = convergence
         velocity = complex(east(), north()) * cmath.rect(FOOT_M, convergence)
@@ -145,6 +147,7 @@ class JsbsimModel:
             pitch(),
             airspeed() * FOOT_M,
             load_factor(),
+            throttle(),
         )
 
     def _place(self, latitude_rad: float, longitude_rad: float) -> tuple[complex, float]:

@@ -15,6 +15,7 @@ STATE_PROPERTIES = (
     "attitude/theta-rad",  # nose up
     "velocities/vtrue-fps",
     "accelerations/Nz",  # 1 in level flight
+    "fcs/throttle-cmd-norm",
 )
 """Read for `AircraftState`, in the order in which `JsbsimModel.state` unpacks them."""
 

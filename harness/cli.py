@@ -13,6 +13,8 @@ from typing import Annotated, Final
 
 import typer
 
+from harness.commands.check import check
+from harness.commands.export import export
 from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
 from harness.commands.options import BAD_INPUT, FAILED, Command, Group, flag
@@ -21,7 +23,7 @@ from harness.commands.review import report, view
 INTERRUPTED: Final = 130
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
-for command in (fly, compare, validate, schema, view, report, bench):
+for command in (fly, check, compare, validate, schema, view, report, export, bench):
     app.command(cls=Command)(command)
 app.command("list", cls=Command)(list_names)
 
@@ -85,7 +87,8 @@ def _report(error: Exception) -> int:
         typer.echo(str(error), err=True)
         return BAD_INPUT
     if isinstance(error, typer.TyperException):
-        typer.echo(f"wayproof: {error.format_message()} (see wayproof --help)", err=True)
+        text = " ".join(error.format_message().split())
+        typer.echo(f"wayproof: {text} (see wayproof --help)", err=True)
         return BAD_INPUT
     if isinstance(error, OSError):
         typer.echo(f"wayproof: {error}", err=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,10 @@ from harness.smoothness import (
     stations_in_effect,
     window_m,
 )
-from harness.trackability import FlightLimits, legs, saturated
+from harness.trackability import Corner, FlightLimits, legs, saturated
 
 
-def metrics(flight: Flight, limits: FlightLimits) -> dict[str, Any]:
+def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()) -> dict[str, Any]:
     """All figures of a flight, ready for JSON: a figure that does not exist is None, never NaN or infinity.
 
     Distances are of the flown track as logged. `planned_length_m` is the curve length of those parts of the
@@ -32,6 +33,7 @@ def metrics(flight: Flight, limits: FlightLimits) -> dict[str, Any]:
     Args:
         flight: the flight; its track has at least one row.
         limits: what the flight is measured against.
+        corners: of a path that was given, in order.
 
     Raises:
         ValueError: the track is empty.
@@ -41,7 +43,8 @@ def metrics(flight: Flight, limits: FlightLimits) -> dict[str, Any]:
         raise ValueError("a flight without a track has no metrics")
     window = window_m(track)
     planned = planned_profile(track, flight.plans, window)
-    verdicts = legs(track, flight.plans, limits, lost_control=flight.outcome is Outcome.LOST_CONTROL)
+    lost_control = flight.outcome is Outcome.LOST_CONTROL
+    verdicts = legs(track, flight.plans, limits, lost_control, corners)
     followed = track.cross_track_m[track.plan_index >= 0]
     return {
         "outcome": flight.outcome.value,
@@ -54,7 +57,7 @@ def metrics(flight: Flight, limits: FlightLimits) -> dict[str, Any]:
         "cross_track_m": error_figures(followed),
         "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
         "smoothness": {
-            "planned": dataclasses.asdict(smoothness(planned, window)),
+            "planned": dataclasses.asdict(smoothness(planned, window, planned_length_m(flight))),
             "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
         },
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),

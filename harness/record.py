@@ -85,6 +85,7 @@ class Track:
         clearance_m: true distance to the nearest active obstacle edge, negative inside, inf with none.
         plan_index: row of `plans.parquet` being flown, -1 before the first.
         station_m: distance along that plan; NaN before the first plan.
+        throttle: throttle command, 0 to 1; NaN for a flight model without an engine.
     """
 
     time_s: FloatArray
@@ -103,6 +104,7 @@ class Track:
     clearance_m: FloatArray
     plan_index: IntArray
     station_m: FloatArray
+    throttle: FloatArray
 
     def __post_init__(self) -> None:
         for name in TRACK_FIELDS:
@@ -125,7 +127,7 @@ class Track:
         )
 
 
-TRACK_FIELDS = (*COLUMNS, "station_m")
+TRACK_FIELDS = (*COLUMNS, "station_m", "throttle")
 """All columns of `track.parquet`."""
 
 
@@ -182,8 +184,8 @@ class TrackLog:
     def _cut(self) -> None:
         rows = np.array(self._values).reshape(-1, ROW_VALUES).T
         self._values = array("d")
-        time, east, north, up, east_mps, north_mps, _, heading, roll, pitch, airspeed, load_factor = rows[:12]
-        roll_command, cross_track, station, plan_index = rows[12:]
+        time, east, north, up, east_mps, north_mps, _, heading, roll, pitch = rows[:10]
+        airspeed, load_factor, throttle, roll_command, cross_track, station, plan_index = rows[10:]
         block = Track(
             time_s=time,
             east_m=east,
@@ -201,6 +203,7 @@ class TrackLog:
             clearance_m=self._clearance(np.column_stack((east, north)), time),
             plan_index=plan_index,
             station_m=station,
+            throttle=throttle,
         )
         self._blocks.append(block)
         for sink in self._sinks:

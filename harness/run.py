@@ -15,7 +15,7 @@ import numpy as np
 
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
-from aircraft.guidance import PathFollower
+from aircraft.guidance import GRAVITY_MPS2, PathFollower
 from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, StartConditions
@@ -24,9 +24,10 @@ from harness.metrics import metrics
 from harness.obstacle_map import ObstacleMap
 from harness.planner_keys import config_of
 from harness.range_sensor import RangeSensor
-from harness.record import AcceptedPlan, Track
+from harness.record import AcceptedPlan, Flight, Track
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
+from harness.scenario_sections import Environment
 from harness.trackability import FlightLimits
 from harness.world import World
 from planner.registry import planner_kinds
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
 
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
+
+
+Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
 
 
 def make_loop(
@@ -108,13 +112,29 @@ def jsbsim_aircraft(scenario: Scenario, start: StartConditions, air: Atmosphere)
 
 def flight_limits(scenario: Scenario) -> FlightLimits:
     """What a scenario's flight is measured against."""
-    performance = performance_of(scenario)
+    performance, limits = performance_of(scenario), scenario.trackability
+    calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
+    guidance = airframe(scenario.aircraft.model).guidance_limits
+    speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
+    wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
+    sensor = scenario.sensor
+    blind_s = scenario.planner.compute_latency_s + sensor.latency_s + 1.0 / sensor.rate_hz
     return FlightLimits(
         altitude_m=scenario.mission.altitude_m,
-        clearance_m=_given(scenario.planner.clearance_m),
-        bank_limit_rad=airframe(scenario.aircraft.model).guidance_limits.bank_limit_rad,
+        clearance_m=clearance,
+        bank_limit_rad=guidance.bank_limit_rad,
         turn_radius_m=performance.turn_radius_m,
         tracking_error_m=performance.tracking_error_m,
+        airspeed_mps=speed,
+        calm_radius_m=calm.turn_radius_m,
+        tightest_radius_m=speed * speed / (GRAVITY_MPS2 * math.tan(guidance.bank_limit_rad)),
+        roll_rate_radps=guidance.roll_rate_radps,
+        sensor_range_m=_given(sensor.range_m),
+        horizon_m=performance.turn_radius_m + clearance + (speed + wind) * (blind_s + performance.roll_in_s),
+        max_cross_track_m=_given(limits.cross_track_m),
+        max_altitude_error_m=_given(limits.altitude_m),
+        max_airspeed_error_mps=_given(limits.airspeed_mps),
+        max_load_factor=_given(limits.load_factor),
     )
 
 
@@ -126,6 +146,9 @@ def fly_to_folder(
     *,
     make: Callable[[Scenario], Loop] = make_loop,
     watching: Sequence[Observer] = (),
+    pilot: str | None = None,
+    flown_by: Fly = fly,
+    measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
 ) -> dict[str, Any]:
     """Flies a scenario into a run folder and returns the content of its `metrics.json`.
 
@@ -136,6 +159,9 @@ def fly_to_folder(
         progress: told of the flight as it goes on.
         make: makes the parts of the flight.
         watching: look on besides those that write the folder.
+        pilot: stands in the recording's name; default: the planner's kind.
+        flown_by: flies the parts to an end.
+        measured_by: gives the content of `metrics.json`.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
@@ -145,11 +171,11 @@ def fly_to_folder(
     with ExitStack() as stack:
         folder = stack.enter_context(RunFolder.create(out, dump_scenario(scenario), [shlex.join(sys.argv)]))
         observers: list[Observer] = [_Writer(folder), *watching]
-        log = _recording(scenario, loop, folder) if recording else None
+        log = _recording(scenario, loop, folder, pilot or scenario.planner.kind) if recording else None
         if log is not None:
             observers.append(log)
-        flight = fly(loop, observers, progress)
-        figures = metrics(flight, flight_limits(scenario))
+        flight = flown_by(loop, observers, progress)
+        figures = measured_by(flight, flight_limits(scenario))
         if log is not None:
             log.close(figures)
         folder.finish(flight.plans, figures)
@@ -175,11 +201,11 @@ class _Writer:
         """Events belong to the recording."""
 
 
-def _recording(scenario: Scenario, loop: Loop, folder: RunFolder) -> Any:
+def _recording(scenario: Scenario, loop: Loop, folder: RunFolder, pilot: str) -> Any:
     from harness.rerun_blueprint import Scene
     from harness.rerun_log import RerunLog
 
-    title = f"{scenario.name}, {scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}"
+    title = f"{scenario.name}, {pilot}, {scenario.aircraft.model}, seed {scenario.seed}"
     scene = Scene(
         title,
         loop.mission,

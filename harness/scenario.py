@@ -7,7 +7,7 @@ other have been refused.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -24,6 +24,7 @@ from harness.scenario_sections import (
     PlannerSpec,
     Section,
     Sensor,
+    TrackabilitySpec,
     key,
 )
 from harness.strict_yaml import COMMAND_LINE, InputError, Loc, Node
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
 MAX_WIND_FRACTION: Final = 0.9
 """Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
+
+POUND_KG: Final = 0.45359237
 
 
 class Scenario(Section):
@@ -55,6 +58,9 @@ class Scenario(Section):
     sensor: Sensor = key("What it senses with.", default_factory=Sensor)
     planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
     environment: Environment = key("The air.", default_factory=Environment)
+    trackability: TrackabilitySpec = key(
+        "What a leg may be off before it counts as not trackable.", default_factory=TrackabilitySpec
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> Scenario:
@@ -73,9 +79,19 @@ class Scenario(Section):
             time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
         )
         self._set("planner", clearance_m=_rounded_up(radius_m, 10))
+        self._set("trackability", cross_track_m=self._cross_track_m(performance.tracking_error_m))
+        self._set(
+            "trackability",
+            altitude_m=max(10.0, self.trackability.cross_track_m),
+            airspeed_mps=0.1 * self.aircraft.airspeed_mps,
+            load_factor=_limit_load_factor(self.aircraft),
+        )
         check_start_and_goal(self.area, self.obstacles, self.mission, self.planner.clearance_m)
         object.__setattr__(self, "planner", planner_keys.resolved(self.planner, mission_of(self)))
         return self
+
+    def _cross_track_m(self, tracking_error_m: float) -> float:
+        return max(0.1 * self.planner.clearance_m, 2.0 * tracking_error_m)
 
     def _set(self, name: str, **defaults: float) -> None:
         """Fills in those keys of a section that the file leaves out."""
@@ -109,6 +125,22 @@ def parse_scenario(text: str, source: str = "scenario") -> Scenario:
         InputError: it is not a scenario.
     """
     return _validated(strict_yaml.parse(text, source), source)
+
+
+def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """A scenario from keys that a command has put together, every default filled in.
+
+    Args:
+        keys: as in a file; plain values.
+        overrides: as `load_scenario` takes them.
+
+    Raises:
+        InputError: it is not a scenario; its faults name the command line.
+    """
+    root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
+    for name, text in overrides:
+        root = _overridden(root, name, text)
+    return _validated(root, "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -201,6 +233,13 @@ def _cruise_mps(spec: AircraftSpec) -> float:
         return airframe(spec.model).cruise_mps
     except AircraftError as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
+
+
+def _limit_load_factor(spec: AircraftSpec) -> float:
+    from aircraft.airframes import airframe
+
+    weight_lb = airframe(spec.model).mass_kg / POUND_KG
+    return min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0))
 
 
 def _rounded_up(value: float, step: int) -> float:

@@ -274,6 +274,40 @@ class PlannerSpec(Section):
         return dict(self.__pydantic_extra__ or {})
 
 
+class TrackabilitySpec(Section):
+    """What a leg of the flight may be off before it counts as not trackable."""
+
+    cross_track_m: float = key(
+        "Distance from the plan.",
+        unit="m",
+        derived="the larger of a tenth of planner.clearance_m and twice the aircraft's tracking error",
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
+    altitude_m: float = key(
+        "Distance from mission.altitude_m.",
+        unit="m",
+        derived="the larger of 10 m and cross_track_m",
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
+    airspeed_mps: float = key(
+        "Error of the true airspeed, averaged over 20 s.",
+        unit="m/s",
+        derived="a tenth of aircraft.airspeed_mps",
+        gt=0,
+        le=1000,
+    )
+    load_factor: float = key(
+        "Load factor, averaged over 1 s.",
+        unit="1",
+        derived="the limit manoeuvring load factor of 14 CFR 23.337 (amendment 23-48) for the aircraft's mass, "
+        "2.1 + 24000 / (weight in lb + 10000) and at most 3.8",
+        gt=1,
+        le=20,
+    )
+
+
 class Wind(Section):
     """Steady wind, the same everywhere."""
 

@@ -1,4 +1,4 @@
-"""How smooth a path is, planned and flown, in the same four figures.
+"""How smooth a path is, planned and flown, in the same figures.
 
 Both are brought to one form, a curvature profile: consecutive pieces of length `l_i` (m) and constant
 curvature `k_i` (1/m, positive = left). A plan has this form already. A flown track gets it from the course
@@ -8,6 +8,7 @@ shorter than a turn.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -41,7 +42,9 @@ class Profile(NamedTuple):
 
 @dataclass(frozen=True)
 class Smoothness:
-    """Four figures of a path; 0 for a straight one.
+    """Figures of a path of length L; 0 for a straight one.
+
+    Figures called normalised are free of units, and the same for a path and for its enlargement.
 
     Attributes:
         heading_change_deg: total absolute change of direction, the sum of |k_i| l_i.
@@ -51,28 +54,50 @@ class Smoothness:
         max_curvature_rate_1pm2: largest |k(s + w) - k(s)| / w over a window w. The rate of curvature is what
             an aircraft turns into roll rate (Kanayama and Hartman, Smooth local path planning for autonomous
             vehicles, 1989); the window makes it finite where a line meets an arc.
+        angle_over_length_radpm: total absolute change of direction over L, the sum of |k_i| l_i / L (AOL of
+            Heiden et al., Bench-MR: a motion planning benchmark for wheeled mobile robots, IEEE RA-L 6(3),
+            2021).
+        bending_energy_normalised: bending energy times L; (2 pi)^2 for any full circle (Bruckstein and
+            Netravali, On minimal energy trajectories, CVGIP 49, 1990, on why the energy is scaled so).
+        max_curvature_normalised: largest |k_i| times L.
+        max_curvature_rate_normalised: largest rate of curvature times L^2.
     """
 
     heading_change_deg: float
     bending_energy_1pm: float
     max_curvature_1pm: float
     max_curvature_rate_1pm2: float
+    angle_over_length_radpm: float
+    bending_energy_normalised: float
+    max_curvature_normalised: float
+    max_curvature_rate_normalised: float
 
 
-def smoothness(profile: Profile, window_m: float) -> Smoothness:
-    """The four figures of a curvature profile.
+def smoothness(profile: Profile, window_m: float, length_m: float | None = None) -> Smoothness:
+    """The figures of a curvature profile.
 
     Args:
         profile: pieces of constant curvature.
         window_m: w of the curvature rate, > 0.
+        length_m: L; default: that of the profile. A profile in which corners count as arcs is longer than
+            its path.
     """
     length, curvature = profile
     bent = np.abs(curvature)
+    whole = float(length.sum()) if length_m is None else length_m
+    turned = float(bent @ length)
+    energy = float((bent * bent) @ length)
+    sharpest = float(bent.max(initial=0.0))
+    rate = _max_rate(profile, window_m)
     return Smoothness(
-        heading_change_deg=float(np.degrees(bent @ length)),
-        bending_energy_1pm=float((bent * bent) @ length),
-        max_curvature_1pm=float(bent.max(initial=0.0)),
-        max_curvature_rate_1pm2=_max_rate(profile, window_m),
+        heading_change_deg=math.degrees(turned),
+        bending_energy_1pm=energy,
+        max_curvature_1pm=sharpest,
+        max_curvature_rate_1pm2=rate,
+        angle_over_length_radpm=turned / whole if whole > 0.0 else 0.0,
+        bending_energy_normalised=energy * whole,
+        max_curvature_normalised=sharpest * whole,
+        max_curvature_rate_normalised=rate * whole * whole,
     )
 
 
@@ -109,19 +134,52 @@ def flown_lengths(track: Track) -> FloatArray:
 def planned_profile(track: Track, plans: Sequence[AcceptedPlan], window_m: float) -> Profile:
     """Curvature profile of what was planned and in effect, plan after plan.
 
-    Of every plan, the part between the stations at which it was taken up and replaced counts. A corner inside
-    it, where the tangent jumps, counts as an arc of length `window_m`; where two plans meet, only their
-    curvatures count.
+    Of every plan, the part between the stations at which it was taken up and replaced counts. A corner, where
+    the tangent jumps, counts as an arc of length `window_m`: inside a plan, and where a plan takes over from
+    another in a different direction.
 
     Args:
         track: the flown track, with stations.
         plans: `plans[i]` is the plan of rows with `plan_index` i.
         window_m: length over which a corner is taken to be turned.
     """
-    parts = [_stretch(plans[index], start, end, window_m) for index, start, end in stations_in_effect(track)]
+    stretches = stations_in_effect(track)
+    parts: list[Profile] = []
+    for number, (index, start, end) in enumerate(stretches):
+        if number:
+            before, _, left = stretches[number - 1]
+            corner = _corner(_tangent(plans[before], left), _tangent(plans[index], start))
+            if abs(corner) > CORNER_RAD:
+                parts.append(Profile(np.array([window_m]), np.array([corner / window_m])))
+        parts.append(_stretch(plans[index], start, end, window_m))
     length = np.concatenate([[], *(part.length_m for part in parts)])
     curvature = np.concatenate([[], *(part.curvature_1pm for part in parts)])
     return Profile(length[length > 0], curvature[length > 0])
+
+
+def polyline_profile(points_m: FloatArray, window_m: float) -> Profile:
+    """Curvature profile of a polyline.
+
+    The turn at a vertex is spread over half of the legs on either side of it, but over no more than
+    `window_m`: vertices that sample a curve get its curvature, a corner between long legs that of a corner.
+
+    Args:
+        points_m: (n, 2) vertices, no two neighbours in one place.
+        window_m: length over which a corner is taken to be turned.
+    """
+    legs = np.diff(points_m[:, 0]) + 1j * np.diff(points_m[:, 1])
+    length = np.abs(legs)
+    turn = np.angle(legs[1:] / legs[:-1])
+    half = np.minimum(0.5 * length, 0.5 * window_m)
+    bent = half[:-1] + half[1:]
+    lengths = np.zeros(2 * len(legs) - 1)
+    curvatures = np.zeros_like(lengths)
+    lengths[1::2] = bent
+    lengths[::2] = length
+    lengths[2::2] -= half[1:]
+    lengths[:-1:2] -= half[:-1]
+    curvatures[1::2] = turn / bent
+    return Profile(lengths, curvatures)
 
 
 def stations_in_effect(track: Track) -> list[tuple[int, float, float]]:
@@ -165,6 +223,24 @@ def _stretch(accepted: AcceptedPlan, start_m: float, end_m: float, window_m: flo
     return Profile(
         np.append(lengths, beyond), np.append(curvatures, segments[-1, 4] if accepted.loiter else 0.0)
     )
+
+
+def _tangent(accepted: AcceptedPlan, station_m: float) -> tuple[float, float]:
+    """Unit tangent of a plan at a station; beyond its end that of the line, or the loiter circle, there."""
+    segments = accepted.segments
+    begins = np.append(0.0, np.cumsum(segments[:-1, 5]))
+    row = max(int(np.searchsorted(begins, station_m, side="right")) - 1, 0)
+    east, north, curvature, length = segments[row, 2:].tolist()
+    along = max(station_m - float(begins[row]), 0.0)
+    turn = curvature * (along if accepted.loiter else min(along, length))
+    cosine, sine = math.cos(turn), math.sin(turn)
+    return east * cosine - north * sine, north * cosine + east * sine
+
+
+def _corner(before: tuple[float, float], after: tuple[float, float]) -> float:
+    """Angle from one direction to another, rad, positive to the left."""
+    (x0, y0), (x1, y1) = before, after
+    return math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
 
 
 def _max_rate(profile: Profile, window_m: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
@@ -74,7 +74,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     style = _OUTCOME_STYLE.get(metrics["outcome"], "bold red")
     compute, timing = metrics["compute_ms"], metrics["timing"]
     return {
-        "outcome": f"[{style}]{metrics['outcome']}[/]: {_plain(metrics['reason'])}",
+        "outcome": f"[{style}]{metrics['outcome']}[/]: {plain(metrics['reason'])}",
         "length flown": f"{_number(metrics['flown_length_m'])} m, "
         f"planned {_number(metrics['planned_length_m'])} m",
         "flight time": f"{_number(metrics['flight_time_s'])} s",
@@ -104,13 +104,18 @@ def _tracked(metrics: Mapping[str, Any]) -> str:
     if metrics["trackable"]:
         return "yes"
     legs = metrics["trackability"]
-    causes = [str(leg["cause"]) for leg in legs if not leg["trackable"]]
-    if not causes:
-        return "no: no plan was flown"
-    return f"no: {len(causes)} of {len(legs)} legs, {_plain(', '.join(dict.fromkeys(causes)))}"
+    bad = [leg for leg in legs if not leg["trackable"]]
+    return f"no: {len(bad)} of {len(legs)} legs, {causes(bad)}" if bad else "no: no plan was flown"
 
 
-def _plain(text: str) -> str:
+def causes(bad: Sequence[Mapping[str, Any]]) -> str:
+    """The causes of legs that are not trackable, each once, with the number of legs."""
+    every = [leg["cause"] for leg in bad]
+    times = {cause: every.count(cause) for cause in dict.fromkeys(every)}
+    return ", ".join(f"{cause} ({count} legs)" if count > 1 else cause for cause, count in times.items())
+
+
+def plain(text: str) -> str:
     """`text` with nothing in it that rich would take for markup."""
     return text.replace("[", "\\[")
 

@@ -98,6 +98,28 @@ def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_pat
     assert refused.stderr in blocks("text")
 
 
+def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tmp_path: Path) -> None:
+    (text,), (scenario,) = blocks("csv"), blocks("yaml")
+    (tmp_path / "my_path.csv").write_text(text)
+    (tmp_path / "my_world.yaml").write_text(scenario)
+    checked = wayproof("check my_path.csv --aircraft aerosonde --no-recording", tmp_path)
+    assert (checked.returncode, checked.stderr) == (1, "")
+    (shown,) = (block for block in blocks("text") if block.startswith("my_path.csv"))
+    names = [line[:20].strip() for line in shown.splitlines()]
+    assert [line[:20].strip() for line in checked.stdout.splitlines()][: len(names)] == names
+    assert "no: turn radius too tight (2 legs)" in checked.stdout
+
+    assert wayproof("fly my_world.yaml --no-recording --quiet", tmp_path).returncode == 0
+    run = "runs/my_world/rolling_window-aerosonde-1"
+    assert load_run(tmp_path / run).metrics["trackable"] is True
+    for command in (
+        f"export {run} --what planned --format geojson --out planned.geojson",
+        "check planned.geojson --aircraft aerosonde",
+    ):
+        assert f"`wayproof {command}`" in README
+        assert wayproof(command, tmp_path).returncode == 0
+
+
 def test_ones_own_planner_is_found_and_flown(tmp_path: Path) -> None:
     (planner,), (project,), (scenario,) = blocks("python"), blocks("toml"), blocks("yaml")
     assert len([line for line in planner.splitlines() if line.strip()]) < 30

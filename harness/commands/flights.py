@@ -170,6 +170,7 @@ def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> 
     """Flies into a folder, with a progress bar where a person looks on."""
     from contextlib import nullcontext
 
+    from aircraft.airframes import AircraftError
     from harness.record import RunFolderError
     from harness.run import fly_to_folder
     from harness.terminal import progress_bar
@@ -177,7 +178,7 @@ def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> 
     try:
         with nullcontext() if silent else progress_bar(straight_m(scenario)) as report:
             return fly_to_folder(scenario, folder, recording, report)
-    except RunFolderError as error:
+    except (AircraftError, RunFolderError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
         typer.echo(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)

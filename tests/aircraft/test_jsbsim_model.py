@@ -30,6 +30,14 @@ def model_of(
     )
 
 
+def test_state_has_the_throttle_that_holds_the_airspeed() -> None:
+    slow, fast = (
+        JsbsimModel("aerosonde", StartConditions(0.0, 0.0, 300.0, 0.0, speed), LocalPlane(47.0, 8.0))
+        for speed in (20.0, 30.0)
+    )
+    assert 0.0 < slow.state().throttle < fast.state().throttle < 1.0
+
+
 def test_is_a_flight_model() -> None:
     model: FlightModel = model_of("aerosonde")
     assert model.step_rate_hz == 120

@@ -36,6 +36,7 @@ def track(rows: int, **columns: FloatArray | float) -> Track:
         "clearance_m": 1000.0,
         "plan_index": 0,
         "station_m": 25.0 * time_s,
+        "throttle": 0.5,
     }
     filled = {name: np.broadcast_to(value, rows) for name, value in {**level, **columns}.items()}
     return Track(**filled)

@@ -24,7 +24,7 @@ from planner.registry import planner_kinds
 
 ROOT = Path(__file__).parents[2]
 SLOW = {"jsbsim", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "yaml"}
-COMMANDS = ("fly", "compare", "validate", "schema", "list", "view", "report", "bench")
+COMMANDS = ("fly", "check", "compare", "validate", "schema", "list", "view", "report", "export", "bench")
 FLY_OPTIONS = (
     *("--planner", "--aircraft", "--seed", "--set", "--out"),
     *("--no-recording", "--view", "--quiet", "--json"),

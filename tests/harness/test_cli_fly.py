@@ -115,6 +115,15 @@ def test_a_folder_with_other_things_is_refused_and_left_alone(
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
 
+def test_an_aircraft_that_cannot_be_trimmed_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = ("--aircraft", "c172p", "--set", "aircraft.airspeed_mps=60", "--set", "mission.altitude_m=9000")
+    assert main(["fly", "paper_circles", *keys, "--out", str(tmp_path / "run")]) == 2
+    assert "c172p cannot be trimmed for level flight at 60 m/s, 9000 m" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_second_run_replaces_the_first(tmp_path: Path) -> None:
     options = ["--out", str(tmp_path / "run"), "--no-recording", "--quiet"]
     assert main(["fly", "aerosonde_forest", "--set", "mission.time_limit_s=9", *options]) == 1

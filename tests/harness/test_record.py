@@ -30,7 +30,7 @@ def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
 
 def test_columns_are_those_of_the_contract() -> None:
     assert " ".join(COLUMNS) == CONTRACT
-    assert (*COLUMNS, "station_m") == TRACK_FIELDS
+    assert (*COLUMNS, "station_m", "throttle") == TRACK_FIELDS
 
 
 def test_row_holds_the_state_in_the_units_of_the_file() -> None:

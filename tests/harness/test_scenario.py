@@ -21,6 +21,7 @@ from harness.scenario import (
     load_scenario,
     mission_of,
     parse_scenario,
+    performance_of,
     scenario_schema,
 )
 from harness.strict_yaml import InputError
@@ -33,6 +34,20 @@ area: {bounds_m: [0, 0, 40000, 40000]}
 mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
 """
 WITH_PLANNER = LEAST + "planner: {kind: rolling_window, clearance_m: 70, candidates: 9}\n"
+
+
+def test_trackability_follows_from_clearance_and_aircraft() -> None:
+    light = parse_scenario(LEAST).trackability
+    assert light.altitude_m == max(10.0, light.cross_track_m)
+    assert (light.airspeed_mps, light.load_factor) == (2.5, 3.8)
+    wide = parse_scenario(LEAST + "planner: {clearance_m: 500}\n").trackability
+    assert (wide.cross_track_m, wide.altitude_m) == (50.0, 50.0)
+    narrow = parse_scenario(LEAST + "planner: {clearance_m: 1}\n")
+    assert narrow.trackability.cross_track_m == 2.0 * performance_of(narrow).tracking_error_m
+    # 853 kg are 1880 lb: 2.1 + 24000 / 11880 is more than the 3.8 that suffice.
+    assert parse_scenario(LEAST + "aircraft: {model: c172p}\n").trackability.load_factor == 3.8
+    own = parse_scenario(LEAST + "trackability: {cross_track_m: 3.0, load_factor: 1.5}\n").trackability
+    assert (own.cross_track_m, own.altitude_m, own.load_factor) == (3.0, 10.0, 1.5)
 
 
 def test_fills_in_every_default() -> None:

@@ -34,6 +34,7 @@ planner:
 environment:
   wind: {speed_mps: 5, from_deg: 270}
   turbulence: {model: tustin, intensity: light}
+trackability: {cross_track_m: 10, altitude_m: 15, airspeed_mps: 2, load_factor: 2.5}
 """
 
 SPEED = "airspeed_mps: 25"
@@ -168,6 +169,31 @@ BROKEN = {
     ),
     "turbulence model": ("tustin", "dryden", "25: environment.turbulence.model", "'tustin' or 'milspec'"),
     "intensity": ("light", "mild", "25: environment.turbulence.intensity", "'light', 'moderate' or 'severe'"),
+    "no tolerance": (
+        "cross_track_m: 10",
+        "cross_track_m: 0",
+        "26: trackability.cross_track_m",
+        "must be greater than 0",
+    ),
+    "altitude tolerance": ("altitude_m: 15", "altitude_m: .nan", "26: trackability.altitude_m", "finite"),
+    "airspeed tolerance": (
+        "airspeed_mps: 2,",
+        "airspeed_mps: -2,",
+        "26: trackability.airspeed_mps",
+        "must be greater than 0",
+    ),
+    "load factor of level flight": (
+        "load_factor: 2.5",
+        "load_factor: 1",
+        "26: trackability.load_factor",
+        "must be greater than 1",
+    ),
+    "misspelt tolerance": (
+        "cross_track_m: 10",
+        "crosstrack_m: 10",
+        "26: trackability.crosstrack_m",
+        "did you mean cross_track_m?",
+    ),
     "key given twice": ("seed: 1", "seed: 1\nseed: 2", "4: seed", "is given twice, first in line 3"),
     "nested key given twice": ("rays: 360", "rays: 3, rays: 4", "18: sensor.rays", "is given twice"),
     "anchor": ("seed: 1", "seed: &one 1", "3: seed", "has the anchor &one"),
@@ -228,7 +254,7 @@ BYTES = {
     "only spaces": (b"   \n\n", ":1: is empty"),
     "a word": (b"scenario\n", ":1: is the text 'scenario'; must be a mapping"),
     "a list": (b"- 1\n- 2\n", ":1: is a list of 2; must be a mapping"),
-    "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":26: a second document begins here"),
+    "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":27: a second document begins here"),
     "Latin-1": (GOOD.replace("good", "gut\xe9").encode("latin-1"), ":2: byte 0xe9 is not UTF-8"),
     "UTF-16": (GOOD.encode("utf-16"), ": is not a text file"),
     "binary": (bytes(range(256)) * 50, ": is not a text file"),

@@ -14,6 +14,7 @@ from harness.smoothness import (
     Smoothness,
     flown_profile,
     planned_profile,
+    polyline_profile,
     smoothness,
     stations_in_effect,
     window_m,
@@ -34,11 +35,16 @@ def test_circle_in_closed_form(radius: float, turn: float, cuts: int) -> None:
     assert figures.bending_energy_1pm == pytest.approx(turn / radius)
     assert figures.max_curvature_1pm == pytest.approx(1.0 / radius)
     assert figures.max_curvature_rate_1pm2 == 0.0
+    assert figures.angle_over_length_radpm == pytest.approx(1.0 / radius)
+    assert figures.bending_energy_normalised == pytest.approx(turn**2)
+    assert figures.max_curvature_normalised == pytest.approx(turn)
+    assert figures.max_curvature_rate_normalised == 0.0
 
 
 def test_straight_line_is_zero_in_all() -> None:
-    assert smoothness(profile((1000.0, 0.0)), 25.0) == Smoothness(0.0, 0.0, 0.0, 0.0)
-    assert smoothness(Profile(np.zeros(0), np.zeros(0)), 25.0) == Smoothness(0.0, 0.0, 0.0, 0.0)
+    nothing = Smoothness(*[0.0] * 8)
+    assert smoothness(profile((1000.0, 0.0)), 25.0) == nothing
+    assert smoothness(Profile(np.zeros(0), np.zeros(0)), 25.0) == nothing
 
 
 def test_clothoid_in_closed_form() -> None:
@@ -50,6 +56,22 @@ def test_clothoid_in_closed_form() -> None:
     assert figures.bending_energy_1pm == pytest.approx(rate**2 * length**3 / 3, rel=1e-6)
     assert figures.max_curvature_1pm == pytest.approx(rate * length, rel=1e-3)
     assert figures.max_curvature_rate_1pm2 == pytest.approx(rate, rel=1e-6)
+    assert figures.angle_over_length_radpm == pytest.approx(rate * length / 2)
+    assert figures.bending_energy_normalised == pytest.approx(rate**2 * length**4 / 3, rel=1e-6)
+    assert figures.max_curvature_rate_normalised == pytest.approx(rate * length**2, rel=1e-6)
+
+
+@given(scale=st.floats(0.1, 100.0))
+def test_normalised_figures_do_not_change_with_the_scale(scale: float) -> None:
+    small = smoothness(profile((300.0, 0.0), (200.0, 0.01), (300.0, -0.004)), 25.0)
+    large = smoothness(
+        profile((300.0 * scale, 0.0), (200.0 * scale, 0.01 / scale), (300.0 * scale, -0.004 / scale)),
+        25.0 * scale,
+    )
+    for name in ("bending_energy_normalised", "max_curvature_normalised", "max_curvature_rate_normalised"):
+        assert getattr(large, name) == pytest.approx(getattr(small, name))
+    assert large.heading_change_deg == pytest.approx(small.heading_change_deg)
+    assert large.angle_over_length_radpm == pytest.approx(small.angle_over_length_radpm / scale)
 
 
 def test_line_into_arc_has_the_rate_of_the_window() -> None:
@@ -105,6 +127,53 @@ def test_planned_corner_is_turned_over_the_window(
     assert figures.heading_change_deg == pytest.approx(90.0)
     assert figures.bending_energy_1pm == pytest.approx((math.pi / 2) ** 2 / 25.0)
     assert figures.max_curvature_1pm == pytest.approx(math.pi / 2 / 25.0)
+
+
+def test_angle_over_length_of_a_polyline_takes_the_length_of_the_polyline() -> None:
+    """A right angle in 500 m, turned over a window that makes the profile longer than the path."""
+    bent = profile((100.0, 0.0), (25.0, math.pi / 2 / 25.0), (400.0, 0.0))
+    assert smoothness(bent, 25.0, 500.0).angle_over_length_radpm == pytest.approx(math.pi / 2 / 500.0)
+
+
+@given(radius=st.floats(50.0, 1e4), chords=st.integers(8, 200))
+def test_polyline_in_a_circle_has_nearly_its_curvature(radius: float, chords: int) -> None:
+    """With a turn of a = 2 pi / n at each vertex and chords of 2 r sin(a / 2), the curvature is a over a chord."""
+    angle = np.linspace(0.0, math.tau, chords + 1)
+    points = radius * np.column_stack((np.cos(angle), np.sin(angle)))
+    chord, turn = 2.0 * radius * math.sin(math.pi / chords), math.tau / chords
+    bent = polyline_profile(points, 2.0 * chord)
+    figures = smoothness(bent, 2.0 * chord)
+    assert bent.length_m.sum() == pytest.approx(chords * chord)
+    assert figures.max_curvature_1pm == pytest.approx(turn / chord)
+    assert figures.heading_change_deg == pytest.approx(math.degrees(turn * (chords - 1)))
+    assert figures.bending_energy_1pm == pytest.approx(turn**2 / chord * (chords - 1))
+
+
+def test_polyline_with_a_corner_turns_it_over_the_window() -> None:
+    bent = polyline_profile(np.array([(0.0, 0.0), (0.0, 100.0), (-400.0, 100.0)]), 25.0)
+    assert bent.length_m == pytest.approx([87.5, 25.0, 387.5])
+    assert bent.curvature_1pm == pytest.approx([0.0, math.pi / 2 / 25.0, 0.0])
+    line = polyline_profile(np.array([(0.0, 0.0), (30.0, 40.0)]), 25.0)
+    assert (line.length_m.tolist(), line.curvature_1pm.tolist()) == ([50.0], [0.0])
+
+
+@pytest.mark.parametrize("end_turn", [0.0, 0.3])
+def test_the_turn_onto_a_new_plan_counts(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan], end_turn: float
+) -> None:
+    """North for 1000 m, the last part of it an arc, then a plan that begins at 0.5 rad to the right."""
+    arc = (end_turn / 100.0, 100.0)
+    out = 0.5
+    plans = [
+        make_plan([(0, 0, 0, 1, 0.0, 900.0), (0, 900, 0, 1, *arc)]),
+        make_plan([(0, 1000, math.sin(out), math.cos(out), 0.0, 5000.0)], index=1),
+    ]
+    station = np.arange(601) * 2.5
+    index = (station >= 1000.0).astype(int)
+    track = make_track(601, plan_index=index, station_m=station - 1000.0 * index)
+    figures = smoothness(planned_profile(track, plans, 25.0), 25.0)
+    assert figures.heading_change_deg == pytest.approx(math.degrees(end_turn + end_turn + out))
+    assert figures.max_curvature_1pm == pytest.approx((end_turn + out) / 25.0)
 
 
 @pytest.mark.parametrize(("loiter", "turned_rad"), [(True, 300.0 / 40.0), (False, math.tau)])

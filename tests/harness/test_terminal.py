@@ -41,7 +41,7 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
     assert max(map(len, shown.splitlines())) <= 80
     assert "collision: hit obstacle [3] at 812.3 s" in shown
     assert "94,322 m, planned - m" in shown
-    assert "no: 3 of 4 legs, wind drift, bank limit" in shown
+    assert "no: 3 of 4 legs, wind drift (2 legs), bank limit" in shown
     assert "rms 0.04 / p95 0.09 / max 0.18 m" in shown
     assert "rms - / p95 - / max - m" in shown
     assert "\x1b" not in shown

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +30,8 @@ def test_threshold_is_the_margin_planners_keep() -> None:
 def test_leg_is_trackable_up_to_the_threshold(
     make_track: Callable[..., Track], straight_plan: AcceptedPlan, error_m: float, trackable: bool
 ) -> None:
-    (leg,) = legs(make_track(201, cross_track_m=error_m), [straight_plan], LIMITS)
+    error = np.minimum(np.arange(201) / 100.0, 1.0) * error_m
+    (leg,) = legs(make_track(201, cross_track_m=error), [straight_plan], LIMITS)
     assert (leg.start_s, leg.end_s, leg.max_cross_track_m) == (0.0, 20.0, abs(error_m))
     assert leg.trackable is trackable
     assert leg.cause == (None if trackable else "tracking error")
@@ -69,6 +72,96 @@ def test_cause_is_a_turn_tighter_than_can_be_flown(
     track = make_track(201, cross_track_m=OFF, roll_command_deg=45.0)
     assert legs(track, [tight], LIMITS)[0].cause == "turn radius too tight"
     assert legs(track, [wide], LIMITS)[0].cause == "bank limit"
+
+
+def test_cause_is_a_corner_that_is_overshot(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    """The aircraft flies on past a right angle at 250 m; the nearest point of the plan stays there."""
+    corner = make_plan([(0, 0, 0, 1, 0.0, 250.0), (0, 250, 1, 0, 0.0, 900.0)])
+    along = np.minimum(25.0 * np.arange(151) / 10.0, 250.0)
+    off = np.maximum(np.arange(151) - 100.0, 0.0)
+    track = make_track(151, station_m=along, cross_track_m=off, roll_command_deg=np.where(off > 0, 45.0, 0.0))
+    assert legs(track, [corner], LIMITS)[0].cause == "turn radius too tight"
+    long = make_plan([(0, 0, 0, 1, 0.0, 9000.0)])
+    assert legs(track, [long], LIMITS)[0].cause == "bank limit"
+
+
+WIDE = replace(
+    LIMITS, airspeed_mps=25.0, max_altitude_error_m=10.0, max_airspeed_error_mps=2.5, max_load_factor=2.0
+)
+
+
+@pytest.mark.parametrize(
+    ("columns", "cause"),
+    [
+        ({"up_m": 311.0, "throttle": 1.0}, "speed or throttle saturation"),
+        ({"up_m": 311.0, "throttle": 0.5}, "tracking error"),
+        ({"up_m": 309.0, "throttle": 1.0}, None),
+        ({"airspeed_mps": 22.0}, "speed or throttle saturation"),
+        ({"airspeed_mps": 23.0}, None),
+        ({"airspeed_mps": np.where(np.arange(601) % 100 < 50, 21.0, 28.0)}, None),
+        ({"load_factor": 2.1}, "load factor"),
+        ({"load_factor": np.where(np.arange(601) % 20 == 0, 5.0, 1.0)}, None),
+    ],
+)
+def test_altitude_airspeed_and_load_factor_have_limits_too(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan, columns: dict[str, Any], cause: str | None
+) -> None:
+    """Speed is judged over 20 s and load factor over 1 s: not gust by gust."""
+    (leg,) = legs(make_track(601, **columns), [straight_plan], WIDE)
+    assert leg.cause == cause
+    assert leg.trackable is (cause is None)
+
+
+def test_cause_is_what_was_at_its_limit_for_longer(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    """Rolling at 50 of 60 deg/s all the time, the command at its limit for a part of it."""
+    limits = replace(LIMITS, roll_rate_radps=math.radians(60.0))
+    back_and_forth = 5.0 * np.abs(np.arange(201) % 16 - 8)
+    track = make_track(
+        201,
+        cross_track_m=OFF,
+        roll_deg=back_and_forth,
+        roll_command_deg=np.where(np.arange(201) % 3, 0.0, 45.0),
+    )
+    assert legs(track, [straight_plan], limits)[0].cause == "roll rate"
+    still = replace(track, roll_deg=np.zeros(201))
+    assert legs(still, [straight_plan], limits)[0].cause == "bank limit"
+
+
+def test_thresholds_can_be_given() -> None:
+    assert replace(LIMITS, max_cross_track_m=1.5).cross_track_threshold_m == 1.5
+
+
+@dataclass(frozen=True)
+class Passed:
+    station_m: float
+    cut_m: float
+
+
+def test_corners_end_legs_and_may_be_cut_by_the_clearance(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    corners = [Passed(500.0, 49.0), Passed(1000.0, 51.0)]
+    judged = legs(make_track(601), [straight_plan], LIMITS, corners=corners)
+    assert [(leg.end_s, leg.corner_cut_m, leg.cause) for leg in judged] == [
+        (20.0, 49.0, None),
+        (40.0, 51.0, "turn radius too tight"),
+        (60.0, 0.0, None),
+    ]
+
+
+@pytest.mark.parametrize(("calm_m", "cause"), [(100.0, "wind drift"), (140.0, "bank limit")])
+def test_bank_is_used_up_by_the_wind_where_calm_air_would_do(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan], calm_m: float, cause: str
+) -> None:
+    """A turn of 120 m, where the wind asks for 150 m and the bank limit in calm air gives 60 m."""
+    turning = make_plan([(0, 0, 0, 1, 1 / 120.0, 5000.0)])
+    limits = replace(LIMITS, turn_radius_m=150.0, calm_radius_m=calm_m, tightest_radius_m=60.0)
+    track = make_track(201, cross_track_m=OFF, roll_command_deg=-45.0)
+    assert legs(track, [turning], limits)[0].cause == cause
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,198 @@
+"""Paths and plans made untrackable on purpose, each in one way, and flyable again by mending just that.
+
+The aircraft are those of JSBSim throughout; a figure in a test is one that the flight is far from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.closed_loop import fly
+from harness.metrics import metrics
+from harness.path_flight import check_path, scenario_for
+from harness.record import FloatArray
+from harness.run import flight_limits, make_loop
+from harness.scenario import Scenario
+from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+
+Check = Callable[..., dict[str, Any]]
+Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]
+SmallWorld = Callable[..., Scenario]
+
+
+def turn(radius_m: float, turn_rad: float = 6.0) -> FloatArray:
+    """500 m to the north, then a left turn, sampled every 5 m."""
+    angle = np.linspace(0.0, turn_rad, round(radius_m * turn_rad / 5.0))
+    arc = np.column_stack((radius_m * (np.cos(angle) - 1.0), 500.0 + radius_m * np.sin(angle)))
+    return np.concatenate(([[0.0, 0.0]], arc))
+
+
+def weave(radius_m: float, lobe_rad: float, lobes: int) -> FloatArray:
+    """Left and right turns without a straight between them."""
+    place, ahead = 500j, 1j
+    points = [0j, place]
+    for lobe in range(lobes):
+        side = 1 - 2 * (lobe % 2)
+        around = lobe_rad * (0.5 if lobe == 0 else 1.0) * side
+        centre = place + side * 1j * ahead * radius_m
+        angles = np.linspace(0.0, around, round(abs(around) * radius_m / 5.0))[1:]
+        points += (centre + (place - centre) * np.exp(1j * angles)).tolist()
+        place, ahead = points[-1], ahead * np.exp(1j * around)
+    points.append(place + 500.0 * ahead)
+    return np.column_stack((np.real(points), np.imag(points)))
+
+
+@pytest.fixture
+def check(tmp_path: FilePath) -> Check:
+    """Flies a path with an Aerosonde at 25 m/s in calm air, unless keys say otherwise; returns its metrics."""
+
+    def fly_it(points: FloatArray, model: str = "aerosonde", **keys: float) -> dict[str, Any]:
+        overrides = [(name.replace("__", "."), str(value)) for name, value in keys.items()]
+        scenario = scenario_for("path", points, {"aircraft": {"model": model}}, overrides)
+        return check_path(scenario, points, tmp_path / "run", recording=False)
+
+    return fly_it
+
+
+def causes(flown: dict[str, Any]) -> set[str | None]:
+    """The causes of the legs that were not trackable; empty for a trackable path."""
+    bad = {leg["cause"] for leg in flown["trackability"] if not leg["trackable"]}
+    assert flown["trackable"] is not bool(bad)
+    return bad
+
+
+def test_turn_radius_too_tight(check: Check) -> None:
+    """The bank limit of 45 degrees gives 64 m at 25 m/s."""
+    assert causes(check(turn(50.0))) == {"turn radius too tight"}
+    assert causes(check(turn(112.0))) == set()
+
+
+def test_turn_radius_too_tight_for_a_corner_without_room(check: Check) -> None:
+    strip = [(0.0, 0.0), (0.0, 2000.0), (60.0, 2000.0), (60.0, 0.0)]
+    assert causes(check(np.array(strip))) == {"turn radius too tight"}
+    wide = [(0.0, 0.0), (0.0, 2000.0), (300.0, 2000.0), (300.0, 0.0)]
+    assert causes(check(np.array(wide))) == set()
+
+
+def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_there_is_room(check: Check) -> None:
+    """The arc of 110 m passes a corner of 170 degrees at 1.2 km, one of 90 degrees at 46 m."""
+    sharp = check(np.array([(0.0, 0.0), (0.0, 3000.0), (525.0, 0.0)]))
+    assert causes(sharp) == {"turn radius too tight"}
+    (corner,) = sharp["check"]["corners"]
+    assert (corner["waypoint"], corner["allowed_cut_m"]) == (1, 120.0)
+    assert corner["flown_cut_m"] == pytest.approx(corner["cut_m"], abs=1.0)
+    assert 1000.0 < corner["cut_m"] < 1400.0
+    square = np.array([(0.0, 0.0), (0.0, 3000.0), (3000.0, 3000.0)])
+    assert causes(check(square)) == set()
+    assert causes(check(square, planner__clearance_m=20, trackability__cross_track_m=5)) == {
+        "turn radius too tight"
+    }
+
+
+def test_bank_limit(check: Check) -> None:
+    """66 m takes 44 of the 45 degrees: none are left to get back onto the path with."""
+    assert causes(check(turn(66.0), trackability__cross_track_m=1)) == {"bank limit"}
+    assert causes(check(turn(112.0), trackability__cross_track_m=1)) == set()
+
+
+def test_roll_rate(check: Check) -> None:
+    assert causes(check(weave(112.0, 0.7, 8), trackability__cross_track_m=0.5)) == {"roll rate"}
+    assert causes(check(weave(700.0, 0.7, 4), trackability__cross_track_m=0.5)) == set()
+
+
+def test_load_factor(check: Check) -> None:
+    assert causes(check(turn(90.0), trackability__load_factor=1.2)) == {"load factor"}
+    assert causes(check(turn(112.0), trackability__load_factor=1.2)) == set()
+
+
+def test_speed_or_throttle(check: Check) -> None:
+    """In a long turn so high up and so fast, the Cessna's full throttle does not hold the speed."""
+    fast = {"aircraft__airspeed_mps": 60, "trackability__airspeed_mps": 1.0}
+    path = turn(500.0, 18.0)
+    high = check(path, "c172p", mission__altitude_m=2480, **fast)
+    assert causes(high) == {"speed or throttle saturation"}
+    assert causes(check(path, "c172p", mission__altitude_m=1500, **fast)) == set()
+
+
+def test_wind_drift(check: Check) -> None:
+    """A turn that calm air allows, but not a tailwind of half the airspeed."""
+    wind = {"environment__wind__speed_mps": 12, "environment__wind__from_deg": 180}
+    blown = check(turn(112.0), **wind)
+    assert causes(blown) == {"wind drift"}
+    calm = check(turn(112.0))
+    assert causes(calm) == set()
+    assert blown["trackability"][0]["threshold_m"] == calm["trackability"][0]["threshold_m"] == 12.0
+
+
+def north_then_left(mission: Mission, request: PlanRequest) -> Plan:
+    """At the first scan after 10 s, a left turn that begins where the aircraft is."""
+    if request.flown is not None and (request.time_s < 10.0 or len(request.flown.waypoints_m) > 1):
+        return Plan(PlanStatus.KEPT, "on the way")
+    (x, y), (u, v) = request.position_m, request.direction
+    if request.flown is None:
+        return Plan(PlanStatus.FOUND, "on", np.array([(x, y)]), Path(np.array([(x, y, u, v, 0.0, 9e3)])))
+    rows = np.array([(x, y, u, v, 1.0 / mission.turn_radius_m, 200.0)])
+    return Plan(PlanStatus.FOUND, "left", np.array([(x, y), mission.goal_m]), Path(rows))
+
+
+def causes_in_the_loop(scenario: Scenario) -> set[str | None]:
+    """Flies the whole loop; the causes of what was not trackable."""
+    flown = metrics(fly(make_loop(scenario)), flight_limits(scenario))
+    return {leg["cause"] for leg in flown["trackability"] if not leg["trackable"]}
+
+
+def test_planner_too_late(answering: Install, small_world: SmallWorld) -> None:
+    answering(north_then_left)
+
+    def after(latency_s: float) -> Scenario:
+        return small_world(
+            planner={"kind": "stand_in", "compute_latency_s": latency_s},
+            mission={"start_m": [3000.0, 300.0], "course_deg": 0.0, "time_limit_s": 20.0},
+        )
+
+    assert causes_in_the_loop(after(4.0)) == {"planner too late"}
+    assert causes_in_the_loop(after(0.0)) == set()
+
+
+def round_the_wall(mission: Mission, request: PlanRequest) -> Plan:
+    """Straight on; as soon as something is seen, a corner to the right as sharp as it takes."""
+    edges = request.seen.edges_since(-1)
+    turned = request.flown is not None and len(request.flown.waypoints_m) > 1
+    if request.flown is not None and (turned or not len(edges)):
+        return Plan(PlanStatus.KEPT, "on the way")
+    x, y = request.position_m
+    if not len(edges):
+        return Plan(PlanStatus.FOUND, "on", np.array([(x, y)]), Path(np.array([(x, y, 0.0, 1.0, 0.0, 9e3)])))
+    room = float(edges[:, 1].min()) - mission.clearance_m - y
+    radius = min(max(room, 10.0), 2.0 * mission.turn_radius_m)
+    rows = [
+        (x, y, 0.0, 1.0, -1.0 / radius, 0.5 * math.pi * radius),
+        (x + radius, y + radius, 1.0, 0.0, 0.0, 9e3),
+    ]
+    return Plan(PlanStatus.FOUND, "right", np.array([(x, y), mission.goal_m]), Path(np.array(rows)))
+
+
+def test_sensor_horizon(answering: Install, small_world: SmallWorld) -> None:
+    """The turn along the wall ends 40 m from it: with 1.5 km of sight it is wide, with 80 m too tight."""
+    answering(round_the_wall)
+    wall = {"polygon": {"vertices_m": [[100.0, 2500.0], [5900.0, 2500.0], [5900.0, 2600.0], [100.0, 2600.0]]}}
+
+    def seen_from(range_m: float) -> Scenario:
+        scenario = small_world(
+            wall,
+            planner={"kind": "stand_in"},
+            sensor={"rate_hz": 4.0},
+            mission={"start_m": [1000.0, 300.0], "course_deg": 0.0, "time_limit_s": 110.0},
+        )
+        # Asked for openly, so short a range is refused for a planner that has to be safe.
+        sensor = scenario.sensor.model_copy(update={"range_m": range_m})
+        return scenario.model_copy(update={"sensor": sensor})
+
+    assert causes_in_the_loop(seen_from(80.0)) == {"sensor horizon"}
+    assert causes_in_the_loop(seen_from(1500.0)) == set()
