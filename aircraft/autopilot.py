@@ -47,6 +47,11 @@ class Derivatives:
     xa: float
     xdt: float
 
+    @property
+    def roll_mode_radps(self) -> float:
+        """Where the roll rate loop puts the roll mode: lambda = max(1.4 |Lp|, 10) 1/s."""
+        return max(1.4 * abs(self.lp), 10.0)
+
 
 @dataclass(frozen=True)
 class Gains:
@@ -101,6 +106,10 @@ class Gains:
     throttle_integral: float
     throttle_climb_forward: float
     throttle_load_forward: float
+
+    def rounded(self, digits: int) -> Gains:
+        """The same to a number of significant digits."""
+        return Gains(**{f.name: float(f"{getattr(self, f.name):.{digits}g}") for f in fields(self)})
 
     def properties(self) -> dict[str, float]:
         """JSBSim property name to value."""
@@ -190,7 +199,7 @@ def gains(at: Derivatives) -> Gains:
             f"unstable in pitch at trim (omega^2 = {short_period2:.3g} 1/s2): no gains can be derived"
         )
     speed = at.airspeed_fps
-    roll_mode = max(1.4 * abs(at.lp), 10.0)
+    roll_mode = at.roll_mode_radps
     roll = min(4.0, roll_mode / 4.0)
     aileron_p = (roll_mode - abs(at.lp)) / at.lda
 

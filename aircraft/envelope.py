@@ -17,6 +17,9 @@ TRACKING_FACTOR = {None: 1.0, "light": 1.5, "moderate": 3.0, "severe": 6.0}
 scale of the bump at an arc-line joint; what was flown stays below half of it in calm air, and the factors for
 turbulence leave as much."""
 
+LEAST_BANK_DEG = 5.0
+"""An aircraft that can bank less at an airspeed is not planned for there."""
+
 
 def performance(
     airframe: Airframe, airspeed_mps: float, wind_mps: float = 0.0, turbulence: str | None = None
@@ -24,7 +27,8 @@ def performance(
     """Planning figures at one airspeed.
 
     The radius follows from the coordinated turn at the fastest groundspeed, downwind, with bank in reserve:
-    R = (Va + W)^2 / (g tan(bank limit - reserve)). Below it the bank saturates and tracking fails abruptly.
+    R = (Va + W)^2 / (g tan(bank)), the bank being the limit less the reserve and no steeper than what the aircraft
+    was seen to keep its speed and altitude at. Below it the bank saturates and tracking fails abruptly.
 
     Args:
         airframe: the aircraft.
@@ -45,7 +49,13 @@ def performance(
         raise AircraftError(
             f"{airframe.name} at {airspeed_mps:g} m/s cannot make way against a wind of {wind_mps:g} m/s"
         )
-    bank = math.radians(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence])
+    level_deg = airframe.level_bank_deg(airspeed_mps)
+    if level_deg < LEAST_BANK_DEG:
+        raise AircraftError(
+            f"{airframe.name} cannot turn at {airspeed_mps:g} m/s: it keeps speed and altitude only up to "
+            f"{level_deg:.1f} degrees of bank, and {LEAST_BANK_DEG:g} are needed"
+        )
+    bank = math.radians(min(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence], level_deg))
     fastest = airspeed_mps + wind_mps
     acceleration = GRAVITY_MPS2 * math.tan(bank)
     return Performance(

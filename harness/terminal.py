@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias
 
@@ -48,6 +48,35 @@ def progress_bar(straight_m: float) -> Iterator[Report | None]:
             )
 
         yield report
+
+
+@contextmanager
+def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
+    """A bar of steps done on standard error, or None where that is not a terminal."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with Progress(
+        BarColumn(bar_width=20), TextColumn("{task.description}"), console=console, transient=True
+    ) as bar:
+        task = bar.add_task("")
+
+        def report(done: int, of: int, what: str) -> None:
+            bar.update(task, completed=done, total=of, description=what)
+
+        yield report
+
+
+def print_grid(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table with a heading over each column, on standard output; figures are right-aligned."""
+    console = Console()
+    table = Table(title=title, box=box.SIMPLE, title_justify="left", pad_edge=False)
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="right" if index else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table, width=min(80, console.width))
 
 
 def print_table(title: str, rows: Mapping[str, str]) -> None:
@@ -97,6 +126,18 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
         "planner": ", ".join(f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")),
     }
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
+
+
+def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
+    """Headings and rows of the table of `wayproof bench tracking`; limits are behind the figures."""
+    figures = ("cross_track_p95_m", "cross_track_max_m", "altitude_p95_m")
+    rows: list[Sequence[str]] = []
+    for case in result["cases"]:
+        limits = case["limits"]
+        cells = [f"{case[name]:.3f}" + (f" <= {limits[name]:.2g}" if limits else "") for name in figures]
+        verdict = {True: "kept", False: "[bold red]not kept[/]", None: "-"}[case["kept"]]
+        rows.append((case["case"], *cells, f"{case['bank_saturation']:.1%}", verdict))
+    return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
 
 
 def _plain(text: str) -> str:

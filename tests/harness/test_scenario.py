@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from harness import planner_keys
@@ -22,6 +24,7 @@ from harness.scenario import (
     parse_scenario,
     scenario_schema,
 )
+from harness.shipped import scenario_path
 from harness.strict_yaml import InputError
 from planner.registry import planner_kinds
 
@@ -242,3 +245,26 @@ def test_the_schema_describes_every_key_with_its_unit() -> None:
         if name.endswith(("_m", "_mps", "_s", "_deg", "_hz")):
             assert key["unit"] == {"mps": "m/s", "hz": "Hz"}.get(name.rsplit("_")[-1], name.rsplit("_")[-1])
     assert schema["required"] == ["schema", "name", "area", "mission"]
+
+
+def test_a_model_folder_is_sought_beside_the_scenario_and_then_from_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside, here = tmp_path / "beside", tmp_path / "here"
+    for place, name in ((beside, "mine"), (here, "mine"), (here, "other")):
+        shutil.copytree(Path(aircraft.__path__[0], "aerosonde"), place / name)
+    text = scenario_path("paper_circles").read_text()
+    file = beside / "s.yaml"
+    monkeypatch.chdir(here)
+
+    def model(given: str) -> str:
+        file.write_text(text.replace("model: aerosonde", f"model: {given}"))
+        return load_scenario(file).aircraft.model
+
+    assert model("aerosonde") == "aerosonde"
+    assert model("mine") == str(beside / "mine")
+    assert model("../here/mine") == str(here / "mine")
+    assert model("./other") == str(here / "other")
+    assert parse_scenario(dump_scenario(load_scenario(file))) == load_scenario(file)
+    with pytest.raises(InputError, match=r"s.yaml:\d+: aircraft.model: unknown aircraft 'nowhere/mine'"):
+        model("nowhere/mine")
