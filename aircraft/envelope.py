@@ -22,7 +22,11 @@ LEAST_BANK_DEG = 5.0
 
 
 def performance(
-    airframe: Airframe, airspeed_mps: float, wind_mps: float = 0.0, turbulence: str | None = None
+    airframe: Airframe,
+    airspeed_mps: float,
+    wind_mps: float = 0.0,
+    turbulence: str | None = None,
+    gust_mps: float = 0.0,
 ) -> Performance:
     """Planning figures at one airspeed.
 
@@ -35,14 +39,17 @@ def performance(
         airspeed_mps: true airspeed.
         wind_mps: speed of the steady wind.
         turbulence: None, "light", "moderate" or "severe".
+        gust_mps: speed of a gust front on top of the wind; it may be faster than the aircraft.
 
     Raises:
         AircraftError: if the airframe cannot hold the airspeed or cannot make way against the wind.
-        ValueError: if `wind_mps` is negative or not finite, or `turbulence` is none of the above.
+        ValueError: if `wind_mps` or `gust_mps` is negative or not finite, or `turbulence` is none of the above.
     """
     airframe.check_airspeed(airspeed_mps)
     if not 0.0 <= wind_mps < math.inf:
         raise ValueError(f"wind_mps must be a finite number of at least 0; got {wind_mps:g}")
+    if not 0.0 <= gust_mps < math.inf:
+        raise ValueError(f"gust_mps must be a finite number of at least 0; got {gust_mps:g}")
     if turbulence not in BANK_RESERVE_DEG:
         raise ValueError(f"turbulence must be light, moderate, severe or None; got {turbulence!r}")
     if wind_mps >= airspeed_mps:
@@ -56,7 +63,7 @@ def performance(
             f"{level_deg:.1f} degrees of bank, and {LEAST_BANK_DEG:g} are needed"
         )
     bank = math.radians(min(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence], level_deg))
-    fastest = airspeed_mps + wind_mps
+    fastest = airspeed_mps + wind_mps + gust_mps
     acceleration = GRAVITY_MPS2 * math.tan(bank)
     return Performance(
         airspeed_mps=airspeed_mps,

@@ -18,7 +18,7 @@ from aircraft.properties import (
     TURBULENCE_W20_FPS,
     WIND_PROPERTIES,
 )
-from aircraft.start import Atmosphere, StartConditions
+from aircraft.start import Atmosphere, Gust, StartConditions
 
 GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
@@ -52,7 +52,7 @@ class JsbsimModel:
             aircraft: a name or folder that `airframe` knows, or an airframe.
             start: where and how fast it starts.
             plane: the local plane that all positions refer to.
-            atmosphere: steady wind and turbulence; default: calm.
+            atmosphere: steady wind, gust and turbulence; default: calm.
             step_rate_hz: integration steps per second.
 
         Raises:
@@ -73,6 +73,7 @@ class JsbsimModel:
         self._stall_fps = STALL_SPEED_SHARE * self.airframe.airspeed_range_mps[0] / FOOT_M
         self._patch = plane.patch(*map(math.radians, plane.geodetic(start.east_m, start.north_m)))
         self._convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
+        self._gust: Gust | None = None
         self._windy = atmosphere.wind_mps > 0.0
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
 
@@ -94,6 +95,7 @@ class JsbsimModel:
         self._settle()
         if atmosphere.turbulence is not None and atmosphere.intensity is not None:
             self._stir(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
+        self._gust = atmosphere.gust
         self.engage()
 
     @property
@@ -146,6 +148,12 @@ class JsbsimModel:
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         run = self._fdm.run
+        if self._gust is not None:
+            for _ in range(steps):
+                self._blow()
+                run()
+                self._step += 1
+            return
         for _ in range(steps):
             run()
         self._step += steps
@@ -218,8 +226,11 @@ class JsbsimModel:
         self._fdm.set_dt(1.0 / self._step_rate_hz)
 
     def _wind_true(self) -> tuple[float, float]:
-        """The wind towards true east and north where the aircraft is, ft/s."""
+        """The wind towards true east and north where the aircraft is now, ft/s, the gust included."""
         east, north = self._wind
+        if self._gust is not None:
+            share = self._gust.share(self._step / self._step_rate_hz) / FOOT_M
+            east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
         sine, cosine = math.sin(self._convergence_rad), math.cos(self._convergence_rad)
         return east * cosine + north * sine, north * cosine - east * sine
 

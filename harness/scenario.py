@@ -138,7 +138,7 @@ def mission_of(scenario: Scenario) -> Mission:
 
 
 def performance_of(scenario: Scenario) -> Performance:
-    """What the scenario's aircraft can do at its airspeed, in its wind and turbulence.
+    """What the scenario's aircraft can do at its airspeed, in its wind, gust and turbulence.
 
     Raises:
         KeyFault: there is no such aircraft, it cannot hold the airspeed, or the wind is too strong for it.
@@ -155,7 +155,8 @@ def performance_of(scenario: Scenario) -> Performance:
         )
     try:
         gusts = air.turbulence.intensity if air.turbulence else None
-        return performance(airframe(spec.model), spec.airspeed_mps, wind_mps, gusts)
+        front_mps = air.gust.speed_mps if air.gust else 0.0
+        return performance(airframe(spec.model), spec.airspeed_mps, wind_mps, gusts, front_mps)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
 

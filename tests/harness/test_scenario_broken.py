@@ -34,6 +34,7 @@ planner:
 environment:
   wind: {speed_mps: 5, from_deg: 270}
   turbulence: {model: tustin, intensity: light}
+  gust: {shape: one_minus_cosine, speed_mps: 4, start_s: 60, duration_s: 5}
 """
 
 SPEED = "airspeed_mps: 25"
@@ -168,6 +169,21 @@ BROKEN = {
     ),
     "turbulence model": ("tustin", "dryden", "25: environment.turbulence.model", "'tustin' or 'milspec'"),
     "intensity": ("light", "mild", "25: environment.turbulence.intensity", "'light', 'moderate' or 'severe'"),
+    "gust's shape": (
+        "one_minus_cosine",
+        "ramp",
+        "26: environment.gust.shape",
+        "'step' or 'one_minus_cosine'",
+    ),
+    "gust without end": (", duration_s: 5", "", "26: environment.gust", "has no duration_s"),
+    "gust of no speed": ("speed_mps: 4", "speed_mps: 0", "26: environment.gust.speed_mps", "greater than 0"),
+    "gust before the start": ("start_s: 60", "start_s: -1", "26: environment.gust.start_s", "at least 0"),
+    "gust's misspelt key": (
+        "duration_s: 5",
+        "duration: 5",
+        "26: environment.gust.duration",
+        "did you mean duration_s?",
+    ),
     "key given twice": ("seed: 1", "seed: 1\nseed: 2", "4: seed", "is given twice, first in line 3"),
     "nested key given twice": ("rays: 360", "rays: 3, rays: 4", "18: sensor.rays", "is given twice"),
     "anchor": ("seed: 1", "seed: &one 1", "3: seed", "has the anchor &one"),
@@ -228,7 +244,7 @@ BYTES = {
     "only spaces": (b"   \n\n", ":1: is empty"),
     "a word": (b"scenario\n", ":1: is the text 'scenario'; must be a mapping"),
     "a list": (b"- 1\n- 2\n", ":1: is a list of 2; must be a mapping"),
-    "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":26: a second document begins here"),
+    "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":27: a second document begins here"),
     "Latin-1": (GOOD.replace("good", "gut\xe9").encode("latin-1"), ":2: byte 0xe9 is not UTF-8"),
     "UTF-16": (GOOD.encode("utf-16"), ": is not a text file"),
     "binary": (bytes(range(256)) * 50, ": is not a text file"),
