@@ -68,6 +68,7 @@ class Airframe:
         guidance_bandwidth_radps: natural frequency of the cross-track correction.
         level_banks: (true airspeed m/s, bank deg) pairs, airspeed rising: the steepest bank up to the limit at
             which speed and altitude are kept.
+        weave_error_m: largest cross-track error on a weave of lines and arcs as planned, at cruise in calm air.
         gains: of the autopilot.
         verified: flown against the tracking figures of the tests.
     """
@@ -86,6 +87,7 @@ class Airframe:
     roll_delay_s: float
     guidance_bandwidth_radps: float
     level_banks: tuple[tuple[float, float], ...]
+    weave_error_m: float
     gains: Gains
     verified: bool
 
@@ -166,7 +168,7 @@ def airframe(name: str) -> Airframe:
     )
 
 
-_MEASURED = ("mass_kg", "cruise_mps", "roll_in_s", *FIGURES)
+_MEASURED = ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)
 
 
 @cache

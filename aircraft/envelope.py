@@ -15,7 +15,14 @@ steady wind, and the rest is margin; moderate turbulence uses up 15 to 20."""
 TRACKING_FACTOR = {None: 1.0, "light": 1.5, "moderate": 3.0, "severe": 6.0}
 """Cross-track error that is hardly ever exceeded, in units of (turn acceleration) * (roll lag)^2. That is the
 scale of the bump at an arc-line joint; what was flown stays below half of it in calm air, and the factors for
-turbulence leave as much."""
+turbulence leave as much. An aircraft that was seen to do worse is taken for what it was seen to do."""
+
+WEAVE_FACTOR = 1.5
+"""Cross-track error that is hardly ever exceeded in calm air, in units of the largest on the survey's weave."""
+
+ROLL_IN_LIMIT_S = 1.5
+"""A turn takes no more time than this to roll into: what rolls slowly turns wide, or it would be off the path
+where curvature steps."""
 
 LEAST_BANK_DEG = 5.0
 """An aircraft that can bank less at an airspeed is not planned for there."""
@@ -56,18 +63,20 @@ def performance(
         raise AircraftError(
             f"{airframe.name} at {airspeed_mps:g} m/s cannot make way against a wind of {wind_mps:g} m/s"
         )
+    rolled_deg = airframe.roll_rate_dps * ROLL_IN_LIMIT_S
     level_deg = airframe.level_bank_deg(airspeed_mps)
     if level_deg < LEAST_BANK_DEG:
         raise AircraftError(
             f"{airframe.name} cannot turn at {airspeed_mps:g} m/s: it keeps speed and altitude only up to "
             f"{level_deg:.1f} degrees of bank, and {LEAST_BANK_DEG:g} are needed"
         )
-    bank = math.radians(min(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence], level_deg))
+    bank = math.radians(min(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence], level_deg, rolled_deg))
     fastest = airspeed_mps + wind_mps + gust_mps
     acceleration = GRAVITY_MPS2 * math.tan(bank)
     return Performance(
         airspeed_mps=airspeed_mps,
         turn_radius_m=fastest * fastest / acceleration,
         roll_in_s=airframe.roll_in_s,
-        tracking_error_m=TRACKING_FACTOR[turbulence] * acceleration * airframe.roll_lag_s**2,
+        tracking_error_m=TRACKING_FACTOR[turbulence]
+        * max(acceleration * airframe.roll_lag_s**2, WEAVE_FACTOR * airframe.weave_error_m),
     )

@@ -44,7 +44,7 @@ class GuidanceLimits:
         roll_rate_radps: fastest change of the roll command.
         roll_lag_s: time constant of roll behind its command; the command leads by it.
         roll_delay_s: what further delay there is (actuators, the roll mode).
-        bandwidth_radps: natural frequency omega of the cross-track correction, about 0.3 / roll_lag_s.
+        bandwidth_radps: natural frequency omega of the cross-track correction, about a third of 1 / roll_lag_s.
     """
 
     bank_limit_rad: float

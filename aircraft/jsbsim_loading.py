@@ -87,6 +87,7 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
         values[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
     for path, value in values.items():
         fdm[path] = value
+    fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
     try:
         fdm.run_ic()
         fdm["propulsion/set-running"] = -1.0

@@ -13,6 +13,7 @@ from typing import Annotated, Final
 
 import typer
 
+from harness.commands.envelope import envelope
 from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
 from harness.commands.options import BAD_INPUT, FAILED, flag
@@ -21,7 +22,7 @@ from harness.commands.review import view
 INTERRUPTED: Final = 130
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-for command in (fly, compare, validate, schema, view, bench):
+for command in (fly, compare, validate, schema, view, bench, envelope):
     app.command()(command)
 app.command("list")(list_names)
 

@@ -128,6 +128,47 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
 
 
+def envelope_tables(card: Mapping[str, Any]) -> list[tuple[str, Sequence[str], list[Sequence[str]]]]:
+    """Title, headings and rows of each table of `wayproof envelope`."""
+    low, high = card["airspeed_range_mps"]
+    facts = {
+        "mass": f"{card['mass_kg']:g} kg",
+        "level flight": f"{low:g} to {high:g} m/s, cruise {card['cruise_mps']:g} m/s",
+        "bank limit": f"{card['bank_limit_deg']:g} deg, rolled into at {card['roll_rate_dps']:g} deg/s",
+        "tracking": "held by tests" if card["verified"] else "not held by tests",
+    }
+    tables: list[tuple[str, Sequence[str], list[Sequence[str]]]] = [
+        (card["aircraft"], ("", ""), list(facts.items()))
+    ]
+    for page in card["at"]:
+        title = (
+            f"turns at {page['airspeed_mps']:g} m/s; 90 % of 30 deg in {page['roll_in_s']:g} s; speed and altitude "
+            f"kept up to {page['level_bank_deg']:g} deg"
+        )
+        tables.append((title, tuple(_TURN_COLUMNS.values()), _rows(page["turns"], _TURN_COLUMNS)))
+        title = f"paths at {page['airspeed_mps']:g} m/s"
+        tables.append((title, tuple(_PATH_COLUMNS.values()), _rows(page["tracked"], _PATH_COLUMNS)))
+    return tables
+
+
+_TURN_COLUMNS = {
+    "bank_deg": "bank deg",
+    "radius_m": "radius m",
+    "load_factor": "load factor",
+    "altitude_lost_m": "altitude lost m",
+    "airspeed_lost_mps": "speed lost m/s",
+}
+_PATH_COLUMNS = {
+    "wind_mps": "wind m/s",
+    "tightest_radius_m": "tightest radius tracked m",
+    "planned_radius_m": "planned radius m",
+}
+
+
+def _rows(entries: Sequence[Mapping[str, float | None]], columns: Mapping[str, str]) -> list[Sequence[str]]:
+    return [tuple(_number(entry[name]) for name in columns) for entry in entries]
+
+
 def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
     """Headings and rows of the table of `wayproof bench tracking`; limits are behind the figures."""
     figures = ("cross_track_p95_m", "cross_track_max_m", "altitude_p95_m")
