@@ -127,3 +127,16 @@ def test_level_banks_are_joined_by_lines() -> None:
     frame = replace(airframe("aerosonde"), level_banks=((20.0, 10.0), (30.0, 40.0), (40.0, 20.0)))
     flown = [frame.level_bank_deg(speed) for speed in (15.0, 20.0, 25.0, 30.0, 35.0, 45.0)]
     assert flown == pytest.approx([10.0, 10.0, 25.0, 40.0, 30.0, 20.0])
+
+
+def test_what_rolls_slowly_is_planned_to_turn_wide() -> None:
+    frame = replace(airframe("aerosonde"), roll_rate_dps=8.0)
+    wide = 25.0**2 / (9.80665 * math.tan(math.radians(12.0)))
+    assert performance(frame, 25.0).turn_radius_m == pytest.approx(wide)
+
+
+def test_an_aircraft_that_was_seen_to_track_badly_is_given_more_room() -> None:
+    frame = airframe("aerosonde")
+    usual = performance(frame, 25.0).tracking_error_m
+    assert usual > 1.5 * frame.weave_error_m > 0.0
+    assert performance(replace(frame, weave_error_m=2.0), 25.0).tracking_error_m == pytest.approx(3.0)

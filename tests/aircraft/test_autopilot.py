@@ -49,6 +49,20 @@ def test_loops_lie_where_the_rules_put_them() -> None:
     assert placed.throttle * AEROSONDE.xdt == pytest.approx(1.5, rel=0.05)
 
 
+def test_a_slower_pace_weakens_the_feedback_in_roll_and_yaw_alone() -> None:
+    full, half = gains(AEROSONDE), gains(AEROSONDE, 0.5)
+    changed = {f.name for f in fields(Gains) if getattr(full, f.name) != getattr(half, f.name)}
+    slower = {"roll", "aileron_p", "aileron_p_integral", "rudder_r", "rudder_beta_integral"}
+    assert changed == slower
+    assert all(getattr(half, name) == pytest.approx(0.5 * getattr(full, name)) for name in slower)
+
+
+def test_roll_errors_ask_for_no_more_rate_than_the_ailerons_give() -> None:
+    slow = gains(replace(AEROSONDE, lda=14.0))
+    assert slow.roll_rate_limit * slow.aileron_p_forward == pytest.approx(0.8)
+    assert gains(AEROSONDE).roll_rate_limit == 1.05
+
+
 def test_feed_forwards_cancel_the_moments_of_a_steady_turn() -> None:
     at, placed = AEROSONDE, gains(AEROSONDE)
     rolling = at.lr + at.lda * placed.aileron_r_forward + at.ldr * placed.rudder_r_forward

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import aircraft
 from aircraft.airframes import AircraftError, Entry, aircraft_names, airframe
+from aircraft.autopilot import gains
 from aircraft.interface import AircraftState
+from aircraft.jsbsim_loading import linearised, mass_kg, trimmed
 from aircraft.model_files import model_files
-from aircraft.survey import departure, in_flight, not_held, survey
+from aircraft.survey import departure, in_flight, not_held, survey, weaving_error_m
 
 AEROSONDE = Path(aircraft.__path__[0], "aerosonde")
 
@@ -123,6 +126,24 @@ def test_the_digest_changes_with_every_file_of_the_model(tmp_path: Path) -> None
     assert changed != before
     (home / "more.xml").write_text("", "utf-8")
     assert model_files(str(home)).digest() not in (before, changed)
+
+
+def test_loops_are_as_fast_as_the_weave_allows() -> None:
+    """The T-37's control laws take phase: at full pace its roll swings."""
+    aerosonde, tweet = airframe("aerosonde"), airframe("T37")
+    assert aerosonde.guidance_bandwidth_radps == pytest.approx(0.36 * aerosonde.gains.roll)
+    assert weaving_error_m(aerosonde, 25.0) == pytest.approx(aerosonde.weave_error_m, rel=0.01)
+    assert tweet.gains.roll == pytest.approx(0.7 * 2.5)
+    at = linearised(trimmed(tweet.files, tweet.cruise_mps))
+    swinging = replace(tweet, gains=gains(at), roll_lag_s=0.4, guidance_bandwidth_radps=0.9)
+    assert weaving_error_m(swinging, tweet.cruise_mps) > 1.5 * tweet.weave_error_m
+
+
+def test_no_fuel_is_burnt() -> None:
+    model = in_flight(airframe("c172p"), 50.0)
+    before = mass_kg(model._fdm)
+    model.advance(120 * 300)
+    assert mass_kg(model._fdm) == pytest.approx(before, abs=1e-6)
 
 
 @pytest.mark.slow
