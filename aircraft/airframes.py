@@ -1,30 +1,61 @@
-"""The known airframes: facts that hold before the first flight, read from airframes.yaml."""
+"""The known airframes: what airframes.yaml says of them, and what their models show when they are flown."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
 from aircraft.autopilot import Gains
 from aircraft.guidance import GuidanceLimits
-
-
-class AircraftError(ValueError):
-    """An aircraft that cannot be flown as asked; the message is a sentence for the user."""
+from aircraft.model_files import AircraftError as AircraftError
+from aircraft.model_files import ModelFiles, model_files
 
 
 @dataclass(frozen=True)
-class Airframe:
-    """One airframe.
+class Entry:
+    """One entry of airframes.yaml: what is known of an airframe before it flies.
 
     Attributes:
         name: as in `aircraft.model` of a scenario.
         summary: one line for lists.
+        cruise_mps: default true airspeed; None: from the speeds at which the model can be trimmed.
+        verified: flown against the tracking figures of the tests.
+        figures: attributes of `Airframe` that replace what the survey makes of the model.
+        gains: gains of the autopilot that replace derived ones, by field of `Gains`.
+    """
+
+    name: str
+    summary: str
+    cruise_mps: float | None = None
+    verified: bool = False
+    figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
+    gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
+
+
+FIGURES = (
+    "bank_limit_deg",
+    "roll_rate_dps",
+    "stall_angle_deg",
+    "roll_lag_s",
+    "roll_delay_s",
+    "guidance_bandwidth_radps",
+)
+"""Attributes of `Airframe` that an entry may replace."""
+
+
+@dataclass(frozen=True)
+class Airframe:
+    """One airframe, as flown.
+
+    Attributes:
+        name: as in `aircraft.model` of a scenario; of a folder, that of its model.
+        summary: one line for lists.
+        files: the JSBSim model.
         mass_kg: as flown.
         airspeed_range_mps: lowest and highest true airspeed of level flight, near sea level.
         cruise_mps: default true airspeed.
@@ -35,12 +66,16 @@ class Airframe:
         roll_lag_s: time constant of roll behind its command.
         roll_delay_s: further delay of roll behind its command.
         guidance_bandwidth_radps: natural frequency of the cross-track correction.
+        level_banks: (true airspeed m/s, bank deg) pairs, airspeed rising: the steepest bank up to the limit at
+            which speed and altitude are kept.
+        weave_error_m: largest cross-track error on a weave of lines and arcs as planned, at cruise in calm air.
+        gains: of the autopilot.
         verified: flown against the tracking figures of the tests.
-        gains: gains of the autopilot that replace derived ones, by field of `Gains`.
     """
 
     name: str
     summary: str
+    files: ModelFiles
     mass_kg: float
     airspeed_range_mps: tuple[float, float]
     cruise_mps: float
@@ -51,8 +86,10 @@ class Airframe:
     roll_lag_s: float
     roll_delay_s: float
     guidance_bandwidth_radps: float
+    level_banks: tuple[tuple[float, float], ...]
+    weave_error_m: float
+    gains: Gains
     verified: bool
-    gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
 
     @property
     def guidance_limits(self) -> GuidanceLimits:
@@ -65,6 +102,16 @@ class Airframe:
             bandwidth_radps=self.guidance_bandwidth_radps,
         )
 
+    def level_bank_deg(self, airspeed_mps: float) -> float:
+        """Steepest bank at which an airspeed and the altitude are kept, between the speeds flown linear."""
+        (before, bank), *rest = self.level_banks
+        for speed, after in rest:
+            if airspeed_mps <= speed:
+                share = max(0.0, (airspeed_mps - before) / (speed - before))
+                return bank + share * (after - bank)
+            before, bank = speed, after
+        return bank
+
     def check_airspeed(self, airspeed_mps: float) -> None:
         """Raises `AircraftError` if level flight at a true airspeed is not possible."""
         low, high = self.airspeed_range_mps
@@ -76,29 +123,60 @@ class Airframe:
 
 
 def aircraft_names() -> tuple[str, ...]:
-    """Names that `airframe` knows, in the order of the table."""
+    """Names of the airframe table, in its order."""
     return tuple(_table())
 
 
+@lru_cache(maxsize=64)
 def airframe(name: str) -> Airframe:
-    """The airframe of a name.
+    """The airframe of a name or folder, surveyed by flying it unless that has been done before.
+
+    Args:
+        name: a name of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a
+            JSBSim model.
 
     Raises:
-        AircraftError: if there is none; the message lists the known names.
+        AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
+    from aircraft.card_cache import cached
+
     try:
-        return _table()[name]
-    except KeyError:
+        found = model_files(name)
+    except AircraftError as error:
         known = ", ".join(aircraft_names())
-        raise AircraftError(f"unknown aircraft {name!r}; known are: {known}") from None
+        raise AircraftError(f"{error}; known are: {known}, or a folder with a JSBSim model") from None
+    entry = _table().get(name) or Entry(found.name, f"JSBSim model of {found.model.parent}")
+
+    def surveyed() -> dict[str, Any]:
+        from aircraft.survey import survey
+
+        return survey(entry, found)
+
+    measured = cached(f"{found.name}-airframe", found.digest(), surveyed)
+    banks = tuple((float(speed), float(bank)) for speed, bank in measured["level_banks"])
+    low, high = measured["airspeed_range_mps"]
+    figures = {key: value for key, value in measured.items() if key in _MEASURED}
+    return Airframe(
+        name=found.name,
+        summary=entry.summary,
+        files=found,
+        airspeed_range_mps=(low, high),
+        level_banks=banks,
+        gains=Gains(**measured["gains"]),
+        verified=entry.verified,
+        **figures,
+    )
+
+
+_MEASURED = ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)
 
 
 @cache
-def _table() -> Mapping[str, Airframe]:
+def _table() -> Mapping[str, Entry]:
     return MappingProxyType(parse_airframes(files("aircraft").joinpath("airframes.yaml").read_text("utf-8")))
 
 
-def parse_airframes(text: str) -> dict[str, Airframe]:
+def parse_airframes(text: str) -> dict[str, Entry]:
     """Reads an airframe table.
 
     Args:
@@ -124,62 +202,35 @@ def parse_airframes(text: str) -> dict[str, Airframe]:
     table = yaml.load(text, Loader)
     if not isinstance(table, dict):
         raise ValueError("the airframe table must map names to airframes")
-    return {str(name): _airframe(str(name), keys) for name, keys in table.items()}
+    return {str(name): _entry(str(name), keys) for name, keys in table.items()}
 
 
-def _airframe(name: str, keys: object) -> Airframe:
+def _entry(name: str, keys: object) -> Entry:
     if not isinstance(keys, dict):
         raise ValueError(f"{name}: must be a mapping")
-    wanted = {f.name for f in fields(Airframe)} - {"name"}
-    if unknown := sorted(set(keys) - wanted):
+    if unknown := sorted(set(keys) - {"summary", "cruise_mps", "verified", "gains", *FIGURES}):
         raise ValueError(f"{name}: unknown key {unknown[0]!r}")
-    if missing := sorted(wanted - {"gains"} - set(keys)):
+    if missing := sorted({"summary", "cruise_mps", "verified"} - set(keys)):
         raise ValueError(f"{name}: missing key {missing[0]!r}")
     if not isinstance(keys["verified"], bool):
         raise ValueError(f"{name}.verified: must be true or false")
-    speeds = keys["airspeed_range_mps"]
-    if not isinstance(speeds, list) or len(speeds) != 2:
-        raise ValueError(f"{name}.airspeed_range_mps: must be [lowest, highest]")
     gains = keys.get("gains", {})
     if not isinstance(gains, dict):
         raise ValueError(f"{name}.gains: must be a mapping")
     if unknown := sorted(set(gains) - {f.name for f in fields(Gains)}):
         raise ValueError(f"{name}.gains: unknown gain {unknown[0]!r}")
-
     for gain, value in gains.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise ValueError(f"{name}.gains.{gain}: must be a finite number; got {value!r}")
-
-    def positive(key: str, value: object) -> float:
+    for key in ("cruise_mps", *FIGURES):
+        value = keys.get(key, 1.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise ValueError(f"{name}.{key}: must be a positive number; got {value!r}")
-        return float(value)
-
-    low, high = (positive("airspeed_range_mps", speed) for speed in speeds)
-    cruise = positive("cruise_mps", keys["cruise_mps"])
-    if not low <= cruise <= high:
-        raise ValueError(
-            f"{name}.cruise_mps: must lie in airspeed_range_mps [{low:g}, {high:g}]; got {cruise:g}"
-        )
-    numbers = {
-        key: positive(key, keys[key])
-        for key in (
-            "mass_kg",
-            "bank_limit_deg",
-            "roll_rate_dps",
-            "roll_in_s",
-            "stall_angle_deg",
-            "roll_lag_s",
-            "roll_delay_s",
-            "guidance_bandwidth_radps",
-        )
-    }
-    return Airframe(
+    return Entry(
         name=name,
         summary=str(keys["summary"]),
-        airspeed_range_mps=(low, high),
-        cruise_mps=cruise,
+        cruise_mps=float(keys["cruise_mps"]),
         verified=keys["verified"],
+        figures=MappingProxyType({key: float(keys[key]) for key in FIGURES if key in keys}),
         gains=MappingProxyType({key: float(value) for key, value in gains.items()}),
-        **numbers,
     )

@@ -17,6 +17,8 @@ from aircraft.interface import FloatArray
 
 GRAVITY_FPS2 = 32.174
 ROLL_RATE_LIMIT_RADPS = 1.05
+ROLL_AUTHORITY_SHARE = 0.8
+"""Share of the steady roll rate at full aileron that roll errors may ask for."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,11 @@ class Derivatives:
     mde: float
     xa: float
     xdt: float
+
+    @property
+    def roll_mode_radps(self) -> float:
+        """Where the roll rate loop puts the roll mode: lambda = max(1.4 |Lp|, 10) 1/s."""
+        return max(1.4 * abs(self.lp), 10.0)
 
 
 @dataclass(frozen=True)
@@ -101,6 +108,10 @@ class Gains:
     throttle_integral: float
     throttle_climb_forward: float
     throttle_load_forward: float
+
+    def rounded(self, digits: int) -> Gains:
+        """The same to a number of significant digits."""
+        return Gains(**{f.name: float(f"{getattr(self, f.name):.{digits}g}") for f in fields(self)})
 
     def properties(self) -> dict[str, float]:
         """JSBSim property name to value."""
@@ -168,7 +179,7 @@ def derivatives(
     )
 
 
-def gains(at: Derivatives) -> Gains:
+def gains(at: Derivatives, pace: float = 1.0) -> Gains:
     """Places the loops.
 
     Roll: the roll mode goes to lambda = max(1.4 |Lp|, 10) 1/s and roll to min(4, lambda/4). Yaw: the Dutch
@@ -176,6 +187,11 @@ def gains(at: Derivatives) -> Gains:
     period omega^2 = -M_alpha + M_q Z_alpha sets the pitch, climb and altitude loops, each three to four
     times slower than the one inside.
     Throttle: 1.5 rad/s on airspeed, less where that would ask for more than 0.05 per ft/s.
+
+    Args:
+        at: the aircraft at trim.
+        pace: share of the feedback in roll and yaw, for aircraft whose actuators or control laws, which the
+            derivatives do not show, take a part of the phase.
 
     Raises:
         ValueError: if a control has no authority or the wrong sign, or the short period is not oscillatory.
@@ -190,9 +206,8 @@ def gains(at: Derivatives) -> Gains:
             f"unstable in pitch at trim (omega^2 = {short_period2:.3g} 1/s2): no gains can be derived"
         )
     speed = at.airspeed_fps
-    roll_mode = max(1.4 * abs(at.lp), 10.0)
-    roll = min(4.0, roll_mode / 4.0)
-    aileron_p = (roll_mode - abs(at.lp)) / at.lda
+    roll = pace * min(4.0, at.roll_mode_radps / 4.0)
+    aileron_p = pace * (at.roll_mode_radps - abs(at.lp)) / at.lda
 
     determinant = at.lda * at.ndr - at.ldr * at.nda
 
@@ -203,10 +218,12 @@ def gains(at: Derivatives) -> Gains:
             (at.lda * yawing - at.nda * rolling) / determinant,
         )
 
-    aileron_p_forward, rudder_p_forward = balance(-at.lp, GRAVITY_FPS2 / speed - at.np)
+    aileron_p_forward, rudder_p_forward = balance(
+        -at.lp - at.lr * at.alpha_rad, GRAVITY_FPS2 / speed - at.np - at.nr * at.alpha_rad
+    )
     aileron_r_forward, rudder_r_forward = balance(-at.lr, -at.nr)
     dutch_roll = math.sqrt(max(at.nb + at.nr * at.yb, 0.0))
-    rudder_r = max(1.4 * dutch_roll + at.nr + at.yb, 0.0) / -at.ndr
+    rudder_r = pace * max(1.4 * dutch_roll + at.nr + at.yb, 0.0) / -at.ndr
 
     short_period = math.sqrt(short_period2)
     pitch = min(3.5, 0.315 * short_period)
@@ -215,13 +232,13 @@ def gains(at: Derivatives) -> Gains:
     return Gains(
         qbar_psf=at.qbar_psf,
         roll=roll,
-        roll_rate_limit=ROLL_RATE_LIMIT_RADPS,
+        roll_rate_limit=min(ROLL_RATE_LIMIT_RADPS, ROLL_AUTHORITY_SHARE / max(aileron_p_forward, 1e-6)),
         aileron_p=aileron_p,
         aileron_p_integral=2.0 * aileron_p,
         aileron_p_forward=aileron_p_forward,
         aileron_r_forward=aileron_r_forward,
         rudder_r=rudder_r,
-        rudder_beta_integral=0.28 * max(at.nb, 0.0) / -at.ndr,
+        rudder_beta_integral=pace * 0.28 * max(at.nb, 0.0) / -at.ndr,
         rudder_p_forward=rudder_p_forward,
         rudder_r_forward=rudder_r_forward,
         altitude=0.23 * pitch,

@@ -1,24 +1,14 @@
-"""A JSBSim aircraft with its inner loops closed. The only importer of jsbsim; feet and slugs end here."""
+"""A JSBSim aircraft in flight, its inner loops closed. Feet and slugs end here."""
 
 from __future__ import annotations
 
 import cmath
 import math
-from contextlib import ExitStack
-from dataclasses import fields, replace
-from functools import lru_cache
-from importlib.resources import as_file, files
-from pathlib import Path
-from typing import Any
-
-import jsbsim
-import numpy as np
 
 from aircraft.airframes import AircraftError, Airframe, airframe
-from aircraft.autopilot import Derivatives, Gains, derivatives, gains
 from aircraft.frames import LocalPlane
-from aircraft.injection import with_autopilot
 from aircraft.interface import AircraftState, Command
+from aircraft.jsbsim_loading import FOOT_M, STEP_RATE_HZ, load, node, trim
 from aircraft.properties import (
     COMMAND_PROPERTIES,
     CONTROLS,
@@ -28,11 +18,8 @@ from aircraft.properties import (
     TURBULENCE_W20_FPS,
     WIND_PROPERTIES,
 )
-from aircraft.start import Atmosphere, StartConditions
+from aircraft.start import Atmosphere, Gust, StartConditions
 
-FOOT_M = 0.3048
-REFERENCE_ALTITUDE_M = 300.0
-STEP_RATE_HZ = 120
 GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
 
@@ -40,20 +27,9 @@ MAX_ROLL_RAD = math.radians(75.0)
 STALL_SPEED_SHARE = 0.8
 """Share of the lowest level-flight airspeed below which the aircraft counts as stalled."""
 
-FULL_TRIM = 1
 SETTLING_STEP_S = 1e-9
 INTEGRATOR_MEMORY = 6
 """Steps that replace every derivative an integrator of JSBSim remembers."""
-
-
-class _Silence(jsbsim.FGLogger):
-    """Takes JSBSim's log and says nothing; errors come as exceptions."""
-
-    def message(self, message: str) -> None:
-        """Drops a message."""
-
-    def file_location(self, filename: str, line: int) -> None:
-        """Drops a location."""
 
 
 class JsbsimModel:
@@ -64,7 +40,7 @@ class JsbsimModel:
 
     def __init__(
         self,
-        name: str,
+        aircraft: str | Airframe,
         start: StartConditions,
         plane: LocalPlane,
         atmosphere: Atmosphere | None = None,
@@ -73,19 +49,18 @@ class JsbsimModel:
         """Loads, trims and starts the aircraft.
 
         Args:
-            name: a name of `aircraft_names`.
+            aircraft: a name or folder that `airframe` knows, or an airframe.
             start: where and how fast it starts.
             plane: the local plane that all positions refer to.
-            atmosphere: steady wind and turbulence; default: calm.
+            atmosphere: steady wind, gust and turbulence; default: calm.
             step_rate_hz: integration steps per second.
 
         Raises:
             AircraftError: if the name is unknown, the airspeed out of range or too low for the wind, or the
                 model cannot be loaded, trimmed or held.
         """
-        self.airframe = airframe(name)
+        self.airframe = airframe(aircraft) if isinstance(aircraft, str) else aircraft
         self.airframe.check_airspeed(start.airspeed_mps)
-        self.gains = _gains(name)
         self._plane = plane
         self._step_rate_hz = step_rate_hz
         self._step = 0
@@ -93,23 +68,24 @@ class JsbsimModel:
         try:
             heading_rad = start.heading_rad(atmosphere)
         except ValueError as error:
-            raise AircraftError(f"{name}: {error}") from None
+            raise AircraftError(f"{self.airframe.name}: {error}") from None
         self._stall_rad = math.radians(self.airframe.stall_angle_deg)
         self._stall_fps = STALL_SPEED_SHARE * self.airframe.airspeed_range_mps[0] / FOOT_M
         self._patch = plane.patch(*map(math.radians, plane.geodetic(start.east_m, start.north_m)))
         self._convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
+        self._gust: Gust | None = None
         self._windy = atmosphere.wind_mps > 0.0
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
 
-        fdm = self._fdm = _load(self.airframe, step_rate_hz)
-        _trim(fdm, self.airframe, plane, start, heading_rad + self._convergence_rad)
-        self._read = tuple(_node(fdm, path).get_double_value for path in STATE_PROPERTIES)
-        self._write = tuple(_node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
-        self._write_wind = tuple(_node(fdm, path).set_double_value for path in WIND_PROPERTIES)
-        self._alpha = _node(fdm, "aero/alpha-rad").get_double_value
-        self._enable = _node(fdm, "wayproof/enable").set_double_value
+        fdm = self._fdm = load(self.airframe.files, step_rate_hz)
+        trim(fdm, self.airframe.name, plane, start, heading_rad + self._convergence_rad)
+        self._read = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
+        self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
+        self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
+        self._alpha = node(fdm, "aero/alpha-rad").get_double_value
+        self._enable = node(fdm, "wayproof/enable").set_double_value
         self._roll, self._airspeed, self._altitude = (
-            _node(fdm, path).get_double_value
+            node(fdm, path).get_double_value
             for path in ("attitude/phi-rad", "velocities/vtrue-fps", "position/h-sl-ft")
         )
         self._set_up_autopilot()
@@ -119,6 +95,7 @@ class JsbsimModel:
         self._settle()
         if atmosphere.turbulence is not None and atmosphere.intensity is not None:
             self._stir(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
+        self._gust = atmosphere.gust
         self.engage()
 
     @property
@@ -174,6 +151,12 @@ class JsbsimModel:
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         run = self._fdm.run
+        if self._gust is not None:
+            for _ in range(steps):
+                self._blow()
+                run()
+                self._step += 1
+            return
         for _ in range(steps):
             run()
         self._step += steps
@@ -206,12 +189,12 @@ class JsbsimModel:
     def _set_up_autopilot(self) -> None:
         """Gives the autopilot its gains and the trim that they hold for."""
         fdm = self._fdm
-        values = self.gains.properties()
+        values = self.airframe.gains.properties()
         for control in CONTROLS:
             values[f"wayproof/trim/{control}-norm"] = fdm[f"fcs/{control}-cmd-norm"]
         values["wayproof/trim/pitch-rad"] = fdm["attitude/theta-rad"]
         for path, value in values.items():
-            _node(fdm, path).set_double_value(value)
+            node(fdm, path).set_double_value(value)
 
     def _move_with_wind(self) -> None:
         """Gives the trimmed aircraft the velocity of the wind, and then the air.
@@ -246,8 +229,11 @@ class JsbsimModel:
         self._fdm.set_dt(1.0 / self._step_rate_hz)
 
     def _wind_true(self) -> tuple[float, float]:
-        """The wind towards true east and north where the aircraft is, ft/s."""
+        """The wind towards true east and north where the aircraft is now, ft/s, the gust included."""
         east, north = self._wind
+        if self._gust is not None:
+            share = self._gust.share(self._step / self._step_rate_hz) / FOOT_M
+            east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
         sine, cosine = math.sin(self._convergence_rad), math.cos(self._convergence_rad)
         return east * cosine + north * sine, north * cosine - east * sine
 
@@ -264,105 +250,4 @@ class JsbsimModel:
             "atmosphere/turbulence/milspec/severity": float(TURBULENCE_SEVERITY[intensity]),
         }
         for path, value in values.items():
-            _node(self._fdm, path).set_double_value(value)
-
-
-def _node(fdm: Any, path: str) -> Any:
-    """A property that must exist: JSBSim itself would make a new one of a misspelt name."""
-    node = fdm.get_property_manager().get_node(path)
-    if node is None:
-        raise AircraftError(f"the model has no property {path!r}")
-    return node
-
-
-def _load(frame: Airframe, step_rate_hz: int) -> Any:
-    """A fresh JSBSim with the aircraft and the autopilot; a second model in one FGFDMExec would crash."""
-    jsbsim.set_logger(_Silence())
-    fdm = jsbsim.FGFDMExec(None)
-    fdm.set_debug_level(0)
-    with ExitStack() as stack:
-        own = stack.enter_context(as_file(files("aircraft").joinpath(frame.name)))
-        root = Path(jsbsim.get_default_root_dir())
-        folder = own if own.is_dir() else root / "aircraft" / frame.name
-        try:
-            derived = stack.enter_context(with_autopilot(folder / f"{frame.name}.xml"))
-            fdm.set_aircraft_path(str(derived))
-            fdm.set_engine_path(str(folder if own.is_dir() else root / "engine"))
-            fdm.set_systems_path(str(root / "systems"))
-            loaded = fdm.load_model(frame.name)
-        except (OSError, ValueError, jsbsim.BaseError) as error:
-            raise AircraftError(f"{frame.name}: the model cannot be loaded: {error}") from None
-    if not loaded:
-        raise AircraftError(f"{frame.name}: JSBSim refuses the model")
-    fdm.disable_output()
-    fdm.set_dt(1.0 / step_rate_hz)
-    return fdm
-
-
-def _trim(fdm: Any, frame: Airframe, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:
-    """Trims for straight level flight in calm air, engines running, heading from true north."""
-    latitude_deg, longitude_deg = plane.geodetic(start.east_m, start.north_m)
-    values = {
-        "ic/lat-geod-deg": latitude_deg,
-        "ic/long-gc-deg": longitude_deg,
-        "ic/h-sl-ft": start.altitude_m / FOOT_M,
-        "ic/psi-true-rad": heading_rad % math.tau,
-        "ic/vt-fps": start.airspeed_mps / FOOT_M,
-        "gear/gear-cmd-norm": 0.0,
-    }
-    for engine in range(fdm.get_propulsion().get_num_engines()):
-        values[f"fcs/mixture-cmd-norm[{engine}]"] = 0.9
-        values[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
-    for path, value in values.items():
-        fdm[path] = value
-    try:
-        fdm.run_ic()
-        fdm["propulsion/set-running"] = -1.0
-        fdm.do_trim(FULL_TRIM)
-    except (jsbsim.BaseError, jsbsim.TrimFailureError):
-        raise AircraftError(
-            f"{frame.name} cannot be trimmed for level flight at {start.airspeed_mps:g} m/s, "
-            f"{start.altitude_m:g} m above sea level"
-        ) from None
-
-
-@lru_cache(maxsize=64)
-def _gains(frame_name: str) -> Gains:
-    """Gains of the airframe table; what it leaves out comes from the linearised model."""
-    frame = airframe(frame_name)
-    if len(frame.gains) == len(fields(Gains)):
-        return Gains(**frame.gains)
-    return replace(derived_gains(frame_name), **frame.gains)
-
-
-def derived_gains(name: str) -> Gains:
-    """Gains from the model linearised at its trim at cruise airspeed, 300 m above the sea, in calm air.
-
-    Args:
-        name: a name of `aircraft_names`.
-
-    Raises:
-        AircraftError: if the model cannot be loaded or trimmed, or is none that the autopilot can hold.
-    """
-    frame = airframe(name)
-    fdm = _load(frame, STEP_RATE_HZ)
-    cruise = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, frame.cruise_mps)
-    _trim(fdm, frame, LocalPlane(45.0, 0.0), cruise, heading_rad=0.0)
-    try:
-        return gains(linearised(fdm))
-    except ValueError as error:
-        raise AircraftError(f"{name} at {frame.cruise_mps:g} m/s: {error}") from None
-
-
-def linearised(fdm: Any) -> Derivatives:
-    """Derivatives of a trimmed jsbsim.FGFDMExec, by JSBSim's FGLinearization."""
-    linear = jsbsim.FGLinearization(fdm)
-    return derivatives(
-        list(linear.x_names),
-        list(linear.u_names),
-        np.asarray(linear.system_matrix),
-        np.asarray(linear.input_matrix),
-        airspeed_fps=fdm["velocities/vtrue-fps"],
-        alpha_rad=fdm["aero/alpha-rad"],
-        qbar_psf=fdm["aero/qbar-psf"],
-    )
+            node(self._fdm, path).set_double_value(value)

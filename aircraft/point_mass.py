@@ -36,12 +36,12 @@ class PointMass:
             step_rate_hz: steps per second that `advance` counts in.
 
         Raises:
-            ValueError: if the course cannot be held in the wind, or turbulence is asked for, which this does
-                not model.
+            ValueError: if the course cannot be held in the wind, or turbulence or a gust is asked for, which
+                this does not model.
         """
         atmosphere = atmosphere or Atmosphere()
-        if atmosphere.turbulence is not None:
-            raise ValueError("the point mass does not model turbulence")
+        if atmosphere.turbulence is not None or atmosphere.gust is not None:
+            raise ValueError("the point mass does not model turbulence or gusts")
         if not roll_lag_s > 0.0:
             raise ValueError(f"roll_lag_s must be positive; got {roll_lag_s:g}")
         self._step_rate_hz = step_rate_hz

@@ -14,6 +14,7 @@ from typing import Annotated, Final
 import typer
 
 from harness.commands.check import check
+from harness.commands.envelope import envelope
 from harness.commands.export import export
 from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
@@ -23,7 +24,7 @@ from harness.commands.review import report, view
 INTERRUPTED: Final = 130
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
-for command in (fly, check, compare, validate, schema, view, report, export, bench):
+for command in (fly, check, compare, validate, schema, view, report, export, bench, envelope):
     app.command(cls=Command)(command)
 app.command("list", cls=Command)(list_names)
 

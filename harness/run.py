@@ -18,7 +18,7 @@ from aircraft.frames import LocalPlane
 from aircraft.guidance import GRAVITY_MPS2, PathFollower
 from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
-from aircraft.start import Atmosphere, StartConditions
+from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.closed_loop import Loop, Observer, Progress, fly
 from harness.metrics import metrics
 from harness.obstacle_map import ObstacleMap
@@ -89,16 +89,30 @@ def start_conditions(scenario: Scenario) -> StartConditions:
 
 def atmosphere(scenario: Scenario) -> Atmosphere:
     """The air of a scenario."""
-    wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
-    blows = math.radians(wind.from_deg) + math.pi if wind else 0.0
-    speed = wind.speed_mps if wind else 0.0
+    air = scenario.environment
+    east, north = _towards(air.wind.speed_mps, air.wind.from_deg) if air.wind else (0.0, 0.0)
+    turbulence, front = air.turbulence, air.gust
     return Atmosphere(
-        wind_east_mps=speed * math.sin(blows),
-        wind_north_mps=speed * math.cos(blows),
+        wind_east_mps=east,
+        wind_north_mps=north,
         turbulence=turbulence.model if turbulence else None,
         intensity=turbulence.intensity if turbulence else None,
         seed=int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF,
+        gust=Gust(
+            front.shape,
+            *_towards(front.speed_mps, front.from_deg),
+            front.start_s,
+            math.inf if front.duration_s is None else front.duration_s,
+        )
+        if front
+        else None,
     )
+
+
+def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
+    """East and north of a wind that blows from a direction."""
+    blows = math.radians(from_deg) + math.pi
+    return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
 
 
 def jsbsim_aircraft(scenario: Scenario, start: StartConditions, air: Atmosphere) -> FlightModel:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import Strict, ValidationError, model_validator
+from pydantic import Strict, ValidationError, ValidationInfo, model_validator
 
 from harness import planner_keys, strict_yaml
 from harness.scenario_checks import check_start_and_goal
@@ -63,8 +63,10 @@ class Scenario(Section):
     )
 
     @model_validator(mode="after")
-    def _complete(self) -> Scenario:
+    def _complete(self, info: ValidationInfo) -> Scenario:
         """Fills in derived defaults, each after those it depends on, and checks across sections."""
+        found = _model(self.aircraft.model, (info.context or {}).get("folder"))
+        object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))
         self._set("aircraft", airspeed_mps=_cruise_mps(self.aircraft))
         performance = performance_of(self)
         radius_m = performance.turn_radius_m
@@ -115,7 +117,7 @@ def load_scenario(path: Path, overrides: Sequence[tuple[str, str]] = ()) -> Scen
     root = strict_yaml.read(path)
     for name, text in overrides:
         root = _overridden(root, name, text)
-    return _validated(root, str(path))
+    return _validated(root, str(path), path.parent)
 
 
 def parse_scenario(text: str, source: str = "scenario") -> Scenario:
@@ -168,7 +170,7 @@ def mission_of(scenario: Scenario) -> Mission:
 
 
 def performance_of(scenario: Scenario) -> Performance:
-    """What the scenario's aircraft can do at its airspeed, in its wind and turbulence.
+    """What the scenario's aircraft can do at its airspeed, in its wind, gust and turbulence.
 
     Raises:
         KeyFault: there is no such aircraft, it cannot hold the airspeed, or the wind is too strong for it.
@@ -185,7 +187,8 @@ def performance_of(scenario: Scenario) -> Performance:
         )
     try:
         gusts = air.turbulence.intensity if air.turbulence else None
-        return performance(airframe(spec.model), spec.airspeed_mps, wind_mps, gusts)
+        front_mps = air.gust.speed_mps if air.gust else 0.0
+        return performance(airframe(spec.model), spec.airspeed_mps, wind_mps, gusts, front_mps)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
 
@@ -197,9 +200,9 @@ def scenario_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _validated(root: Node, source: str) -> Scenario:
+def _validated(root: Node, source: str, folder: Path | None = None) -> Scenario:
     try:
-        return Scenario.model_validate(root.plain())
+        return Scenario.model_validate(root.plain(), context={"folder": folder})
     except ValidationError as error:
         raise input_error(error, Scenario, root, source) from error
 
@@ -224,6 +227,20 @@ def _without_own_keys(root: Node, kind: Node) -> Node:
         return root
     common = {name: node for name, node in planner.value.items() if name in PlannerSpec.model_fields}
     return strict_yaml.replaced(root, ("planner",), Node(common, planner.line))
+
+
+def _model(model: str, folder: Path | None) -> str:
+    """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
+    for place in (Path() if folder is None else folder, Path()):
+        if ("/" in model or model not in _aircraft_names()) and (place / model).expanduser().is_dir():
+            return str((place / model).expanduser().resolve())
+    return model
+
+
+def _aircraft_names() -> tuple[str, ...]:
+    from aircraft.airframes import aircraft_names
+
+    return aircraft_names()
 
 
 def _cruise_mps(spec: AircraftSpec) -> float:

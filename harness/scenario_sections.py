@@ -317,6 +317,31 @@ class Wind(Section):
     from_deg: float = key("Direction it blows from.", unit="deg", default=270.0, ge=0, le=360)
 
 
+class Gust(Section):
+    """One gust front, on top of the wind; it reaches the whole area at one time."""
+
+    shape: Literal["step", "one_minus_cosine"] = key(
+        "step: all of it at once, until its end; one_minus_cosine: speed / 2 (1 - cos(2 pi t / duration)).",
+        default="one_minus_cosine",
+    )
+    speed_mps: float = key("Speed of the gust at its strongest.", unit="m/s", gt=0, le=200)
+    from_deg: float = key("Direction it blows from.", unit="deg", default=270.0, ge=0, le=360)
+    start_s: float = key("When it begins.", unit="s", default=60.0, ge=0, le=1e7)
+    duration_s: float | None = key(
+        "How long it lasts (its length over the airspeed). Default: a step stays; the other shape needs it.",
+        unit="s",
+        default=None,
+        gt=0,
+        le=1e7,
+    )
+
+    @model_validator(mode="after")
+    def _ends_unless_a_step(self) -> Gust:
+        if self.duration_s is None and self.shape != "step":
+            raise ValueError(f"has no duration_s; a {self.shape} gust must have one")
+        return self
+
+
 class Turbulence(Section):
     """Continuous gusts on top of the wind."""
 
@@ -330,4 +355,5 @@ class Environment(Section):
     """The air."""
 
     wind: Wind | None = key("Steady wind. Default: calm.", default=None)
+    gust: Gust | None = key("A gust front. Default: none.", default=None)
     turbulence: Turbulence | None = key("Gusts. Default: smooth air.", default=None)

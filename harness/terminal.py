@@ -50,6 +50,35 @@ def progress_bar(straight_m: float) -> Iterator[Report | None]:
         yield report
 
 
+@contextmanager
+def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
+    """A bar of steps done on standard error, or None where that is not a terminal."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    with Progress(
+        BarColumn(bar_width=20), TextColumn("{task.description}"), console=console, transient=True
+    ) as bar:
+        task = bar.add_task("")
+
+        def report(done: int, of: int, what: str) -> None:
+            bar.update(task, completed=done, total=of, description=what)
+
+        yield report
+
+
+def print_grid(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """A table with a heading over each column, on standard output; figures are right-aligned."""
+    console = Console()
+    table = Table(title=title, box=box.SIMPLE, title_justify="left", pad_edge=False)
+    for index, column in enumerate(columns):
+        table.add_column(column, justify="right" if index else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table, width=min(80, console.width))
+
+
 def print_table(title: str, rows: Mapping[str, str]) -> None:
     """Two columns, name and value, on standard output and never wider than 80."""
     console = Console()
@@ -113,6 +142,59 @@ def causes(bad: Sequence[Mapping[str, Any]]) -> str:
     every = [leg["cause"] for leg in bad]
     times = {cause: every.count(cause) for cause in dict.fromkeys(every)}
     return ", ".join(f"{cause} ({count} legs)" if count > 1 else cause for cause, count in times.items())
+
+
+def envelope_tables(card: Mapping[str, Any]) -> list[tuple[str, Sequence[str], list[Sequence[str]]]]:
+    """Title, headings and rows of each table of `wayproof envelope`."""
+    low, high = card["airspeed_range_mps"]
+    facts = {
+        "mass": f"{card['mass_kg']:g} kg",
+        "level flight": f"{low:g} to {high:g} m/s, cruise {card['cruise_mps']:g} m/s",
+        "bank limit": f"{card['bank_limit_deg']:g} deg, rolled into at {card['roll_rate_dps']:g} deg/s",
+        "tracking": "held by tests" if card["verified"] else "not held by tests",
+    }
+    tables: list[tuple[str, Sequence[str], list[Sequence[str]]]] = [
+        (card["aircraft"], ("", ""), list(facts.items()))
+    ]
+    for page in card["at"]:
+        title = (
+            f"turns at {page['airspeed_mps']:g} m/s; 90 % of 30 deg in {page['roll_in_s']:g} s; speed and altitude "
+            f"kept up to {page['level_bank_deg']:g} deg"
+        )
+        tables.append((title, tuple(_TURN_COLUMNS.values()), _rows(page["turns"], _TURN_COLUMNS)))
+        title = f"paths at {page['airspeed_mps']:g} m/s"
+        tables.append((title, tuple(_PATH_COLUMNS.values()), _rows(page["tracked"], _PATH_COLUMNS)))
+    return tables
+
+
+_TURN_COLUMNS = {
+    "bank_deg": "bank deg",
+    "radius_m": "radius m",
+    "load_factor": "load factor",
+    "altitude_lost_m": "altitude lost m",
+    "airspeed_lost_mps": "speed lost m/s",
+}
+_PATH_COLUMNS = {
+    "wind_mps": "wind m/s",
+    "tightest_radius_m": "tightest radius tracked m",
+    "planned_radius_m": "planned radius m",
+}
+
+
+def _rows(entries: Sequence[Mapping[str, float | None]], columns: Mapping[str, str]) -> list[Sequence[str]]:
+    return [tuple(_number(entry[name]) for name in columns) for entry in entries]
+
+
+def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
+    """Headings and rows of the table of `wayproof bench tracking`; limits are behind the figures."""
+    figures = ("cross_track_p95_m", "cross_track_max_m", "altitude_p95_m")
+    rows: list[Sequence[str]] = []
+    for case in result["cases"]:
+        limits = case["limits"]
+        cells = [f"{case[name]:.3f}" + (f" <= {limits[name]:.2g}" if limits else "") for name in figures]
+        verdict = {True: "kept", False: "[bold red]not kept[/]", None: "-"}[case["kept"]]
+        rows.append((case["case"], *cells, f"{case['bank_saturation']:.1%}", verdict))
+    return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
 
 
 def plain(text: str) -> str:

@@ -37,7 +37,7 @@ ALLOWED = {
 }
 # Packages that only these files (patterns of `fnmatch`) may import.
 ONLY_IN = {
-    "jsbsim": ("aircraft/jsbsim_model.py",),
+    "jsbsim": ("aircraft/jsbsim_loading.py",),
     "rerun": ("harness/rerun_*.py",),
     "yaml": ("aircraft/airframes.py", "harness/strict_yaml.py"),
     "typer": ("harness/cli.py", "harness/commands/*.py"),
@@ -48,7 +48,7 @@ ONLY_IN = {
 }
 # Slow to import: inside the function that needs them, but for files that are imported late themselves.
 LATE = {
-    "jsbsim": ("aircraft/jsbsim_model.py",),
+    "jsbsim": ("aircraft/jsbsim_loading.py",),
     "rerun": ("harness/rerun_*.py",),
     "pyarrow": (),
     "shapely": (),

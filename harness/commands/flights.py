@@ -115,6 +115,7 @@ def compare(
     kinds = [kind.strip() for kind in planners.split(",")]
     loaded = [load(scenario, [("planner.kind", kind)]) for scenario in scenarios for kind in kinds]
 
+    from aircraft.airframes import AircraftError
     from harness.compare import compare as fly_and_compare
     from harness.compare_terminal import comparison_bar, print_comparison
     from harness.record import RunFolderError
@@ -129,7 +130,7 @@ def compare(
                 workers=workers or os.cpu_count() or 1,
                 progress=report,
             )
-    except RunFolderError as error:
+    except (RunFolderError, AircraftError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
         typer.echo(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
@@ -142,23 +143,67 @@ def compare(
     return 0 if comparison.all_reached else FAILED
 
 
-def bench(scenario: ScenarioArgument = "paper_circles", as_json: JsonOption = False) -> int:
+def bench(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="[SCENARIO]", help="A file or shipped name; or the word tracking.", show_default=True
+        ),
+    ] = "paper_circles",
+    aircraft: Annotated[
+        str | None, typer.Option(metavar="NAME", help="With tracking: what flies. Default: aerosonde.")
+    ] = None,
+    seeds: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="With tracking: courses a case. Default: 20.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> int:
     """What the loop costs on this machine against bare JSBSim, block by block.
+
+    `bench tracking` measures how close an aircraft stays to random courses of 14 turns in calm air, wind and
+    turbulence, the worst of all courses of a case; its exit status is 1 if that is more than promised.
 
     For example: wayproof bench aerosonde_forest --json
     """
+    if scenario == "tracking":
+        return bench_tracking(aircraft or "aerosonde", seeds or 20, as_json)
+    if aircraft or seeds:
+        raise typer.BadParameter("--aircraft and --seeds go with `bench tracking`")
     loaded = load(scenario)
 
+    from aircraft.airframes import AircraftError
     from harness.bench import bench as measure
     from harness.terminal import bench_rows, print_table, progress_bar
 
-    with progress_bar(straight_m(loaded)) as report:
-        result = measure(loaded, report)
+    try:
+        with progress_bar(straight_m(loaded)) as report:
+            result = measure(loaded, report)
+    except AircraftError as error:
+        raise bad_input(error) from error
     if as_json:
         print_json(result)
     else:
         print_table(f"bench of {loaded.name}", bench_rows(result))
     return 0
+
+
+def bench_tracking(name: str, seeds: int, as_json: bool) -> int:
+    """The table of tracking errors of an aircraft."""
+    from aircraft.airframes import AircraftError
+    from harness import tracking
+    from harness.terminal import print_grid, step_bar, tracking_rows
+
+    try:
+        with step_bar() as report:
+            result = tracking.bench_tracking(name, seeds, report)
+    except AircraftError as error:
+        raise bad_input(error) from error
+    if as_json:
+        print_json(result)
+    else:
+        title = f"{result['aircraft']} at {result['airspeed_mps']:g} m/s, worst of {seeds} courses a case"
+        print_grid(title, *tracking_rows(result))
+    return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
 
 
 def _default_folder(scenario: Scenario) -> Path:

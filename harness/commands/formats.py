@@ -48,12 +48,39 @@ def list_names(
 ) -> int:
     """Prints the names that a scenario or a command can use.
 
+    Aircraft that have not been flown here before are flown for their figures, which takes about a second each.
+
     For example: wayproof list planners
     """
     from harness.terminal import print_columns
 
-    print_columns(_summaries(what))
+    if what == "aircraft":
+        _print_aircraft()
+    else:
+        print_columns(_summaries(what))
     return 0
+
+
+def _print_aircraft() -> None:
+    """A row for each of the fleet, as soon as it is known; columns are those of `_AIRCRAFT_ROW`."""
+    from aircraft.airframes import AircraftError, aircraft_names, airframe
+    from aircraft.envelope import performance
+
+    typer.echo(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "verified", "what"))
+    for name in aircraft_names():
+        try:
+            frame = airframe(name)
+            radius_m = performance(frame, frame.cruise_mps).turn_radius_m
+        except AircraftError as error:
+            typer.echo(f"{name:10} cannot be flown: {error}")
+            continue
+        low, high = frame.airspeed_range_mps
+        verified = "yes" if frame.verified else "no"
+        cells = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
+        typer.echo(_AIRCRAFT_ROW.format(name, *cells, verified, frame.summary))
+
+
+_AIRCRAFT_ROW = "{:10} {:>7} {:>11} {:>6} {:>6}  {:8}  {}"
 
 
 def _summaries(what: str) -> dict[str, str]:
@@ -62,10 +89,6 @@ def _summaries(what: str) -> dict[str, str]:
         from planner.registry import planner_kinds
 
         return {name: kind.summary for name, kind in planner_kinds().items()}
-    if what == "aircraft":
-        from aircraft.airframes import aircraft_names, airframe
-
-        return {name: airframe(name).summary for name in aircraft_names()}
     from harness.shipped import shipped_scenarios, summary
 
     return {name: summary(path) for name, path in shipped_scenarios().items()}

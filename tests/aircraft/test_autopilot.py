@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ElementTree
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import aircraft
-from aircraft.airframes import aircraft_names, airframe
+from aircraft.airframes import airframe
 from aircraft.autopilot import Derivatives, Gains, derivatives, gains
 from aircraft.injection import with_autopilot
-from aircraft.jsbsim_model import derived_gains
+from aircraft.jsbsim_loading import linearised, trimmed
+from aircraft.model_files import model_files
 
 AEROSONDE = Derivatives(
     airspeed_fps=82.02,
@@ -46,6 +47,20 @@ def test_loops_lie_where_the_rules_put_them() -> None:
     assert placed.roll == 4.0
     assert placed.elevator_q * -AEROSONDE.mde == pytest.approx(math.sqrt(99.96 + 5.30 * 4.48))
     assert placed.throttle * AEROSONDE.xdt == pytest.approx(1.5, rel=0.05)
+
+
+def test_a_slower_pace_weakens_the_feedback_in_roll_and_yaw_alone() -> None:
+    full, half = gains(AEROSONDE), gains(AEROSONDE, 0.5)
+    changed = {f.name for f in fields(Gains) if getattr(full, f.name) != getattr(half, f.name)}
+    slower = {"roll", "aileron_p", "aileron_p_integral", "rudder_r", "rudder_beta_integral"}
+    assert changed == slower
+    assert all(getattr(half, name) == pytest.approx(0.5 * getattr(full, name)) for name in slower)
+
+
+def test_roll_errors_ask_for_no_more_rate_than_the_ailerons_give() -> None:
+    slow = gains(replace(AEROSONDE, lda=14.0))
+    assert slow.roll_rate_limit * slow.aileron_p_forward == pytest.approx(0.8)
+    assert gains(AEROSONDE).roll_rate_limit == 1.05
 
 
 def test_feed_forwards_cancel_the_moments_of_a_steady_turn() -> None:
@@ -90,11 +105,17 @@ def test_propeller_speed_is_eliminated_as_settled() -> None:
     assert at.xdt == pytest.approx(0.02 * 1000.0 / 5.0)
 
 
-@pytest.mark.parametrize("name", aircraft_names())
-def test_the_table_holds_the_gains_of_the_model(name: str) -> None:
-    derived = asdict(derived_gains(name))
-    for gain, value in airframe(name).gains.items():
-        assert value == pytest.approx(derived[gain], rel=2e-3, abs=1e-5), gain
+def test_gains_follow_from_the_model_at_cruise() -> None:
+    frame = airframe("aerosonde")
+    at = linearised(trimmed(model_files("aerosonde"), frame.cruise_mps))
+    assert frame.gains == gains(at).rounded(5)
+    assert frame.gains.roll == 4.0
+    assert frame.gains.elevator_q == pytest.approx(0.724, rel=0.01)
+
+
+def test_rounding_keeps_the_given_number_of_digits() -> None:
+    rounded = replace(gains(AEROSONDE), roll=1.23456789, climb=-0.000123456).rounded(4)
+    assert (rounded.roll, rounded.climb) == (1.235, -0.0001235)
 
 
 def test_every_gain_is_a_property_of_the_system() -> None:

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from aircraft.airframes import aircraft_names
+from aircraft import airframes
 from harness import cli, scenario, shipped
 from harness.cli import main
 from harness.commands import flights
@@ -24,7 +24,19 @@ from planner.registry import planner_kinds
 
 ROOT = Path(__file__).parents[2]
 SLOW = {"jsbsim", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "yaml"}
-COMMANDS = ("fly", "check", "compare", "validate", "schema", "list", "view", "report", "export", "bench")
+COMMANDS = (
+    "fly",
+    "check",
+    "compare",
+    "validate",
+    "schema",
+    "list",
+    "view",
+    "report",
+    "export",
+    "bench",
+    "envelope",
+)
 FLY_OPTIONS = (
     *("--planner", "--aircraft", "--seed", "--set", "--out"),
     *("--no-recording", "--view", "--quiet", "--json"),
@@ -58,7 +70,7 @@ def wayproof(*arguments: str, folder: Path, **environment: str) -> subprocess.Co
     return subprocess.run(
         [sys.executable, "-m", "harness", *arguments],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        env={**os.environ, "PYTHONPATH": str(ROOT)} | environment,
         capture_output=True,
         text=True,
         timeout=60,
@@ -140,10 +152,12 @@ from harness.cli import main
 assert main(["validate", "paper_circles"]) == 0
 print(sorted({"jsbsim", "rerun", "pyarrow"} & set(sys.modules)), file=sys.stderr)
 """
+    environment = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    wayproof("validate", "paper_circles", folder=tmp_path, **environment)  # flies the aircraft, once
     run = subprocess.run(
         [sys.executable, "-c", code],
         cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env={**os.environ, **environment},
         capture_output=True,
         text=True,
         check=True,
@@ -162,7 +176,7 @@ print(sorted({"jsbsim", "rerun", "pyarrow"} & set(sys.modules)), file=sys.stderr
         (["fly", "paper_circles", "--seed", "-3"], "command line: seed: is -3; must be at least 0"),
         (["fly", "paper_circles", "--planner", "astar"], "command line: planner.kind: is 'astar'"),
         (["fly", "paper_circles", "--aircraft", "kite"], "command line: aircraft.model: "),
-        (["fly", "paper_circles", "--aircraft", "c172p"], "c172p cannot hold 25 m/s"),
+        (["fly", "paper_circles", "--aircraft", "T38"], "T38 cannot hold 25 m/s"),
         (["fly", "paper_circles", "--set", "seed"], "'seed' is not KEY.PATH=VALUE"),
         (["fly", "paper_circles", "--set", "sensor.rnge_m=3"], "did you mean range_m?"),
         (["fly", "paper_circles", "--view", "--no-recording"], "nothing to view with --no-recording"),
@@ -265,7 +279,6 @@ def test_schema_prints_the_json_schema(capsys: pytest.CaptureFixture[str]) -> No
 def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
     wanted = {
         "planners": tuple(planner_kinds()),
-        "aircraft": aircraft_names(),
         "scenarios": tuple(shipped.shipped_scenarios()),
     }
     for what, names in wanted.items():
@@ -273,6 +286,55 @@ def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
         lines = capsys.readouterr().out.splitlines()
         assert tuple(line.split()[0] for line in lines) == names
         assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_list_of_aircraft_has_their_figures(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "c172p", "SGS"))
+    assert main(["list", "aircraft"]) == 0
+    heading, aerosonde, cessna, glider = capsys.readouterr().out.splitlines()
+    assert heading.split()[0] == "name"
+    assert aerosonde.split()[:6] == ["aerosonde", "11", "17.6-32.3", "25", "110", "yes"]
+    assert cessna.split()[:2] == ["c172p", "853"]
+    assert glider.startswith("SGS        cannot be flown: SGS cannot be trimmed for level flight")
+
+
+def test_a_flight_of_a_model_that_cannot_be_flown_ends_before_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["fly", "paper_circles", "--aircraft", "SGS", "--out", str(out)]) == 2
+    assert "aircraft.model: SGS cannot be trimmed for level flight at any speed" in capsys.readouterr().err
+    too_high = ["--set", "mission.altitude_m=9000"]
+    assert main(["fly", "paper_circles", *too_high, "--out", str(out)]) == 2
+    assert (
+        "wayproof: aerosonde cannot be trimmed for level flight at 25 m/s, 9000 m" in capsys.readouterr().err
+    )
+    assert not out.exists()
+
+
+def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "tracking", "--seeds", "1", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["aircraft"], result["seeds"], len(result["cases"])) == ("aerosonde", 1, 6)
+    calm = result["cases"][0]
+    assert 0.0 < calm["cross_track_p95_m"] < calm["cross_track_max_m"] <= calm["limits"]["cross_track_max_m"]
+    assert all(case["kept"] for case in result["cases"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["bench", "paper_circles", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
+        (["bench", "tracking", "--aircraft", "kite"], "unknown aircraft 'kite'"),
+    ],
+)
+def test_bench_refuses_what_makes_no_sense(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from harness import planner_keys
@@ -24,6 +26,7 @@ from harness.scenario import (
     performance_of,
     scenario_schema,
 )
+from harness.shipped import scenario_path
 from harness.strict_yaml import InputError
 from planner.registry import planner_kinds
 
@@ -288,7 +291,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
     values = [
         (name, key)
         for name, key in keys
-        if name not in holders | {"environment", "wind", "turbulence", "trackability"}
+        if name not in holders | {"environment", "wind", "turbulence", "gust", "trackability"}
     ]
     required = {
         "schema",
@@ -317,3 +320,26 @@ def test_editors_find_the_schema_beside_the_scenarios() -> None:
         first, second = path.read_text().splitlines()[:2]
         assert first == "# yaml-language-server: $schema=scenario.schema.json"
         assert second.startswith("# ")
+
+
+def test_a_model_folder_is_sought_beside_the_scenario_and_then_from_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside, here = tmp_path / "beside", tmp_path / "here"
+    for place, name in ((beside, "mine"), (here, "mine"), (here, "other")):
+        shutil.copytree(Path(aircraft.__path__[0], "aerosonde"), place / name)
+    text = scenario_path("paper_circles").read_text()
+    file = beside / "s.yaml"
+    monkeypatch.chdir(here)
+
+    def model(given: str) -> str:
+        file.write_text(text.replace("model: aerosonde", f"model: {given}"))
+        return load_scenario(file).aircraft.model
+
+    assert model("aerosonde") == "aerosonde"
+    assert model("mine") == str(beside / "mine")
+    assert model("../here/mine") == str(here / "mine")
+    assert model("./other") == str(here / "other")
+    assert parse_scenario(dump_scenario(load_scenario(file))) == load_scenario(file)
+    with pytest.raises(InputError, match=r"s.yaml:\d+: aircraft.model: unknown aircraft 'nowhere/mine'"):
+        model("nowhere/mine")

@@ -34,6 +34,7 @@ planner:
 environment:
   wind: {speed_mps: 5, from_deg: 270}
   turbulence: {model: tustin, intensity: light}
+  gust: {shape: one_minus_cosine, speed_mps: 4, start_s: 60, duration_s: 5}
 trackability: {cross_track_m: 10, altitude_m: 15, airspeed_mps: 2, load_factor: 2.5}
 """
 
@@ -172,27 +173,42 @@ BROKEN = {
     "no tolerance": (
         "cross_track_m: 10",
         "cross_track_m: 0",
-        "26: trackability.cross_track_m",
+        "27: trackability.cross_track_m",
         "must be greater than 0",
     ),
-    "altitude tolerance": ("altitude_m: 15", "altitude_m: .nan", "26: trackability.altitude_m", "finite"),
+    "altitude tolerance": ("altitude_m: 15", "altitude_m: .nan", "27: trackability.altitude_m", "finite"),
     "airspeed tolerance": (
         "airspeed_mps: 2,",
         "airspeed_mps: -2,",
-        "26: trackability.airspeed_mps",
+        "27: trackability.airspeed_mps",
         "must be greater than 0",
     ),
     "load factor of level flight": (
         "load_factor: 2.5",
         "load_factor: 1",
-        "26: trackability.load_factor",
+        "27: trackability.load_factor",
         "must be greater than 1",
     ),
     "misspelt tolerance": (
         "cross_track_m: 10",
         "crosstrack_m: 10",
-        "26: trackability.crosstrack_m",
+        "27: trackability.crosstrack_m",
         "did you mean cross_track_m?",
+    ),
+    "gust's shape": (
+        "one_minus_cosine",
+        "ramp",
+        "26: environment.gust.shape",
+        "'step' or 'one_minus_cosine'",
+    ),
+    "gust without end": (", duration_s: 5", "", "26: environment.gust", "has no duration_s"),
+    "gust of no speed": ("speed_mps: 4", "speed_mps: 0", "26: environment.gust.speed_mps", "greater than 0"),
+    "gust before the start": ("start_s: 60", "start_s: -1", "26: environment.gust.start_s", "at least 0"),
+    "gust's misspelt key": (
+        "duration_s: 5",
+        "duration: 5",
+        "26: environment.gust.duration",
+        "did you mean duration_s?",
     ),
     "key given twice": ("seed: 1", "seed: 1\nseed: 2", "4: seed", "is given twice, first in line 3"),
     "nested key given twice": ("rays: 360", "rays: 3, rays: 4", "18: sensor.rays", "is given twice"),

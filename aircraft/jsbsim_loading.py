@@ -1,0 +1,145 @@
+"""Loads a JSBSim model with the autopilot inside, trims it, linearises it. Feet and slugs end here."""
+
+from __future__ import annotations
+
+import math
+from contextlib import ExitStack
+from typing import Any
+
+import jsbsim
+import numpy as np
+
+from aircraft.autopilot import Derivatives, derivatives
+from aircraft.frames import LocalPlane
+from aircraft.injection import with_autopilot
+from aircraft.model_files import AircraftError, ModelFiles, TrimError
+from aircraft.start import StartConditions
+
+FOOT_M = 0.3048
+SLUG_KG = 14.59390
+REFERENCE_ALTITUDE_M = 300.0
+STEP_RATE_HZ = 120
+FULL_TRIM = 1
+
+
+class _Silence(jsbsim.FGLogger):
+    """Takes JSBSim's log and says nothing; errors come as exceptions."""
+
+    def message(self, message: str) -> None:
+        """Drops a message."""
+
+    def file_location(self, filename: str, line: int) -> None:
+        """Drops a location."""
+
+
+def node(fdm: Any, path: str) -> Any:
+    """A property that must exist: JSBSim itself would make a new one of a misspelt name."""
+    found = fdm.get_property_manager().get_node(path)
+    if found is None:
+        raise AircraftError(f"the model has no property {path!r}")
+    return found
+
+
+def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
+    """A fresh jsbsim.FGFDMExec with the model and the autopilot; a second model in one would crash.
+
+    Raises:
+        AircraftError: the model cannot be loaded.
+    """
+    jsbsim.set_logger(_Silence())
+    fdm = jsbsim.FGFDMExec(None)
+    fdm.set_debug_level(0)
+    with ExitStack() as stack:
+        try:
+            derived = stack.enter_context(with_autopilot(files.model))
+            fdm.set_aircraft_path(str(derived))
+            fdm.set_engine_path(str(files.engines))
+            fdm.set_systems_path(str(files.systems))
+            loaded = fdm.load_model(files.name)
+        except (OSError, ValueError, jsbsim.BaseError) as error:
+            reason = " ".join(str(error).split())
+            raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from None
+    if not loaded:
+        raise AircraftError(f"{files.name}: JSBSim refuses the model")
+    fdm.disable_output()
+    fdm.set_dt(1.0 / step_rate_hz)
+    return fdm
+
+
+def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:
+    """Trims for straight level flight in calm air, engines running, heading from true north.
+
+    Raises:
+        TrimError: there is no such flight.
+        AircraftError: the model cannot be started.
+    """
+    latitude_deg, longitude_deg = plane.geodetic(start.east_m, start.north_m)
+    values = {
+        "ic/lat-geod-deg": latitude_deg,
+        "ic/long-gc-deg": longitude_deg,
+        "ic/h-sl-ft": start.altitude_m / FOOT_M,
+        "ic/psi-true-rad": heading_rad % math.tau,
+        "ic/vt-fps": start.airspeed_mps / FOOT_M,
+        "gear/gear-cmd-norm": 0.0,
+    }
+    for engine in range(fdm.get_propulsion().get_num_engines()):
+        values[f"fcs/mixture-cmd-norm[{engine}]"] = 0.9
+        values[f"fcs/advance-cmd-norm[{engine}]"] = 1.0
+    for path, value in values.items():
+        fdm[path] = value
+    fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
+    try:
+        fdm.run_ic()
+        fdm["propulsion/set-running"] = -1.0
+        fdm.do_trim(FULL_TRIM)
+    except jsbsim.TrimFailureError:
+        raise TrimError(
+            f"{name} cannot be trimmed for level flight at {start.airspeed_mps:g} m/s, "
+            f"{start.altitude_m:g} m above sea level"
+        ) from None
+    except jsbsim.BaseError as error:
+        reason = " ".join(str(error).split())
+        raise AircraftError(f"{name}: the model cannot be started: {reason}") from None
+
+
+def trimmed(files: ModelFiles, airspeed_mps: float) -> Any:
+    """A fresh jsbsim.FGFDMExec in level flight northwards, 300 m above the sea, in calm air.
+
+    Raises:
+        AircraftError: the model cannot be loaded, or not trimmed at this true airspeed.
+    """
+    fdm = load(files)
+    start = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, airspeed_mps)
+    trim(fdm, files.name, LocalPlane(45.0, 0.0), start, heading_rad=0.0)
+    return fdm
+
+
+def mass_kg(fdm: Any) -> float:
+    """Mass of a loaded and trimmed aircraft."""
+    return float(fdm["inertia/mass-slugs"]) * SLUG_KG
+
+
+def angle_of_attack_rad(fdm: Any) -> float:
+    """Angle of attack of a trimmed aircraft."""
+    return float(fdm["aero/alpha-rad"])
+
+
+def linearised(fdm: Any) -> Derivatives:
+    """Derivatives of a trimmed jsbsim.FGFDMExec, by JSBSim's FGLinearization.
+
+    Raises:
+        AircraftError: JSBSim cannot linearise it, or the model lacks one of the usual states and controls.
+    """
+    try:
+        linear = jsbsim.FGLinearization(fdm)
+    except jsbsim.BaseError as error:
+        raise AircraftError(f"the model cannot be linearised: {' '.join(str(error).split())}") from None
+    return derivatives(
+        list(linear.x_names),
+        list(linear.u_names),
+        np.asarray(linear.system_matrix),
+        np.asarray(linear.input_matrix),
+        airspeed_fps=fdm["velocities/vtrue-fps"],
+        alpha_rad=fdm["aero/alpha-rad"],
+        qbar_psf=fdm["aero/qbar-psf"],
+    )

@@ -1,0 +1,306 @@
+"""Flies a model to find out what kind of aircraft it is: mass, speeds, gains, roll, banks it can keep.
+
+Every flight begins trimmed, 300 m above the sea, in calm air. Speeds are true airspeeds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from aircraft.airframes import FIGURES, AircraftError, Airframe, Entry
+from aircraft.autopilot import Derivatives, Gains, gains
+from aircraft.envelope import performance
+from aircraft.frames import LocalPlane
+from aircraft.guidance import GRAVITY_MPS2, PathFollower, arc_point
+from aircraft.interface import AircraftState, Command, Route
+from aircraft.jsbsim_loading import (
+    REFERENCE_ALTITUDE_M,
+    angle_of_attack_rad,
+    linearised,
+    mass_kg,
+    trimmed,
+)
+from aircraft.jsbsim_model import JsbsimModel
+from aircraft.model_files import ModelFiles, TrimError
+from aircraft.start import Atmosphere, StartConditions
+
+SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0
+"""Speeds outside of these are not looked at: the air is taken for incompressible enough below."""
+
+SPEED_STEP = 1.12
+SPEED_DIGITS = 1
+SPEED_TOLERANCE = 0.01
+GAIN_DIGITS = 5
+"""Significant digits of derived gains: fewer than what processors and compilers agree on."""
+
+BANK_LIMIT_DEG = 45.0
+ROLL_RATE_DPS = 60.0
+ROLL_AUTHORITY_SHARE = 0.5
+"""Share of the steady roll rate at full aileron that the roll command may ask for."""
+
+STALL_DEG, STALL_MARGIN_DEG = 15.0, 5.0
+"""Angle of attack that counts as stalled, and the least of it beyond that of the slowest level flight."""
+
+BANDWIDTH_SHARE = 0.36
+"""Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
+
+ROLL_LIMITED_S = 0.1
+"""Flying time; a cross-track error of that much flight is corrected without reaching the limit of roll rate.
+Correcting an error e at bandwidth w takes a change of g * roll of w^3 e; beyond the limit it becomes unstable."""
+
+LOOSE_STALL_DEG = 40.0
+DOUBLET = (10.0, -10.0, 0.0)
+REVERSALS = (30.0, -30.0, 15.0, 0.0)
+RESTED_SHARE = 0.7
+WEAVE_DEG = (60.0, -30.0, 90.0, -60.0, -20.0, 20.0)
+WELL_TRACKED_S = 0.01
+"""Flying time; a cross-track error of that much flight is what a good autopilot stays within."""
+
+PACES = (1.0, 0.7, 0.5, 0.35)
+LEG_S = 10.0
+TURN_S = 20.0
+BANK_STEP_DEG = 1.0
+ROLL_IN_DEG = 30.0
+KEPT_SPEED_SHARE = 0.03
+KEPT_ALTITUDE_M = 2.0
+KEPT_ROLL_DEG = 1.5
+UPDATE_STEPS = 6
+
+
+def survey(entry: Entry, files: ModelFiles) -> dict[str, Any]:
+    """Everything measured of `Airframe`, by attribute.
+
+    Args:
+        entry: what is known of it.
+        files: its model.
+
+    Raises:
+        AircraftError: it cannot be loaded, trimmed or held; the message says where it failed.
+    """
+    cruise = entry.cruise_mps or middle_of_trims(files)
+    frame = _held_at_cruise(entry, files, cruise)
+    low, high = _edge(frame, 1.0 / SPEED_STEP), _edge(frame, SPEED_STEP)
+    alpha_deg = math.degrees(angle_of_attack_rad(trimmed(files, low)))
+    stall_deg = float(math.ceil(max(alpha_deg + STALL_MARGIN_DEG, STALL_DEG)))
+    stall_deg = entry.figures.get("stall_angle_deg", stall_deg)
+    frame = replace(frame, airspeed_range_mps=(low, high), stall_angle_deg=stall_deg)
+    speeds = sorted({*np.linspace(low, high, 5).round(SPEED_DIGITS).tolist(), cruise})
+    return {
+        "mass_kg": float(f"{frame.mass_kg:.4g}"),
+        "airspeed_range_mps": [low, high],
+        "cruise_mps": cruise,
+        "roll_in_s": roll_in_s(frame, cruise),
+        "weave_error_m": float(f"{frame.weave_error_m:.3g}"),
+        "level_banks": [(speed, steepest_level_bank_deg(frame, speed)) for speed in speeds],
+        "gains": asdict(frame.gains),
+        **{key: getattr(frame, key) for key in FIGURES},
+    }
+
+
+def _held_at_cruise(entry: Entry, files: ModelFiles, cruise: float) -> Airframe:
+    """The airframe as far as its cruise tells, its loops as fast as they can be to track a weave well.
+
+    If they do so at no pace, the pace at which they do it best.
+
+    Raises:
+        AircraftError: it has no trim there, none that gains can be derived for, or is not held at any pace.
+    """
+    best, least_m = None, math.inf
+    try:
+        at = linearised(trimmed(files, cruise))
+        reason: str | None = None
+        for pace in PACES:
+            placed = replace(gains(at, pace).rounded(GAIN_DIGITS), **entry.gains)
+            frame = _provisional(entry, files, cruise, at, placed)
+            if reason := not_held(frame, cruise, REVERSALS):
+                continue
+            error_m = weaving_error_m(frame, cruise)
+            if error_m < least_m:
+                best, least_m = replace(frame, weave_error_m=error_m), error_m
+            if error_m <= WELL_TRACKED_S * cruise:
+                break
+    except TrimError:
+        raise
+    except ValueError as error:
+        reason = str(error)
+    if best is None:
+        raise AircraftError(f"{files.name} cannot be held at {cruise:g} m/s: {reason}")
+    return best
+
+
+def _provisional(entry: Entry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains) -> Airframe:
+    """The airframe before its limits are known."""
+    roll_rate_dps = ROLL_AUTHORITY_SHARE * math.degrees(1.0 / max(abs(placed.aileron_p_forward), 1e-6))
+    roll_rate_dps = float(math.floor(min(roll_rate_dps, ROLL_RATE_DPS)))
+    slow = (GRAVITY_MPS2 * math.radians(roll_rate_dps) / (ROLL_LIMITED_S * cruise)) ** (1.0 / 3.0)
+    figures = {
+        "bank_limit_deg": BANK_LIMIT_DEG,
+        "roll_rate_dps": roll_rate_dps,
+        "stall_angle_deg": LOOSE_STALL_DEG,
+        "roll_lag_s": round(1.0 / placed.roll, 3),
+        "roll_delay_s": round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p), 2),
+        "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),
+        **entry.figures,
+    }
+    return Airframe(
+        name=files.name,
+        summary=entry.summary,
+        files=files,
+        mass_kg=mass_kg(trimmed(files, cruise)),
+        airspeed_range_mps=(SLOWEST_MPS, FASTEST_MPS),
+        cruise_mps=cruise,
+        roll_in_s=1.0,
+        weave_error_m=0.0,
+        level_banks=((cruise, figures["bank_limit_deg"]),),
+        gains=placed,
+        verified=entry.verified,
+        **figures,
+    )
+
+
+def middle_of_trims(files: ModelFiles) -> float:
+    """The (geometric) middle of the longest run of speeds at which a model can be trimmed, m/s.
+
+    Raises:
+        AircraftError: there is no such speed, or the model cannot be loaded.
+    """
+    runs: list[list[float]] = [[]]
+    speed = SLOWEST_MPS
+    while speed <= FASTEST_MPS:
+        try:
+            trimmed(files, speed)
+            runs[-1].append(speed)
+        except TrimError:
+            runs.append([])
+        speed *= SPEED_STEP
+    longest = max(runs, key=len)
+    if not longest:
+        raise AircraftError(
+            f"{files.name} cannot be trimmed for level flight at any speed from {SLOWEST_MPS:g} to "
+            f"{FASTEST_MPS:g} m/s"
+        )
+    return round(math.sqrt(longest[0] * longest[-1]), SPEED_DIGITS)
+
+
+def _edge(frame: Airframe, factor: float) -> float:
+    """The last speed that is held on the way from cruise by a factor, to 1 % and 0.1 m/s.
+
+    Every speed that counts as held has been flown: near the stall some trims fail between others that do not.
+    """
+    good = bad = frame.cruise_mps
+    while bad == good and SLOWEST_MPS < good < FASTEST_MPS:
+        bad = round(min(max(good * factor, SLOWEST_MPS), FASTEST_MPS), SPEED_DIGITS)
+        good = bad if not_held(frame, bad) is None else good
+    while abs(good - bad) > max(SPEED_TOLERANCE * good, 10.0**-SPEED_DIGITS):
+        middle = round(0.5 * (good + bad), SPEED_DIGITS)
+        good, bad = (middle, bad) if not_held(frame, middle) is None else (good, middle)
+    return good
+
+
+def in_flight(frame: Airframe, speed: float, atmosphere: Atmosphere | None = None) -> JsbsimModel:
+    """An aircraft in level flight northwards."""
+    start = StartConditions(0.0, 0.0, REFERENCE_ALTITUDE_M, 0.0, speed)
+    return JsbsimModel(frame, start, LocalPlane(45.0, 0.0), atmosphere)
+
+
+def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET) -> str | None:
+    """Why the autopilot does not keep a speed through banks, one after the other; None if it does.
+
+    Bank must have come to rest in the last seconds of each.
+    """
+    try:
+        model = in_flight(frame, speed)
+    except AircraftError as error:
+        return str(error)
+    ticks = round(LEG_S * model.step_rate_hz / UPDATE_STEPS)
+    for bank_deg in banks_deg:
+        model.command(Command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed))
+        for tick in range(ticks):
+            model.advance(UPDATE_STEPS)
+            if fault := model.fault():
+                return fault
+            off_deg = math.degrees(model.state().roll_rad) - bank_deg
+            if tick > RESTED_SHARE * ticks and abs(off_deg) > KEPT_ROLL_DEG:
+                return f"bank off by {off_deg:.1f} deg"
+        if drift := departure(model.state(), bank_deg, speed):
+            return drift
+    return None
+
+
+def weaving_error_m(frame: Airframe, speed: float) -> float:
+    """Largest cross-track error on a weave of lines and arcs at the radius of planning; infinite if lost."""
+    radius = performance(frame, speed).turn_radius_m
+    point, rows = (0.0, 0.0, 0.0, 1.0), []
+    for turn_deg in WEAVE_DEG:
+        for curvature, length in ((0.0, radius), (1.0 / radius, math.radians(turn_deg) * radius)):
+            bend = math.copysign(curvature, turn_deg)
+            rows.append((*point, bend, abs(length)))
+            point = arc_point(rows[-1], abs(length))
+    follower = PathFollower(frame.guidance_limits)
+    follower.follow(Route(np.array(rows)))
+    model, worst = in_flight(frame, speed), 0.0
+    while True:
+        output = follower.update(model.state())
+        if model.fault() or output.past_end:
+            return math.inf if model.fault() else worst
+        worst = max(worst, abs(output.cross_track_m))
+        model.command(Command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed))
+        model.advance(UPDATE_STEPS)
+
+
+def departure(state: AircraftState, bank_deg: float, speed: float) -> str | None:
+    """What of a steady turn at a bank is not kept; None if all is."""
+    off_deg = math.degrees(state.roll_rad) - bank_deg
+    if abs(off_deg) > KEPT_ROLL_DEG:
+        return f"bank off by {off_deg:.1f} deg"
+    if abs(state.airspeed_mps - speed) > KEPT_SPEED_SHARE * speed:
+        return f"airspeed {state.airspeed_mps:.1f} m/s instead of {speed:.1f}"
+    if abs(state.up_m - REFERENCE_ALTITUDE_M) > KEPT_ALTITUDE_M:
+        return f"altitude off by {state.up_m - REFERENCE_ALTITUDE_M:.1f} m"
+    return None
+
+
+def roll_in_s(frame: Airframe, speed: float) -> float:
+    """Time from level to 90 % of 30 degrees, the command a step; to 0.01 s.
+
+    Raises:
+        AircraftError: it does not get there.
+    """
+    model = in_flight(frame, speed)
+    bank = math.radians(min(ROLL_IN_DEG, frame.bank_limit_deg))
+    model.command(Command(bank, REFERENCE_ALTITUDE_M, speed))
+    while model.state().roll_rad < 0.9 * bank:
+        model.advance(1)
+        if model.state().time_s > TURN_S:
+            raise AircraftError(f"{frame.name} cannot be held: it does not roll to {ROLL_IN_DEG:g} degrees")
+    return round(model.state().time_s, 2)
+
+
+def steepest_level_bank_deg(frame: Airframe, speed: float) -> float:
+    """Steepest bank up to the limit of an airframe at which a speed and the altitude are kept for 20 s."""
+
+    def keeps(bank_deg: float) -> bool:
+        try:
+            model = in_flight(frame, speed)
+        except AircraftError:
+            return False
+        model.command(Command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed))
+        for _ in range(round(TURN_S * model.step_rate_hz / UPDATE_STEPS)):
+            model.advance(UPDATE_STEPS)
+            if model.fault():
+                return False
+        return departure(model.state(), bank_deg, speed) is None
+
+    bad = frame.bank_limit_deg
+    if keeps(bad):
+        return bad
+    good = 0.0
+    while bad - good > BANK_STEP_DEG:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if keeps(middle) else (good, middle)
+    return math.floor(good)

@@ -1,0 +1,70 @@
+"""The cache of measurements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aircraft.card_cache import cache_folder, cached
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "wayproof"
+
+
+class Measurement:
+    """Counts how often it is made."""
+
+    def __init__(self) -> None:
+        self.times = 0
+
+    def __call__(self) -> dict[str, Any]:
+        self.times += 1
+        return {"value": 0.1 + 0.2, "list": (1, 2)}
+
+
+def test_is_measured_once_and_gives_the_same_either_way(folder: Path) -> None:
+    measure = Measurement()
+    first = cached("a", "d" * 64, measure)
+    assert cached("a", "d" * 64, measure) == first == {"value": 0.1 + 0.2, "list": [1, 2]}
+    assert measure.times == 1
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_another_digest_is_another_measurement(folder: Path) -> None:
+    measure = Measurement()
+    cached("a", "d" * 64, measure)
+    cached("a", "d" * 16 + "e" * 48, measure)
+    cached("a", "e" * 64, measure)
+    assert measure.times == 3
+
+
+@pytest.mark.parametrize("wreck", ["", "{", "[]", '{"digest": 1}', '{"digest": "%s", "result": 3}', "\0"])
+def test_a_corrupt_file_is_made_anew(folder: Path, wreck: str) -> None:
+    measure = Measurement()
+    first = cached("a", "d" * 64, measure)
+    (file,) = folder.iterdir()
+    file.write_text(wreck.replace("%s", "d" * 64), "utf-8")
+    assert cached("a", "d" * 64, measure) == first
+    assert cached("a", "d" * 64, measure) == first
+    assert measure.times == 2
+
+
+def test_a_folder_that_cannot_be_written_costs_only_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("", "utf-8")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    measure = Measurement()
+    assert cached("a", "d" * 64, measure) == cached("a", "d" * 64, measure)
+    assert measure.times == 2
+
+
+@pytest.mark.parametrize("home", ["", "relative/path"])
+def test_the_default_folder_is_in_the_home(home: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", home)
+    assert cache_folder() == Path.home() / ".cache" / "wayproof"

@@ -1,0 +1,157 @@
+"""Gust fronts, and wind that the aircraft cannot fly against."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aircraft.airframes import airframe
+from aircraft.envelope import performance
+from aircraft.frames import LocalPlane
+from aircraft.guidance import PathFollower, air_direction
+from aircraft.interface import AircraftState, Command, FlightModel, Route
+from aircraft.jsbsim_model import JsbsimModel
+from aircraft.point_mass import PointMass
+from aircraft.start import Atmosphere, Gust, StartConditions
+
+EASTWARDS = StartConditions(0.0, 0.0, 300.0, math.pi / 2, 25.0)
+EAST_LINE = Route(np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 20_000.0]]))
+
+
+class Row(NamedTuple):
+    state: AircraftState
+    cross_track_m: float
+    roll_command_rad: float
+
+
+def flown(model: FlightModel, seconds: float, route: Route = EAST_LINE) -> list[Row]:
+    follower = PathFollower(airframe("aerosonde").guidance_limits)
+    follower.follow(route)
+    rows = []
+    for _ in range(round(20 * seconds)):
+        state = model.state()
+        output = follower.update(state)
+        rows.append(Row(state, output.cross_track_m, output.roll_command_rad))
+        model.command(Command(output.roll_command_rad, 300.0, 25.0))
+        model.advance(6)
+        assert model.fault() is None
+    return rows
+
+
+def test_a_step_is_all_or_nothing() -> None:
+    gust = Gust("step", 3.0, 4.0, 10.0, 5.0)
+    assert [gust.share(t) for t in (0.0, 9.99, 10.0, 14.99, 15.0, 99.0)] == [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
+    assert Gust("step", 3.0, 4.0, 10.0).share(1e6) == 1.0
+
+
+def test_one_minus_cosine_rises_and_falls() -> None:
+    gust = Gust("one_minus_cosine", 3.0, 4.0, 10.0, 8.0)
+    assert [gust.share(t) for t in (9.0, 10.0, 12.0, 14.0, 16.0, 18.0, 20.0)] == pytest.approx(
+        [0.0, 0.0, 0.5, 1.0, 0.5, 0.0, 0.0]
+    )
+
+
+@pytest.mark.parametrize(
+    ("gust", "message"),
+    [
+        (("ramp", 1.0, 0.0, 0.0, 1.0), "shape must be"),
+        (("step", math.inf, 0.0, 0.0, 1.0), "must be finite"),
+        (("step", 1.0, 0.0, -1.0, 1.0), "begin at 0 or later"),
+        (("step", 1.0, 0.0, 0.0, 0.0), "duration_s must be positive"),
+        (("one_minus_cosine", 1.0, 0.0, 0.0, math.inf), "finite but of a step"),
+    ],
+)
+def test_a_gust_that_is_none_is_refused(gust: tuple[str, float, float, float, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Gust(*gust)
+    with pytest.raises(ValueError, match="does not model turbulence or gusts"):
+        PointMass(EASTWARDS, Atmosphere(gust=Gust("step", 1.0, 0.0, 0.0)))
+
+
+@pytest.mark.parametrize("gust", [Gust("step", 0.0, 8.0, 5.0), Gust("one_minus_cosine", 0.0, 8.0, 5.0, 6.0)])
+def test_the_aircraft_flies_in_the_gust(gust: Gust) -> None:
+    """Until it begins the flight is the one without it, bit for bit; then the air moves as the gust says."""
+
+    def air_north(state: AircraftState) -> float:
+        return state.velocity_north_mps - state.airspeed_mps * math.cos(state.heading_rad)
+
+    plane = LocalPlane(47.0, 8.0)
+    calm = flown(JsbsimModel("aerosonde", EASTWARDS, plane, Atmosphere(wind_east_mps=3.0)), 12.0)
+    gusty = flown(JsbsimModel("aerosonde", EASTWARDS, plane, Atmosphere(wind_east_mps=3.0, gust=gust)), 12.0)
+    assert gusty[:100] == calm[:100]
+    assert gusty[101:] != calm[101:]
+    assert max(abs(row.state.load_factor - 1.0) for row in gusty[:100]) < 0.01
+    at_8_s, at_11_s = (air_north(gusty[20 * t].state) for t in (8, 11))
+    assert at_8_s == pytest.approx(8.0, abs=2.5)  # less what sideslip hides from this estimate
+    assert max(abs(row.cross_track_m) for row in gusty) > 0.05
+    if gust.shape == "step":
+        assert at_11_s == pytest.approx(8.0, abs=1.0)
+    else:
+        assert abs(at_11_s) < 2.5
+
+
+def test_a_gust_front_is_flown_through() -> None:
+    gust = Gust("step", 0.0, 7.5, 20.0)
+    rows = flown(JsbsimModel("aerosonde", EASTWARDS, LocalPlane(47.0, 8.0), Atmosphere(gust=gust)), 60.0)
+    assert max(abs(row.cross_track_m) for row in rows) < 8.0
+    assert max(abs(row.cross_track_m) for row in rows[20 * 50 :]) < 0.2
+
+
+def test_planning_allows_for_the_gust() -> None:
+    frame = airframe("aerosonde")
+    calm, gusty = performance(frame, 25.0), performance(frame, 25.0, wind_mps=5.0, gust_mps=30.0)
+    assert gusty.turn_radius_m == pytest.approx(calm.turn_radius_m * (60.0 / 25.0) ** 2)
+    with pytest.raises(ValueError, match="gust_mps must be"):
+        performance(frame, 25.0, gust_mps=-1.0)
+
+
+angles = st.floats(0.0, math.tau)
+
+
+@given(angles, angles, st.floats(1.0, 4.0))
+def test_the_heading_makes_the_bearing_good_where_that_can_be(
+    wind_to: float, bearing: float, ratio: float
+) -> None:
+    wind, airspeed = ratio * 25.0, 25.0
+    we, wn = wind * math.sin(wind_to), wind * math.cos(wind_to)
+    be, bn = math.sin(bearing), math.cos(bearing)
+    east, north = air_direction(we, wn, airspeed, be, bn)
+    assert math.hypot(east, north) == pytest.approx(1.0)
+    ge, gn = we + airspeed * east, wn + airspeed * north
+    off = abs(math.remainder(math.atan2(ge, gn) - bearing, math.tau))
+    against = abs(math.remainder(bearing - wind_to, math.tau))
+    if against < math.asin(1.0 / ratio) - 1e-6:
+        assert off < 1e-5
+    else:
+        assert ge * be + gn * bn >= airspeed - wind - 1e-9  # not blown back faster than it must
+
+
+@pytest.mark.parametrize(
+    ("wind", "heading"), [((-30.0, 0.0), 90.0), ((0.0, -30.0), 29.0), ((30.0, 0.0), 90.0)]
+)
+def test_in_too_much_wind_it_drifts_without_circling(wind: tuple[float, float], heading: float) -> None:
+    """Towards the east at 25 m/s: against the wind, across it, with it."""
+    air = Atmosphere(gust=Gust("one_minus_cosine", *wind, 0.0, 240.0))
+    rows = flown(JsbsimModel("aerosonde", EASTWARDS, LocalPlane(47.0, 8.0), air), 120.0)
+    last = rows[-1].state
+    headings = [math.degrees(row.state.heading_rad) for row in rows]
+    turned = sum(abs(math.remainder(b - a, 360.0)) for a, b in pairwise(headings))
+    assert abs(math.remainder(headings[-1] - heading, 360.0)) < 25.0
+    assert turned < 200.0
+    assert abs(last.roll_rad) < math.radians(5.0)
+    if wind[1] == 0.0:
+        assert abs(rows[-1].cross_track_m) < 1.0
+        assert last.velocity_east_mps == pytest.approx(25.0 + wind[0], abs=1.0)
+
+
+def test_when_the_wind_drops_the_path_is_flown_again() -> None:
+    air = Atmosphere(gust=Gust("one_minus_cosine", -20.0, -20.0, 0.0, 120.0))
+    rows = flown(JsbsimModel("aerosonde", EASTWARDS, LocalPlane(47.0, 8.0), air), 180.0)
+    assert max(abs(row.cross_track_m) for row in rows) > 20.0
+    assert max(abs(row.cross_track_m) for row in rows[20 * 170 :]) < 0.2

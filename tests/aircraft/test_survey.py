@@ -1,0 +1,156 @@
+"""What flying a model tells of it, and models that cannot be flown."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import aircraft
+from aircraft.airframes import AircraftError, Entry, aircraft_names, airframe
+from aircraft.autopilot import gains
+from aircraft.interface import AircraftState
+from aircraft.jsbsim_loading import linearised, mass_kg, trimmed
+from aircraft.model_files import model_files
+from aircraft.survey import departure, in_flight, not_held, survey, weaving_error_m
+
+AEROSONDE = Path(aircraft.__path__[0], "aerosonde")
+
+
+def test_the_aerosonde_is_what_its_book_says() -> None:
+    """Beard and McLain: 11 kg; level flight from 17.3 to 32.4 m/s, of which some is needed for control."""
+    frame = airframe("aerosonde")
+    low, high = frame.airspeed_range_mps
+    assert frame.mass_kg == 11.0
+    assert 17.3 <= low <= 18.0
+    assert 31.5 <= high <= 32.4
+    assert frame.roll_in_s == pytest.approx(0.63, abs=0.02)
+    assert (frame.roll_lag_s, frame.roll_delay_s) == (0.25, 0.03)
+    assert frame.level_bank_deg(25.0) == frame.bank_limit_deg == 45.0
+
+
+def test_a_speed_at_the_edge_is_held_and_one_beyond_is_not() -> None:
+    frame = airframe("aerosonde")
+    low, high = frame.airspeed_range_mps
+    assert not_held(frame, low) is None
+    assert not_held(frame, high) is None
+    assert "cannot hold" in (not_held(frame, 0.96 * low) or "")
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({}, None),
+        ({"roll_rad": 0.3}, "bank off by 7.2 deg"),
+        ({"airspeed_mps": 26.0}, "airspeed 26.0 m/s instead of 25.0"),
+        ({"up_m": 297.0}, "altitude off by -3.0 m"),
+    ],
+)
+def test_what_is_not_kept_is_named(change: dict[str, float], reason: str | None) -> None:
+    good = AircraftState(0.0, 0.0, 0.0, 300.0, 0.0, 25.0, 0.0, 0.0, math.radians(10.0), 0.0, 25.0, 1.0)
+    assert departure(good._replace(**change), 10.0, 25.0) == reason
+
+
+def own_model(folder: Path, name: str, *changes: tuple[str, str]) -> Path:
+    """A copy of the Aerosonde under another name, changed."""
+    home = folder / name
+    shutil.copytree(AEROSONDE, home)
+    text = (home / "aerosonde.xml").read_text("utf-8")
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (home / "aerosonde.xml").unlink()
+    (home / f"{name}.xml").write_text(text, "utf-8")
+    return home
+
+
+def test_a_folder_with_a_model_is_an_aircraft(tmp_path: Path) -> None:
+    frame = airframe(str(own_model(tmp_path, "mine")))
+    known = airframe("aerosonde")
+    assert (frame.name, frame.verified) == ("mine", False)
+    assert frame.mass_kg == known.mass_kg
+    assert frame.airspeed_range_mps == pytest.approx(known.airspeed_range_mps, rel=0.03)
+    assert frame.airspeed_range_mps[0] < frame.cruise_mps < frame.airspeed_range_mps[1]
+    in_flight(frame, frame.cruise_mps).advance(10)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("SGS", "SGS cannot be trimmed for level flight at any speed from 8 to 300 m/s"),
+        ("L17", "L17: the model cannot be started: .*fcs/flaps"),
+        ("XB-70", "XB-70 cannot be held at .* m/s: "),
+    ],
+)
+def test_a_model_that_cannot_be_flown_says_why(name: str, message: str) -> None:
+    with pytest.raises(AircraftError, match=message):
+        airframe(name)
+
+
+def test_a_model_that_loses_control_says_how(tmp_path: Path) -> None:
+    """Its centre of gravity far aft, it is unstable in pitch."""
+    home = own_model(tmp_path, "tail_heavy", ("-2.74", "2.74"))
+    with pytest.raises(AircraftError, match="tail_heavy cannot be held at 25 m/s: unstable in pitch"):
+        survey(Entry("tail_heavy", "", 25.0), model_files(str(home)))
+
+
+@pytest.mark.parametrize(
+    ("files", "message"),
+    [
+        ({}, "holds no JSBSim model; must hold odd.xml"),
+        ({"a.xml": "<fdm_config/>", "b.xml": "<fdm_config/>"}, "holds 2 JSBSim models"),
+        ({"a.xml": "<other/>", "b.xml": "not XML"}, "holds no JSBSim model"),
+        ({"odd.xml": "<fdm_config>"}, "odd: the model cannot be loaded: .* is not well-formed XML"),
+    ],
+)
+def test_a_folder_without_a_sound_model_is_refused(
+    tmp_path: Path, files: dict[str, str], message: str
+) -> None:
+    home = tmp_path / "odd"
+    home.mkdir()
+    for name, text in files.items():
+        (home / name).write_text(text, "utf-8")
+    with pytest.raises(AircraftError, match=message):
+        airframe(str(home))
+
+
+def test_the_digest_changes_with_every_file_of_the_model(tmp_path: Path) -> None:
+    home = own_model(tmp_path, "mine")
+    before = model_files(str(home)).digest()
+    assert model_files(str(home)).digest() == before
+    (home / "motor.xml").write_text("<system/>", "utf-8")
+    changed = model_files(str(home)).digest()
+    assert changed != before
+    (home / "more.xml").write_text("", "utf-8")
+    assert model_files(str(home)).digest() not in (before, changed)
+
+
+def test_loops_are_as_fast_as_the_weave_allows() -> None:
+    """The T-37's control laws take phase: at full pace its roll swings."""
+    aerosonde, tweet = airframe("aerosonde"), airframe("T37")
+    assert aerosonde.guidance_bandwidth_radps == pytest.approx(0.36 * aerosonde.gains.roll)
+    assert weaving_error_m(aerosonde, 25.0) == pytest.approx(aerosonde.weave_error_m, rel=0.01)
+    assert tweet.gains.roll == pytest.approx(0.7 * 2.5)
+    at = linearised(trimmed(tweet.files, tweet.cruise_mps))
+    swinging = replace(tweet, gains=gains(at), roll_lag_s=0.4, guidance_bandwidth_radps=0.9)
+    assert weaving_error_m(swinging, tweet.cruise_mps) > 1.5 * tweet.weave_error_m
+
+
+def test_no_fuel_is_burnt() -> None:
+    model = in_flight(airframe("c172p"), 50.0)
+    before = mass_kg(model._fdm)
+    model.advance(120 * 300)
+    assert mass_kg(model._fdm) == pytest.approx(before, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", aircraft_names())
+def test_everything_in_the_table_is_held_at_cruise(name: str) -> None:
+    frame = airframe(name)
+    assert not_held(frame, frame.cruise_mps) is None
+    assert frame.level_bank_deg(frame.cruise_mps) >= 20.0
+    low, high = frame.airspeed_range_mps
+    assert 1.15 * low < frame.cruise_mps < high
