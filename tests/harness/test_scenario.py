@@ -304,7 +304,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         "goal_m",
         "kind",
     }
-    words = {"schema", "name", "kind", "model", "turn", "intensity"}
+    words = {"schema", "name", "kind", "model", "turn", "intensity", "shape"}
     assert len(values) > 40
     for name, key in values:
         assert bounded(key), name

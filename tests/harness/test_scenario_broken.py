@@ -270,7 +270,7 @@ BYTES = {
     "only spaces": (b"   \n\n", ":1: is empty"),
     "a word": (b"scenario\n", ":1: is the text 'scenario'; must be a mapping"),
     "a list": (b"- 1\n- 2\n", ":1: is a list of 2; must be a mapping"),
-    "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":27: a second document begins here"),
+    "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":28: a second document begins here"),
     "Latin-1": (GOOD.replace("good", "gut\xe9").encode("latin-1"), ":2: byte 0xe9 is not UTF-8"),
     "UTF-16": (GOOD.encode("utf-16"), ": is not a text file"),
     "binary": (bytes(range(256)) * 50, ": is not a text file"),
