@@ -303,6 +303,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         "start_m",
         "goal_m",
         "kind",
+        "speed_mps",
     }
     words = {"schema", "name", "kind", "model", "turn", "intensity", "shape"}
     assert len(values) > 40
