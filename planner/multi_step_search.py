@@ -105,7 +105,10 @@ def search(
             continue
         if depth == steps:
             continue
-        for edge in window.sector_edges(here, int(window.labels[hit])):
+        beside = [int(window.labels[hit])]
+        if wide and track.last is not None:
+            beside.append(track.last.obstacle)  # on round what it hugs, whatever lies towards the goal
+        for edge in window.sector_edges(here, beside):
             if not wide and _leads_away(track, edge):
                 continue
             child = _step(window, track, edge, goal, outer_m)

@@ -54,7 +54,7 @@ PORTION = 40
 """Steps of the search at one time, while a plan is in effect that ends in a safe turn."""
 
 MOST_EFFORT = 4
-"""Searches in vain are repeated with twice the effort each, so many times."""
+"""Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
 
 PRESSED = 4
 """Without such a plan so many portions are taken at once."""
@@ -62,7 +62,7 @@ PRESSED = 4
 UNHURRIED = 0.125
 """The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step."""
 
-HOLD_SHARES = (1.0, 0.5, 0.25)
+HOLD_SHARES = (1.0, 0.5, 0.25, 0.05)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
 
 
@@ -173,6 +173,8 @@ class RollingWindow:
         self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
         self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.speed_mps
         self._proof = Proof(mission, self._memory, self._local.least_keeps_m)
+        self._turns_keep_m = mission.clearance_m + mission.turn_radius_m
+        self._proof_for_turns = Proof(mission, self._memory, self._turns_keep_m)
         self._thinking: Deliberation | None = None
         self._dead_ends = DeadEnds(2.0 * mission.clearance_m)
         self._turning: Effect | None = None  # the last plan that was flown into its turn
@@ -216,6 +218,8 @@ class RollingWindow:
         watch = self._watch
         if self._thinking is not None:
             return True
+        if self._effort == MOST_EFFORT and self._searched_with == len(self._memory.points_m):
+            return since >= math.tau * self._mission.turn_radius_m
         wrong = min(watch.cut_m, effect.leaves_m) - here
         near = wrong < self._urgent_m
         if near and (watch.broken or newly_cut):
@@ -323,11 +327,7 @@ class RollingWindow:
         stuck = None if thinking is None else thinking.stuck
         if stuck is None and self._proof.closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
-            return Plan(
-                PlanStatus.UNREACHABLE,
-                "a closed chain of obstacles lies between the aircraft and the goal: "
-                f"no gap in it is wider than {gap:.0f} m",
-            )
+            return _unreachable(f"no gap in it is wider than {gap:.0f} m")
         if effect is None:
             return self._turn_away(request, None, here)
         turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
@@ -336,6 +336,9 @@ class RollingWindow:
             self._refused_at_m = request.station_m
             self._memory.refuse(self._unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
+            if self._proof_for_turns.closed(request.position_m):
+                gap = 2.0 * self._turns_keep_m
+                return _unreachable(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on")
             # No way is left but those given up, or one that takes more looking for.
             self._memory.forgive()
             self._effort = min(self._effort + 1, MOST_EFFORT)
@@ -388,3 +391,10 @@ class RollingWindow:
             f"something was seen at {request.time_s:.1f} s where the plan in effect was certified to be free, "
             "and there is no room to turn away"
         )
+
+
+def _unreachable(gaps: str) -> Plan:
+    return Plan(
+        PlanStatus.UNREACHABLE,
+        f"a closed chain of obstacles lies between the aircraft and the goal: {gaps}",
+    )

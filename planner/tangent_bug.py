@@ -175,7 +175,7 @@ class TangentBug(Walker[State]):
             place, reach, self.known.points_m[near], labels[near], self.known.cell_m, self.known.radii_m[near]
         )
         for label in sorted(wanted & set(np.unique(window.labels).tolist())):
-            for edge in window.sector_edges(place, label):
+            for edge in window.sector_edges(place, [label]):
                 touch = place[0] + edge.touch_m * edge.ux, place[1] + edge.touch_m * edge.uy
                 disc, _ = self.known.seat(touch)
                 x, y = self.known.points_m[disc].tolist()

@@ -10,6 +10,7 @@ something nearer hides is none.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -116,14 +117,15 @@ class Window:
             self._cells[label] = _Cells.of(members, self.points_m[members], self.cell_m)
         return self._cells[label]
 
-    def sector_edges(self, origin: Point, label: int) -> list[SectorEdge]:
-        """The edges M and N of the free sectors beside an obstacle, as seen from a track point.
+    def sector_edges(self, origin: Point, beside: Iterable[int]) -> list[SectorEdge]:
+        """The edges M and N of the free sectors beside some obstacles, as seen from a track point.
 
         Where something hides an edge, or closes it right behind the place where it touches, the edges of that are
         taken as well.
         """
         edges: list[SectorEdge] = []
-        pending, looked_at = [label], {label}
+        pending = list(dict.fromkeys(beside))
+        looked_at = set(pending)
         dx, dy = self.points_m[:, 0] - origin[0], self.points_m[:, 1] - origin[1]
         while pending:
             obstacle = pending.pop()
