@@ -25,7 +25,17 @@ MOST_STATIONS = 32
 
 
 class CertificateBroken(RuntimeError):
-    """Something was seen where the plan in effect was certified to be free, and there is no way out."""
+    """Something was seen where the plan in effect was certified to be free, and there is no way out.
+
+    Args:
+        time_s: when it was seen.
+    """
+
+    def __init__(self, time_s: float) -> None:
+        super().__init__(
+            f"something was seen at {time_s:.1f} s where the plan in effect was certified to be free, "
+            "and there is no room to turn away"
+        )
 
 
 @dataclass(frozen=True)

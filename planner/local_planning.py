@@ -19,7 +19,7 @@ from planner.window import Window
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
 
-LEAST_MARGIN = 0.2
+LEAST_MARGIN = 0.4
 """Share of the margin that is kept where there is no room for all of it."""
 
 MOST_TRACKS = 300

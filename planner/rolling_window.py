@@ -4,14 +4,18 @@ In every rolling step: take the planning window about the track point where the 
 steps deep among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum
 turn radius (`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that
 part is put into effect which ends in a turn seen to be free (`certificate`), and flown until the window rolls
-on.
+on. A search that takes long is spread over several scans (`deliberation`).
 
 Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there
 is a way, the course is a shortest one through what is known. Each course is flown until something seen
 contradicts it. Edge points lie on a finite grid, so that this can happen only finitely often, and a course that
-nothing contradicts ends at the goal. A place that the aircraft cannot be certified to enter is left out of
-further searches (`ObstacleMemory.refuse`): each such place covers a disc of the clearance, so that these are
-finitely many as well. Where no way is left, a closed chain of edges proves it (`barrier`).
+nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
+searches (`dead_ends`, `ObstacleMemory.refuse`): each covers a disc of the clearance, so that these are finitely
+many as well. A search in vain is repeated with twice the effort. Where no way is left at the clearance, a closed
+chain of edges proves it; where none is left but those given up, one with room to turn everywhere must remain,
+or such a chain proves that there is none for this aircraft (`barrier`). Assumed: a world that stands still, a
+sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along which a disc
+of the turn radius can be moved at the clearance.
 """
 
 from __future__ import annotations
@@ -50,19 +54,19 @@ BROKEN_SHARE = 0.99
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-PORTION = 40
+PORTION = 30
 """Steps of the search at one time, while a plan is in effect that ends in a safe turn."""
 
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
 
-PRESSED = 4
+PRESSED = 5
 """Without such a plan so many portions are taken at once."""
 
-UNHURRIED = 0.125
+UNHURRIED = 0.0625
 """The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step."""
 
-HOLD_SHARES = (1.0, 0.5, 0.25, 0.05)
+HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
 
 
@@ -387,14 +391,9 @@ class RollingWindow:
                 return plan
         if effect is None:
             return Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start")
-        raise CertificateBroken(
-            f"something was seen at {request.time_s:.1f} s where the plan in effect was certified to be free, "
-            "and there is no room to turn away"
-        )
+        raise CertificateBroken(request.time_s)
 
 
 def _unreachable(gaps: str) -> Plan:
-    return Plan(
-        PlanStatus.UNREACHABLE,
-        f"a closed chain of obstacles lies between the aircraft and the goal: {gaps}",
-    )
+    chain = "a closed chain of obstacles lies between the aircraft and the goal"
+    return Plan(PlanStatus.UNREACHABLE, f"{chain}: {gaps}")
