@@ -236,7 +236,8 @@ class ObstacleMap:
         offsets = self._points.take(slots) - sensor
         distance = np.abs(offsets)
         rays = len(scan.ranges_m)
-        position = _clockwise_from(scan.start_rad, offsets) / scan.spacing_rad
+        bearing = _clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
+        position = bearing / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
         # Only a ray that passes close by says anything about the point.
         aimed = (np.abs(position - ray) * scan.spacing_rad * distance < 0.25 * self._cell) & (
@@ -300,13 +301,12 @@ class _FreeSpace:
         # From the sensor to the middle of each cell.
         x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
         y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
-        distance = np.hypot(x, y)
+        distance = np.sqrt(x * x + y * y)
         rays = len(scan.ranges_m)
-        position = _clockwise_from(scan.start_rad, x + 1j * y) / scan.spacing_rad
-        ray = np.rint(position).astype(np.int64)
+        ray = np.rint(_clockwise_from(scan.start_rad, x, y) * (1.0 / scan.spacing_rad)).astype(np.int64)
         # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
         half = 0.75 * self._cell
-        level = np.ceil(half / np.maximum(distance, half) / scan.spacing_rad).astype(np.int64) + 1
+        level = np.ceil(half / scan.spacing_rad / np.maximum(distance, half)).astype(np.int64) + 1
         if not _all_round(scan):
             covered = ((ray >= level) & (ray < rays - level)).nonzero()[0]
             column, row, distance, ray, level = (
@@ -342,9 +342,9 @@ def _pairs(points: ComplexArray) -> FloatArray:
     return points.view(np.float64).reshape(-1, 2)
 
 
-def _clockwise_from(start_rad: float, offsets: ComplexArray) -> FloatArray:
+def _clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> FloatArray:
     """(k,) bearings of offsets, clockwise from a bearing, in [0, 2 pi]."""
-    turns = (np.arctan2(offsets.real, offsets.imag) - start_rad) * (1.0 / math.tau)
+    turns = (np.arctan2(east, north) - start_rad) * (1.0 / math.tau)
     turned: FloatArray = (turns - np.floor(turns)) * math.tau
     return turned
 
@@ -352,16 +352,16 @@ def _clockwise_from(start_rad: float, offsets: ComplexArray) -> FloatArray:
 def _least_beside(ranges: FloatArray, ray: NDArray[np.int64], level: NDArray[np.int64]) -> FloatArray:
     """The least range of each of some rays and at least those `level` rays to either side.
 
-    The ends of the fan are joined. Windows are widened to 2^k - 1 rays to either side.
+    The ends of the fan are joined: its last ray is followed by the first. Windows are widened to 2^k - 1 rays
+    to either side.
     """
     rays = len(ranges)
     power = np.minimum(np.frexp(level)[1], rays.bit_length() - 1)
     ring = np.concatenate((ranges, ranges, ranges))
-    least = [ranges]
+    least = [ring[rays : 2 * rays + 1]]
     for k in range(int(power.max(initial=0))):
         wide = 2**k
         ring = np.minimum(np.minimum(ring[: -2 * wide], ring[wide:-wide]), ring[2 * wide :])
         first = rays + 1 - 2 * wide
-        least.append(ring[first : first + rays])
-    result: FloatArray = np.array(least)[power, ray % rays]
-    return result
+        least.append(ring[first : first + rays + 1])
+    return np.concatenate(least).take(power * (rays + 1) + ray)

@@ -130,39 +130,40 @@ class RangeSensor:
         """(n,) ranges to the nearest face, +inf beyond the range; sine and cosine of the heading."""
         faces = self._near(east, north, time).faces(time)
         ranges = self._nothing.copy()
-        if faces.circles_m.shape[1]:
-            self._hit_circles(ranges, faces.circles_m.T.tolist(), complex(east, north), complex(cos, sin))
+        for circle in faces.circles:
+            self._hit_circle(ranges, circle, complex(east, north), complex(cos, sin))
         if faces.edges_m.shape[1]:
             away_east, away_north = faces.edges_m[::2] - east, faces.edges_m[1::2] - north
             self._hit_edges(ranges, cos * away_east - sin * away_north, sin * away_east + cos * away_north)
-        if faces.circles_m.size or faces.edges_m.size:
+        if faces.circles or faces.edges_m.size:
             np.copyto(ranges, math.inf, where=ranges > self._config.range_m)
         return ranges
 
-    def _hit_circles(
-        self, ranges: FloatArray, circles: list[list[float]], place: complex, heading: complex
+    def _hit_circle(
+        self, ranges: FloatArray, circle: tuple[float, float, float], place: complex, heading: complex
     ) -> None:
-        """Lowers ranges to circles: centre east and north, radius; from a place, with a nose."""
-        tries, faces = [], []
-        for east, north, radius in circles:
-            centre = (complex(east, north) - place) * heading  # to the right + i ahead
-            away = abs(centre)
-            if away - radius > self._config.range_m:
-                continue
-            half_rad, near_side = (math.asin(radius / away), -1.0) if away > radius else (math.pi, 1.0)
-            x, y = centre.real, centre.imag
-            for span in self._tried(math.atan2(x, y) - half_rad, 2.0 * half_rad):
-                tries.append(span)
-                faces.append((x, y, (away - radius) * (away + radius), near_side))
-        if not tries:
+        """Lowers ranges to a circle: centre east and north, radius; from a place, with a nose."""
+        east, north, radius = circle
+        centre = (complex(east, north) - place) * heading  # to the right + i ahead
+        away = abs(centre)
+        if away - radius > self._config.range_m:
             return
+        half_rad, near_side = (math.asin(radius / away), True) if away > radius else (math.pi, False)
+        right, ahead = centre.real, centre.imag
         # The power of the sensor's place: the square of its tangent to the circle, negative inside.
-        (ray_right, ray_ahead), (right, ahead, power, sign) = self._pairs(tries, np.array(faces).T)
-        along = right * ray_right + ahead * ray_ahead
-        half_chord2 = along * along - power
-        distance = along + sign * np.sqrt(np.maximum(half_chord2, 0.0))
-        np.copyto(distance, math.inf, where=np.minimum(half_chord2, distance) < 0.0)
-        _lower(ranges, tries, distance)
+        power = (away - radius) * (away + radius)
+        for low, high in self._tried(math.atan2(right, ahead) - half_rad, 2.0 * half_rad):
+            along = self._fan[0, low:high] * right
+            along += self._fan[1, low:high] * ahead
+            half_chord2 = along * along
+            half_chord2 -= power
+            half_chord = np.sqrt(np.maximum(half_chord2, 0.0))
+            distance = along - half_chord if near_side else along + half_chord
+            # Only the outermost rays may pass by: the margin is far less than a ray.
+            for end in (0, -1):
+                if half_chord2[end] < 0.0 or distance[end] < 0.0:
+                    distance[end] = math.inf
+            np.minimum(ranges[low:high], distance, out=ranges[low:high])
 
     def _hit_edges(self, ranges: FloatArray, right: FloatArray, ahead: FloatArray) -> None:
         """Lowers ranges to edges; (2, e) where they start and end, to the right and ahead.
