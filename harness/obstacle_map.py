@@ -95,7 +95,7 @@ class ObstacleMap:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         self._scans += 1
-        nearest = float(scan.ranges_m.min())
+        nearest = float(np.minimum.reduce(scan.ranges_m))
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
             if self._unconfirmed or not abs(sensor - self._taken_at) < min(SAME_PLACE * nearest, self._cell):
@@ -130,9 +130,9 @@ class ObstacleMap:
         self._unconfirmed = False
         hits = (scan.ranges_m < math.inf).nonzero()[0]
         ranges = scan.ranges_m.take(hits)
-        directions: ComplexArray = scan.directions.view(np.complex128).ravel()
         # Places are points seen from the corner of the grid.
-        places = directions.take(hits) * ranges + (complex(scan.east_m, scan.north_m) - self._origin)
+        places = scan.from_sensor_m(hits)
+        places += complex(scan.east_m, scan.north_m) - self._origin
         cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
         column, row = cells[::2], cells[1::2]
         if not self._holds(scan):

@@ -7,6 +7,7 @@ only choose which rays are tried, with a margin. So a face that is not hit canno
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
+ComplexArray = NDArray[np.complex128]
 
 # The neighbour list reaches this part of the range further, and this far into the future.
 _SKIN = 0.1
@@ -32,16 +34,17 @@ _MARGIN_RAYS = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class RangeScan:
-    """One scan; all arrays are copied and read-only.
+    """One scan; all arrays are read-only, and copied if they were not.
 
     Attributes:
         time_s: when the sensor looked.
         available_s: when the scan may be used.
         east_m: sensor position.
         north_m: sensor position.
+        heading_rad: bearing of the nose, clockwise from north.
         start_rad: bearing of ray 0, clockwise from north, in [0, 2 pi).
         spacing_rad: bearing of each ray less that of the one before; positive, clockwise.
-        directions: (n, 2) unit vectors (east, north) of the rays.
+        fan: (n,) unit vectors of the rays as the nose sees them, to its right + i ahead.
         ranges_m: (n,) measured ranges, +inf where nothing came back.
         max_range_m: no return is longer.
     """
@@ -50,17 +53,33 @@ class RangeScan:
     available_s: float
     east_m: float
     north_m: float
+    heading_rad: float
     start_rad: float
     spacing_rad: float
-    directions: FloatArray
+    fan: ComplexArray
     ranges_m: FloatArray
     max_range_m: float
 
     def __post_init__(self) -> None:
-        for name in ("directions", "ranges_m"):
-            array = getattr(self, name).copy()
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        for name in ("fan", "ranges_m"):
+            array = getattr(self, name)
+            if array.flags.writeable:
+                array = array.copy()
+                array.setflags(write=False)
+                object.__setattr__(self, name, array)
+
+    def from_sensor_m(self, rays: IntArray) -> ComplexArray:
+        """(k,) where some rays ended, east + i north of the sensor."""
+        turned: ComplexArray = self.fan.take(rays) * self.ranges_m.take(rays)
+        turned *= cmath.rect(1.0, -self.heading_rad)
+        return turned
+
+    @property
+    def directions(self) -> FloatArray:
+        """(n, 2) unit vectors (east, north) of the rays."""
+        turned: ComplexArray = self.fan * cmath.rect(1.0, -self.heading_rad)
+        turned.setflags(write=False)
+        return turned.view(np.float64).reshape(-1, 2)
 
 
 class RangeSensor:
@@ -91,7 +110,8 @@ class RangeSensor:
         offsets = self._first_rad + self._spacing_rad * np.arange(config.rays)
         self._turn = math.tau / self._spacing_rad
         self._fan = np.array((np.sin(offsets), np.cos(offsets)))  # seen from the nose: to its right, ahead
-        self._fan_turned = self._fan[0] + 1j * self._fan[1]
+        self._rays: ComplexArray = self._fan[0] + 1j * self._fan[1]
+        self._rays.setflags(write=False)
         self._nothing = np.full(config.rays, math.inf)
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
@@ -102,16 +122,18 @@ class RangeSensor:
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
         """Looks around from a place, at a time."""
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
-        directions = self._fan_turned * complex(cos, -sin)
+        ranges = self._degraded(self._true_ranges(east_m, north_m, time_s, sin, cos))
+        ranges.setflags(write=False)
         return RangeScan(
             time_s=time_s,
             available_s=time_s + self._config.latency_s,
             east_m=east_m,
             north_m=north_m,
+            heading_rad=heading_rad,
             start_rad=(heading_rad + self._first_rad) % math.tau,
             spacing_rad=self._spacing_rad,
-            directions=directions.view(np.float64).reshape(-1, 2),
-            ranges_m=self._degraded(self._true_ranges(east_m, north_m, time_s, sin, cos)),
+            fan=self._rays,
+            ranges_m=ranges,
             max_range_m=self._config.range_m,
         )
 
