@@ -129,47 +129,51 @@ class ObstacleMap:
         """
         self._unconfirmed = False
         hits = (scan.ranges_m < math.inf).nonzero()[0]
-        ranges = scan.ranges_m.take(hits)
         # Places are points seen from the corner of the grid.
         places = scan.from_sensor_m(hits)
         places += complex(scan.east_m, scan.north_m) - self._origin
-        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
-        column, row = cells[::2], cells[1::2]
+        column, row = self._column_and_row(places)
         if not self._holds(scan):
             on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
-            hits, ranges, places = hits[on_grid], ranges[on_grid], places[on_grid]
-            column, row = column[on_grid], row[on_grid]
+            hits, places, column, row = hits[on_grid], places[on_grid], column[on_grid], row[on_grid]
         keys = column * self._ny + row
-        news = self._score.take(keys) < CERTAIN
-        anything_new = np.count_nonzero(news) > 0
-        if not anything_new and not nearest_m < self._near_by:
+        uncertain = self._score.take(keys) < CERTAIN
+        news = uncertain.nonzero()[0]
+        near = nearest_m < self._near_by and len(hits) > 0
+        if not len(news) and not near:
             return
-        near = ranges < self._near_by
-        counted, found = keys[news], places[news]
+        counted, found = keys.take(news), places.take(news)
         rays = len(scan.ranges_m)
         closed = _all_round(scan) and hits[0] + rays - hits[-1] <= 2
         if closed:
             hits = np.concatenate((hits, hits[:1] + rays))
             places = np.concatenate((places, places[:1]))
-            news, near = np.concatenate((news, news[:1])), np.concatenate((near, near[:1]))
+            uncertain = np.concatenate((uncertain, uncertain[:1]))
         step = places[1:] - places[:-1]
         gap = np.abs(step)
         # One ray may be missing between neighbours: a lost return does not open a wall.
         joined = (gap < self._join) & (hits[1:] - hits[:-1] <= 2)
-        if anything_new:
-            wide = (joined & (gap > self._cell) & (news[1:] | news[:-1])).nonzero()[0]
-            between = (places[wide, None] + step[wide, None] * BETWEEN).ravel()
-            cells = (between.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
-            counted = np.concatenate((counted, cells[::2] * self._ny + cells[1::2]))
-            found = np.concatenate((found, between))
-        ends = (~joined).nonzero()[0]
-        ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
-        ends = ends[near[ends]]
-        if len(ends):
-            counted = np.concatenate((counted, self._fine_keys(places[ends])))
-            found = np.concatenate((found, places[ends]))
+        if len(news):
+            wide = (joined & (gap > self._cell) & (uncertain[1:] | uncertain[:-1])).nonzero()[0]
+            if len(wide):
+                between = (places[wide, None] + step[wide, None] * BETWEEN).ravel()
+                column, row = self._column_and_row(between)
+                counted = np.concatenate((counted, column * self._ny + row))
+                found = np.concatenate((found, between))
+        if near:
+            ends = (~joined).nonzero()[0]
+            ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
+            ends = ends[scan.ranges_m.take(hits[ends], mode="wrap") < self._near_by]
+            if len(ends):
+                counted = np.concatenate((counted, self._fine_keys(places[ends])))
+                found = np.concatenate((found, places[ends]))
         if len(counted):
             self._count_hits(counted, found)
+
+    def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Cells of places seen from the corner of the grid."""
+        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
+        return cells[::2], cells[1::2]
 
     def _holds(self, scan: RangeScan) -> bool:
         """Whether all that a scan can reach lies on the grid."""
@@ -191,7 +195,8 @@ class ObstacleMap:
             self._revision += 1
             self._since[self._slot[raised]] = self._revision
         fresh = (score == 0).nonzero()[0]
-        fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
+        if len(fresh):
+            fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
         if len(fresh):
             first: dict[int, int] = {}
             for key, hit in zip(keys[fresh].tolist(), uncertain[fresh].tolist(), strict=True):
