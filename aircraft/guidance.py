@@ -154,13 +154,13 @@ class PathFollower:
         bank_limit = self._bank_limit
         heading_east, heading_north = math.sin(state.heading_rad), math.cos(state.heading_rad)
         airspeed = state.airspeed_mps
-        wind_east, wind_north = (
-            velocity_east - airspeed * heading_east,
-            velocity_north - airspeed * heading_north,
-        )
-        if wind_east * wind_east + wind_north * wind_north >= airspeed * airspeed:
+        ahead_mps = velocity_east * heading_east + velocity_north * heading_north
+        # The wind, the ground velocity less the air velocity, is not weaker than the airspeed.
+        if speed * speed >= 2.0 * airspeed * ahead_mps:
+            wind_east = velocity_east - airspeed * heading_east
+            wind_north = velocity_north - airspeed * heading_north
             # Left of the path by this sine, as far as it can be made good.
-            left = INTERCEPT_SINE * max(-1.0, min(1.0, cross * self._pull_per_s / airspeed))
+            left = INTERCEPT_SINE * _within(1.0, cross * self._pull_per_s / airspeed)
             ahead = math.sqrt(1.0 - left * left)
             bearing_east = ahead * tangent_east - left * tangent_north
             bearing_north = ahead * tangent_north + left * tangent_east
@@ -172,36 +172,34 @@ class PathFollower:
         elif along_mps <= 0.0:
             wanted = -bank_limit if cross_mps > 0.0 else bank_limit
         else:
-            lift_share = (velocity_east * heading_east + velocity_north * heading_north) / speed
-            approach = INTERCEPT_SINE * speed
-            pull = max(-approach, min(approach, cross * self._pull_per_s))
+            pull = _within(INTERCEPT_SINE * speed, cross * self._pull_per_s)
             # Lift acts across the course, the correction across the path.
             across = -self._two_zeta_omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
             acceleration = across - self._curvature_ahead(station, speed) * speed * speed
-            wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(lift_share, 0.2)))
-        saturated = abs(wanted) > bank_limit
-        if saturated:
-            wanted = math.copysign(bank_limit, wanted)
-        step = max(-self._roll_step, min(self._roll_step, wanted - self._roll))
+            wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
+        allowed = _within(bank_limit, wanted)
+        step = _within(self._roll_step, allowed - self._roll)
         self._roll += step
         # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
-        command = max(-bank_limit, min(bank_limit, self._roll + self._lead_updates * step))
+        command = _within(bank_limit, self._roll + self._lead_updates * step)
         past_end = not self._loiter and station > self._length
-        return GuidanceOutput(command, cross, station, saturated, past_end)
+        return GuidanceOutput(command, cross, station, allowed != wanted, past_end)
 
     def _project(self, east: float, north: float) -> tuple[float, float, float]:
         """Moves to the nearest point; cross-track error and the unit tangent there."""
         while True:
             row = self._rows[self._index]
-            length = row[5]
-            if row[4] == 0.0:
-                along, cross, tangent_east, tangent_north = _on_line(row, east, north)
-            elif self._index < self._last or self._loiter or self._along <= length:
+            east0, north0, tangent_east, tangent_north, curvature, length = row
+            begun = 0.0
+            if curvature and self._along > length and self._index == self._last and not self._loiter:
+                east0, north0, tangent_east, tangent_north = arc_point(row, length)
+                curvature, begun = 0.0, length
+            if curvature:
                 along, cross, tangent_east, tangent_north = _on_arc(row, east, north, self._along)
             else:
-                end = (*arc_point(row, length), 0.0, math.inf)
-                along, cross, tangent_east, tangent_north = _on_line(end, east, north)
-                along += length
+                to_east, to_north = east - east0, north - north0
+                along = begun + to_east * tangent_east + to_north * tangent_north
+                cross = to_east * tangent_north - to_north * tangent_east
             if along <= length or self._index == self._last:
                 self._along = max(along, 0.0)
                 return cross, tangent_east, tangent_north
@@ -232,16 +230,16 @@ class PathFollower:
         return self._turned[index] + self._rows[index][4] * along
 
 
-def _on_line(row: _Row, east: float, north: float) -> tuple[float, float, float, float]:
-    """Where a point is along and to the right of a line, and the unit tangent there."""
-    east0, north0, tangent_east, tangent_north, _, _ = row
-    east, north = east - east0, north - north0
-    along = east * tangent_east + north * tangent_north
-    return along, east * tangent_north - north * tangent_east, tangent_east, tangent_north
+def _within(limit: float, value: float) -> float:
+    """The value between minus and plus a limit that is nearest to it."""
+    return value if -limit <= value <= limit else math.copysign(limit, value)
 
 
 def _on_arc(row: _Row, east: float, north: float, near_m: float) -> tuple[float, float, float, float]:
-    """The same of an arc, on which the point is within half a turn of a place along it."""
+    """Where a point is along and to the right of an arc, and the unit tangent there.
+
+    The point is within half a turn of a place along the arc.
+    """
     east0, north0, tangent_east, tangent_north, curvature, _ = row
     # The centre lies 1/curvature to the left of the start; angles are counted along the flight.
     radius = 1.0 / curvature

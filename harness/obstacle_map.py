@@ -95,7 +95,7 @@ class ObstacleMap:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         self._scans += 1
-        nearest = float(scan.ranges_m.min())
+        nearest = float(np.minimum.reduce(scan.ranges_m))
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
             if self._unconfirmed or not abs(sensor - self._taken_at) < min(SAME_PLACE * nearest, self._cell):
@@ -129,47 +129,51 @@ class ObstacleMap:
         """
         self._unconfirmed = False
         hits = (scan.ranges_m < math.inf).nonzero()[0]
-        ranges = scan.ranges_m.take(hits)
-        directions: ComplexArray = scan.directions.view(np.complex128).ravel()
         # Places are points seen from the corner of the grid.
-        places = directions.take(hits) * ranges + (complex(scan.east_m, scan.north_m) - self._origin)
-        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
-        column, row = cells[::2], cells[1::2]
+        places = scan.from_sensor_m(hits)
+        places += complex(scan.east_m, scan.north_m) - self._origin
+        column, row = self._column_and_row(places)
         if not self._holds(scan):
             on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
-            hits, ranges, places = hits[on_grid], ranges[on_grid], places[on_grid]
-            column, row = column[on_grid], row[on_grid]
+            hits, places, column, row = hits[on_grid], places[on_grid], column[on_grid], row[on_grid]
         keys = column * self._ny + row
-        news = self._score.take(keys) < CERTAIN
-        anything_new = np.count_nonzero(news) > 0
-        if not anything_new and not nearest_m < self._near_by:
+        uncertain = self._score.take(keys) < CERTAIN
+        news = uncertain.nonzero()[0]
+        near = nearest_m < self._near_by and len(hits) > 0
+        if not len(news) and not near:
             return
-        near = ranges < self._near_by
-        counted, found = keys[news], places[news]
+        counted, found = keys.take(news), places.take(news)
         rays = len(scan.ranges_m)
         closed = _all_round(scan) and hits[0] + rays - hits[-1] <= 2
         if closed:
             hits = np.concatenate((hits, hits[:1] + rays))
             places = np.concatenate((places, places[:1]))
-            news, near = np.concatenate((news, news[:1])), np.concatenate((near, near[:1]))
+            uncertain = np.concatenate((uncertain, uncertain[:1]))
         step = places[1:] - places[:-1]
         gap = np.abs(step)
         # One ray may be missing between neighbours: a lost return does not open a wall.
         joined = (gap < self._join) & (hits[1:] - hits[:-1] <= 2)
-        if anything_new:
-            wide = (joined & (gap > self._cell) & (news[1:] | news[:-1])).nonzero()[0]
-            between = (places[wide, None] + step[wide, None] * BETWEEN).ravel()
-            cells = (between.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
-            counted = np.concatenate((counted, cells[::2] * self._ny + cells[1::2]))
-            found = np.concatenate((found, between))
-        ends = (~joined).nonzero()[0]
-        ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
-        ends = ends[near[ends]]
-        if len(ends):
-            counted = np.concatenate((counted, self._fine_keys(places[ends])))
-            found = np.concatenate((found, places[ends]))
+        if len(news):
+            wide = (joined & (gap > self._cell) & (uncertain[1:] | uncertain[:-1])).nonzero()[0]
+            if len(wide):
+                between = (places[wide, None] + step[wide, None] * BETWEEN).ravel()
+                column, row = self._column_and_row(between)
+                counted = np.concatenate((counted, column * self._ny + row))
+                found = np.concatenate((found, between))
+        if near:
+            ends = (~joined).nonzero()[0]
+            ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
+            ends = ends[scan.ranges_m.take(hits[ends], mode="wrap") < self._near_by]
+            if len(ends):
+                counted = np.concatenate((counted, self._fine_keys(places[ends])))
+                found = np.concatenate((found, places[ends]))
         if len(counted):
             self._count_hits(counted, found)
+
+    def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Cells of places seen from the corner of the grid."""
+        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
+        return cells[::2], cells[1::2]
 
     def _holds(self, scan: RangeScan) -> bool:
         """Whether all that a scan can reach lies on the grid."""
@@ -191,7 +195,8 @@ class ObstacleMap:
             self._revision += 1
             self._since[self._slot[raised]] = self._revision
         fresh = (score == 0).nonzero()[0]
-        fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
+        if len(fresh):
+            fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
         if len(fresh):
             first: dict[int, int] = {}
             for key, hit in zip(keys[fresh].tolist(), uncertain[fresh].tolist(), strict=True):
@@ -236,7 +241,8 @@ class ObstacleMap:
         offsets = self._points.take(slots) - sensor
         distance = np.abs(offsets)
         rays = len(scan.ranges_m)
-        position = _clockwise_from(scan.start_rad, offsets) / scan.spacing_rad
+        bearing = _clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
+        position = bearing / scan.spacing_rad
         ray = np.rint(position).astype(np.int64)
         # Only a ray that passes close by says anything about the point.
         aimed = (np.abs(position - ray) * scan.spacing_rad * distance < 0.25 * self._cell) & (
@@ -300,13 +306,12 @@ class _FreeSpace:
         # From the sensor to the middle of each cell.
         x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
         y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
-        distance = np.hypot(x, y)
+        distance = np.sqrt(x * x + y * y)
         rays = len(scan.ranges_m)
-        position = _clockwise_from(scan.start_rad, x + 1j * y) / scan.spacing_rad
-        ray = np.rint(position).astype(np.int64)
+        ray = np.rint(_clockwise_from(scan.start_rad, x, y) * (1.0 / scan.spacing_rad)).astype(np.int64)
         # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
         half = 0.75 * self._cell
-        level = np.ceil(half / np.maximum(distance, half) / scan.spacing_rad).astype(np.int64) + 1
+        level = np.ceil(half / scan.spacing_rad / np.maximum(distance, half)).astype(np.int64) + 1
         if not _all_round(scan):
             covered = ((ray >= level) & (ray < rays - level)).nonzero()[0]
             column, row, distance, ray, level = (
@@ -342,9 +347,9 @@ def _pairs(points: ComplexArray) -> FloatArray:
     return points.view(np.float64).reshape(-1, 2)
 
 
-def _clockwise_from(start_rad: float, offsets: ComplexArray) -> FloatArray:
+def _clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> FloatArray:
     """(k,) bearings of offsets, clockwise from a bearing, in [0, 2 pi]."""
-    turns = (np.arctan2(offsets.real, offsets.imag) - start_rad) * (1.0 / math.tau)
+    turns = (np.arctan2(east, north) - start_rad) * (1.0 / math.tau)
     turned: FloatArray = (turns - np.floor(turns)) * math.tau
     return turned
 
@@ -352,16 +357,16 @@ def _clockwise_from(start_rad: float, offsets: ComplexArray) -> FloatArray:
 def _least_beside(ranges: FloatArray, ray: NDArray[np.int64], level: NDArray[np.int64]) -> FloatArray:
     """The least range of each of some rays and at least those `level` rays to either side.
 
-    The ends of the fan are joined. Windows are widened to 2^k - 1 rays to either side.
+    The ends of the fan are joined: its last ray is followed by the first. Windows are widened to 2^k - 1 rays
+    to either side.
     """
     rays = len(ranges)
     power = np.minimum(np.frexp(level)[1], rays.bit_length() - 1)
     ring = np.concatenate((ranges, ranges, ranges))
-    least = [ranges]
+    least = [ring[rays : 2 * rays + 1]]
     for k in range(int(power.max(initial=0))):
         wide = 2**k
         ring = np.minimum(np.minimum(ring[: -2 * wide], ring[wide:-wide]), ring[2 * wide :])
         first = rays + 1 - 2 * wide
-        least.append(ring[first : first + rays])
-    result: FloatArray = np.array(least)[power, ray % rays]
-    return result
+        least.append(ring[first : first + rays + 1])
+    return np.concatenate(least).take(power * (rays + 1) + ray)

@@ -7,6 +7,7 @@ only choose which rays are tried, with a margin. So a face that is not hit canno
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
+ComplexArray = NDArray[np.complex128]
 
 # The neighbour list reaches this part of the range further, and this far into the future.
 _SKIN = 0.1
@@ -32,16 +34,17 @@ _MARGIN_RAYS = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class RangeScan:
-    """One scan; all arrays are copied and read-only.
+    """One scan; all arrays are read-only, and copied if they were not.
 
     Attributes:
         time_s: when the sensor looked.
         available_s: when the scan may be used.
         east_m: sensor position.
         north_m: sensor position.
+        heading_rad: bearing of the nose, clockwise from north.
         start_rad: bearing of ray 0, clockwise from north, in [0, 2 pi).
         spacing_rad: bearing of each ray less that of the one before; positive, clockwise.
-        directions: (n, 2) unit vectors (east, north) of the rays.
+        fan: (n,) unit vectors of the rays as the nose sees them, to its right + i ahead.
         ranges_m: (n,) measured ranges, +inf where nothing came back.
         max_range_m: no return is longer.
     """
@@ -50,17 +53,33 @@ class RangeScan:
     available_s: float
     east_m: float
     north_m: float
+    heading_rad: float
     start_rad: float
     spacing_rad: float
-    directions: FloatArray
+    fan: ComplexArray
     ranges_m: FloatArray
     max_range_m: float
 
     def __post_init__(self) -> None:
-        for name in ("directions", "ranges_m"):
-            array = getattr(self, name).copy()
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        for name in ("fan", "ranges_m"):
+            array = getattr(self, name)
+            if array.flags.writeable:
+                array = array.copy()
+                array.setflags(write=False)
+                object.__setattr__(self, name, array)
+
+    def from_sensor_m(self, rays: IntArray) -> ComplexArray:
+        """(k,) where some rays ended, east + i north of the sensor."""
+        turned: ComplexArray = self.fan.take(rays) * self.ranges_m.take(rays)
+        turned *= cmath.rect(1.0, -self.heading_rad)
+        return turned
+
+    @property
+    def directions(self) -> FloatArray:
+        """(n, 2) unit vectors (east, north) of the rays."""
+        turned: ComplexArray = self.fan * cmath.rect(1.0, -self.heading_rad)
+        turned.setflags(write=False)
+        return turned.view(np.float64).reshape(-1, 2)
 
 
 class RangeSensor:
@@ -91,7 +110,8 @@ class RangeSensor:
         offsets = self._first_rad + self._spacing_rad * np.arange(config.rays)
         self._turn = math.tau / self._spacing_rad
         self._fan = np.array((np.sin(offsets), np.cos(offsets)))  # seen from the nose: to its right, ahead
-        self._fan_turned = self._fan[0] + 1j * self._fan[1]
+        self._rays: ComplexArray = self._fan[0] + 1j * self._fan[1]
+        self._rays.setflags(write=False)
         self._nothing = np.full(config.rays, math.inf)
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
@@ -102,16 +122,18 @@ class RangeSensor:
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
         """Looks around from a place, at a time."""
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
-        directions = self._fan_turned * complex(cos, -sin)
+        ranges = self._degraded(self._true_ranges(east_m, north_m, time_s, sin, cos))
+        ranges.setflags(write=False)
         return RangeScan(
             time_s=time_s,
             available_s=time_s + self._config.latency_s,
             east_m=east_m,
             north_m=north_m,
+            heading_rad=heading_rad,
             start_rad=(heading_rad + self._first_rad) % math.tau,
             spacing_rad=self._spacing_rad,
-            directions=directions.view(np.float64).reshape(-1, 2),
-            ranges_m=self._degraded(self._true_ranges(east_m, north_m, time_s, sin, cos)),
+            fan=self._rays,
+            ranges_m=ranges,
             max_range_m=self._config.range_m,
         )
 
@@ -130,39 +152,40 @@ class RangeSensor:
         """(n,) ranges to the nearest face, +inf beyond the range; sine and cosine of the heading."""
         faces = self._near(east, north, time).faces(time)
         ranges = self._nothing.copy()
-        if faces.circles_m.shape[1]:
-            self._hit_circles(ranges, faces.circles_m.T.tolist(), complex(east, north), complex(cos, sin))
+        for circle in faces.circles:
+            self._hit_circle(ranges, circle, complex(east, north), complex(cos, sin))
         if faces.edges_m.shape[1]:
             away_east, away_north = faces.edges_m[::2] - east, faces.edges_m[1::2] - north
             self._hit_edges(ranges, cos * away_east - sin * away_north, sin * away_east + cos * away_north)
-        if faces.circles_m.size or faces.edges_m.size:
+        if faces.circles or faces.edges_m.size:
             np.copyto(ranges, math.inf, where=ranges > self._config.range_m)
         return ranges
 
-    def _hit_circles(
-        self, ranges: FloatArray, circles: list[list[float]], place: complex, heading: complex
+    def _hit_circle(
+        self, ranges: FloatArray, circle: tuple[float, float, float], place: complex, heading: complex
     ) -> None:
-        """Lowers ranges to circles: centre east and north, radius; from a place, with a nose."""
-        tries, faces = [], []
-        for east, north, radius in circles:
-            centre = (complex(east, north) - place) * heading  # to the right + i ahead
-            away = abs(centre)
-            if away - radius > self._config.range_m:
-                continue
-            half_rad, near_side = (math.asin(radius / away), -1.0) if away > radius else (math.pi, 1.0)
-            x, y = centre.real, centre.imag
-            for span in self._tried(math.atan2(x, y) - half_rad, 2.0 * half_rad):
-                tries.append(span)
-                faces.append((x, y, (away - radius) * (away + radius), near_side))
-        if not tries:
+        """Lowers ranges to a circle: centre east and north, radius; from a place, with a nose."""
+        east, north, radius = circle
+        centre = (complex(east, north) - place) * heading  # to the right + i ahead
+        away = abs(centre)
+        if away - radius > self._config.range_m:
             return
+        half_rad, near_side = (math.asin(radius / away), True) if away > radius else (math.pi, False)
+        right, ahead = centre.real, centre.imag
         # The power of the sensor's place: the square of its tangent to the circle, negative inside.
-        (ray_right, ray_ahead), (right, ahead, power, sign) = self._pairs(tries, np.array(faces).T)
-        along = right * ray_right + ahead * ray_ahead
-        half_chord2 = along * along - power
-        distance = along + sign * np.sqrt(np.maximum(half_chord2, 0.0))
-        np.copyto(distance, math.inf, where=np.minimum(half_chord2, distance) < 0.0)
-        _lower(ranges, tries, distance)
+        power = (away - radius) * (away + radius)
+        for low, high in self._tried(math.atan2(right, ahead) - half_rad, 2.0 * half_rad):
+            along = self._fan[0, low:high] * right
+            along += self._fan[1, low:high] * ahead
+            half_chord2 = along * along
+            half_chord2 -= power
+            half_chord = np.sqrt(np.maximum(half_chord2, 0.0))
+            distance = along - half_chord if near_side else along + half_chord
+            # Only the outermost rays may pass by: the margin is far less than a ray.
+            for end in (0, -1):
+                if half_chord2[end] < 0.0 or distance[end] < 0.0:
+                    distance[end] = math.inf
+            np.minimum(ranges[low:high], distance, out=ranges[low:high])
 
     def _hit_edges(self, ranges: FloatArray, right: FloatArray, ahead: FloatArray) -> None:
         """Lowers ranges to edges; (2, e) where they start and end, to the right and ahead.

@@ -7,7 +7,7 @@ x = east, y = north, z = up above mean sea level; course and heading clockwise f
 from __future__ import annotations
 
 import hashlib
-from array import array
+import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -44,7 +44,7 @@ COLUMNS = (
 """Columns of `track.parquet` that the digest covers, in its order."""
 
 BLOCK_ROWS = 1800
-ROW_VALUES = len(AircraftState._fields) + 4
+ROW = struct.Struct(f"={len(AircraftState._fields) + 4}d")
 CHORD_ERROR_M = 0.5
 
 
@@ -158,8 +158,8 @@ class TrackLog:
     ) -> None:
         self._clearance = clearance
         self._sinks = tuple(sinks)
-        self._values = array("d")  # row by row: no more objects while flying than now
-        self._values_a_block = block_rows * ROW_VALUES
+        self._rows = bytearray()  # no more objects while flying than now
+        self._bytes_a_block = block_rows * ROW.size
         self._blocks: list[Track] = []
 
     def add(
@@ -171,19 +171,19 @@ class TrackLog:
         plan_index: int,
     ) -> None:
         """Adds one row; without a plan, `cross_track_m` and `station_m` are NaN and `plan_index` is -1."""
-        self._values.extend((*state, roll_command_rad, cross_track_m, station_m, plan_index))
-        if len(self._values) == self._values_a_block:
+        self._rows += ROW.pack(*state, roll_command_rad, cross_track_m, station_m, plan_index)
+        if len(self._rows) == self._bytes_a_block:
             self._cut()
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
-        if self._values:
+        if self._rows:
             self._cut()
         return Track.joined(self._blocks)
 
     def _cut(self) -> None:
-        rows = np.array(self._values).reshape(-1, ROW_VALUES).T
-        self._values = array("d")
+        rows = np.frombuffer(self._rows).reshape(-1, ROW.size // 8).T
+        self._rows = bytearray()
         time, east, north, up, east_mps, north_mps, _, heading, roll, pitch = rows[:10]
         airspeed, load_factor, throttle, roll_command, cross_track, station, plan_index = rows[10:]
         block = Track(

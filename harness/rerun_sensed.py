@@ -77,6 +77,6 @@ class Sensed:
 
 def returns_m(scan: RangeScan) -> FloatArray:
     """(k, 2) places from which something came back."""
-    hit = np.isfinite(scan.ranges_m)
-    places: FloatArray = scan.directions[hit] * scan.ranges_m[hit, None] + (scan.east_m, scan.north_m)
-    return places
+    places = scan.from_sensor_m(np.flatnonzero(scan.ranges_m < np.inf))
+    places += complex(scan.east_m, scan.north_m)
+    return places.view(np.float64).reshape(-1, 2)

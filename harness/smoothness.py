@@ -85,8 +85,9 @@ def smoothness(profile: Profile, window_m: float, length_m: float | None = None)
     length, curvature = profile
     bent = np.abs(curvature)
     whole = float(length.sum()) if length_m is None else length_m
-    turned = float(bent @ length)
-    energy = float((bent * bent) @ length)
+    # Sums, not products of vectors: BLAS would wake its threads for these, which then spin for longer.
+    turned = float((bent * length).sum())
+    energy = float((bent * bent * length).sum())
     sharpest = float(bent.max(initial=0.0))
     rate = _max_rate(profile, window_m)
     return Smoothness(

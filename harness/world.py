@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,6 +88,11 @@ class Faces:
     circles_m: FloatArray
     edges_m: FloatArray
 
+    @cached_property
+    def circles(self) -> list[tuple[float, float, float]]:
+        """The same circles one by one."""
+        return list(zip(*self.circles_m.tolist(), strict=True))
+
 
 class Surroundings:
     """Every face that comes near a place during an interval of time; made by `World.surroundings`."""
@@ -98,6 +104,8 @@ class Surroundings:
 
     def faces(self, time_s: float) -> Faces:
         """Those that are there at a time of the interval, where they are then."""
+        if not (self._circle_motions.matter or self._edge_motions.matter):
+            return self._faces
         circles, edges = self._faces.circles_m, self._faces.edges_m
         if self._circle_motions.matter:
             there = self._circle_motions.present(time_s, time_s)

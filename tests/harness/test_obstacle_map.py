@@ -289,6 +289,14 @@ def test_the_same_loop_again_and_again_adds_nothing() -> None:
     np.testing.assert_array_equal(edges(seen), points)
 
 
+def test_what_lies_beyond_the_border_leaves_nothing() -> None:
+    """Near enough to be kept in detail, further out than the grid, and the only thing in sight."""
+    world = world_of(Circle((BOUNDS[0] - 700.0, 5000.0), 50.0))
+    taken = scans(sensor(world), [(5.0, 5000.0 + 20.0 * i) for i in range(5)])
+    assert all(600.0 < scan.ranges_m.min() < 5.0 * CLEARANCE for scan in taken)
+    assert fed(taken).revision == 0
+
+
 def test_points_never_outnumber_the_cells() -> None:
     tiny = ObstacleMap((0.0, 0.0, 1000.0, 1000.0), CLEARANCE, RANGE)
     rng = np.random.default_rng(1)

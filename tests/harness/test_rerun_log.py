@@ -76,8 +76,8 @@ def strict(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def scan(time_s: float) -> RangeScan:
     ranges = np.array([100.0, np.inf, 200.0, np.inf])
-    directions = np.array([[1.0, 0.0], [0.0, -1.0], [-1.0, 0.0], [0.0, 1.0]])
-    return RangeScan(time_s, time_s, 5.0, 7.0, 0.0, math.pi / 2, directions, ranges, 800.0)
+    fan = np.array([1.0, -1.0j, -1.0, 1.0j])
+    return RangeScan(time_s, time_s, 5.0, 7.0, 0.0, math.pi / 2, math.pi / 2, fan, ranges, 800.0)
 
 
 def record(
@@ -198,11 +198,9 @@ def test_obstacles_appear_as_they_are_sensed(tmp_path: Path, make_track: Callabl
     near, false = (300.0, 1250.0), (-300.0, 0.0)
     log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
     for time_s, points in ((0.0, [false]), (5.0, [near, false]), (10.0, [near])):
-        away = np.array(points)
-        ranges = np.hypot(*away.T)
-        log.on_scan(
-            RangeScan(time_s, time_s, 0.0, 0.0, 0.0, 0.1, away / ranges[:, None], ranges, 2000.0), STATE
-        )
+        away = np.array([complex(*point) for point in points])
+        ranges = np.abs(away)
+        log.on_scan(RangeScan(time_s, time_s, 0.0, 0.0, 0.0, 0.0, 0.1, away / ranges, ranges, 2000.0), STATE)
     log.on_block(make_track(201, plan_index=-1))
     log.close()
     entities = read(tmp_path / "a.rrd")
