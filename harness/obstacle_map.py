@@ -1,7 +1,7 @@
 """What has been seen so far: obstacle edges and space seen to be free.
 
 Edges are points on a square grid of cells, at most one a cell, each where a ray hit or between two such
-places. Near by, where the edge of an obstacle stands out against what is behind it, a finer grid keeps more of
+places. Near by, where the edge of an obstacle stands out against what is behind it, finer grids keep more of
 them: paths bend about such places. Evidence decides: a cell that was hit in two scans holds an edge; one that
 several scans looked through, with neighbouring rays agreeing, does not. So one false return makes no wall and
 one lost return opens none. Free space is a coarser grid, written from key scans. The grids cover the area,
@@ -28,10 +28,10 @@ CERTAIN = 6
 """Scores do not rise above this."""
 BETWEEN = np.arange(1, 8) / 8.0
 """Where points are put between two hits that are joined: no more than a cell apart from each other."""
-NEAR = 5.0
-"""Outlines are kept in detail up to so many clearances away."""
-FINER = 4
-"""Cells of the fine grid in one of the coarse one, along a side."""
+DETAIL = ((5.0, 4), (2.0, 16))
+"""Outlines are kept in detail up to so many clearances away, in so many cells to one along a side."""
+CORNER = 0.3
+"""Sine of the turn from which on a wall has a corner."""
 SAME_PLACE = 1.0 / 32.0
 """Hits that are seen from where others were seen, but for this share of the least range, tell nothing more."""
 LOOK_THROUGH_EVERY = 6
@@ -61,7 +61,7 @@ class ObstacleMap:
         )
         self._coarse = self._nx * self._ny
         self._fine: dict[
-            tuple[int, int], int
+            tuple[int, int, int], int
         ] = {}  # fine cells that were hit, numbered after the coarse ones
         self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # by cell
         self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
@@ -70,7 +70,7 @@ class ObstacleMap:
         self._since = np.zeros(1024, dtype=np.int64)  # by slot: revision at which it last became an edge
         self._count = 0
         self._join = 2.0 * clearance_m
-        self._near_by = NEAR * clearance_m
+        self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
         self._range = range_m
         self._revision = 0
         self._taken_back_at = 0
@@ -160,15 +160,30 @@ class ObstacleMap:
                 column, row = self._column_and_row(between)
                 counted = np.concatenate((counted, column * self._ny + row))
                 found = np.concatenate((found, between))
+        again: list[tuple[NDArray[np.int64], ComplexArray]] = []
         if near:
             ends = (~joined).nonzero()[0]
             ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
-            ends = ends[scan.ranges_m.take(hits[ends], mode="wrap") < self._near_by]
-            if len(ends):
-                counted = np.concatenate((counted, self._fine_keys(places[ends])))
-                found = np.concatenate((found, places[ends]))
+            if nearest_m < DETAIL[-1][0] * self._clearance:
+                # A wall that turns away from the sensor ends there, too, though both of its sides are in sight.
+                turn = (step[1:] * step[:-1].conj()).imag > CORNER * gap[1:] * gap[:-1]
+                ends = np.concatenate((ends, (turn & joined[1:] & joined[:-1]).nonzero()[0] + 1))
+            ranges = scan.ranges_m.take(hits[ends], mode="wrap")
+            known = self._score.take(keys.take(ends, mode="wrap")) >= CONFIRMED
+            for reach, finer in DETAIL:
+                within = ranges < reach * self._clearance
+                at = places[ends[within]]
+                if len(at):
+                    fine = self._fine_keys(at, finer)
+                    # Where the wall is known, this only tells where it ends: once is enough.
+                    sure = known[within]
+                    counted = np.concatenate((counted, fine))
+                    found = np.concatenate((found, at))
+                    again.append((fine[sure], at[sure]))
         if len(counted):
             self._count_hits(counted, found)
+        for fine, at in again:
+            self._count_hits(fine, at)
 
     def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Cells of places seen from the corner of the grid."""
@@ -189,7 +204,7 @@ class ObstacleMap:
             return
         keys, score = keys[uncertain], score[uncertain]
         self._score[keys] = score + 1  # duplicates of a cell count once a scan
-        self._unconfirmed = bool(score.min() < CONFIRMED - 1)
+        self._unconfirmed |= bool(score.min() < CONFIRMED - 1)
         raised = keys[score == CONFIRMED - 1]
         if len(raised):
             self._revision += 1
@@ -209,10 +224,10 @@ class ObstacleMap:
             self._since[new] = 0
             self._count = new.stop
 
-    def _fine_keys(self, places: ComplexArray) -> NDArray[np.int64]:
-        """Numbers of the fine cells at some places."""
-        cells = _pairs(places * (FINER / self._cell)).astype(np.int64).tolist()
-        keys = [self._fine.setdefault((x, y), self._coarse + len(self._fine)) for x, y in cells]
+    def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
+        """Numbers of the cells of a finer grid at some places."""
+        cells = _pairs(places * (finer / self._cell)).astype(np.int64).tolist()
+        keys = [self._fine.setdefault((finer, x, y), self._coarse + len(self._fine)) for x, y in cells]
         if self._coarse + len(self._fine) > len(self._score):
             size = self._coarse + 2 * len(self._fine)
             more = size - len(self._score)

@@ -419,3 +419,12 @@ def test_an_outline_is_kept_in_detail_where_the_wall_is_certain_already() -> Non
 
     assert outline([]) == 0
     assert outline([(5000.0 + 5.0 * i, 6000.0) for i in range(10)]) > 2
+
+
+def test_a_corner_is_kept_in_detail_though_both_of_its_sides_are_in_sight() -> None:
+    corner = (5000.0, 5300.0)
+    block = Polygon((corner, (5600.0, 5900.0), (4400.0, 5900.0)))
+    seen = fed(scans(sensor(world_of(block)), [MIDDLE, (5010.0, 5000.0)]))
+    away = np.hypot(*(edges(seen) - corner).T)
+    # Rays are 3 m apart there, coarse cells 50 m.
+    assert away.min() < 5.0
