@@ -421,10 +421,12 @@ def test_an_outline_is_kept_in_detail_where_the_wall_is_certain_already() -> Non
     assert outline([(5000.0 + 5.0 * i, 6000.0) for i in range(10)]) > 2
 
 
-def test_a_corner_is_kept_in_detail_though_both_of_its_sides_are_in_sight() -> None:
-    corner = (5000.0, 5300.0)
-    block = Polygon((corner, (5600.0, 5900.0), (4400.0, 5900.0)))
-    seen = fed(scans(sensor(world_of(block)), [MIDDLE, (5010.0, 5000.0)]))
+@pytest.mark.parametrize("off_m", [0.0, 13.0, 29.0, 41.0])
+def test_a_corner_is_kept_in_detail_though_both_of_its_sides_are_in_sight(off_m: float) -> None:
+    corner = (5000.0 + off_m, 5300.0 + off_m)
+    block = Polygon((corner, (corner[0] + 600.0, corner[1] + 600.0), (corner[0] - 600.0, corner[1] + 600.0)))
+    eye = sensor(world_of(block))
+    seen = fed(scans(eye, [(4990.0, 2800.0), (5000.0, 2850.0)]), scans(eye, [MIDDLE, (5010.0, 5000.0)]))
     away = np.hypot(*(edges(seen) - corner).T)
-    # Rays are 3 m apart there, coarse cells 50 m.
+    # Near by rays are 3 m apart, and the points that were kept from afar up to 50.
     assert away.min() < 5.0
