@@ -224,10 +224,12 @@ class LocalPlanning:
                 most_tracks=MOST_TRACKS * widening,
                 wide=widening > 1,
             )
+            steps_since = 0
             for track in tracks:
                 yield track
                 found += track is not None
-                if found == self._candidates:
+                steps_since += found > 0
+                if found == self._candidates or steps_since > MOST_TRACKS:
                     break
             if found or closed():
                 return

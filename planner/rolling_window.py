@@ -326,6 +326,7 @@ class RollingWindow:
         """No new plan yet: think on, prove that there is none, or let the plan in effect end in its turn."""
         if self._watch.broken and effect is not None:
             return self._turn_away(request, effect, here)
+        no_room = self._effort > 0 and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
         stuck = None if thinking is None else thinking.stuck
@@ -340,7 +341,7 @@ class RollingWindow:
             self._refused_at_m = request.station_m
             self._memory.refuse(self._unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
-            if self._proof_for_turns.closed(request.position_m):
+            if no_room:
                 gap = 2.0 * self._turns_keep_m
                 return _unreachable(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on")
             # No way is left but those given up, or one that takes more looking for.
