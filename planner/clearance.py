@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.curves import Point, end_of
 from planner.interface import FloatArray, Path
+
+IntArray = NDArray[np.intp]
 
 
 def _to_lines(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -161,10 +164,26 @@ def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | Floa
     Returns:
         Distance from a (m) and index of the disc; infinite and -1 where the line is clear.
     """
+    entry, entered = _entries(a, b, points_m, radius_m)
+    if not len(entered):
+        return math.inf, -1
+    first = int(entry.argmin())
+    return max(float(entry[first]), 0.0), int(entered[first])
+
+
+def all_entered(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> IntArray:
+    """Indices of all discs that the line from a to b enters, as `first_entry` has it."""
+    return _entries(a, b, points_m, radius_m)[1]
+
+
+def _entries(
+    a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Distances from a at which the line to b enters discs, and the indices of these discs."""
     ux, uy = b[0] - a[0], b[1] - a[1]
     length = math.hypot(ux, uy)
     if length < 1e-9 or not len(points_m):
-        return math.inf, -1
+        return np.zeros(0), np.zeros(0, dtype=np.intp)
     ux, uy = ux / length, uy / length
     dx, dy = points_m[:, 0] - a[0], points_m[:, 1] - a[1]
     ahead = dx * ux + dy * uy
@@ -172,8 +191,4 @@ def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | Floa
     past = np.maximum(ahead - length, 0.0)
     room = np.square(radius_m) - beside * beside
     hit = np.flatnonzero((room > past * past) & (ahead > 0.0))
-    if not len(hit):
-        return math.inf, -1
-    entry = ahead[hit] - np.sqrt(room[hit])
-    first = int(entry.argmin())
-    return max(float(entry[first]), 0.0), int(hit[first])
+    return ahead[hit] - np.sqrt(room[hit]), hit

@@ -13,7 +13,9 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from planner.clearance import first_entry
+import numpy as np
+
+from planner.clearance import all_entered, first_entry
 from planner.curves import Point
 from planner.step_model import distance_left_m
 from planner.window import SectorEdge, Window, guide_vector
@@ -106,8 +108,11 @@ def search(
         if depth == steps:
             continue
         beside = [int(window.labels[hit])]
-        if wide and track.last is not None:
-            beside.append(track.last.obstacle)  # on round what it hugs, whatever lies towards the goal
+        if wide:
+            # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
+            entered = all_entered(here, goal, window.points_m, window.keep_m)
+            beside += np.unique(window.labels[entered]).tolist()
+            beside += [] if track.last is None else [track.last.obstacle]
         for edge in window.sector_edges(here, beside):
             if not wide and _leads_away(track, edge):
                 continue
