@@ -175,7 +175,7 @@ class PathFollower:
             pull = _within(INTERCEPT_SINE * speed, cross * self._pull_per_s)
             # Lift acts across the course, the correction across the path.
             across = -self._two_zeta_omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
-            acceleration = across - self._curvature_ahead(station, speed) * speed * speed
+            acceleration = across - self._curvature_ahead(station, speed) * (speed * speed)
             wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
         allowed = _within(bank_limit, wanted)
         step = _within(self._roll_step, allowed - self._roll)
