@@ -59,4 +59,5 @@ def _with_system(model: bytes) -> bytes:
                 ElementTree.SubElement(component, "output").text = f"{THROTTLE}[{index}]"
     # Systems run in document order: commands before whatever of the model reads them.
     root.insert(0, system)
-    return ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    derived: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return derived
