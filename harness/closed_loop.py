@@ -20,7 +20,7 @@ from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
 LOG_RATE_HZ = 10
 PROGRESS_EVERY_S = 5.0
-LONGEST_UNCHECKED_S = 2.5
+LONGEST_UNCHECKED_S = 5.0
 """Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
 
 Progress = Callable[[float, float, str], None]
