@@ -145,7 +145,8 @@ class PathFollower:
         if not self._rows:
             raise RuntimeError("follow() a route before update()")
         cross, tangent_east, tangent_north = self._project(state.east_m, state.north_m)
-        station = self._starts[self._index] + self._along
+        index = self._index
+        station = self._starts[index] + self._along
         velocity_east, velocity_north = state.velocity_east_mps, state.velocity_north_mps
         speed = max(math.hypot(velocity_east, velocity_north), 1.0)
         along_mps = velocity_east * tangent_east + velocity_north * tangent_north
@@ -175,7 +176,14 @@ class PathFollower:
             pull = _within(INTERCEPT_SINE * speed, cross * self._pull_per_s)
             # Lift acts across the course, the correction across the path.
             across = -self._two_zeta_omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
-            acceleration = across - self._curvature_ahead(station, speed) * speed * speed
+            # The curvature where the aircraft will be when it has rolled, averaged over the way that takes.
+            blend = speed * self._blend_s
+            low = station + speed * self._lead_s - 0.5 * blend
+            if self._starts[index] <= low and low + blend <= self._stops[index]:
+                curvature = self._rows[index][4]
+            else:
+                curvature = (self._turn_at(low + blend) - self._turn_at(low)) / blend
+            acceleration = across - curvature * (speed * speed)
             wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
         allowed = _within(bank_limit, wanted)
         step = _within(self._roll_step, allowed - self._roll)
@@ -205,16 +213,6 @@ class PathFollower:
                 return cross, tangent_east, tangent_north
             self._index += 1
             self._along = 0.0
-
-    def _curvature_ahead(self, station: float, speed: float) -> float:
-        """Curvature where the aircraft will be when it has rolled, averaged over the way that takes."""
-        blend = speed * self._blend_s
-        middle = station + speed * self._lead_s
-        low, high = middle - 0.5 * blend, middle + 0.5 * blend
-        index = self._index
-        if self._starts[index] <= low and high <= self._stops[index]:
-            return self._rows[index][4]
-        return (self._turn_at(high) - self._turn_at(low)) / blend
 
     def _turn_at(self, station: float) -> float:
         """Direction change of the route from its start to a station, rad, positive to the left."""

@@ -6,7 +6,8 @@ import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.resources import as_file, files
+from functools import lru_cache
+from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -29,13 +30,28 @@ def with_autopilot(model: Path) -> Iterator[Path]:
         ValueError: if the model is not well-formed XML or not a JSBSim model.
     """
     try:
-        root = ElementTree.parse(model).getroot()
+        with_system = _with_system(model.read_bytes())
     except ElementTree.ParseError as error:
         raise ValueError(f"{model} is not well-formed XML: {error}") from None
+    except ValueError as error:
+        raise ValueError(f"{model} is not a JSBSim model: {error}") from None
+    with TemporaryDirectory(prefix="wayproof-") as folder:
+        derived = Path(folder, model.stem)
+        derived.mkdir()
+        for item in model.resolve().parent.iterdir():
+            if item.name != model.name:
+                os.symlink(item, derived / item.name)
+        (derived / model.name).write_bytes(with_system)
+        yield Path(folder)
+
+
+@lru_cache(maxsize=8)
+def _with_system(model: bytes) -> bytes:
+    """The XML of a model that starts with the autopilot system."""
+    root = ElementTree.fromstring(model)
     if root.tag != "fdm_config":
-        raise ValueError(f"{model} is not a JSBSim model: its root element is <{root.tag}>, not <fdm_config>")
-    with as_file(files("aircraft").joinpath("systems", "autopilot.xml")) as path:
-        system = ElementTree.parse(path).getroot()
+        raise ValueError(f"its root element is <{root.tag}>, not <fdm_config>")
+    system = ElementTree.fromstring(files("aircraft").joinpath("systems", "autopilot.xml").read_bytes())
     engines = len(root.findall("propulsion/engine"))
     for component in system.iter("fcs_function"):
         if any(output.text == THROTTLE for output in component.findall("output")):
@@ -43,11 +59,5 @@ def with_autopilot(model: Path) -> Iterator[Path]:
                 ElementTree.SubElement(component, "output").text = f"{THROTTLE}[{index}]"
     # Systems run in document order: commands before whatever of the model reads them.
     root.insert(0, system)
-    with TemporaryDirectory(prefix="wayproof-") as folder:
-        derived = Path(folder, model.stem)
-        derived.mkdir()
-        for item in model.resolve().parent.iterdir():
-            if item.name != model.name:
-                os.symlink(item, derived / item.name)
-        ElementTree.ElementTree(root).write(derived / model.name, encoding="utf-8", xml_declaration=True)
-        yield Path(folder)
+    derived: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+    return derived

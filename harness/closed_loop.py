@@ -20,7 +20,7 @@ from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
 LOG_RATE_HZ = 10
 PROGRESS_EVERY_S = 5.0
-LONGEST_UNCHECKED_S = 2.5
+LONGEST_UNCHECKED_S = 5.0
 """Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
 
 Progress = Callable[[float, float, str], None]
@@ -120,7 +120,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
             if plans.index >= 0:
-                roll_command, cross_track, station, _, _ = follower.update(state)
+                roll_command, cross_track, station = follower.update(state)[:3]
             model.command(Command(roll_command, loop.altitude_m, mission.speed_mps))
         if log_due:
             log.add(state, roll_command, cross_track, station, plans.index)

@@ -156,7 +156,7 @@ class ObstacleMap:
         if len(news):
             wide = (joined & (gap > self._cell) & (uncertain[1:] | uncertain[:-1])).nonzero()[0]
             if len(wide):
-                between = (places[wide, None] + step[wide, None] * BETWEEN).ravel()
+                between = (places.take(wide) + np.multiply.outer(BETWEEN, step.take(wide))).ravel()
                 column, row = self._column_and_row(between)
                 counted = np.concatenate((counted, column * self._ny + row))
                 found = np.concatenate((found, between))
@@ -332,8 +332,9 @@ class _FreeSpace:
             column, row, distance, ray, level = (
                 each[covered] for each in (column, row, distance, ray, level)
             )
-        free = _least_beside(np.minimum(scan.ranges_m, reach), ray, level) - half > distance
-        seen[column[free], row[free]] = True
+        beyond = _least_beside(np.minimum(scan.ranges_m, reach), ray, level) - half
+        free = (beyond > distance).nonzero()[0]
+        seen[column.take(free), row.take(free)] = True
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""

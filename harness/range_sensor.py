@@ -110,8 +110,10 @@ class RangeSensor:
         offsets = self._first_rad + self._spacing_rad * np.arange(config.rays)
         self._turn = math.tau / self._spacing_rad
         self._fan = np.array((np.sin(offsets), np.cos(offsets)))  # seen from the nose: to its right, ahead
-        self._rays: ComplexArray = self._fan[0] + 1j * self._fan[1]
+        self._fan_right, self._fan_ahead = self._fan
+        self._rays: ComplexArray = self._fan_right + 1j * self._fan_ahead
         self._rays.setflags(write=False)
+        self._surely_in_range_m = config.range_m * (1.0 - 1e-9)
         self._nothing = np.full(config.rays, math.inf)
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
@@ -157,8 +159,6 @@ class RangeSensor:
         if faces.edges_m.shape[1]:
             away_east, away_north = faces.edges_m[::2] - east, faces.edges_m[1::2] - north
             self._hit_edges(ranges, cos * away_east - sin * away_north, sin * away_east + cos * away_north)
-        if faces.circles or faces.edges_m.size:
-            np.copyto(ranges, math.inf, where=ranges > self._config.range_m)
         return ranges
 
     def _hit_circle(
@@ -174,18 +174,22 @@ class RangeSensor:
         right, ahead = centre.real, centre.imag
         # The power of the sensor's place: the square of its tangent to the circle, negative inside.
         power = (away - radius) * (away + radius)
+        farthest = math.sqrt(power) if near_side else away + radius
         for low, high in self._tried(math.atan2(right, ahead) - half_rad, 2.0 * half_rad):
-            along = self._fan[0, low:high] * right
-            along += self._fan[1, low:high] * ahead
+            along = self._fan_right[low:high] * right
+            along += self._fan_ahead[low:high] * ahead
             half_chord2 = along * along
             half_chord2 -= power
             half_chord = np.sqrt(np.maximum(half_chord2, 0.0))
             distance = along - half_chord if near_side else along + half_chord
             # Only the outermost rays may pass by: the margin is far less than a ray.
             for end in (0, -1):
-                if half_chord2[end] < 0.0 or distance[end] < 0.0:
+                if half_chord2.item(end) < 0.0 or distance.item(end) < 0.0:
                     distance[end] = math.inf
-            np.minimum(ranges[low:high], distance, out=ranges[low:high])
+            if farthest > self._surely_in_range_m:
+                distance[distance > self._config.range_m] = math.inf
+            reached = ranges[low:high]
+            np.minimum(reached, distance, out=reached)
 
     def _hit_edges(self, ranges: FloatArray, right: FloatArray, ahead: FloatArray) -> None:
         """Lowers ranges to edges; (2, e) where they start and end, to the right and ahead.
@@ -218,7 +222,7 @@ class RangeSensor:
         hit = ((start_side >= 0) != (end_side >= 0)).nonzero()[0]
         distance = np.full(len(lever), math.inf)
         distance[hit] = lever[hit] / (end_side[hit] - start_side[hit])
-        distance[distance < 0] = math.inf
+        distance[(distance < 0) | (distance > self._config.range_m)] = math.inf
         _lower(ranges, tries, distance)
 
     def _tried(self, first_rad: float, width_rad: float) -> Iterable[tuple[int, int]]:

@@ -223,16 +223,12 @@ def _judge(
     high = np.abs(leg.up_m - limits.altitude_m)
     slow = np.abs(_averaged(leg.airspeed_mps - limits.airspeed_mps, leg, SPEED_S))
     load = float(_averaged(leg.load_factor, leg, LOAD_S).max())
-    peak = first + int(off.argmax())
     threshold = limits.cross_track_threshold_m
-    within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= threshold)
-    grows = int(within[-1]) if len(within) else 0
-    lead = _rows(track, int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S)), peak + 1)
     cause = None
     if lost_control:
         cause = "lost control"
     elif off.max() > threshold:
-        cause = _cause(track, lead, plans, limits)
+        cause = _cause(track, _before_peak(track, first + int(off.argmax()), threshold), plans, limits)
     elif cut_m > limits.clearance_m:
         cause = "turn radius too tight"
     elif load > limits.max_load_factor:
@@ -256,6 +252,13 @@ def _judge(
         trackable=cause is None,
         cause=cause,
     )
+
+
+def _before_peak(track: Track, peak: int, threshold_m: float) -> Track:
+    """The rows up to a peak of the cross-track error, from shortly before it outgrew what it may be."""
+    within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= threshold_m)
+    grows = int(within[-1]) if len(within) else 0
+    return _rows(track, int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S)), peak + 1)
 
 
 def _cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> str:
