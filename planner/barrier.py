@@ -49,13 +49,10 @@ class Barrier:
         self._parity = [False]  # crossings on the way to the parent
         self._cells: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
         self._thinned: set[tuple[int, int]] = set()
-        self.count = 0
-        """How many points have been taken in or left out."""
         self.closed = False
 
     def add(self, points_m: FloatArray) -> None:
         """Takes in edge points, (k, 2)."""
-        self.count += len(points_m)
         places = np.floor(points_m / (THIN * self._clearance)).astype(np.int64).tolist()
         for (x, y), (column, row) in zip(points_m.tolist(), places, strict=True):
             if (column, row) not in self._thinned:
@@ -119,17 +116,26 @@ class Proof:
     Args:
         mission: goal and bounds.
         memory: the edge points; those refused prove nothing.
-        keeps_m: what a way has to keep from every point.
+        keeps_m: what a way has to keep from every point, but for those that are nearer than this to the goal or to
+            where the aircraft is at first: they prove nothing either.
     """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, keeps_m: float) -> None:
         self._mission, self._memory, self._keeps_m = mission, memory, keeps_m
         self._barrier: Barrier | None = None
+        self._taken = 0
+        self._ends: tuple[Point, ...] = ()
 
     def closed(self, position: Point) -> bool:
         """Takes in some more of the points and says whether they close all ways from a position."""
         genuine = self._memory.genuine_m
-        if self._barrier is None or self._barrier.count > len(genuine):
-            self._barrier = Barrier(position, self._mission.goal_m, self._mission.bounds_m, self._keeps_m)
-        self._barrier.add(genuine[self._barrier.count :][:PROVED_AT_ONCE])
+        if self._barrier is None or self._taken > len(genuine):
+            goal = self._mission.goal_m
+            self._barrier = Barrier(position, goal, self._mission.bounds_m, self._keeps_m)
+            self._taken, self._ends = 0, (position, goal)
+        more = genuine[self._taken :][:PROVED_AT_ONCE]
+        self._taken += len(more)
+        for east, north in self._ends:
+            more = more[np.hypot(more[:, 0] - east, more[:, 1] - north) >= self._keeps_m]
+        self._barrier.add(more)
         return self._barrier.closed
