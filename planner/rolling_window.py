@@ -28,7 +28,7 @@ import numpy as np
 from planner.barrier import Proof
 from planner.certificate import CertificateBroken, Certified, Certifier, least_sensor_range_m
 from planner.course import Course
-from planner.curves import Point, Pose, along, on_loiter, onward, place_on
+from planner.curves import Point, Segment, along, on_loiter, onward, place_on
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
@@ -308,17 +308,16 @@ class RollingWindow:
         return plan
 
     def _start(self, request: PlanRequest, effect: Effect | None, here: float) -> Start:
-        """Where a new plan begins: a little ahead on the one in effect, or at the aircraft itself."""
+        """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
+        prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
         if effect is not None:
             nearest, _ = place_on(effect.path, here)
-            if math.dist(nearest[:2], request.position_m) <= max(
-                1.0, OFF_PATH * self._mission.tracking_error_m
-            ):
-                prefix = onward(effect.path, here, max(0.0, min(self._lead_m, self._watch.cut_m - here)))
-                if prefix:
-                    last = prefix[-1]
-                    return Start(request.position_m, along(last, last[5]), last[4], prefix)
-        return Start(request.position_m, Pose(*request.position_m, *request.direction))
+            off_m = math.dist(nearest[:2], request.position_m)
+            if off_m <= max(1.0, OFF_PATH * self._mission.tracking_error_m):
+                uncut_m = math.inf if effect.holds(here) else max(0.0, self._watch.cut_m - here)
+                prefix = onward(effect.path, here, min(self._lead_m, uncut_m)) or prefix
+        last = prefix[-1]
+        return Start(request.position_m, along(last, last[5]), last[4], prefix)
 
     def _no_way(
         self, request: PlanRequest, effect: Effect | None, here: float, thinking: Deliberation | None

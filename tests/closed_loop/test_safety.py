@@ -28,6 +28,7 @@ from harness.record import AcceptedPlan, Flight, Outcome, Track
 from harness.run import make_loop
 from harness.scenario import Scenario, dump_scenario
 from harness.world import World
+from planner.clearance import distances
 from planner.curves import on_loiter, pose_at, sample
 from planner.interface import Path
 
@@ -48,6 +49,7 @@ class Invariant:
 
     def __init__(self, world: World, turn_radius_m: float, tracking_error_m: float) -> None:
         self._world, self._radius, self._off = world, turn_radius_m, tracking_error_m
+        self._before: Path | None = None
         self.plans = 0
         self.least_m = math.inf
         """Smallest true clearance of an accepted plan."""
@@ -56,7 +58,11 @@ class Invariant:
         path = accepted.plan.path
         assert path is not None
         self.plans += 1
-        assert math.dist(pose_at(path, 0.0)[:2], (state.east_m, state.north_m)) <= 1.0 + 4.0 * self._off
+        begin = pose_at(path, 0.0)[:2]
+        joins_aircraft = math.dist(begin, (state.east_m, state.north_m)) <= 1.0 + 4.0 * self._off
+        joins_plan = self._before is not None and distances(self._before, np.array([begin]))[0][0] < 1e-3
+        assert joins_aircraft or joins_plan
+        self._before = path
         ends, begins = path.segments[:-1], path.segments[1:]
         for row, following in zip(ends, begins, strict=True):
             met = pose_at(Path(row[None]), math.inf)

@@ -128,9 +128,10 @@ def test_straight_in_the_open(assert_flyable: AssertFlyable) -> None:
     assert_flyable(plan.path, MISSION.turn_radius_m)
     # Straight as far as the sensor sees, and then a turn that can be flown for ever.
     assert plan.path.loiter
-    assert plan.path.segments[:-1, 4].tolist() == [0.0]
-    assert plan.path.segments[0, 5] == pytest.approx(MISSION.sensor_range_m)
-    assert plan.path.segments[1, 5] == pytest.approx(math.tau * MISSION.turn_radius_m)
+    *ahead, turn = plan.path.segments
+    assert all(segment[4] == 0.0 for segment in ahead)
+    assert sum(segment[5] for segment in ahead) == pytest.approx(MISSION.sensor_range_m)
+    assert turn[5] == pytest.approx(math.tau * MISSION.turn_radius_m)
     np.testing.assert_allclose(plan.waypoints_m, [(0.0, 0.0), MISSION.goal_m])
     assert "20.0 km to go" in plan.reason
 
