@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner.curves import Segment
-from planner.interface import FloatArray, Path
+from planner.interface import BoolArray, FloatArray, Path, SeenWorld
 
 MakePoints = Callable[..., FloatArray]
 
@@ -31,6 +31,21 @@ def wall(start_m: tuple[float, float], end_m: tuple[float, float], spacing_m: fl
     count = math.ceil(2.0 * math.dist(start_m, end_m) / spacing_m) + 1
     points = np.column_stack([np.linspace(a, b, count) for a, b in zip(start_m, end_m, strict=True)])
     return one_a_cell(np.concatenate((points[-1:], points)), spacing_m)
+
+
+class Known:
+    """Edge points that are all known from the beginning, in space that is seen to be free."""
+
+    spacing_m, revision, taken_back_at = 50.0, 1, 0
+
+    def __init__(self, points: FloatArray) -> None:
+        self._points = points
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return self._points if revision < 1 else self._points[:0]
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.ones(len(points_m), dtype=np.bool_)
 
 
 def integrated(
@@ -84,3 +99,8 @@ def integrated_fixture() -> Callable[..., FloatArray]:
 @pytest.fixture(scope="session", name="assert_flyable")
 def assert_flyable_fixture() -> Callable[[Path, float], None]:
     return assert_flyable
+
+
+@pytest.fixture(name="known")
+def known_fixture() -> Callable[[FloatArray], SeenWorld]:
+    return Known

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 
 from planner.barrier import PROVED_AT_ONCE, THIN, Barrier, Proof
 from planner.curves import Point
-from planner.interface import BoolArray, FloatArray, Mission
+from planner.interface import FloatArray, Mission, SeenWorld
 from planner.memory import ObstacleMemory
 
 MakePoints = Callable[..., FloatArray]
+Known = Callable[[FloatArray], SeenWorld]
 
 BOUNDS = (0.0, 0.0, 1000.0, 1000.0)
 CLEARANCE = 40.0
@@ -172,22 +173,7 @@ def test_order_does_not_matter_to_points_far_enough_apart(seed: int, count: int)
     assert barrier_of(points).closed is barrier_of(rng.permutation(points)).closed
 
 
-class Known:
-    """Edge points that are all known from the beginning."""
-
-    spacing_m, revision, taken_back_at = 25.0, 1, 0
-
-    def __init__(self, points: FloatArray) -> None:
-        self._points = points
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return self._points if revision < 1 else self._points[:0]
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.ones(len(points_m), dtype=np.bool_)
-
-
-def proof_of(points: FloatArray, keeps_m: float) -> tuple[Proof, int]:
+def proof_of(seen: SeenWorld, keeps_m: float) -> tuple[Proof, int]:
     mission = Mission(
         goal_m=GOAL,
         goal_radius_m=10.0,
@@ -200,36 +186,36 @@ def proof_of(points: FloatArray, keeps_m: float) -> tuple[Proof, int]:
         sensor_range_m=1000.0,
     )
     memory = ObstacleMemory(CLEARANCE)
-    memory.take_in(Known(points))
-    return Proof(mission, memory, keeps_m), math.ceil(len(points) / PROVED_AT_ONCE)
+    memory.take_in(seen)
+    return Proof(mission, memory, keeps_m), math.ceil(len(memory.points_m) / PROVED_AT_ONCE)
 
 
-def proved(points: FloatArray, keeps_m: float) -> bool:
-    proof, portions = proof_of(points, keeps_m)
+def proved(seen: SeenWorld, keeps_m: float) -> bool:
+    proof, portions = proof_of(seen, keeps_m)
     answers = [proof.closed(START) for _ in range(portions)]
     assert not any(answers[:-1]) or answers[-1]
     return answers[-1]
 
 
-def test_a_proof_takes_its_time(wall: MakePoints) -> None:
+def test_a_proof_takes_its_time(wall: MakePoints, known: Known) -> None:
     points = wall((500.0, 0.0), (500.0, 1000.0), 5.0)
     assert len(points) > PROVED_AT_ONCE
-    proof, portions = proof_of(points, CLEARANCE)
+    proof, portions = proof_of(known(points), CLEARANCE)
     assert not proof.closed(START)
     assert all(proof.closed(START) or portions > i for i in range(2, portions + 2))
     assert proof.closed(START)
 
 
-def test_what_lies_about_the_ends_proves_nothing(ring: MakePoints) -> None:
-    assert proved(ring(*GOAL, 150.0, 10.0), 140.0)
-    assert not proved(ring(*GOAL, 130.0, 10.0), 140.0)
-    assert not proved(ring(*START, 130.0, 10.0), 140.0)
+def test_what_lies_about_the_ends_proves_nothing(ring: MakePoints, known: Known) -> None:
+    assert proved(known(ring(*GOAL, 150.0, 10.0)), 140.0)
+    assert not proved(known(ring(*GOAL, 130.0, 10.0)), 140.0)
+    assert not proved(known(ring(*START, 130.0, 10.0)), 140.0)
 
 
-def test_what_was_refused_proves_nothing(wall: MakePoints) -> None:
+def test_what_was_refused_proves_nothing(wall: MakePoints, known: Known) -> None:
     points = wall((500.0, 0.0), (500.0, 1000.0), 20.0)
-    proof, _ = proof_of(points[:0], CLEARANCE)
+    proof, _ = proof_of(known(points[:0]), CLEARANCE)
     for place in points.tolist():
         proof._memory.refuse((place[0], place[1]))
     assert not proof.closed(START)
-    assert proved(points, CLEARANCE)
+    assert proved(known(points), CLEARANCE)

@@ -12,12 +12,13 @@ import planner.local_planning
 from planner.course import Course
 from planner.curves import Pose
 from planner.deliberation import Deliberation
-from planner.interface import BoolArray, FloatArray, Mission
+from planner.interface import FloatArray, Mission, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import search
 
 MakePoints = Callable[..., FloatArray]
+Known = Callable[[FloatArray], SeenWorld]
 
 MISSION = Mission(
     goal_m=(12_000.0, 0.0),
@@ -33,32 +34,17 @@ MISSION = Mission(
 START = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
 
 
-class Known:
-    """Edge points that are all known from the beginning."""
-
-    spacing_m, revision, taken_back_at = 50.0, 1, 0
-
-    def __init__(self, points: FloatArray) -> None:
-        self._points = points
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return self._points if revision < 1 else self._points[:0]
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return np.ones(len(points_m), dtype=np.bool_)
-
-
 @pytest.fixture
-def trap(wall: MakePoints) -> FloatArray:
+def trap(wall: MakePoints, known: Known) -> SeenWorld:
     """A U that is open towards the start, and a wall behind it."""
     corners = [(2000.0, 2000.0), (6000.0, 2000.0), (6000.0, -2000.0), (2000.0, -2000.0)]
     sides = [wall(a, b, 50.0) for a, b in pairwise(corners)]
-    return np.concatenate([*sides, wall((8000.0, -5000.0), (8000.0, 1500.0), 50.0)])
+    return known(np.concatenate([*sides, wall((8000.0, -5000.0), (8000.0, 1500.0), 50.0)]))
 
 
-def deliberation(points: FloatArray, closed: Callable[[], bool] = lambda: False) -> Deliberation:
+def deliberation(seen: SeenWorld, closed: Callable[[], bool] = lambda: False) -> Deliberation:
     memory = ObstacleMemory(MISSION.clearance_m)
-    memory.take_in(Known(points))
+    memory.take_in(seen)
     local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
     return Deliberation(local, len(memory.points_m), 0, closed)
 
@@ -72,7 +58,7 @@ def all_courses(thinking: Deliberation, work: int, start: Callable[[], Start]) -
     return courses, portions
 
 
-def test_in_portions_and_at_once_the_same_is_found(trap: FloatArray) -> None:
+def test_in_portions_and_at_once_the_same_is_found(trap: SeenWorld) -> None:
     at_once, one = all_courses(deliberation(trap), 10**9, lambda: START)
     slowly, many = all_courses(deliberation(trap), 5, lambda: START)
     assert one == 1
@@ -82,7 +68,7 @@ def test_in_portions_and_at_once_the_same_is_found(trap: FloatArray) -> None:
     assert at_once[0].nodes[-1] == MISSION.goal_m
 
 
-def test_a_portion_is_no_larger_than_asked_for(trap: FloatArray, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_portion_is_no_larger_than_asked_for(trap: SeenWorld, monkeypatch: pytest.MonkeyPatch) -> None:
     steps = 0
 
     def counted(*args: object, **keys: object) -> object:
@@ -102,7 +88,7 @@ def test_a_portion_is_no_larger_than_asked_for(trap: FloatArray, monkeypatch: py
     assert steps > 7
 
 
-def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: FloatArray) -> None:
+def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: SeenWorld) -> None:
     flown = 0.0
 
     def start() -> Start:
@@ -118,7 +104,7 @@ def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: FloatArra
     assert flown > 50.0
 
 
-def test_walled_in_the_proof_ends_it(ring: MakePoints) -> None:
+def test_walled_in_the_proof_ends_it(ring: MakePoints, known: Known) -> None:
     asked = 0
 
     def closed() -> bool:
@@ -126,6 +112,6 @@ def test_walled_in_the_proof_ends_it(ring: MakePoints) -> None:
         asked += 1
         return True
 
-    courses, _ = all_courses(deliberation(ring(0.0, 0.0, 3000.0, 50.0), closed), 40, lambda: START)
+    courses, _ = all_courses(deliberation(known(ring(0.0, 0.0, 3000.0, 50.0)), closed), 40, lambda: START)
     assert courses == []
     assert asked
