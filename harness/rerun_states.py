@@ -78,7 +78,8 @@ class States:
 
 def mode_of(reason: str) -> str:
     """A plan's reason without its numbers: what stays the same while the planner does the same."""
-    return re.split(r"[,;:]?\s+(?:(?:at|in|of|after|by)\s+)?[-+]?\d", reason)[0].strip() or reason
+    told = re.sub(r"\s+at\s+[\d.]+\s+k?m\b", "", reason)
+    return re.split(r"[,;:]?\s+(?:(?:at|in|of|after|by)\s+)?[-+]?\d", told)[0].strip() or reason
 
 
 def tracking_changes(legs: Sequence[Mapping[str, Any]]) -> list[Change]:

@@ -26,7 +26,7 @@ def sentence(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
         return f"way to the goal in view, {left / 1000:.1f} km to go"
     x, y = nodes[0][0] - position[0], nodes[0][1] - position[1]
     side = "left" if ux * y - uy * x > 0.0 else "right"
-    return f"obstacle ahead, passing {side} at {math.hypot(x, y) / 1000:.1f} km"
+    return f"obstacle ahead at {math.hypot(x, y) / 1000:.1f} km, passing {side}"
 
 
 def picture(

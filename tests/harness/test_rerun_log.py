@@ -233,7 +233,7 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Calla
     circle = (0, 125.0, 0, 1, 0.01, 200 * math.pi)
     straight = (0, 0, 0, 1, 0.0, 125.0)
     path = PlannedPath(np.array([straight, circle]), loiter=True)
-    plan = Plan(PlanStatus.FOUND, "obstacle ahead, passing left at 9.8 km", path=path)
+    plan = Plan(PlanStatus.FOUND, "obstacle ahead at 9.8 km, passing left", path=path)
     rows = np.arange(101)
     track = make_track(
         101,
@@ -267,7 +267,7 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Calla
 @pytest.mark.parametrize(
     ("reason", "mode"),
     [
-        ("obstacle ahead, passing left at 9.8 km", "obstacle ahead, passing left"),
+        ("obstacle ahead at 9.8 km, passing left", "obstacle ahead, passing left"),
         ("way to the goal in view, 56.2 km to go", "way to the goal in view"),
         ("following a boundary, 1.3 km from the hit point", "following a boundary"),
         ("turning away", "turning away"),
