@@ -15,13 +15,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.curves import Limits, Segment, along, between, curvature_at, full_turn, place_on, poses_at
-from planner.interface import FloatArray, Path, SeenWorld
+from planner.interface import BoolArray, FloatArray, Path, SeenWorld
 from planner.route_optimisation import Terrain
 
 DISC = 1.04
 """Radius of the certified disc over that of the turn: room for tracking error and rolling in."""
 
 MOST_STATIONS = 32
+
+AT_ONCE = 4
+"""So many stations are looked at together: mostly one of the first serves."""
+
+SIDES = (1.0, -1.0)
+"""Left, right."""
 
 
 class CertificateBroken(RuntimeError):
@@ -87,24 +93,27 @@ class Certifier:
         free_to = self.seen_free_to_m(path, seen)
         step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
         stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
-        poses, bends = poses_at(path, stations), curvature_at(path, stations)
-        free: dict[float, list[bool]] = {}
-        for side in (1.0, -1.0):  # left, right
-            # Where the path turns the other way, the turn begins after room to roll.
-            roll = np.where(side * bends < 0.0, self._limits.roll_m, 0.0)[:, None]
-            leftwards = np.column_stack((-poses[:, 3], poses[:, 2]))
-            centres = poses[:, :2] + roll * poses[:, 2:] + side * self._limits.radius_m * leftwards
-            places = (centres[:, None] + self._disc).reshape(-1, 2)
-            free[side] = np.all(seen.seen_free(places).reshape(len(stations), -1), axis=1).tolist()
-        for i, station in enumerate(stations.tolist()):
-            for side in (1.0, -1.0):
-                if free[side][i]:
-                    turn = self._turn(path, station, side)
-                    if terrain.admits(Path(np.array(turn))):
-                        return Certified(
-                            Path(np.array([*between(path, 0.0, station), *turn]), loiter=True), station
-                        )
+        for some in (stations[i : i + AT_ONCE] for i in range(0, len(stations), AT_ONCE)):
+            free = [self._discs_free(path, some, side, seen).tolist() for side in SIDES]
+            for station, *sides_free in zip(some.tolist(), *free, strict=True):
+                for side, disc_free in zip(SIDES, sides_free, strict=True):
+                    if disc_free:
+                        turn = self._turn(path, station, side)
+                        if terrain.admits(Path(np.array(turn))):
+                            way = between(path, 0.0, station)
+                            return Certified(Path(np.array([*way, *turn]), loiter=True), station)
         return None
+
+    def _discs_free(self, path: Path, stations: FloatArray, side: float, seen: SeenWorld) -> BoolArray:
+        """(k,) whether the disc of a turn off a path, at each of (k,) stations, has been seen to be free."""
+        poses, bends = poses_at(path, stations), curvature_at(path, stations)
+        # Where the path turns the other way, the turn begins after room to roll.
+        roll = np.where(side * bends < 0.0, self._limits.roll_m, 0.0)[:, None]
+        leftwards = np.column_stack((-poses[:, 3], poses[:, 2]))
+        centres = poses[:, :2] + roll * poses[:, 2:] + side * self._limits.radius_m * leftwards
+        places = (centres[:, None] + self._disc).reshape(-1, 2)
+        free: BoolArray = np.all(seen.seen_free(places).reshape(len(stations), -1), axis=1)
+        return free
 
     def _turn(self, path: Path, station_m: float, side: float) -> list[Segment]:
         """A full turn off a path, after a straight to roll where the path turns the other way."""
