@@ -83,6 +83,8 @@ class Deliberation:
                 yield self._course(route, shortest=i == 0)
         if not found:
             route = self._local.tight_route(self._now()[0])
+            if route is None and self.tracks:
+                route = self._local.beginning(self._now()[0], self.tracks[0])
             if route is not None:
                 yield self._course(route, shortest=False)
 

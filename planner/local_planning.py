@@ -186,6 +186,16 @@ class LocalPlanning:
         )
         return search_poses(start.pose, start.curvature, self._mission.goal_m, self.limits, terrain)
 
+    def beginning(self, start: Start, track: Track) -> Route | None:
+        """As much of a track as can be flown, where all of it cannot: from there the rest may look otherwise."""
+        attempt = Attempt(self._mission.clearance_m, LEAST_MARGIN * self._margin_m)
+        nodes = (start.pose[:2], *track.nodes[1:])
+        for end in range(len(nodes) - 1, 1, -1):
+            route = self._fit(start, attempt, nodes[:end])
+            if route is not None:
+                return route
+        return None
+
     def window(self, start: Start, keep_m: FloatArray) -> Window:
         """The planning window about the start of a plan."""
         memory = self._memory
