@@ -124,18 +124,19 @@ class Proof:
         self._mission, self._memory, self._keeps_m = mission, memory, keeps_m
         self._barrier: Barrier | None = None
         self._taken = 0
-        self._ends: tuple[Point, ...] = ()
+        self._ends: tuple[Point, Point] | None = None
 
     def closed(self, position: Point) -> bool:
-        """Takes in some more of the points and says whether they close all ways from a position."""
+        """Takes in some more of the points and says whether they close all ways from the first position given."""
         genuine = self._memory.genuine_m
         if self._barrier is None or self._taken > len(genuine):
-            goal = self._mission.goal_m
-            self._barrier = Barrier(position, goal, self._mission.bounds_m, self._keeps_m)
-            self._taken, self._ends = 0, (position, goal)
+            # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
+            begin, goal = self._ends or (position, self._mission.goal_m)
+            self._barrier = Barrier(begin, goal, self._mission.bounds_m, self._keeps_m)
+            self._taken, self._ends = 0, (begin, goal)
         more = genuine[self._taken :][:PROVED_AT_ONCE]
         self._taken += len(more)
-        for east, north in self._ends:
+        for east, north in self._ends or ():
             more = more[np.hypot(more[:, 0] - east, more[:, 1] - north) >= self._keeps_m]
         self._barrier.add(more)
         return self._barrier.closed

@@ -199,6 +199,7 @@ class RollingWindow:
         fresh = self._memory.take_in(request.seen)
         effect = self._in_effect(request)
         if effect is None:
+            self._proof_for_turns.closed(request.position_m)
             return self._roll(request, None, 0.0)
         here = request.station_m
         if effect.holds(here):
