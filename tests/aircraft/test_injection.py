@@ -1,0 +1,36 @@
+"""What is made of a model before JSBSim loads it."""
+
+from __future__ import annotations
+
+import shutil
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+
+import aircraft
+from aircraft.injection import with_autopilot
+
+MODEL = Path(aircraft.__path__[0], "aerosonde", "aerosonde.xml")
+
+
+def test_a_model_writes_no_files_of_its_own(tmp_path: Path) -> None:
+    shutil.copytree(MODEL.parent, tmp_path / "aerosonde")
+    model = tmp_path / "aerosonde" / MODEL.name
+    told = (
+        '<output name="left_behind.csv" type="CSV" rate="10"><property>attitude/phi-rad</property></output>'
+    )
+    model.write_text(model.read_text().replace("</fdm_config>", f"{told}</fdm_config>"))
+    with with_autopilot(model) as folder:
+        derived = ElementTree.parse(folder / "aerosonde" / MODEL.name).getroot()
+    assert derived.find("output") is None
+    # Those of the flight control components stay.
+    assert derived.find(".//fcs_function/output") is not None
+
+
+def test_what_is_no_model_is_refused(tmp_path: Path) -> None:
+    model = tmp_path / "a" / "a.xml"
+    model.parent.mkdir()
+    model.write_text("<aircraft/>")
+    with pytest.raises(ValueError, match="its root element is <aircraft>"), with_autopilot(model):
+        pass
