@@ -6,8 +6,6 @@ import shutil
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-import pytest
-
 import aircraft
 from aircraft.injection import with_autopilot
 
@@ -26,11 +24,3 @@ def test_a_model_writes_no_files_of_its_own(tmp_path: Path) -> None:
     assert derived.find("output") is None
     # Those of the flight control components stay.
     assert derived.find(".//fcs_function/output") is not None
-
-
-def test_what_is_no_model_is_refused(tmp_path: Path) -> None:
-    model = tmp_path / "a" / "a.xml"
-    model.parent.mkdir()
-    model.write_text("<aircraft/>")
-    with pytest.raises(ValueError, match="its root element is <aircraft>"), with_autopilot(model):
-        pass
