@@ -18,11 +18,6 @@ FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
 
 
-def wrap_pi(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
-    return (angle_rad + math.pi) % math.tau - math.pi
-
-
 class Patch(NamedTuple):
     """The local plane near a geodetic point: `LocalPlane.project` to the second order, to a tenth of a millimetre.
 

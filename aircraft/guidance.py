@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aircraft.interface import AircraftState, FloatArray, Route
+from aircraft.interface import AircraftState, Route
 
 GRAVITY_MPS2 = 9.80665
 UPDATE_RATE_HZ = 20
@@ -343,35 +343,3 @@ def route_point(route: Route, station_m: float) -> tuple[float, float, float, fl
     row = (east, north, tangent_east, tangent_north, curvature, length)
     east, north, tangent_east, tangent_north = arc_point(row, along - over)
     return east + over * tangent_east, north + over * tangent_north, tangent_east, tangent_north
-
-
-def sample_route(route: Route, spacing_m: float) -> FloatArray:
-    """Polyline along a route.
-
-    Args:
-        route: any route.
-        spacing_m: largest distance between neighbouring points, along the route.
-
-    Returns:
-        (k, 2) east and north (m); every segment's start and the route's end are among the points.
-
-    Raises:
-        ValueError: if `spacing_m` is not positive.
-    """
-    if not spacing_m > 0.0:
-        raise ValueError(f"spacing_m must be positive; got {spacing_m:g}")
-    rows = route.segments
-    counts = np.maximum(np.ceil(rows[:, 5] / spacing_m - 1e-9), 1.0).astype(np.int64)
-    index = np.repeat(np.arange(len(rows)), counts)
-    within = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
-    index = np.append(index, len(rows) - 1)
-    along = np.append(rows[index[:-1], 5] * within / counts[index[:-1]], rows[-1, 5])
-    east, north, tangent_east, tangent_north, curvature, _ = rows[index].T
-    half = 0.5 * curvature * along
-    chord = along * np.sinc(half / np.pi)
-    return np.column_stack(
-        (
-            east + chord * (tangent_east * np.cos(half) - tangent_north * np.sin(half)),
-            north + chord * (tangent_east * np.sin(half) + tangent_north * np.cos(half)),
-        )
-    )

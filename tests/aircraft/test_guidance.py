@@ -18,7 +18,6 @@ from aircraft.guidance import (
     arc_point,
     route_length,
     route_point,
-    sample_route,
 )
 from aircraft.interface import AircraftState, Command, Route
 from aircraft.point_mass import PointMass
@@ -66,18 +65,6 @@ def northwards(east: float = 0.0, north: float = 0.0, course: float = 0.0) -> St
 pieces = st.lists(st.tuples(st.floats(-1e-2, 1e-2), st.floats(1.0, 2000.0)), min_size=1, max_size=6)
 
 
-@given(pieces, st.floats(1.0, 100.0))
-def test_samples_lie_on_the_route_no_further_apart_than_asked(parts: list[Piece], spacing: float) -> None:
-    route = joined(parts)
-    points = sample_route(route, spacing)
-    assert points[0] == pytest.approx((0.0, 0.0))
-    assert points[-1] == pytest.approx(route_point(route, route_length(route))[:2], abs=1e-6)
-    gaps = np.hypot(*np.diff(points, axis=0).T)
-    assert gaps.max() <= spacing * (1 + 1e-6)
-    counts = [math.ceil(length / spacing - 1e-9) for _, length in parts]
-    assert len(points) == sum(max(count, 1) for count in counts) + 1
-
-
 @given(pieces, st.floats(0.0, 1.0))
 def test_the_tangent_is_the_derivative_of_the_point(parts: list[Piece], share: float) -> None:
     route = joined(parts)
@@ -95,11 +82,6 @@ def test_beyond_the_end_a_route_goes_straight_on_and_a_loiter_round() -> None:
         (-100.0, 100.0), abs=1e-6
     )
     assert route_point(joined([(0.0, 50.0)]), 80.0) == pytest.approx((0.0, 80.0, 0.0, 1.0))
-
-
-def test_spacing_must_be_positive() -> None:
-    with pytest.raises(ValueError, match="spacing_m must be positive"):
-        sample_route(joined([(0.0, 1.0)]), 0.0)
 
 
 def test_update_needs_a_route() -> None:
