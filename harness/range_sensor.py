@@ -276,3 +276,15 @@ def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
     return np.random.default_rng(
         np.random.SeedSequence(root.entropy, spawn_key=key, pool_size=root.pool_size)
     )
+
+
+def all_round(scan: RangeScan) -> bool:
+    """Whether the first ray is the neighbour of the last."""
+    return len(scan.ranges_m) * scan.spacing_rad > math.tau - 1e-9
+
+
+def clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> FloatArray:
+    """(k,) bearings of offsets, clockwise from a bearing, in [0, 2 pi]."""
+    turns = (np.arctan2(east, north) - start_rad) * (1.0 / math.tau)
+    turned: FloatArray = (turns - np.floor(turns)) * math.tau
+    return turned

@@ -1,0 +1,106 @@
+"""Space that scans have looked through, on a grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.range_sensor import RangeScan, all_round, clockwise_from
+from planner.interface import BoolArray, FloatArray
+
+MOST_CELLS = 1_000_000
+
+
+class FreeSpace:
+    """Cells of space that a scan has looked through, on a grid twice as coarse as the edges'."""
+
+    def __init__(
+        self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float
+    ) -> None:
+        xmin, ymin, xmax, ymax = bounds_m
+        span = max(xmax - xmin, ymax - ymin)
+        self._cell = max(clearance_m / 2.0, span / math.sqrt(MOST_CELLS))
+        self._x0, self._y0 = xmin, ymin
+        self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
+        self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
+        self._clearance, self._every = clearance_m, range_m / 40.0
+        self._last = (math.inf, math.inf)
+        self._reach = 0.0
+        self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
+
+    def update(self, scan: RangeScan) -> None:
+        """Marks what a scan looked through, if the sensor has moved on far enough since the last time."""
+        if math.hypot(scan.east_m - self._last[0], scan.north_m - self._last[1]) < self._every:
+            return
+        self._last = (scan.east_m, scan.north_m)
+        # Beyond this range the rays are further apart than what must not be missed between them.
+        reach = min(scan.max_range_m, self._clearance / scan.spacing_rad)
+        if self._reach != reach:
+            self._reach, self._disc = reach, _disc(math.ceil(reach / self._cell) + 1)
+        # The disc's corner lies at this cell; some of it may lie outside the area.
+        across = len(self._disc) // 2
+        x_first = math.floor((scan.east_m - self._x0) / self._cell) - across
+        y_first = math.floor((scan.north_m - self._y0) / self._cell) - across
+        x_low, x_high = max(x_first, 0), min(x_first + len(self._disc), self._nx)
+        y_low, y_high = max(y_first, 0), min(y_first + len(self._disc), self._ny)
+        if x_low >= x_high or y_low >= y_high:
+            return
+        seen = self._seen[x_low:x_high, y_low:y_high]
+        disc = self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first]
+        # Most of what is in reach has been seen from the places before.
+        cell = (disc > seen).ravel().nonzero()[0]
+        column = cell // seen.shape[1]
+        row = cell - column * seen.shape[1]
+        # From the sensor to the middle of each cell.
+        x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
+        y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
+        distance = np.sqrt(x * x + y * y)
+        rays = len(scan.ranges_m)
+        ray = np.rint(clockwise_from(scan.start_rad, x, y) * (1.0 / scan.spacing_rad)).astype(np.int64)
+        # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
+        half = 0.75 * self._cell
+        level = np.ceil(half / scan.spacing_rad / np.maximum(distance, half)).astype(np.int64) + 1
+        if not all_round(scan):
+            covered = ((ray >= level) & (ray < rays - level)).nonzero()[0]
+            column, row, distance, ray, level = (
+                each[covered] for each in (column, row, distance, ray, level)
+            )
+        beyond = _least_beside(np.minimum(scan.ranges_m, reach), ray, level) - half
+        free = (beyond > distance).nonzero()[0]
+        seen[column.take(free), row.take(free)] = True
+
+    def contains(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each point lies in a cell seen to be free."""
+        ix = np.floor((points_m[:, 0] - self._x0) / self._cell).astype(np.int64)
+        iy = np.floor((points_m[:, 1] - self._y0) / self._cell).astype(np.int64)
+        inside = (ix >= 0) & (iy >= 0) & (ix < self._nx) & (iy < self._ny)
+        out = np.zeros(len(points_m), dtype=np.bool_)
+        out[inside] = self._seen[ix[inside], iy[inside]]
+        return out
+
+
+def _disc(cells: int) -> BoolArray:
+    """(2 k + 1, 2 k + 1) which cells lie within k cells of the middle one."""
+    away = np.arange(-cells, cells + 1) ** 2
+    disc: BoolArray = away[:, None] + away <= cells * cells
+    return disc
+
+
+def _least_beside(ranges: FloatArray, ray: NDArray[np.int64], level: NDArray[np.int64]) -> FloatArray:
+    """The least range of each of some rays and at least those `level` rays to either side.
+
+    The ends of the fan are joined: its last ray is followed by the first. Windows are widened to 2^k - 1 rays
+    to either side.
+    """
+    rays = len(ranges)
+    power = np.minimum(np.frexp(level)[1], rays.bit_length() - 1)
+    ring = np.concatenate((ranges, ranges, ranges))
+    least = [ring[rays : 2 * rays + 1]]
+    for k in range(int(power.max(initial=0))):
+        wide = 2**k
+        ring = np.minimum(np.minimum(ring[: -2 * wide], ring[wide:-wide]), ring[2 * wide :])
+        first = rays + 1 - 2 * wide
+        least.append(ring[first : first + rays + 1])
+    return np.concatenate(least).take(power * (rays + 1) + ray)
