@@ -15,6 +15,7 @@ from aircraft.interface import AircraftState, Command, FlightModel, Route
 from harness.obstacle_map import ObstacleMap
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
+from harness.reflection_map import ReflectionMap
 from harness.world import World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
@@ -66,7 +67,7 @@ class Loop:
 
     world: World
     sensor: RangeSensor
-    seen: ObstacleMap
+    seen: ObstacleMap | ReflectionMap
     planner: Planner
     model: FlightModel
     follower: PathFollower

@@ -17,7 +17,11 @@ class FreeSpace:
     """Cells of space that a scan has looked through, on a grid twice as coarse as the edges'."""
 
     def __init__(
-        self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float
+        self,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        range_m: float,
+        noise_m: float = 0.0,
     ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
         span = max(xmax - xmin, ymax - ymin)
@@ -25,7 +29,7 @@ class FreeSpace:
         self._x0, self._y0 = xmin, ymin
         self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
         self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
-        self._clearance, self._every = clearance_m, range_m / 40.0
+        self._clearance, self._every, self._noise = clearance_m, range_m / 40.0, noise_m
         self._last = (math.inf, math.inf)
         self._reach = 0.0
         self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
@@ -67,7 +71,7 @@ class FreeSpace:
             column, row, distance, ray, level = (
                 each[covered] for each in (column, row, distance, ray, level)
             )
-        beyond = _least_beside(np.minimum(scan.ranges_m, reach), ray, level) - half
+        beyond = _least_beside(np.minimum(scan.ranges_m, reach), ray, level) - half - self._noise
         free = (beyond > distance).nonzero()[0]
         seen[column.take(free), row.take(free)] = True
 

@@ -88,11 +88,19 @@ class ObstacleMemory:
         self._points[new] = fresh
         self._genuine[new] = genuine
         self._count = total
-        cells = [tuple(cell) for cell in np.floor(fresh / self.cell_m).astype(np.int64).tolist()]
-        for cell in dict.fromkeys(cells):
+        at = np.floor(fresh / self.cell_m).astype(np.int64)
+        if new.start == 0:
+            cells, which = np.unique(at, axis=0, return_inverse=True)
+            labels = _gathered(cells)
+            self._of_cell = dict(zip(map(tuple, cells.tolist()), labels.tolist(), strict=True))
+            self._next = len(cells)
+            self._labels[new] = labels[which.ravel()]
+            return
+        cells_of = [tuple(cell) for cell in at.tolist()]
+        for cell in dict.fromkeys(cells_of):
             if cell not in self._of_cell:
                 self._join(cell)
-        self._labels[new] = [self._of_cell[cell] for cell in cells]
+        self._labels[new] = [self._of_cell[cell] for cell in cells_of]
 
     def _join(self, cell: tuple[int, int]) -> None:
         """Gives a new cell the label of its neighbours, which become one obstacle if they were several."""
@@ -107,3 +115,24 @@ class ObstacleMemory:
             for key, value in self._of_cell.items():
                 if value == other:
                     self._of_cell[key] = label
+
+
+def _gathered(cells: IntArray) -> IntArray:
+    """(k,) labels of (k, 2) cells, in order of columns and rows: one for all that are joined by neighbours."""
+    labels = np.arange(len(cells))
+    base = cells.min(axis=0) - 1
+    width = int(np.ptp(cells[:, 1])) + 3
+    keys = (cells - base) @ (width, 1)
+    pairs: list[tuple[IntArray, IntArray]] = []
+    for step in (1, width - 1, width, width + 1):
+        beside = np.searchsorted(keys, keys + step)
+        found = (beside < len(keys)) & (keys.take(beside, mode="clip") == keys + step)
+        pairs.append((found.nonzero()[0], beside[found]))
+    a, b = (np.concatenate(each) for each in zip(*pairs, strict=True))
+    while True:
+        least = np.minimum(labels[a], labels[b])
+        if (least == labels[a]).all() and (least == labels[b]).all():
+            return labels
+        np.minimum.at(labels, labels[a], least)
+        np.minimum.at(labels, labels[b], least)
+        labels = labels[labels]
