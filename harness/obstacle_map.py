@@ -47,10 +47,16 @@ class ObstacleMap:
         clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way
             between them and are joined. Edge points lie about a quarter of it apart.
         range_m: sensing range.
+        false_returns: the sensor is known to return ranges where nothing is.
     """
 
     def __init__(
-        self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float
+        self,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        range_m: float,
+        *,
+        false_returns: bool = False,
     ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
         span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
@@ -72,7 +78,7 @@ class ObstacleMap:
         self._count = 0
         self._join = 2.0 * clearance_m
         self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
-        self._range = range_m
+        self._range, self._false_returns = range_m, false_returns
         self._revision = 0
         self._taken_back_at = 0
         self._scans = 0
@@ -129,7 +135,9 @@ class ObstacleMap:
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
         self._unconfirmed = False
-        hits = (scan.ranges_m < math.inf).nonzero()[0]
+        hits = (_supported(scan, self._join) if self._false_returns else scan.ranges_m < math.inf).nonzero()[
+            0
+        ]
         # Places are points seen from the corner of the grid.
         places = scan.from_sensor_m(hits)
         places += complex(scan.east_m, scan.north_m) - self._origin
@@ -282,3 +290,17 @@ class ObstacleMap:
 def _pairs(points: ComplexArray) -> FloatArray:
     """(k, 2) east and north of points east + i north."""
     return points.view(np.float64).reshape(-1, 2)
+
+
+def _supported(scan: RangeScan, apart_m: float) -> BoolArray:
+    """(n,) which rays returned something that one of the two to either side returned, too: no false return."""
+    ranges = scan.ranges_m if all_round(scan) else np.concatenate((scan.ranges_m, np.full(2, math.inf)))
+    hit = ranges < math.inf
+    finite = np.where(hit, ranges, -math.inf)
+    supported = np.zeros(len(ranges), dtype=np.bool_)
+    for side in (1, 2):
+        # Where one of two is missing, they are infinitely far apart.
+        with np.errstate(invalid="ignore"):
+            alike = np.abs(finite - np.roll(finite, side)) < apart_m
+        supported |= alike | np.roll(alike, -side)
+    return (supported & hit)[: len(scan.ranges_m)]

@@ -79,13 +79,10 @@ def make_loop(
 
 def empty_map(scenario: Scenario, mission: Mission) -> ObstacleMap | ReflectionMap:
     """The obstacle map that suits the sensor: where ranges are noisy, one that weighs many returns."""
-    noise_m, known = (
-        scenario.sensor.range_noise_m,
-        (mission.bounds_m, mission.clearance_m, mission.sensor_range_m),
-    )
-    if noise_m > NOISY * mission.clearance_m:
-        return ReflectionMap(*known, noise_m)
-    return ObstacleMap(*known)
+    sensor, known = scenario.sensor, (mission.bounds_m, mission.clearance_m, mission.sensor_range_m)
+    if sensor.range_noise_m > NOISY * mission.clearance_m:
+        return ReflectionMap(*known, sensor.range_noise_m)
+    return ObstacleMap(*known, false_returns=sensor.false_return > 0.0)
 
 
 def kinematic_loop(scenario: Scenario) -> Loop:

@@ -166,6 +166,8 @@ def mission_of(scenario: Scenario) -> Mission:
         tracking_error_m=performance.tracking_error_m,
         sensor_range_m=scenario.sensor.range_m,
         compute_latency_s=scenario.planner.compute_latency_s,
+        sensor_latency_s=scenario.sensor.latency_s,
+        wind_mps=_wind_mps(scenario.environment),
     )
 
 
@@ -179,7 +181,7 @@ def performance_of(scenario: Scenario) -> Performance:
     from aircraft.envelope import performance
 
     spec, air = scenario.aircraft, scenario.environment
-    wind_mps = air.wind.speed_mps if air.wind else 0.0
+    wind_mps = _wind_mps(air)
     if wind_mps >= MAX_WIND_FRACTION * spec.airspeed_mps:
         raise KeyFault(
             ("environment", "wind", "speed_mps"),
@@ -191,6 +193,10 @@ def performance_of(scenario: Scenario) -> Performance:
         return performance(airframe(spec.model), spec.airspeed_mps, wind_mps, gusts, front_mps)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
+
+
+def _wind_mps(air: Environment) -> float:
+    return air.wind.speed_mps if air.wind else 0.0
 
 
 def scenario_schema() -> dict[str, Any]:

@@ -270,3 +270,15 @@ def onward(path: Path, station_m: float, length_m: float) -> list[Segment]:
 def full_turn(pose: Pose, radius_m: float, side: float) -> Segment:
     """A full circle from a pose, to the left (`side` = 1) or to the right (-1)."""
     return (*pose, side / radius_m, math.tau * radius_m)
+
+
+def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
+    """Segments as a whole brought to where they begin at another pose."""
+    x, y, tx, ty = segments[0][:4]
+    turn = complex(to.tangent_east, to.tangent_north) * complex(tx, -ty)
+    out: list[Segment] = []
+    for east, north, tangent_east, tangent_north, curvature, length in segments:
+        place = complex(to.east_m, to.north_m) + turn * complex(east - x, north - y)
+        tangent = turn * complex(tangent_east, tangent_north)
+        out.append((place.real, place.imag, tangent.real, tangent.imag, curvature, length))
+    return out

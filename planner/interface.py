@@ -80,6 +80,8 @@ class Mission:
         tracking_error_m: how far off the path the aircraft may be.
         sensor_range_m: radius of the sensing range (the paper's r).
         compute_latency_s: a plan takes effect this much after it was asked for.
+        sensor_latency_s: a scan is known this much after it was taken.
+        wind_mps: the strongest steady wind to expect.
     """
 
     goal_m: tuple[float, float]
@@ -92,6 +94,13 @@ class Mission:
     tracking_error_m: float
     sensor_range_m: float
     compute_latency_s: float = 0.0
+    sensor_latency_s: float = 0.0
+    wind_mps: float = 0.0
+
+    @property
+    def ground_speed_mps(self) -> float:
+        """Speed over the ground with the wind behind."""
+        return self.speed_mps + self.wind_mps
 
 
 @dataclass(frozen=True, eq=False)

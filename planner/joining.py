@@ -62,5 +62,5 @@ def departure(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segmen
         return here, []
     if math.dist(pose_at(path, station)[:2], here[:2]) > max(1.0, OFF_PATH * mission.tracking_error_m):
         return here, []
-    leave = station + mission.speed_mps * (LEAD_S + mission.compute_latency_s)
+    leave = station + mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
     return pose_at(path, leave), between(path, station, leave)

@@ -28,7 +28,7 @@ import numpy as np
 from planner.barrier import Proof
 from planner.certificate import CertificateBroken, Certified, Certifier, least_sensor_range_m
 from planner.course import Course
-from planner.curves import Point, Segment, along, on_loiter, onward, place_on
+from planner.curves import Point, Pose, Segment, along, moved, on_loiter, onward, place_on
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
@@ -68,7 +68,6 @@ UNHURRIED = 0.0625
 
 HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
-
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 
@@ -129,9 +128,9 @@ class RollingWindowConfig:
             ValueError: the planning window is larger than the sensing range, or that is too short for the turn
                 radius.
         """
-        reaction_s = LEAD_S + mission.compute_latency_s + mission.roll_in_s
+        reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
         least = least_sensor_range_m(
-            mission.turn_radius_m, mission.clearance_m, mission.speed_mps, reaction_s
+            mission.turn_radius_m, mission.clearance_m, mission.ground_speed_mps, reaction_s
         )
         if mission.sensor_range_m < least:
             raise ValueError(
@@ -173,9 +172,9 @@ class RollingWindow:
             steps=config.steps,
             candidates=config.candidates,
         )
-        self._lead_m = mission.speed_mps * (LEAD_S + mission.compute_latency_s)
+        self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
         self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
-        self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.speed_mps
+        self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps
         self._proof = Proof(mission, self._memory, self._local.least_keeps_m)
         self._turns_keep_m = mission.clearance_m + mission.turn_radius_m
         self._proof_for_turns = Proof(mission, self._memory, self._turns_keep_m)
@@ -312,11 +311,12 @@ class RollingWindow:
         """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
         prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
         if effect is not None:
-            nearest, _ = place_on(effect.path, here)
-            off_m = math.dist(nearest[:2], request.position_m)
-            if off_m <= max(1.0, OFF_PATH * self._mission.tracking_error_m):
-                uncut_m = math.inf if effect.holds(here) else max(0.0, self._watch.cut_m - here)
-                prefix = onward(effect.path, here, min(self._lead_m, uncut_m)) or prefix
+            off_m = math.dist(place_on(effect.path, here)[0][:2], request.position_m)
+            uncut_m = math.inf if effect.holds(here) else max(0.0, self._watch.cut_m - here)
+            if flown := onward(effect.path, here, min(self._lead_m, uncut_m)):
+                near = off_m <= max(1.0, OFF_PATH * self._mission.tracking_error_m)
+                # An aircraft off the path bends as that does until it is told otherwise.
+                prefix = flown if near else moved(flown, Pose(*request.position_m, *request.direction))
         last = prefix[-1]
         return Start(request.position_m, along(last, last[5]), last[4], prefix)
 
@@ -368,8 +368,8 @@ class RollingWindow:
         """A turn that only keeps away from what is known, for want of one that is seen to be free."""
         limits = self._local.limits
         if effect is None:
-            straight = (*request.position_m, *request.direction, 0.0, limits.roll_m)
-            path, here, last = Path(np.array([straight])), 0.0, 0.0
+            straight = (*request.position_m, *request.direction, 0.0, self._lead_m)
+            path, here, last = Path(np.array([straight])), 0.0, self._lead_m
         else:
             path, last = effect.path, min(self._watch.cut_m, effect.leaves_m)
         for share in HOLD_SHARES:
