@@ -12,10 +12,9 @@ from typing import Protocol
 
 from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.interface import AircraftState, Command, FlightModel, Route
-from harness.obstacle_map import ObstacleMap
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
-from harness.reflection_map import ReflectionMap
+from harness.sensed_world import SensedWorld
 from harness.world import World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
@@ -67,7 +66,7 @@ class Loop:
 
     world: World
     sensor: RangeSensor
-    seen: ObstacleMap | ReflectionMap
+    seen: SensedWorld
     planner: Planner
     model: FlightModel
     follower: PathFollower

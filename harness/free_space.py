@@ -75,6 +75,41 @@ class FreeSpace:
         free = (beyond > distance).nonzero()[0]
         seen[column.take(free), row.take(free)] = True
 
+    def take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
+        """Something stands where space was seen to be free: it, and what it hides, is not known to be free any more.
+
+        Args:
+            scan: that it was seen with.
+            edges_m: (k, 2) its edge points.
+        """
+        around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
+        places = (edges_m[:, None] + around).reshape(-1, 2)
+        edges_m = edges_m[self.contains(places).reshape(-1, len(around)).all(axis=1)]
+        if not len(edges_m):
+            return
+        column, row = self._seen.nonzero()
+        x = (column + 0.5) * self._cell + (self._x0 - scan.east_m)
+        y = (row + 0.5) * self._cell + (self._y0 - scan.north_m)
+        distance = np.hypot(x, y)
+        east, north = (edges_m - (scan.east_m, scan.north_m)).T
+        half_rad = np.arcsin(
+            np.minimum(1.5 * self._cell / np.maximum(np.hypot(east, north), self._cell), 1.0)
+        )
+        # Bearings are told by slices; each is hidden from the nearest edge on.
+        width = max(scan.spacing_rad, 1e-3)
+        slices = math.ceil(math.tau / width)
+        hidden_from = np.full(slices, math.inf)
+        middle = np.arctan2(east, north)
+        for at, half, away in zip(
+            middle.tolist(), half_rad.tolist(), np.hypot(east, north).tolist(), strict=True
+        ):
+            which = np.arange(math.floor((at - half) / width), math.ceil((at + half) / width) + 1) % slices
+            hidden_from[which] = np.minimum(hidden_from[which], away)
+        mine = np.floor(np.arctan2(x, y) / width).astype(np.int64) % slices
+        hidden = distance > hidden_from[mine] - self._cell
+        self._seen[column[hidden], row[hidden]] = False
+        self._last = (math.inf, math.inf)
+
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""
         ix = np.floor((points_m[:, 0] - self._x0) / self._cell).astype(np.int64)

@@ -1,11 +1,10 @@
-"""What has been seen so far: obstacle edges and space seen to be free.
+"""The edges of obstacles that have been seen so far.
 
 Edges are points on a square grid of cells, at most one a cell, each where a ray hit or between two such
 places. Near by, where the edge of an obstacle stands out against what is behind it, finer grids keep more of
 them: paths bend about such places. Evidence decides: a cell that was hit in two scans holds an edge; one that
 several scans looked through, with neighbouring rays agreeing, does not. So one false return makes no wall and
-one lost return opens none. Free space is a coarser grid, written from key scans. The grids cover the area,
-that of the edges with a border, so that the map cannot outgrow them.
+one lost return opens none. The grids cover the area with a border, so that the map cannot outgrow them.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.free_space import FreeSpace
 from harness.range_sensor import RangeScan, all_round, clockwise_from
 from planner.interface import BoolArray, FloatArray
 
@@ -40,7 +38,7 @@ LOOK_THROUGH_EVERY = 6
 
 
 class ObstacleMap:
-    """The planner's only source of knowledge about obstacles (`planner.interface.SeenWorld`).
+    """What stands still, as a sensor with exact ranges shows it (`harness.sensed_world.Edges`).
 
     Args:
         bounds_m: xmin, ymin, xmax, ymax of the area.
@@ -87,7 +85,6 @@ class ObstacleMap:
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
         self._near_count = 0
-        self._free = FreeSpace(bounds_m, clearance_m, range_m)
 
     @property
     def spacing_m(self) -> float:
@@ -99,18 +96,17 @@ class ObstacleMap:
         """Grows with every change of the set of edge points."""
         return self._revision
 
-    def update(self, scan: RangeScan) -> None:
-        """Takes in one scan."""
+    def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
+        """Takes in one scan, but for some of its rays."""
         self._scans += 1
         nearest = float(np.minimum.reduce(scan.ranges_m))
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
             if self._unconfirmed or not abs(sensor - self._taken_at) < min(SAME_PLACE * nearest, self._cell):
                 self._taken_at = sensor
-                self._take_in(scan, nearest)
+                self._take_in(scan, nearest, ignored)
         if self._scans % LOOK_THROUGH_EVERY == 0 and self._count:
             self._look_through(scan)
-        self._free.update(scan)
 
     @property
     def taken_back_at(self) -> int:
@@ -125,19 +121,24 @@ class ObstacleMap:
         slots = slots[self._score[self._key[slots]] >= CONFIRMED]
         return _pairs(self._points[slots[np.argsort(self._since[slots], kind="stable")]])
 
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        """(k,) whether each of (k, 2) points lies in space seen to be free."""
-        return self._free.contains(points_m)
+    def forget(self, points_m: FloatArray, within_m: float) -> None:
+        """Forgets all that is no further from some points, (k, 2)."""
+        known = self._points[: self._count]
+        for point in points_m[:, 0] + 1j * points_m[:, 1]:
+            self._score[self._key[: self._count][np.abs(known - point) <= within_m]] = 0
+        self._revision += 1
+        self._taken_back_at = self._revision
 
-    def _take_in(self, scan: RangeScan, nearest_m: float) -> None:
+    def _take_in(self, scan: RangeScan, nearest_m: float, ignored: BoolArray | None) -> None:
         """Counts hits; where they are news, also what lies between them; and near outlines in detail.
 
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
         self._unconfirmed = False
-        hits = (_supported(scan, self._join) if self._false_returns else scan.ranges_m < math.inf).nonzero()[
-            0
-        ]
+        taken = _supported(scan, self._join) if self._false_returns else scan.ranges_m < math.inf
+        hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
+        if not len(hits):
+            return
         # Places are points seen from the corner of the grid.
         places = scan.from_sensor_m(hits)
         places += complex(scan.east_m, scan.north_m) - self._origin

@@ -16,7 +16,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.free_space import FreeSpace
 from harness.range_sensor import RangeScan, all_round, clockwise_from
 from planner.interface import BoolArray, FloatArray
 
@@ -40,7 +39,7 @@ SETTLED_EVERY = 8
 
 
 class ReflectionMap:
-    """The planner's knowledge of obstacles (`planner.interface.SeenWorld`) where ranges are noisy.
+    """What stands still, as a sensor with noisy ranges shows it (`harness.sensed_world.Edges`).
 
     Args:
         bounds_m: xmin, ymin, xmax, ymax of the area.
@@ -79,7 +78,6 @@ class ReflectionMap:
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
         self._near_count = 0
-        self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
 
     @property
     def spacing_m(self) -> float:
@@ -103,21 +101,26 @@ class ReflectionMap:
         points = self._points[slots[np.argsort(since[slots], kind="stable")]]
         return points.view(np.float64).reshape(-1, 2)
 
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        """(k,) whether each of (k, 2) points lies in space seen to be free."""
-        return self._free.contains(points_m)
-
-    def update(self, scan: RangeScan) -> None:
-        """Takes in one scan."""
+    def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
+        """Takes in one scan, but for some of its rays."""
         self._scans += 1
-        self._add_cells(scan)
+        taken = scan.ranges_m < math.inf
+        self._add_cells(scan, (taken if ignored is None else taken & ~ignored).nonzero()[0])
         if self._count:
-            self._ask_cells(scan)
-        self._free.update(scan)
+            self._ask_cells(scan, ignored)
 
-    def _add_cells(self, scan: RangeScan) -> None:
+    def forget(self, points_m: FloatArray, within_m: float) -> None:
+        """Forgets all that is no further from some points, (k, 2)."""
+        known = self._points[: self._count]
+        for point in points_m[:, 0] + 1j * points_m[:, 1]:
+            near = np.abs(known - point) <= within_m
+            self._counts[: self._count][near] = 0.0
+            self._edge[: self._count][near] = False
+        self._revision += 1
+        self._taken_back_at = self._revision
+
+    def _add_cells(self, scan: RangeScan, hits: NDArray[np.intp]) -> None:
         """Cells that returned a ray for the first time get a slot."""
-        hits = (scan.ranges_m < math.inf).nonzero()[0]
         places = scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
         column, row = (places.view(np.float64).reshape(-1, 2).T / self._cell).astype(np.int64)
         on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
@@ -137,7 +140,7 @@ class ReflectionMap:
         self._points[new] = self._origin + self._cell * (column + 0.5 + 1j * (row + 0.5))
         self._count = end
 
-    def _ask_cells(self, scan: RangeScan) -> None:
+    def _ask_cells(self, scan: RangeScan, ignored: BoolArray | None) -> None:
         """Counts what the rays towards known cells did, and decides anew which cells are edges."""
         slots = self._in_range(complex(scan.east_m, scan.north_m))
         offsets = self._points.take(slots) - complex(scan.east_m, scan.north_m)
@@ -151,6 +154,8 @@ class ReflectionMap:
         aimed &= distance < scan.max_range_m - 2.0 * self._noise
         if not all_round(scan):
             aimed &= ray < len(scan.ranges_m)
+        if ignored is not None:
+            aimed &= ~ignored.take(ray, mode="wrap")
         slots, distance, ray = slots[aimed], distance[aimed], ray[aimed]
         counts = self._counts[slots]
         counts += self._rays_did(scan.ranges_m.take(ray, mode=ends) - distance)
@@ -178,7 +183,8 @@ class ReflectionMap:
             self._near_at, self._near_count = sensor, self._count
         slots = np.concatenate((self._near, np.arange(self._near_count, self._count, dtype=np.int32)))
         unsettled = self._counts.take(slots, axis=0).sum(axis=1) < SETTLED
-        return slots[unsettled | (slots % SETTLED_EVERY == self._scans % SETTLED_EVERY)]
+        chosen: NDArray[np.int32] = slots[unsettled | (slots % SETTLED_EVERY == self._scans % SETTLED_EVERY)]
+        return chosen
 
     def _decide(self, slots: NDArray[np.int32], counts: NDArray[np.float32]) -> None:
         reflected, passed, before = counts.T

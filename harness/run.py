@@ -21,25 +21,20 @@ from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.closed_loop import Loop, Observer, Progress, fly
 from harness.metrics import metrics
-from harness.obstacle_map import ObstacleMap
 from harness.planner_keys import config_of
 from harness.range_sensor import RangeSensor
 from harness.record import AcceptedPlan, Flight, Track
-from harness.reflection_map import ReflectionMap
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.scenario_sections import Environment
+from harness.sensed_world import SensedWorld
 from harness.trackability import FlightLimits
 from harness.world import World
-from planner.interface import Mission
 from planner.registry import planner_kinds
 
 if TYPE_CHECKING:
     from aircraft.interface import AircraftState
     from harness.range_sensor import RangeScan
-
-NOISY = 0.1
-"""Ranges that err by more than this share of the clearance are weighed, not taken as they are."""
 
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
@@ -66,7 +61,13 @@ def make_loop(
     return Loop(
         world=world,
         sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
-        seen=empty_map(scenario, mission),
+        seen=SensedWorld(
+            mission.bounds_m,
+            mission.clearance_m,
+            mission.sensor_range_m,
+            noise_m=scenario.sensor.range_noise_m,
+            false_returns=scenario.sensor.false_return > 0.0,
+        ),
         planner=planner_kinds()[scenario.planner.kind].make(config_of(scenario.planner), mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
         follower=PathFollower(airframe(scenario.aircraft.model).guidance_limits),
@@ -75,14 +76,6 @@ def make_loop(
         time_limit_s=_given(scenario.mission.time_limit_s),
         scan_rate_hz=scenario.sensor.rate_hz,
     )
-
-
-def empty_map(scenario: Scenario, mission: Mission) -> ObstacleMap | ReflectionMap:
-    """The obstacle map that suits the sensor: where ranges are noisy, one that weighs many returns."""
-    sensor, known = scenario.sensor, (mission.bounds_m, mission.clearance_m, mission.sensor_range_m)
-    if sensor.range_noise_m > NOISY * mission.clearance_m:
-        return ReflectionMap(*known, sensor.range_noise_m)
-    return ObstacleMap(*known, false_returns=sensor.false_return > 0.0)
 
 
 def kinematic_loop(scenario: Scenario) -> Loop:

@@ -38,6 +38,24 @@ class PlanStatus(Enum):
     """No way can exist in what has been seen: the goal is proved unreachable."""
 
 
+@dataclass(frozen=True, eq=False)
+class MovingEdges:
+    """The seen edge of one obstacle that moves.
+
+    Attributes:
+        time_s: when it was there.
+        points_m: (k, 2) edge points.
+        velocity_mps: east and north.
+    """
+
+    time_s: float
+    points_m: FloatArray
+    velocity_mps: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points_m", _frozen(self.points_m))
+
+
 class SeenWorld(Protocol):
     """What the sensor has shown so far: obstacle edges and free space. All that a planner may know."""
 
@@ -54,6 +72,11 @@ class SeenWorld(Protocol):
     @property
     def taken_back_at(self) -> int:
         """The last revision at which edge points were taken away again; 0 where none ever was."""
+        ...
+
+    @property
+    def moving(self) -> tuple[MovingEdges, ...]:
+        """What is known to move; its edges are not among the others."""
         ...
 
     def edges_since(self, revision: int) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,10 @@ from planner.interface import FloatArray, SeenWorld
 IntArray = NDArray[np.intp]
 
 
+FIRST_MOVING = -1000
+"""Label of the first obstacle that moves; those of the others are below."""
+MOVED = 0.3
+"""What has moved no further than this share of a cell is left where it was."""
 NOTHING = np.zeros((0, 2))
 
 
@@ -27,6 +32,7 @@ class ObstacleMemory:
 
     def __init__(self, clearance_m: float) -> None:
         self.cell_m = clearance_m / math.sqrt(2.0)
+        self._outlines: Sequence[FloatArray] = ()
         self._forget()
 
     def _forget(self) -> None:
@@ -34,39 +40,76 @@ class ObstacleMemory:
         self._labels = np.zeros(256, dtype=np.intp)
         self._genuine = np.zeros(256, dtype=np.bool_)
         self._count = 0
+        self._moving = 0
         self._of_cell: dict[tuple[int, int], int] = {}
         self._next = 0
         self._revision = -1
 
     @property
     def points_m(self) -> FloatArray:
-        """(m, 2) edge points."""
-        return self._points[: self._count]
+        """(m, 2) edge points, those of what moves last."""
+        return self._points[: self._count + self._moving]
 
     @property
     def labels(self) -> IntArray:
         """(m,) the obstacle that each point belongs to."""
-        return self._labels[: self._count]
+        return self._labels[: self._count + self._moving]
 
     @property
     def genuine_m(self) -> FloatArray:
-        """(k, 2) those points that were seen, not refused."""
-        return self.points_m[self._genuine[: self._count]]
+        """(k, 2) those points that were seen to stand still, not refused."""
+        return self._points[: self._count][self._genuine[: self._count]]
 
     def refuse(self, place: tuple[float, float]) -> None:
         """Remembers a place as if there were an edge: it is not to be gone to again."""
         self._add(np.array([place]), genuine=False)
+        self._append(self._outlines)
 
     def forgive(self) -> None:
         """Forgets what was refused: at the next call of `take_in` all that was seen is learnt anew."""
         if not self._genuine[: self._count].all():
             self._forget()
 
-    def take_in(self, seen: SeenWorld) -> FloatArray:
+    def take_in(self, seen: SeenWorld, met: Sequence[FloatArray] | None = None) -> FloatArray:
         """Remembers what has come in since the last call, and returns it: (k, 2).
 
         Where something was taken back, all is learnt anew.
+
+        Args:
+            seen: what has been seen so far.
+            met: for each obstacle that moves, (k, 2) where its edge is to be thought of; default: where it is.
         """
+        fresh = self._take_in(seen)
+        outlines = [each.points_m for each in seen.moving] if met is None else met
+        if self._alike(outlines):
+            outlines = self._outlines
+        elif len(outlines):
+            fresh = np.concatenate((fresh, *outlines))
+        self._append(outlines)
+        return fresh
+
+    def _alike(self, outlines: Sequence[FloatArray]) -> bool:
+        """Whether what moves is where it was, but for a little."""
+        if len(outlines) != len(self._outlines):
+            return False
+        corners = [
+            np.abs(edge(new, axis=0) - edge(old, axis=0)).max()
+            for new, old in zip(outlines, self._outlines, strict=True)
+            for edge in (np.min, np.max)
+        ]
+        return max(corners, default=0.0) < MOVED * self.cell_m
+
+    def _append(self, outlines: Sequence[FloatArray]) -> None:
+        """Puts the points of what moves after all others: an obstacle each."""
+        self._outlines, self._moving = outlines, 0
+        for number, outline in enumerate(outlines):
+            begin = self._count + self._moving
+            self._grow(begin + len(outline))
+            new = slice(begin, begin + len(outline))
+            self._points[new], self._labels[new], self._genuine[new] = outline, FIRST_MOVING - number, False
+            self._moving += len(outline)
+
+    def _take_in(self, seen: SeenWorld) -> FloatArray:
         if seen.taken_back_at > self._revision >= 0:
             self._forget()
         if seen.revision == self._revision:
@@ -79,11 +122,7 @@ class ObstacleMemory:
 
     def _add(self, fresh: FloatArray, genuine: bool) -> None:
         total = self._count + len(fresh)
-        if total > len(self._points):
-            size = max(2 * len(self._points), total)
-            self._points = np.resize(self._points, (size, 2))
-            self._labels = np.resize(self._labels, size)
-            self._genuine = np.resize(self._genuine, size)
+        self._grow(total)
         new = slice(self._count, total)
         self._points[new] = fresh
         self._genuine[new] = genuine
@@ -101,6 +140,13 @@ class ObstacleMemory:
             if cell not in self._of_cell:
                 self._join(cell)
         self._labels[new] = [self._of_cell[cell] for cell in cells_of]
+
+    def _grow(self, total: int) -> None:
+        if total > len(self._points):
+            size = max(2 * len(self._points), total)
+            self._points = np.resize(self._points, (size, 2))
+            self._labels = np.resize(self._labels, size)
+            self._genuine = np.resize(self._genuine, size)
 
     def _join(self, cell: tuple[int, int]) -> None:
         """Gives a new cell the label of its neighbours, which become one obstacle if they were several."""

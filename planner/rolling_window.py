@@ -32,6 +32,7 @@ from planner.curves import Point, Pose, Segment, along, moved, on_loiter, onward
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
+from planner.encounters import encounters
 from planner.hold import hold
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus, SeenWorld
 from planner.local_planning import LocalPlanning, Start
@@ -195,7 +196,7 @@ class RollingWindow:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
-        fresh = self._memory.take_in(request.seen)
+        fresh = self._memory.take_in(request.seen, encounters(request, self._mission))
         effect = self._in_effect(request)
         if effect is None:
             self._proof_for_turns.closed(request.position_m)

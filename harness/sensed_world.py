@@ -1,0 +1,121 @@
+"""All that the sensor has shown so far: edges of what stands still, what moves, and space seen to be free."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from harness.free_space import FreeSpace
+from harness.moving_obstacles import MovingObstacles
+from harness.obstacle_map import ObstacleMap
+from harness.range_sensor import RangeScan
+from harness.reflection_map import ReflectionMap
+from planner.interface import BoolArray, FloatArray, MovingEdges
+
+NOISY = 0.1
+"""Ranges that err by more than this share of the clearance are weighed, not taken as they are."""
+
+
+class Edges(Protocol):
+    """A map of the edges of what stands still; the members of `planner.interface.SeenWorld` that concern it."""
+
+    @property
+    def spacing_m(self) -> float: ...  # noqa: D102
+
+    @property
+    def revision(self) -> int: ...  # noqa: D102
+
+    @property
+    def taken_back_at(self) -> int: ...  # noqa: D102
+
+    def edges_since(self, revision: int) -> FloatArray: ...  # noqa: D102
+
+    def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
+        """Takes in one scan, but for some of its rays."""
+        ...
+
+    def forget(self, points_m: FloatArray, within_m: float) -> None:
+        """Forgets all that is no further from some points, (k, 2)."""
+        ...
+
+
+class SensedWorld:
+    """The planner's only source of knowledge about obstacles (`planner.interface.SeenWorld`).
+
+    Args:
+        bounds_m: xmin, ymin, xmax, ymax of the area.
+        clearance_m: wanted distance from obstacles.
+        range_m: sensing range.
+        noise_m: standard deviation of ranges, as the sensor's maker states it.
+        false_returns: the sensor is known to return ranges where nothing is.
+    """
+
+    def __init__(
+        self,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        range_m: float,
+        *,
+        noise_m: float = 0.0,
+        false_returns: bool = False,
+    ) -> None:
+        self._clearance = clearance_m
+        self._edges: Edges = (
+            ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
+            if noise_m > NOISY * clearance_m
+            else ObstacleMap(bounds_m, clearance_m, range_m, false_returns=false_returns)
+        )
+        self._moving = MovingObstacles(clearance_m, noise_m)
+        self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
+        self._known_to_move = 0
+        self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
+
+    @property
+    def spacing_m(self) -> float:
+        """Edge points of one wall are about this far apart."""
+        return self._edges.spacing_m
+
+    @property
+    def revision(self) -> int:
+        """Grows with every change of the set of edge points."""
+        return self._edges.revision
+
+    @property
+    def taken_back_at(self) -> int:
+        """The last revision at which edge points were taken away again."""
+        return self._edges.taken_back_at
+
+    @property
+    def moving(self) -> tuple[MovingEdges, ...]:
+        """What is known to move; its edges are not among the others."""
+        return self._moving.found
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) edge points that came in after `revision`, in the order in which they did."""
+        since, now, points = self._asked
+        if since != revision or now != self.revision:
+            points = self._edges.edges_since(revision)
+            self._asked = (revision, self.revision, points)
+        return points
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) points lies in space seen to be free."""
+        return self._free.contains(points_m)
+
+    def update(self, scan: RangeScan) -> None:
+        """Takes in one scan."""
+        ignored = self._moving.update(scan)
+        before = self.revision
+        self._edges.update(scan, ignored)
+        if self.revision != before:
+            self._free.take_back(scan, self.edges_since(before))
+        found = self.moving
+        if len(found) > self._known_to_move:
+            for each in found:
+                self._edges.forget(each.points_m, self._clearance + math.hypot(*each.velocity_mps))
+        self._known_to_move = len(found)
+        for each in found:
+            self._free.take_back(scan, each.points_m)
+        self._free.update(scan)
