@@ -75,18 +75,21 @@ class FreeSpace:
         free = (beyond > distance).nonzero()[0]
         seen[column.take(free), row.take(free)] = True
 
-    def take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
+    def take_back(self, scan: RangeScan, edges_m: FloatArray) -> bool:
         """Something stands where space was seen to be free: it, and what it hides, is not known to be free any more.
 
         Args:
             scan: that it was seen with.
             edges_m: (k, 2) its edge points.
+
+        Returns:
+            Whether any of it does.
         """
         around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
         places = (edges_m[:, None] + around).reshape(-1, 2)
         edges_m = edges_m[self.contains(places).reshape(-1, len(around)).all(axis=1)]
         if not len(edges_m):
-            return
+            return False
         column, row = self._seen.nonzero()
         x = (column + 0.5) * self._cell + (self._x0 - scan.east_m)
         y = (row + 0.5) * self._cell + (self._y0 - scan.north_m)
@@ -109,6 +112,7 @@ class FreeSpace:
         hidden = distance > hidden_from[mine] - self._cell
         self._seen[column[hidden], row[hidden]] = False
         self._last = (math.inf, math.inf)
+        return True
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""

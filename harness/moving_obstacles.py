@@ -23,7 +23,9 @@ from planner.interface import BoolArray, FloatArray, MovingEdges
 ComplexArray = NDArray[np.complex128]
 
 COMPARED_S = 12.0
-"""Scans are compared with those taken so long before."""
+"""Scans are compared with those taken so long before,"""
+SLOW_MPS = 5.0
+"""and as much longer as something so slow takes to leave the noise."""
 LOOK_EVERY_S = 1.5
 FEWEST = 3
 """Neighbouring rays that must tell the same."""
@@ -31,7 +33,11 @@ LEAST_MPS = 0.5
 """What is slower than this stands still."""
 MOST_MPS = 30.0
 DECIDED_S = 5.0
-"""Whether something moves is decided after so long."""
+"""Whether something moves is decided after so long at the soonest, and when it is sure."""
+SURE = 4.0
+"""In standard errors of the velocity."""
+UNDECIDED_S = 30.0
+"""What cannot be told to move for so long is taken to stand still."""
 NEW_OUTLINE_S = 12.0
 """Outlines are compared with one no older than this."""
 HISTORY_S = 40.0
@@ -57,6 +63,7 @@ class _Track:
         base: translation from its first outline to this one.
         shifts: (time, translation) from the first outline on.
         velocity: east + i north.
+        error_mps: standard error of it.
         seen_s: when it was last seen.
         moves: it is known to.
     """
@@ -67,6 +74,7 @@ class _Track:
     begun_s: float
     shifts: deque[tuple[float, complex]]
     velocity: complex = 0j
+    error_mps: float = math.inf
     seen_s: float = -math.inf
     moves: bool = False
 
@@ -85,8 +93,9 @@ class MovingObstacles:
     """
 
     def __init__(self, clearance_m: float, noise_m: float) -> None:
-        self._apart = clearance_m
+        self._apart = clearance_m + 6.0 * noise_m
         self._sure = 4.0 * noise_m + 0.02 * clearance_m
+        self._compared_s = COMPARED_S + self._sure / SLOW_MPS
         self._gate = max(0.5 * clearance_m, 3.0 * noise_m)
         self._before: deque[RangeScan] = deque()
         self._looked_s = -math.inf
@@ -111,7 +120,7 @@ class MovingObstacles:
         self._before.append(scan)
         if scan.time_s - self._looked_s >= LOOK_EVERY_S:
             self._looked_s = scan.time_s
-            while len(self._before) > 1 and self._before[1].time_s <= scan.time_s - COMPARED_S:
+            while len(self._before) > 1 and self._before[1].time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()
             self._look(scan, self._before[0], moving)
         return moving
@@ -153,9 +162,10 @@ class MovingObstacles:
             if scan.time_s - track.seen_s > (COASTS_S if track.moves else 2.0):
                 continue
             if age >= DECIDED_S:
-                track.moves = abs(track.velocity) >= LEAST_MPS * (0.7 if track.moves else 1.0)
-                if not track.moves:
+                doubt = SURE * track.error_mps
+                if abs(track.velocity) + doubt < LEAST_MPS or (age > UNDECIDED_S and not track.moves):
                     continue
+                track.moves |= abs(track.velocity) >= LEAST_MPS + doubt
             kept.append(track)
             if track.moves:
                 moving[hits[mine]] = True
@@ -225,6 +235,8 @@ class MovingObstacles:
         last_s, last = track.shifts[-1]
         track.outline = track.outline + (last - track.base) - velocity * (last_s - track.outline_s)
         track.base = last - velocity * (last_s - track.outline_s)
+        off = shifts - shifts.mean() - velocity * times
+        track.error_mps = math.sqrt(float((np.abs(off) ** 2).sum() / (len(off) - 2) / (times * times).sum()))
         track.velocity = velocity if abs(velocity) <= MOST_MPS else velocity * (MOST_MPS / abs(velocity))
 
 

@@ -32,10 +32,6 @@ DOUBT = 0.3
 """What is an edge remains one down to this part of both."""
 FORGET_AT = 48.0
 """Counts are halved from so many on: what has gone fades, what is new counts."""
-SETTLED = 24.0
-"""A cell with so many is asked only once in a while."""
-SETTLED_EVERY = 8
-"""In scans."""
 
 
 class ReflectionMap:
@@ -74,7 +70,6 @@ class ReflectionMap:
         self._edge = np.zeros(1024, dtype=np.bool_)
         self._since = np.zeros(1024, dtype=np.int64)  # revision at which it last became an edge
         self._revision = self._taken_back_at = 0
-        self._scans = 0
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
         self._near_count = 0
@@ -103,7 +98,6 @@ class ReflectionMap:
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan, but for some of its rays."""
-        self._scans += 1
         taken = scan.ranges_m < math.inf
         self._add_cells(scan, (taken if ignored is None else taken & ~ignored).nonzero()[0])
         if self._count:
@@ -182,9 +176,7 @@ class ReflectionMap:
             self._near = near.nonzero()[0].astype(np.int32)
             self._near_at, self._near_count = sensor, self._count
         slots = np.concatenate((self._near, np.arange(self._near_count, self._count, dtype=np.int32)))
-        unsettled = self._counts.take(slots, axis=0).sum(axis=1) < SETTLED
-        chosen: NDArray[np.int32] = slots[unsettled | (slots % SETTLED_EVERY == self._scans % SETTLED_EVERY)]
-        return chosen
+        return slots
 
     def _decide(self, slots: NDArray[np.int32], counts: NDArray[np.float32]) -> None:
         reflected, passed, before = counts.T

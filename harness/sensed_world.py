@@ -15,7 +15,7 @@ from harness.reflection_map import ReflectionMap
 from planner.interface import BoolArray, FloatArray, MovingEdges
 
 NOISY = 0.1
-"""Ranges that err by more than this share of the clearance are weighed, not taken as they are."""
+"""Ranges that err by more than this share of the clearance are weighed, and too vague to tell what moves."""
 
 
 class Edges(Protocol):
@@ -61,15 +61,17 @@ class SensedWorld:
         noise_m: float = 0.0,
         false_returns: bool = False,
     ) -> None:
+        noisy = noise_m > NOISY * clearance_m
         self._clearance = clearance_m
         self._edges: Edges = (
             ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
-            if noise_m > NOISY * clearance_m
+            if noisy
             else ObstacleMap(bounds_m, clearance_m, range_m, false_returns=false_returns)
         )
-        self._moving = MovingObstacles(clearance_m, noise_m)
+        self._moving = None if noisy else MovingObstacles(clearance_m, noise_m)
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
         self._known_to_move = 0
+        self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
 
     @property
@@ -90,7 +92,12 @@ class SensedWorld:
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
         """What is known to move; its edges are not among the others."""
-        return self._moving.found
+        return self._moving.found if self._moving else ()
+
+    @property
+    def surprised_s(self) -> float:
+        """When something was last seen to stand in space that had been seen to be free; -inf: never."""
+        return self._surprised_s
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""
@@ -106,16 +113,16 @@ class SensedWorld:
 
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
-        ignored = self._moving.update(scan)
+        ignored = self._moving.update(scan) if self._moving else None
         before = self.revision
         self._edges.update(scan, ignored)
-        if self.revision != before:
-            self._free.take_back(scan, self.edges_since(before))
+        fresh = [self.edges_since(before)] if self.revision != before else []
         found = self.moving
         if len(found) > self._known_to_move:
             for each in found:
                 self._edges.forget(each.points_m, self._clearance + math.hypot(*each.velocity_mps))
         self._known_to_move = len(found)
-        for each in found:
-            self._free.take_back(scan, each.points_m)
+        for edges in (*fresh, *(each.points_m for each in found)):
+            if self._free.take_back(scan, edges):
+                self._surprised_s = scan.available_s
         self._free.update(scan)

@@ -79,6 +79,11 @@ class SeenWorld(Protocol):
         """What is known to move; its edges are not among the others."""
         ...
 
+    @property
+    def surprised_s(self) -> float:
+        """When something was last seen to stand in space that had been seen to be free; -inf: never."""
+        ...
+
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, oldest first; all of them after -1."""
         ...
