@@ -68,7 +68,9 @@ UNHURRIED = 0.0625
 """The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step."""
 
 HOLD_SHARES = (1.0, 0.5, 0.25)
-"""Shares of the clearance with which a turn is sought where the certificate is broken."""EVADING_S = 60.0
+"""Shares of the clearance with which a turn is sought where the certificate is broken."""
+
+EVADING_S = 60.0
 """The certificate holds for a world that stands still: so long after something appeared it may be broken."""
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
@@ -395,7 +397,9 @@ class RollingWindow:
         if effect is None:
             return Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start")
         if request.time_s - request.seen.surprised_s < EVADING_S:
-            return Plan(PlanStatus.NO_PATH, "something has appeared in the way, and there is no room to turn away")
+            return Plan(
+                PlanStatus.NO_PATH, "something has appeared in the way, and there is no room to turn away"
+            )
         raise CertificateBroken(request.time_s)
 
 
