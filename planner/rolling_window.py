@@ -54,7 +54,7 @@ BROKEN_SHARE = 0.99
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-PORTION = 30
+PORTION = 40
 """Steps of the search at one time, while a plan is in effect that ends in a safe turn."""
 
 MOST_EFFORT = 4
@@ -68,7 +68,6 @@ UNHURRIED = 0.0625
 
 HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
-
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 
@@ -236,10 +235,10 @@ class RollingWindow:
         return since >= max(self._lead_m if near else self._rolling_step_m, UNHURRIED * wrong)
 
     def _in_effect(self, request: PlanRequest) -> Effect | None:
-        """The plan in effect; a new one begins uncut."""
+        """The plan in effect."""
         if self._proposed is not None and request.flown is self._proposed.plan:
             self._effect, self._proposed = self._proposed, None
-            self._watch.begin()
+            self._watch.begin(self._effect, self._memory.points_m)
             self._searched_at_m = self._refused_at_m = 0.0
         return self._effect
 
@@ -288,7 +287,8 @@ class RollingWindow:
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps))
+        cut_m = self._watch.cut_at(course, self._memory.points_m)
+        return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
 
     def _leads_on(self, certified: Certified, course: Course) -> bool:
         """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
