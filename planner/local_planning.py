@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -14,6 +15,7 @@ from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track, search
 from planner.pose_search import search_poses
 from planner.route_optimisation import Route, Terrain, optimise
+from planner.trail import Trail
 from planner.window import Window
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
@@ -34,6 +36,12 @@ OPTIMISING = 3
 
 SWITCH = 0.01
 """The other way round is taken only where it saves this share of the distance left."""
+
+RETRACE = 0.25
+"""And this share of what it leads back along where the aircraft has been."""
+
+TRAIL_CLEARANCES = 4.0
+"""So many clearances is as good as the same place for that."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,7 @@ class LocalPlanning:
         self._mission, self._memory = mission, memory
         self._window_m, self._margin_m = window_m, margin_m
         self._steps, self._candidates = steps, candidates
+        self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
         self.limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
 
@@ -157,37 +166,38 @@ class LocalPlanning:
         room = self._room(start, points)
         window = self.window(start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room))
         begun = start
-        best: Route | None = None
-        stays = False
-        fitted: list[tuple[bool, float, Route]] = []
+        fitted: list[tuple[float, Route]] = []
         for track in self._found(window, attempt, effort, closed):
             if track is None:
                 yield
                 continue
             start, course = now()
-            switching = 0.0 if course is None or stays else SWITCH * track.cost_m
-            if best is not None and track.cost_m >= best.path.length_m + switching:
+            least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
+            if track.cost_m >= least_m:
                 break
             tracks.append(track)
-            same = course is None or course.same_side(track.nodes, self._memory.points_m)
-            if best is not None and track.cost_m >= best.path.length_m and not same:
+            reluctance_m = self._reluctance_m(track, course)
+            if track.cost_m + reluctance_m >= least_m:
                 continue
             route = self._fit(start, attempt, track.nodes, points)
             if route is not None:
-                fitted.append((not same, route.path.length_m, route))
-                _, _, best = min(fitted, key=lambda each: each[:2])
-                stays |= same
+                fitted.append((route.path.length_m + reluctance_m, route))
             for _ in range(OPTIMISING):
                 yield
+        fitted.sort(key=lambda each: each[0])
         start, _ = now()
         if start is begun:
-            return best
+            return fitted[0][1] if fitted else None
         # The aircraft has flown on meanwhile.
-        routes = (
-            self._fit(start, attempt, (start.pose[:2], *route.nodes), points)
-            for _, _, route in sorted(fitted, key=lambda each: each[:2])
-        )
+        routes = (self._fit(start, attempt, (start.pose[:2], *route.nodes), points) for _, route in fitted)
         return next((route for route in routes if route is not None), None)
+
+    def _reluctance_m(self, track: Track, course: Course | None) -> float:
+        """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
+        if course is not None and course.same_side(track.nodes, self._memory.points_m):
+            return 0.0
+        switching = 0.0 if course is None else SWITCH * track.cost_m
+        return switching + RETRACE * self.trail.retraced_m(track.nodes)
 
     def _fit(
         self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray

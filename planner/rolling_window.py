@@ -37,7 +37,7 @@ from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus, Seen
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track
-from planner.telling import picture, sentence
+from planner.telling import no_way_through, picture, sentence
 
 LEAD_S = 1.0
 """A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
@@ -196,6 +196,7 @@ class RollingWindow:
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
         fresh = self._memory.take_in(request.seen)
+        self._local.trail.add(request.position_m)
         effect = self._in_effect(request)
         if effect is None:
             self._proof_for_turns.closed(request.position_m)
@@ -248,7 +249,8 @@ class RollingWindow:
         ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
         serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
         known = len(self._memory.points_m)
-        worth_m = math.inf if ahead is None else ahead.path.length_m * (1.0 - BETTER)
+        whole = ahead is not None and ahead.to_goal and ahead.nodes[-1] == self._mission.goal_m
+        worth_m = ahead.path.length_m * (1.0 - BETTER) if ahead is not None and whole else math.inf
         if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
             self._thinking = None
         else:
@@ -257,7 +259,8 @@ class RollingWindow:
                 thinking = self._thinking = Deliberation(
                     self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
                 )
-            for course in thinking.courses(start, ahead, self._work(effect, here)):
+            work = PRESSED * PORTION if self._pressed(effect, here) else PORTION
+            for course in thinking.courses(start, ahead, work):
                 if serves and course.path.length_m > worth_m:
                     thinking.done = True
                     break
@@ -277,12 +280,10 @@ class RollingWindow:
             return self._found(request, start, ahead, certified, [])
         return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
 
-    def _work(self, effect: Effect | None, here: float) -> int:
-        """How much to think at once: more where there is no safe plan in effect to think on."""
-        pressed = effect is None or (
-            self._watch.broken and min(self._watch.cut_m, effect.leaves_m) - here < self._urgent_m
-        )
-        return PRESSED * PORTION if pressed else PORTION
+    def _pressed(self, effect: Effect | None, here: float) -> bool:
+        """Whether there is no safe plan in effect to think on."""
+        near_m = 0.0 if effect is None else min(self._watch.cut_m, effect.leaves_m) - here
+        return effect is None or (self._watch.broken and near_m < self._urgent_m)
 
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
@@ -324,7 +325,8 @@ class RollingWindow:
         self, request: PlanRequest, effect: Effect | None, here: float, thinking: Deliberation | None
     ) -> Plan:
         """No new plan yet: think on, prove that there is none, or let the plan in effect end in its turn."""
-        if self._watch.broken and effect is not None:
+        waits = thinking is not None and not thinking.done and not self._pressed(effect, here)
+        if self._watch.broken and effect is not None and not waits:
             return self._turn_away(request, effect, here)
         no_room = self._effort > 0 and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
@@ -332,7 +334,7 @@ class RollingWindow:
         stuck = None if thinking is None else thinking.stuck
         if stuck is None and self._proof.closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
-            return _unreachable(f"no gap in it is wider than {gap:.0f} m")
+            return Plan(PlanStatus.UNREACHABLE, no_way_through(f"no gap in it is wider than {gap:.0f} m"))
         if effect is None:
             return self._turn_away(request, None, here)
         turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
@@ -343,7 +345,10 @@ class RollingWindow:
         if stuck is None and thinking is not None:
             if no_room:
                 gap = 2.0 * self._turns_keep_m
-                return _unreachable(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on")
+                return Plan(
+                    PlanStatus.UNREACHABLE,
+                    no_way_through(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on"),
+                )
             # No way is left but those given up, or one that takes more looking for.
             self._memory.forgive()
             self._effort = min(self._effort + 1, MOST_EFFORT)
@@ -393,8 +398,3 @@ class RollingWindow:
         if effect is None:
             return Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start")
         raise CertificateBroken(request.time_s)
-
-
-def _unreachable(gaps: str) -> Plan:
-    chain = "a closed chain of obstacles lies between the aircraft and the goal"
-    return Plan(PlanStatus.UNREACHABLE, f"{chain}: {gaps}")
