@@ -82,15 +82,18 @@ class Certifier:
         hidden = np.flatnonzero(~seen.seen_free(poses_at(path, stations)[:, :2]))
         return float(stations[hidden[0]]) if len(hidden) else end
 
-    def certify(self, path: Path, seen: SeenWorld, terrain: Terrain) -> Certified | None:
+    def certify(
+        self, path: Path, seen: SeenWorld, terrain: Terrain, to_m: float = math.inf
+    ) -> Certified | None:
         """The longest part of a path that ends in a turn which is seen to be free.
 
         Args:
-            path: a path that keeps its distance from all edges seen.
+            path: a path that keeps its distance from all edges seen, up to `to_m`.
             seen: what has been seen to be free.
             terrain: the edges, and the distance that the turn has to keep from each.
+            to_m: station before which the turn begins.
         """
-        free_to = self.seen_free_to_m(path, seen)
+        free_to = min(self.seen_free_to_m(path, seen), to_m)
         step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
         stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
         for some in (stations[i : i + AT_ONCE] for i in range(0, len(stations), AT_ONCE)):

@@ -189,11 +189,12 @@ def fillet(
     cut_m: float,
     start_curvature: float = 0.0,
     longer_turn: bool = False,
+    first_radius_m: float | None = None,
 ) -> Path | None:
     """A path from a pose through the corners of a polyline, each corner rounded by one arc.
 
-    The first turn has the smallest radius. Every corner gets the largest arc that its legs have room for and
-    that passes the corner within a given distance, so that curvature is no larger than it has to be.
+    The first turn has the smallest radius, if none is given. Every corner gets the largest arc that its legs have
+    room for and that passes the corner within a given distance, so that curvature is no larger than it has to be.
 
     Args:
         start: where the path begins.
@@ -202,17 +203,19 @@ def fillet(
         cut_m: how far from a corner its arc may pass, where the smallest radius leaves the choice.
         start_curvature: curvature (1/m) flown on arrival at the start.
         longer_turn: begin with the longer of the two turns towards the first corner.
+        first_radius_m: radius of that turn.
 
     Returns:
         The path, or None where a corner cannot be rounded.
     """
-    ways = turns_onto(start, nodes[0], limits.radius_m)[longer_turn:]
+    radius_m = first_radius_m or limits.radius_m
+    ways = turns_onto(start, nodes[0], radius_m)[longer_turn:]
     segments: list[Segment] = []
     if ways and ways[0][0][4] * start_curvature < 0.0:
         if limits.roll_m > SHORTEST_M:
             segments.append((*start, 0.0, limits.roll_m))
             start = along(segments[0], limits.roll_m)
-        ways = turns_onto(start, nodes[0], limits.radius_m)[longer_turn:]
+        ways = turns_onto(start, nodes[0], radius_m)[longer_turn:]
     if not ways:
         return None
     first = ways[0]

@@ -18,6 +18,9 @@ from planner.local_planning import LocalPlanning, Start
 from planner.multi_step_search import Track
 from planner.route_optimisation import Route
 
+POINTS_A_STEP = 2000
+"""A step among so many edge points is twice the work of one among a few."""
+
 
 class Deliberation:
     """One search for ways to the goal, those that are wanted most first.
@@ -51,15 +54,17 @@ class Deliberation:
         Args:
             start: where a plan would begin now.
             flown: what is flown now.
-            work: how much may be done, in steps of the multi-step search.
+            work: how much may be done, in steps of the multi-step search among a few edge points.
         """
+        step = 1.0 + self.known / POINTS_A_STEP
+        left = float(work)
         self._start, self._flown = start, flown
         for thought in self._thoughts:
             if thought is not None:
                 yield thought
             else:
-                work -= 1
-                if work <= 0:
+                left -= step
+                if left <= 0.0:
                     return
         self.done = True
 
@@ -74,20 +79,22 @@ class Deliberation:
         for i, attempt in enumerate(self._local.attempts()):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
-            before = len(self.tracks)
-            route = yield from self._local.route(attempt, self._effort, self._now, self.tracks, self._closed)
+            before, known = len(self.tracks), self._local.known
+            route = yield from self._local.route(
+                attempt, known, self._effort, self._now, self.tracks, self._closed
+            )
             if len(self.tracks) == before:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:
                 found = True
-                yield self._course(route, shortest=i == 0)
+                yield self._course(route, known, shortest=i == 0)
         if not found:
             route = self._local.tight_route(self._now()[0])
             if route is None and self.tracks:
                 route = self._local.beginning(self._now()[0], self.tracks[0])
             if route is not None:
-                yield self._course(route, shortest=False)
+                yield self._course(route, self._local.known, shortest=False)
 
-    def _course(self, route: Route, shortest: bool) -> Course:
+    def _course(self, route: Route, known: int, shortest: bool) -> Course:
         path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
-        return Course(path, route.nodes, self.known, shortest)
+        return Course(path, route.nodes, known, shortest)

@@ -56,14 +56,19 @@ class Watch:
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
         self._since = WATCHED_TOGETHER  # scans since edges were compared
-        self.begin()
-
-    def begin(self) -> None:
-        """A new plan is in effect: it begins uncut."""
         self.cut_m = math.inf
         """Station at which the course comes too near to an edge seen since it was found."""
         self.broken = False
         """Its certified part does so, or its turn."""
+
+    def begin(self, effect: Effect, points_m: FloatArray) -> None:
+        """A new plan is in effect: it may be cut by what came in while it was looked for, of (m, 2) edges."""
+        self.cut_m = self.cut_at(effect.course, points_m)
+        self.broken = self.cut_m < effect.leaves_m
+
+    def cut_at(self, course: Course, points_m: FloatArray) -> float:
+        """Station at which a course comes too near to one of (m, 2) edges that it was not found with."""
+        return first_breach(course.path, points_m[course.known :], self._keep)
 
     def look(self, effect: Effect, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
         """Takes in new edges, (k, 2): compares them at once where one is near, else those of a few scans together.

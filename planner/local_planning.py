@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -14,6 +15,7 @@ from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track, search
 from planner.pose_search import search_poses
 from planner.route_optimisation import Route, Terrain, optimise
+from planner.trail import Trail
 from planner.window import Window
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
@@ -34,6 +36,12 @@ OPTIMISING = 3
 
 SWITCH = 0.01
 """The other way round is taken only where it saves this share of the distance left."""
+
+RETRACE = 0.25
+"""And this share of what it leads back along where the aircraft has been."""
+
+TRAIL_CLEARANCES = 4.0
+"""So many clearances is as good as the same place for that."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +103,8 @@ class LocalPlanning:
         self._mission, self._memory = mission, memory
         self._window_m, self._margin_m = window_m, margin_m
         self._steps, self._candidates = steps, candidates
+        self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
+        self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
         self.limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
 
     @property
@@ -115,18 +125,33 @@ class LocalPlanning:
         leads through no gap that would have to be entered before it can be seen to have an end.
         """
         clearance, margin, radius = self._mission.clearance_m, self._margin_m, self._mission.turn_radius_m
-        attempts = [Attempt(clearance, margin), Attempt(clearance, LEAST_MARGIN * margin)]
+        attempts = [Attempt(clearance, margin), self._tight]
         if radius > clearance:
             attempts.append(Attempt(radius, margin))
         return [*attempts, Attempt(clearance + radius, margin)]
 
+    @property
+    def known(self) -> int:
+        """How many edge points are remembered."""
+        return len(self._memory.points_m)
+
     def route(
-        self, attempt: Attempt, effort: int, now: Now, tracks: list[Track], closed: Callable[[], bool]
+        self,
+        attempt: Attempt,
+        known: int,
+        effort: int,
+        now: Now,
+        tracks: list[Track],
+        closed: Callable[[], bool],
     ) -> Generator[None, None, Route | None]:
         """The shortest of the n best tracks, after route optimisation.
 
+        What comes in while this goes on is left for the next search: else the shortest way round something that is
+        just coming into view would be dropped, again and again, for a long one that leads away.
+
         Args:
             attempt: how far from obstacles.
+            known: with how many of the edge points, the first to be remembered.
             effort: how often the work of a wide search is doubled.
             now: tells where a plan would begin, and what is flown: the other side of something is taken only for
                 a shorter way.
@@ -137,82 +162,82 @@ class LocalPlanning:
             None after each step of work.
         """
         start, _ = now()
-        window = self.window(
-            start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, self._room(start))
-        )
+        points = self._memory.points_m[:known]
+        room = self._room(start, points)
+        window = self.window(start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room))
         begun = start
-        best: Route | None = None
-        stays = False
-        fitted: list[tuple[bool, float, Route]] = []
+        fitted: list[tuple[float, Route]] = []
         for track in self._found(window, attempt, effort, closed):
             if track is None:
                 yield
                 continue
             start, course = now()
-            switching = 0.0 if course is None or stays else SWITCH * track.cost_m
-            if best is not None and track.cost_m >= best.path.length_m + switching:
+            least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
+            if track.cost_m >= least_m:
                 break
             tracks.append(track)
-            same = course is None or course.same_side(track.nodes, self._memory.points_m)
-            if best is not None and track.cost_m >= best.path.length_m and not same:
+            reluctance_m = self._reluctance_m(track, course)
+            if track.cost_m + reluctance_m >= least_m:
                 continue
-            route = self._fit(start, attempt, track.nodes)
+            route = self._fit(start, attempt, track.nodes, points)
             if route is not None:
-                fitted.append((not same, route.path.length_m, route))
-                _, _, best = min(fitted, key=lambda each: each[:2])
-                stays |= same
+                fitted.append((route.path.length_m + reluctance_m, route))
             for _ in range(OPTIMISING):
                 yield
+        fitted.sort(key=lambda each: each[0])
         start, _ = now()
         if start is begun:
-            return best
+            return fitted[0][1] if fitted else None
         # The aircraft has flown on meanwhile.
-        routes = (
-            self._fit(start, attempt, (start.pose[:2], *route.nodes))
-            for _, _, route in sorted(fitted, key=lambda each: each[:2])
-        )
+        routes = (self._fit(start, attempt, (start.pose[:2], *route.nodes), points) for _, route in fitted)
         return next((route for route in routes if route is not None), None)
 
-    def _fit(self, start: Start, attempt: Attempt, nodes: Sequence[Point]) -> Route | None:
+    def _reluctance_m(self, track: Track, course: Course | None) -> float:
+        """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
+        if course is not None and course.same_side(track.nodes, self._memory.points_m):
+            return 0.0
+        switching = 0.0 if course is None else SWITCH * track.cost_m
+        return switching + RETRACE * self.trail.retraced_m(track.nodes)
+
+    def _fit(
+        self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
+    ) -> Route | None:
         """The curve along a track, from where a plan would begin now."""
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
-        terrain = self._terrain(attempt, self._room(start))
+        terrain = self._terrain(start, attempt, points)
         return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
 
     def tight_route(self, start: Start) -> Route | None:
         """A way found by search over poses, where none through the free sectors can be flown."""
-        terrain = self._terrain(
-            Attempt(self._mission.clearance_m, LEAST_MARGIN * self._margin_m), self._room(start)
-        )
+        terrain = self._terrain(start, self._tight, self._memory.points_m)
         return search_poses(start.pose, start.curvature, self._mission.goal_m, self.limits, terrain)
 
     def beginning(self, start: Start, track: Track) -> Route | None:
         """As much of a track as can be flown, where all of it cannot: from there the rest may look otherwise."""
-        attempt = Attempt(self._mission.clearance_m, LEAST_MARGIN * self._margin_m)
         nodes = (start.pose[:2], *track.nodes[1:])
         for end in range(len(nodes) - 1, 1, -1):
-            route = self._fit(start, attempt, nodes[:end])
+            route = self._fit(start, self._tight, nodes[:end], self._memory.points_m)
             if route is not None:
                 return route
         return None
 
     def window(self, start: Start, keep_m: FloatArray) -> Window:
-        """The planning window about the start of a plan."""
-        memory = self._memory
-        return Window(start.pose[:2], self._window_m, memory.points_m, memory.labels, memory.cell_m, keep_m)
+        """The planning window about the start of a plan, with the first (m,) points that are remembered."""
+        memory, known = self._memory, len(keep_m)
+        points, labels = memory.points_m[:known], memory.labels[:known].copy()
+        return Window(start.pose[:2], self._window_m, points, labels, memory.cell_m, keep_m)
 
     def terrain(self, keep_m: float) -> Terrain:
         """Where a curve may lie that keeps one distance from all edge points."""
         points = self._memory.points_m
         return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m)
 
-    def _terrain(self, attempt: Attempt, room: FloatArray) -> Terrain:
-        keep = np.minimum(self._mission.clearance_m + PATH_SHARE * attempt.margin_m, room)
-        return Terrain(self._memory.points_m, keep, self._mission.bounds_m)
+    def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
+        keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
+        return Terrain(points, np.minimum(keep, self._room(start, points)), self._mission.bounds_m)
 
-    def _room(self, start: Start) -> FloatArray:
+    def _room(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
-        points = self._memory.points_m
         ends = (start.pose, self._mission.goal_m)
         room = [np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) - 1e-3 for end in ends]
         nearer: FloatArray = np.minimum(*room)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import Any
 
-from planner import bug1, bug2, dubins_tree, rolling_window, tangent_bug, vfh_plus
+from planner import bug1, bug2, dubins_tree, rolling_window, rolling_window_config, tangent_bug, vfh_plus
 from planner.interface import Mission, Planner
 
 GROUP = "wayproof.planners"
@@ -45,7 +45,7 @@ BUILT_IN = (
     PlannerKind(
         kind="rolling_window",
         summary="improved BUG: rolling window, fan sectors, n-best multi-step search, route optimisation",
-        config=rolling_window.RollingWindowConfig,
+        config=rolling_window_config.RollingWindowConfig,
         make=rolling_window.RollingWindow,
     ),
     PlannerKind(

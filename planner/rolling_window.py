@@ -21,12 +21,11 @@ of the turn radius can be moved at the clearance.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from planner.barrier import Proof
-from planner.certificate import CertificateBroken, Certified, Certifier, least_sensor_range_m
+from planner.certificate import CertificateBroken, Certified, Certifier
 from planner.course import Course
 from planner.curves import Point, Pose, Segment, along, moved, on_loiter, onward, place_on
 from planner.dead_ends import DeadEnds
@@ -38,10 +37,8 @@ from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus, Seen
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track
-from planner.telling import picture, sentence
-
-LEAD_S = 1.0
-"""A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
+from planner.rolling_window_config import LEAD_S, RollingWindowConfig
+from planner.telling import no_way_through, picture, sentence
 
 OFF_PATH = 4.0
 """Further off the path than this many times the tracking error, a plan begins at the aircraft itself."""
@@ -55,7 +52,7 @@ BROKEN_SHARE = 0.99
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-PORTION = 30
+PORTION = 40
 """Steps of the search at one time, while a plan is in effect that ends in a safe turn."""
 
 MOST_EFFORT = 4
@@ -74,87 +71,6 @@ EVADING_S = 60.0
 """The certificate holds for a world that stands still: so long after something appeared it may be broken."""
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
-
-
-@dataclass(frozen=True)
-class RollingWindowConfig:
-    """Keys of `planner.kind: rolling_window`."""
-
-    planning_window_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "radius r1 of the planning window, at most the sensor range; default: the sensor range",
-            "unit": "m",
-            "above": 0.0,
-        },
-    )
-    steps: int = field(
-        default=16,
-        metadata={
-            "doc": "N, how many steps the search looks ahead",
-            "unit": "1",
-            "minimum": 1,
-            "maximum": 100,
-        },
-    )
-    candidates: int = field(
-        default=12,
-        metadata={
-            "doc": "n, how many tracks are kept at every step",
-            "unit": "1",
-            "minimum": 1,
-            "maximum": 100,
-        },
-    )
-    margin_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "planned distance beyond the clearance; "
-            "default: 0.1 of the clearance, at least twice the tracking error",
-            "unit": "m",
-            "minimum": 0.0,
-        },
-    )
-    rolling_step_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "distance flown before the window rolls, unless the plan is cut near by; "
-            "default: 1/16 of the planning window",
-            "unit": "m",
-            "above": 0.0,
-        },
-    )
-
-    def resolved(self, mission: Mission) -> RollingWindowConfig:
-        """This config with every None replaced by its default for the mission.
-
-        Raises:
-            ValueError: the planning window is larger than the sensing range, or that is too short for the turn
-                radius.
-        """
-        reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
-        least = least_sensor_range_m(
-            mission.turn_radius_m, mission.clearance_m, mission.ground_speed_mps, reaction_s
-        )
-        if mission.sensor_range_m < least:
-            raise ValueError(
-                f"sensor.range_m is {mission.sensor_range_m:g}, too short for a turn radius of "
-                f"{mission.turn_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
-                f"no safe turn could be seen ahead: at least {math.ceil(least)} is needed"
-            )
-        window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
-        if window > mission.sensor_range_m:
-            raise ValueError(
-                f"planning_window_m is {window:g}, more than sensor.range_m {mission.sensor_range_m:g}; "
-                "the planner cannot plan beyond what is sensed"
-            )
-        margin = max(0.1 * mission.clearance_m, 2.0 * mission.tracking_error_m)
-        return replace(
-            self,
-            planning_window_m=window,
-            margin_m=margin if self.margin_m is None else self.margin_m,
-            rolling_step_m=window / 16.0 if self.rolling_step_m is None else self.rolling_step_m,
-        )
 
 
 class RollingWindow:
@@ -200,6 +116,7 @@ class RollingWindow:
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
         fresh = self._memory.take_in(request.seen, encounters(request, self._mission))
+        self._local.trail.add(request.position_m)
         effect = self._in_effect(request)
         if effect is None:
             self._proof_for_turns.closed(request.position_m)
@@ -239,10 +156,10 @@ class RollingWindow:
         return since >= max(self._lead_m if near else self._rolling_step_m, UNHURRIED * wrong)
 
     def _in_effect(self, request: PlanRequest) -> Effect | None:
-        """The plan in effect; a new one begins uncut."""
+        """The plan in effect."""
         if self._proposed is not None and request.flown is self._proposed.plan:
             self._effect, self._proposed = self._proposed, None
-            self._watch.begin()
+            self._watch.begin(self._effect, self._memory.points_m)
             self._searched_at_m = self._refused_at_m = 0.0
         return self._effect
 
@@ -252,7 +169,8 @@ class RollingWindow:
         ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
         serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
         known = len(self._memory.points_m)
-        worth_m = math.inf if ahead is None else ahead.path.length_m * (1.0 - BETTER)
+        whole = ahead is not None and ahead.to_goal and ahead.nodes[-1] == self._mission.goal_m
+        worth_m = ahead.path.length_m * (1.0 - BETTER) if ahead is not None and whole else math.inf
         if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
             self._thinking = None
         else:
@@ -261,7 +179,8 @@ class RollingWindow:
                 thinking = self._thinking = Deliberation(
                     self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
                 )
-            for course in thinking.courses(start, ahead, self._work(effect, here)):
+            work = PRESSED * PORTION if self._pressed(effect, here) else PORTION
+            for course in thinking.courses(start, ahead, work):
                 if serves and course.path.length_m > worth_m:
                     thinking.done = True
                     break
@@ -281,17 +200,16 @@ class RollingWindow:
             return self._found(request, start, ahead, certified, [])
         return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
 
-    def _work(self, effect: Effect | None, here: float) -> int:
-        """How much to think at once: more where there is no safe plan in effect to think on."""
-        pressed = effect is None or (
-            self._watch.broken and min(self._watch.cut_m, effect.leaves_m) - here < self._urgent_m
-        )
-        return PRESSED * PORTION if pressed else PORTION
+    def _pressed(self, effect: Effect | None, here: float) -> bool:
+        """Whether there is no safe plan in effect to think on."""
+        near_m = 0.0 if effect is None else min(self._watch.cut_m, effect.leaves_m) - here
+        return effect is None or (self._watch.broken and near_m < self._urgent_m)
 
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps))
+        cut_m = self._watch.cut_at(course, self._memory.points_m)
+        return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
 
     def _leads_on(self, certified: Certified, course: Course) -> bool:
         """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
@@ -328,7 +246,8 @@ class RollingWindow:
         self, request: PlanRequest, effect: Effect | None, here: float, thinking: Deliberation | None
     ) -> Plan:
         """No new plan yet: think on, prove that there is none, or let the plan in effect end in its turn."""
-        if self._watch.broken and effect is not None:
+        waits = thinking is not None and not thinking.done and not self._pressed(effect, here)
+        if self._watch.broken and effect is not None and not waits:
             return self._turn_away(request, effect, here)
         no_room = self._effort > 0 and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
@@ -336,7 +255,7 @@ class RollingWindow:
         stuck = None if thinking is None else thinking.stuck
         if stuck is None and self._proof.closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
-            return _unreachable(f"no gap in it is wider than {gap:.0f} m")
+            return Plan(PlanStatus.UNREACHABLE, no_way_through(f"no gap in it is wider than {gap:.0f} m"))
         if effect is None:
             return self._turn_away(request, None, here)
         turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
@@ -347,7 +266,10 @@ class RollingWindow:
         if stuck is None and thinking is not None:
             if no_room:
                 gap = 2.0 * self._turns_keep_m
-                return _unreachable(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on")
+                return Plan(
+                    PlanStatus.UNREACHABLE,
+                    no_way_through(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on"),
+                )
             # No way is left but those given up, or one that takes more looking for.
             self._memory.forgive()
             self._effort = min(self._effort + 1, MOST_EFFORT)
@@ -398,11 +320,6 @@ class RollingWindow:
             return Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start")
         if request.time_s - request.seen.surprised_s < EVADING_S:
             return Plan(
-                PlanStatus.NO_PATH, "something has appeared in the way, and there is no room to turn away"
+                PlanStatus.NO_PATH, "something has appeared in the way; there is no room to turn away"
             )
         raise CertificateBroken(request.time_s)
-
-
-def _unreachable(gaps: str) -> Plan:
-    chain = "a closed chain of obstacles lies between the aircraft and the goal"
-    return Plan(PlanStatus.UNREACHABLE, f"{chain}: {gaps}")

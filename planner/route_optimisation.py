@@ -74,8 +74,9 @@ def optimise(
     """The curve through the shortcuts of a track, at the minimum turn radius.
 
     All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near
-    to something, the first turn is flown the other way round, then one corner after the other is left out, then
-    corners are rounded as tightly as may be, and then the track is tried as it came.
+    to something, the turn that is being flown at the start is flown on, past the first corners; then the first turn
+    is flown the other way round, then one corner after the other is left out, then corners are rounded as tightly
+    as may be, and then the track is tried as it came.
 
     Args:
         start: pose at which the curve begins.
@@ -91,13 +92,22 @@ def optimise(
     if len(nodes) < 2:
         return None
     short = shortcut(nodes, terrain)[1:]
-    choices = [(short, cut_m, False), (short, cut_m, True)]
+    tightest = limits.radius_m
+    choices = [(short, cut_m, False, tightest)]
+    if start_curvature:
+        flown = max(1.0 / abs(start_curvature), tightest)
+        choices += [(short[i:], cut_m, False, flown) for i in range(min(len(short), MOST_LEFT_OUT))]
+    choices += [(short, cut_m, True, tightest)]
     choices += [
-        ([*short[:i], *short[i + 1 :]], cut_m, False) for i in range(min(len(short) - 1, MOST_LEFT_OUT))
+        ([*short[:i], *short[i + 1 :]], cut_m, False, tightest)
+        for i in range(min(len(short) - 1, MOST_LEFT_OUT))
     ]
-    choices += [(short, 0.0, False), (short, 0.0, True), (list(nodes[1:]), 0.0, False)]
-    for choice, cut, longer_turn in choices:
-        path = fillet(start, choice, limits, cut, start_curvature, longer_turn)
+    choices += [
+        (way, 0.0, longer, tightest)
+        for way, longer in ((short, False), (short, True), (list(nodes[1:]), False))
+    ]
+    for choice, cut, longer_turn, first_radius in choices:
+        path = fillet(start, choice, limits, cut, start_curvature, longer_turn, first_radius)
         if path is not None and terrain.admits(path):
             return Route(tuple(choice), path)
     return None

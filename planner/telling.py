@@ -29,6 +29,11 @@ def sentence(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
     return f"obstacle ahead at {math.hypot(x, y) / 1000:.1f} km, passing {side}"
 
 
+def no_way_through(gaps: str) -> str:
+    """Why the goal cannot be reached; `gaps` says what is wrong with those in the chain."""
+    return f"a closed chain of obstacles lies between the aircraft and the goal: {gaps}"
+
+
 def picture(
     position: Point, goal: Point, nodes: Sequence[Point], tracks: Iterable[Track], window: Window
 ) -> PlanPicture:

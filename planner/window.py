@@ -12,10 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from planner.blocks import Blocks
 from planner.curves import Point
 from planner.interface import FloatArray
 from planner.memory import IntArray
@@ -25,6 +27,9 @@ EDGE_OFF_RAD = 1e-7
 
 MOST_HIDING = 12
 """So many obstacles at most are looked at for the edges of one."""
+
+BLOCK_CELLS = 4
+"""Side of the blocks in which points near a line are looked for, in cells."""
 
 
 def guide_vector(position: Point, goal: Point) -> tuple[float, float, float]:
@@ -53,36 +58,23 @@ class SectorEdge(NamedTuple):
     side: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Cells:
-    """The points of one obstacle, cell by cell of a square grid.
+class _Cells(NamedTuple):
+    """The points of one obstacle, cell by cell.
 
     Attributes:
         members: (k,) indices of the points, those of a cell next to each other.
         first: (c,) where each cell begins in `members`.
         counts: (c,) how many points it has.
-        around: (c, 8) the cells around it; itself where there is none.
+        one, other: (p,) cells that touch each other.
+        keep_m: (k,) distance to be kept from each point.
     """
 
     members: IntArray
     first: IntArray
     counts: IntArray
-    around: IntArray
-
-    @staticmethod
-    def of(members: IntArray, points_m: FloatArray, cell_m: float) -> _Cells:
-        grid = np.floor(points_m / cell_m).astype(np.int64)
-        grid -= grid.min(axis=0) - 1
-        width = int(grid[:, 1].max()) + 2
-        keys = grid[:, 0] * width + grid[:, 1]
-        order = np.argsort(keys, kind="stable")
-        cells, first, counts = np.unique(keys[order], return_index=True, return_counts=True)
-        wanted = cells[:, None] + np.array(
-            (-width - 1, -width, -width + 1, -1, 1, width - 1, width, width + 1)
-        )
-        place = np.minimum(np.searchsorted(cells, wanted), len(cells) - 1)
-        around = np.where(cells[place] == wanted, place, np.arange(len(cells))[:, None])
-        return _Cells(members[order], first, counts, around)
+    one: IntArray
+    other: IntArray
+    keep_m: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,17 +96,23 @@ class Window:
     labels: IntArray
     cell_m: float
     keep_m: FloatArray
-    _keep2: FloatArray = field(init=False, repr=False)
     _cells: dict[int, _Cells] = field(default_factory=dict, init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_keep2", self.keep_m * self.keep_m)
+    @cached_property
+    def _most_kept_m(self) -> float:
+        return float(self.keep_m.max())
+
+    @cached_property
+    def _blocks(self) -> Blocks:
+        return Blocks.of(self.points_m, BLOCK_CELLS * self.cell_m)
 
     def _obstacle(self, label: int) -> _Cells:
         """The points of an obstacle, gathered once."""
         if label not in self._cells:
             members = np.flatnonzero(self.labels == label)
-            self._cells[label] = _Cells.of(members, self.points_m[members], self.cell_m)
+            cells = Blocks.of(self.points_m[members], self.cell_m)
+            members, (one, other) = members[cells.members], cells.beside.T
+            self._cells[label] = _Cells(members, cells.first, cells.counts, one, other, self.keep_m[members])
         return self._cells[label]
 
     def sector_edges(self, origin: Point, beside: Iterable[int]) -> list[SectorEdge]:
@@ -132,7 +130,7 @@ class Window:
             ux, uy, touch, sides = self._tangents(dx, dy, obstacle)
             if not len(ux):
                 continue
-            clear, met = self._clear_along(dx, dy, ux, uy)
+            clear, met = self._clear_along(origin, ux, uy)
             rows = np.column_stack((ux, uy, touch, clear)).tolist()
             for (*row, clear_to), side, met_by in zip(rows, sides, met.tolist(), strict=True):
                 if clear_to >= row[2]:
@@ -147,7 +145,8 @@ class Window:
 
     def hugged_m(self, origin: Point, edge: SectorEdge, outer_m: float) -> float:
         """How far along an edge an outer distance from the obstacle that it touches is reached again."""
-        points = self.points_m[self._obstacle(edge.obstacle).members]
+        _, point = self._blocks.near_lines(origin, np.array([edge.ux]), np.array([edge.uy]), outer_m)
+        points = self.points_m[point[self.labels[point] == edge.obstacle]]
         dx, dy = points[:, 0] - origin[0], points[:, 1] - origin[1]
         ahead = dx * edge.ux + dy * edge.uy
         beside = dx * edge.uy - dy * edge.ux
@@ -166,7 +165,7 @@ class Window:
         cells = self._obstacle(label)
         x, y = dx[cells.members], dy[cells.members]
         square = x * x + y * y
-        keep = self.keep_m[cells.members]
+        keep = cells.keep_m
         half = np.arcsin(np.minimum(keep / np.sqrt(np.maximum(square, 1e-12)), 1.0))
         middle = np.arctan2(y, x)
         angles, touches, sides = [], [], []
@@ -179,9 +178,12 @@ class Window:
             furthest = np.maximum.reduceat(relative, cells.first)
             outmost = reference + furthest
             # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
-            beyond = outmost[cells.around] - outmost[:, None]
+            beyond = outmost[cells.other] - outmost[cells.one]
             beyond -= math.tau * np.rint(beyond / math.tau)
-            for cell in np.flatnonzero((beyond <= 0.0).all(axis=1)).tolist():
+            ends = np.ones(len(outmost), dtype=np.bool_)
+            ends[cells.one[beyond > 0.0]] = False
+            ends[cells.other[beyond < 0.0]] = False
+            for cell in ends.nonzero()[0].tolist():
                 first = cells.first[cell]
                 place = first + int(relative[first : first + cells.counts[cell]].argmax())
                 touch2 = square[place] - keep[place] ** 2
@@ -192,17 +194,18 @@ class Window:
         angle = np.array(angles)
         return np.cos(angle), np.sin(angle), np.array(touches), sides
 
-    def _clear_along(
-        self, dx: FloatArray, dy: FloatArray, ux: FloatArray, uy: FloatArray
-    ) -> tuple[FloatArray, IntArray]:
+    def _clear_along(self, origin: Point, ux: FloatArray, uy: FloatArray) -> tuple[FloatArray, IntArray]:
         """How far (k,) directions lead before they come too near to a point, and to which; infinite: never."""
-        beside = uy[:, None] * dx
-        beside -= ux[:, None] * dy
-        room = self._keep2 - np.square(beside, out=beside)
-        # Few points lie near any of the directions.
-        which, point = (room > 0.0).nonzero()
-        ahead = ux[which] * dx[point] + uy[which] * dy[point]
-        entry = np.where(ahead > 0.0, ahead - np.sqrt(room[which, point]), math.inf)
+        which, point = self._blocks.near_lines(origin, ux, uy, self._most_kept_m)
+        points, keep = self.points_m[point], self.keep_m[point]
+        dx, dy = points[:, 0] - origin[0], points[:, 1] - origin[1]
+        ux_of, uy_of = ux[which], uy[which]
+        beside = uy_of * dx - ux_of * dy
+        ahead = ux_of * dx + uy_of * dy
+        room = keep * keep - beside * beside
+        met_by = ((room > 0.0) & (ahead > 0.0)).nonzero()[0]
+        which, point = which[met_by], point[met_by]
+        entry = ahead[met_by] - np.sqrt(room[met_by])
         clear, met = np.full(len(ux), math.inf), np.zeros(len(ux), dtype=np.intp)
         order = np.lexsort((entry, which))
         directions, first = np.unique(which, return_index=True)

@@ -14,7 +14,7 @@ from harness.strict_yaml import dump
 from planner import registry
 from planner.interface import Mission, Plan, PlanRequest
 from planner.registry import PlannerKind
-from planner.rolling_window import RollingWindowConfig
+from planner.rolling_window_config import RollingWindowConfig
 
 SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]

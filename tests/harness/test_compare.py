@@ -39,7 +39,7 @@ import numpy as np
 
 from planner.interface import Path, Plan, PlanStatus
 from planner.registry import PlannerKind
-from planner.rolling_window import RollingWindowConfig
+from planner.rolling_window_config import RollingWindowConfig
 
 
 class Corner:

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from planner.curves import end_of, pose_at, poses_at, sample
 from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
-from planner.rolling_window import RollingWindow, RollingWindowConfig
+from planner.rolling_window import RollingWindow
+from planner.rolling_window_config import RollingWindowConfig
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
