@@ -30,6 +30,12 @@ from harness.terminal import print_table
 FIRST, LAST = 15, 5
 """Of more runs than both, so many are shown."""
 
+WIDTH: Final = 400
+"""A table of runs may be this wide; a terminal that is not goes on in the next line."""
+
+CELL: Final = 28
+"""A longer value is cut short."""
+
 _STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
 
 
@@ -69,9 +75,7 @@ def sweep_bar(number: int, done: int) -> Iterator[Callable[[Answer], None] | Non
         def report(answer: Answer) -> None:
             nonlocal not_reached
             not_reached += answer.row["outcome"] != "reached"
-            bar.update(
-                task, advance=1, description=f"{not_reached} not at the goal" if not_reached else ""
-            )
+            bar.update(task, advance=1, description=f"{not_reached} not at the goal" if not_reached else "")
 
         yield report
 
@@ -101,25 +105,29 @@ def print_outcomes(name: str, outcomes: Mapping[str, int]) -> None:
         outcome: f"[{_STYLE.get(outcome, 'bold red')}]{number}[/], {number / total:.1%}"
         for outcome, number in outcomes.items()
     }
-    print_table(f"{name}: {sum(outcomes.values())} runs", rows)
+    title = f"{name}: {sum(outcomes.values())} runs"
+    Console().print(title, highlight=False, markup=False)
+    print_table("", rows)
     if ERROR in outcomes:
         Console(stderr=True).print("runs crashed: their rows have the tracebacks", highlight=False)
 
 
 def print_runs(runs: CampaignRuns) -> None:
     """What would be flown, a line a run, those in the middle left out where there are many."""
-    campaign, console = runs.campaign, Console()
-    title = (
-        f"{campaign.name}: {len(runs)} runs of {runs.cases} cases, root seed {campaign.seed}, "
-        f"recordings of {campaign.recordings}"
+    campaign, console = runs.campaign, Console(width=WIDTH)
+    console.print(
+        f"{campaign.name}: {len(runs)} runs of {runs.cases} cases, root seed {campaign.seed}, recordings: "
+        f"{campaign.recordings}",
+        highlight=False,
+        markup=False,
     )
-    table = Table(title=escape(title), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0))
+    table = Table(box=box.SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
     for name in ("run", "case"):
         table.add_column(name, justify="right", no_wrap=True)
     for name in ("scenario", "world", "planner", "aircraft"):
-        table.add_column(name, overflow="fold")
-    if runs.varied:
-        table.add_column("varied", overflow="fold")
+        table.add_column(name, no_wrap=True)
+    for name in runs.varied:
+        table.add_column(escape(name.replace(".", ".\n")), justify="right", no_wrap=True)
     table.add_column("seed", justify="right", no_wrap=True)
     many = len(runs) > FIRST + LAST
     for number in range(FIRST if many else len(runs)):
@@ -132,10 +140,11 @@ def print_runs(runs: CampaignRuns) -> None:
 
 
 def _cells(run: Run) -> list[str]:
-    varied = "\n".join(f"{name} {_shown(value)}" for name, value in run.varied.items())
-    words = [run.scenario, run.world, run.planner, run.aircraft, *([varied] if varied else [])]
+    varied = [_shown(value) for value in run.varied.values()]
+    words = [run.scenario, run.world, run.planner, run.aircraft, *varied]
     return [str(run.run), str(run.case), *map(escape, words), str(run.seed)]
 
 
 def _shown(value: Scalar) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else "none" if value is None else str(value)
+    text = f"{value:.6g}" if isinstance(value, float) else "none" if value is None else str(value)
+    return text if len(text) <= CELL else f"{text[: CELL - 3]}..."

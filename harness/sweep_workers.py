@@ -146,7 +146,7 @@ def dask_workers(address: str) -> Iterator[Workers]:
     except ImportError as error:
         raise InputError("wayproof: --scheduler needs Dask; pip install 'wayproof[cluster]'") from error
     try:
-        client = Client(address, timeout=CONNECT_S, set_as_default=False)
+        client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(f"wayproof: no Dask scheduler answers at {address}; start one there") from error
     with client:
@@ -170,7 +170,7 @@ class DaskWorkers:
 
     def free(self) -> int:
         """Room for jobs that fly and for as many that wait."""
-        threads = sum(self._client.nthreads().values())
+        threads: int = sum(self._client.nthreads().values())
         return WAITING_PER_THREAD * threads - self._flying
 
     def start(self, job: Job) -> Future[Answer]:
