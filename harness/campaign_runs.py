@@ -275,7 +275,7 @@ class CampaignRuns:
                 campaign.sampler,
                 campaign.draws,
                 len(campaign.random),
-                self._stream(place.combination, DESIGN),
+                self._seed(place.combination, DESIGN),
             )
         return list(self._designs[place.combination][place.draw].tolist())
 
@@ -302,7 +302,8 @@ class _Blame:
         for change in reversed(self._changes):
             shared = min(len(loc), len(change.loc))
             if shared and change.loc[:shared] == loc[:shared]:
-                inner = "" if loc == change.loc else f"{key_path(loc)}: "
+                told = loc == change.loc and change.origin[0] != "worlds"
+                inner = "" if told else f"{key_path(loc)}: "
                 return self._runs._line(change.origin, f"{inner}{sentence} (run {self._number})")
         varied = self._runs.run(self._number).varied
         told = "".join(f", {name} {value}" for name, value in varied.items())

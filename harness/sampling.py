@@ -98,7 +98,7 @@ class Distribution(Section):
         return min(int(share * len(self.choice)), len(self.choice) - 1)
 
 
-def design(sampler: Sampler, draws: int, keys: int, seed: np.random.SeedSequence) -> FloatArray:
+def design(sampler: Sampler, draws: int, keys: int, seed: int) -> FloatArray:
     """(draws, keys) points of the unit cube that cover it evenly together.
 
     A Latin hypercube (McKay, Beckman and Conover, Technometrics 21, 1979) has one draw in each of `draws`
