@@ -302,8 +302,8 @@ class _Blame:
         for change in reversed(self._changes):
             shared = min(len(loc), len(change.loc))
             if shared and change.loc[:shared] == loc[:shared]:
-                told = loc == change.loc and change.origin[0] != "worlds"
-                inner = "" if told else f"{key_path(loc)}: "
+                named = loc == change.loc and change.origin[0] != "worlds"
+                inner = "" if named else f"{key_path(loc)}: "
                 return self._runs._line(change.origin, f"{inner}{sentence} (run {self._number})")
         varied = self._runs.run(self._number).varied
         told = "".join(f", {name} {value}" for name, value in varied.items())

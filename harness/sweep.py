@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import asdict
 from typing import Any, Final
 
@@ -83,8 +83,6 @@ def _answer(future: Future[Answer], run: int) -> Answer:
     except WorkerDiedError:
         reason = "the process that flew it died, each time that it was tried"
         return failed(run, reason, f"{reason}\n")
-    except CancelledError as error:
-        raise OSError("the scheduler has gone; go on with --resume when it is back") from error
 
 
 def _row(runs: CampaignRuns, answer: Answer) -> dict[str, Any]:

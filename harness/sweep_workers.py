@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import os
 import signal
@@ -31,6 +32,13 @@ class WorkerDiedError(Exception):
     """The process that flew a run ended before the flight did, as often as it was tried."""
 
 
+class SchedulerGoneError(OSError):
+    """Nobody hands out jobs any more."""
+
+    def __init__(self) -> None:
+        super().__init__("the Dask scheduler has gone")
+
+
 class Workers(Protocol):
     """Who flies."""
 
@@ -39,7 +47,7 @@ class Workers(Protocol):
         ...
 
     def start(self, job: Job) -> Future[Answer]:
-        """Hands out a job; its future may raise WorkerDiedError."""
+        """Hands out a job; its future may raise WorkerDiedError or SchedulerGoneError."""
         ...
 
 
@@ -145,6 +153,8 @@ def dask_workers(address: str) -> Iterator[Workers]:
         from distributed import Client
     except ImportError as error:
         raise InputError("wayproof: --scheduler needs Dask; pip install 'wayproof[cluster]'") from error
+    for logger in ("distributed", "distributed.client"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
         client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -170,7 +180,10 @@ class DaskWorkers:
 
     def free(self) -> int:
         """Room for jobs that fly and for as many that wait."""
-        threads: int = sum(self._client.nthreads().values())
+        try:
+            threads: int = sum(self._client.nthreads().values())
+        except OSError as error:
+            raise SchedulerGoneError from error
         return WAITING_PER_THREAD * threads - self._flying
 
     def start(self, job: Job) -> Future[Answer]:
@@ -183,7 +196,7 @@ class DaskWorkers:
         def over(flown: Future[Answer]) -> None:
             self._count(-1)
             if flown.cancelled():
-                answer.cancel()
+                answer.set_exception(SchedulerGoneError())
             elif error := flown.exception():
                 answer.set_exception(WorkerDiedError() if isinstance(error, KilledWorker) else error)
             else:

@@ -51,7 +51,7 @@ def sweep(
 
     0 every run was flown to its end, wherever that was
 
-    1 a run crashed: its row has the traceback
+    1 a run crashed: its row has the traceback; or the disk was full, the cluster gone: --resume goes on
 
     2 bad input or usage, nothing flown
 
@@ -103,14 +103,17 @@ def _fly(
 
     try:
         with (
-            CampaignFolder(path, runs, resume=resume) as folder,
             dask_workers(scheduler) if scheduler else local_workers(workers) as flyers,
+            CampaignFolder(path, runs, resume=resume) as folder,
             nullcontext() if silent else sweep_bar(len(runs), len(folder.done)) as report,
         ):
             fly_missing(runs, folder, flyers, report)
             return folder.outcomes()
     except RunFolderError as error:
         raise bad_input(error) from error
+    except OSError as error:
+        typer.echo(f"wayproof: {error}; what is done is in {path}, --resume goes on", err=True)
+        raise typer.Exit(FAILED) from error
     except KeyboardInterrupt:
         typer.echo(f"wayproof: interrupted; what is done is in {path}, --resume goes on", err=True)
         raise

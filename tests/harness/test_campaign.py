@@ -178,7 +178,7 @@ draws: 2
     assert [run.world for run in all_of(runs)] == ["forest", "few", "forest", "few"]
     scenarios = [runs.scenario(number) for number in range(4)]
     assert [each.name for each in scenarios] == ["ring"] * 4
-    assert scenarios[0].area.bounds_m == (0, 0, 3000, 3000)
+    assert scenarios[0].area.bounds_m == (0.0, 0.0, 3000.0, 3000.0)
     assert scenarios[0].obstacles != scenarios[2].obstacles, "another world in every case"
     assert scenarios[1].obstacles == scenarios[3].obstacles, "a held one"
     assert scenarios[0].mission.course_deg == pytest.approx(45.0), "towards the goal of this world"

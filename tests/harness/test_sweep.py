@@ -414,8 +414,8 @@ def test_a_full_disk_is_told_and_what_is_done_stays(
 
     with monkeypatch.context() as patch:
         patch.setattr(CampaignFolder, "append", full)
-        assert sweep(place, "--workers", "1") == 2
-    assert "No space left on device" in capsys.readouterr().err
+        assert sweep(place, "--workers", "1") == 1
+    assert "No space left on device; what is done is in" in capsys.readouterr().err
     assert [row["run"] for row in rows_of(place / "out")] == [0, 1, 2]
     assert sweep(place, "--resume", "--workers", "1") == 0
     assert len(rows_of(place / "out")) == 8
