@@ -9,10 +9,11 @@ and the goal in the north-east one, `room_m` from both edges.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Annotated, Any, Final
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Final
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
 from harness.generated_world import (
@@ -27,7 +28,10 @@ from harness.generated_world import (
 from harness.scenario_sections import MAX_COORDINATE_M, Section, key
 
 TRIES: Final = 100
+AT_ONCE: Final = 10
+"""So many places are tried at a time."""
 
+FloatArray = NDArray[np.float64]
 Place = tuple[float, float]
 Count = Annotated[int, Field(ge=1, le=1000)]
 
@@ -181,7 +185,7 @@ def u_traps(config: UTraps, rng: np.random.Generator) -> GeneratedWorld:
     return config.world(_trap(config, place, *row) for place, *row in rows if place is not None)
 
 
-def _placed(config: _Scattered, radii: np.ndarray[Any, Any], rng: np.random.Generator) -> list[Place | None]:
+def _placed(config: _Scattered, radii: FloatArray, rng: np.random.Generator) -> list[Place | None]:
     """A middle for each disc of these radii, None for one without a place."""
     ends = config.world(())
     middles, reach = np.array([ends.start_m, ends.goal_m]), np.full(2, config.room_m)
@@ -189,16 +193,21 @@ def _placed(config: _Scattered, radii: np.ndarray[Any, Any], rng: np.random.Gene
     for radius in radii.tolist():
         kept = reach.copy()
         kept[2:] += config.gap_m
-        tries = rng.uniform((0.0, 0.0), config.size_m, (TRIES, 2))
-        apart = np.hypot(*(tries[:, None] - middles).T).T
-        free = np.flatnonzero((apart >= kept + radius).all(axis=1))
-        if not len(free):
-            found.append(None)
-            continue
-        place = tries[free[0]]
-        found.append((float(place[0]), float(place[1])))
-        middles, reach = np.vstack((middles, place)), np.append(reach, radius)
+        place = next(_free(config, middles, kept + radius, rng), None)
+        found.append(None if place is None else (float(place[0]), float(place[1])))
+        if place is not None:
+            middles, reach = np.vstack((middles, place)), np.append(reach, radius)
     return found
+
+
+def _free(
+    config: _Scattered, middles: FloatArray, kept_m: FloatArray, rng: np.random.Generator
+) -> Iterator[FloatArray]:
+    """Those of `TRIES` places that keep a distance from each middle."""
+    for _ in range(TRIES // AT_ONCE):
+        tries = rng.random((AT_ONCE, 2)) * config.size_m
+        east, north = (np.subtract.outer(tries[:, axis], middles[:, axis]) for axis in (0, 1))
+        yield from tries[(east * east + north * north >= kept_m * kept_m).all(axis=1)]
 
 
 def _circle(place: Place, radius_m: float) -> ObstacleKeys:
