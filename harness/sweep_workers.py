@@ -23,6 +23,9 @@ ONE_THREAD: Final = dict.fromkeys(
 )
 """Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it."""
 
+RECORDED_EACH: Final = 25
+"""Flights of a process that records: rerun 0.41 keeps the layout of every recording, about 3 MB, for ever."""
+
 CONNECT_S: Final = 10.0
 WAITING_PER_THREAD: Final = 2
 SAME: Final = ("wayproof", "jsbsim", "numpy")
@@ -56,8 +59,9 @@ class _Lane:
 
     TRIES: Final = 2
 
-    def __init__(self) -> None:
+    def __init__(self, flights_each: int | None) -> None:
         self.busy = False
+        self._flights_each = flights_each
         self._pool: ProcessPoolExecutor | None = None
 
     def start(self, job: Job) -> Future[Answer]:
@@ -69,7 +73,10 @@ class _Lane:
     def _try(self, job: Job, answer: Future[Answer], tries: int) -> None:
         if self._pool is None:
             self._pool = ProcessPoolExecutor(
-                1, mp_context=multiprocessing.get_context("spawn"), initializer=_begin
+                1,
+                mp_context=multiprocessing.get_context("spawn"),
+                initializer=_begin,
+                max_tasks_per_child=self._flights_each,
             )
         flown = self._pool.submit(fly_job, job)
         flown.add_done_callback(lambda flown: self._over(flown, job, answer, tries - 1))
@@ -99,8 +106,8 @@ class _Lane:
 class LocalWorkers:
     """Processes of this machine."""
 
-    def __init__(self, number: int) -> None:
-        self._lanes = [_Lane() for _ in range(number)]
+    def __init__(self, number: int, flights_each: int | None) -> None:
+        self._lanes = [_Lane(flights_each) for _ in range(number)]
 
     def free(self) -> int:
         """Idle processes."""
@@ -117,12 +124,17 @@ class LocalWorkers:
 
 
 @contextmanager
-def local_workers(number: int) -> Iterator[Workers]:
-    """Processes of this machine; they end with the context, in mid-flight if need be."""
+def local_workers(number: int, *, recording: bool = False) -> Iterator[Workers]:
+    """Processes of this machine; they end with the context, in mid-flight if need be.
+
+    Args:
+        number: of processes.
+        recording: whether they may write recordings; then a process ends after `RECORDED_EACH` flights.
+    """
     before = set(multiprocessing.active_children())
     kept = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(ONE_THREAD)
-    workers = LocalWorkers(number)
+    workers = LocalWorkers(number, RECORDED_EACH if recording else None)
     try:
         yield workers
     finally:

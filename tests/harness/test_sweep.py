@@ -15,6 +15,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
+from harness import sweep_workers
 from harness.campaign import load_campaign
 from harness.campaign_folder import CampaignFolder
 from harness.campaign_runs import CampaignRuns
@@ -23,6 +24,7 @@ from harness.record import RunFolderError
 from harness.results import METRICS, RUN, TIMES, metric_cells
 from harness.run_folder import load_run
 from harness.scenario import load_scenario
+from harness.sweep_workers import ONE_THREAD
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = """\
@@ -418,4 +420,59 @@ def test_a_full_disk_is_told_and_what_is_done_stays(
     assert "No space left on device; what is done is in" in capsys.readouterr().err
     assert [row["run"] for row in rows_of(place / "out")] == [0, 1, 2]
     assert sweep(place, "--resume", "--workers", "1") == 0
+    assert len(rows_of(place / "out")) == 8
+
+
+FLIGHTS_IN_ONE_PROCESS = """
+import json, sys
+from pathlib import Path
+
+import psutil
+
+from harness.campaign import load_campaign
+from harness.campaign_runs import CampaignRuns
+from harness.sweep_flight import Job, fly_job
+
+runs = CampaignRuns(load_campaign(Path("campaign.yaml")))
+grown = []
+for number in range(len(runs)):
+    answer = fly_job(Job(number, runs.scenario(number), Path("run"), "none", True))
+    assert answer.row["outcome"] == "reached", answer.row
+    grown.append(psutil.Process().memory_info().rss / 2**20)
+sys.stdout.write(json.dumps(grown))
+"""
+
+
+@pytest.mark.slow
+def test_a_worker_does_not_grow_over_500_flights(place: Path) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 128"))
+    flown = subprocess.run(
+        [sys.executable, "-c", FLIGHTS_IN_ONE_PROCESS],
+        cwd=place,
+        env={**os.environ, **ONE_THREAD, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert flown.returncode == 0, flown.stderr
+    used_mib = json.loads(flown.stdout)
+    assert len(used_mib) == 512
+    # The first flights fill caches and the heap; a leak of half a track a flight would show.
+    assert used_mib[-1] - used_mib[11] < 10.0
+
+
+def test_a_process_that_records_ends_after_some_flights(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep_workers, "RECORDED_EACH", 2)
+    (place / "campaign.yaml").write_text(f"{CAMPAIGN}recordings: failures\n")
+    begun = []
+    executor = sweep_workers.ProcessPoolExecutor
+
+    def counting(*arguments: Any, **options: Any) -> Any:
+        begun.append(options["max_tasks_per_child"])
+        return executor(*arguments, **options)
+
+    monkeypatch.setattr(sweep_workers, "ProcessPoolExecutor", counting)
+    assert sweep(place, "--workers", "1") == 0
+    assert begun == [2]
     assert len(rows_of(place / "out")) == 8
