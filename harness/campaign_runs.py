@@ -19,7 +19,6 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.campaign import MAX_RUNS, Base, CampaignFile
-from harness.generated_world import GeneratedWorld
 from harness.sampling import FloatArray, design
 from harness.scenario import Scenario, overridden, with_key
 from harness.strict_yaml import (
@@ -105,6 +104,7 @@ class CampaignRuns:
         self._number = campaign.draws * self._combinations * len(self._pairs)
         self._sizes = sizes
         self._designs: dict[int, FloatArray] = {}
+        self._last_world: tuple[int, list[_Change]] = (-1, [])
         if self._number > MAX_RUNS:
             raise InputError(f"{file.source}: has {self._number} runs; must be at most {MAX_RUNS}")
 
@@ -217,10 +217,16 @@ class CampaignRuns:
         ]
 
     def _world(self, place: _Place) -> list[_Change]:
+        """The generated world of a case; runs of one case follow each other, so that the last one is kept."""
         if not self.campaign.worlds:
             return []
+        if self._last_world[0] != place.case:
+            self._last_world = place.case, self._generated(place)
+        return self._last_world[1]
+
+    def _generated(self, place: _Place) -> list[_Change]:
         spec = self.campaign.worlds[place.world]
-        world = self._generated(place)
+        world = generated(spec, self._seed(place.case, WORLD))
         origin: Loc = ("worlds", place.world, spec.generator)
         line = self.file.root.line_of(origin)
         made: tuple[tuple[Loc, Any], ...] = (
@@ -230,9 +236,6 @@ class CampaignRuns:
             (("mission", "goal_m"), world.goal_m),
         )
         return [_Change(loc, node_of(plain, line), origin) for loc, plain in made]
-
-    def _generated(self, place: _Place) -> GeneratedWorld:
-        return generated(self.campaign.worlds[place.world], self._seed(place.case, WORLD))
 
     def _entry(self, name: str, first: str, index: int, section: str | None = None) -> list[_Change]:
         """An entry of `planners` or `aircraft`: bare text, or keys of that section of a scenario."""
