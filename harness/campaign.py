@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -15,7 +16,7 @@ from harness.scenario import model_or_folder
 from harness.scenario_sections import AircraftSpec, PlannerSpec, Section, key
 from harness.shipped import shipped_scenarios
 from harness.strict_yaml import InputError, Loc, Node, fault_line, node_of
-from harness.validation import KeyFault, input_error
+from harness.validation import KeyFault, input_error, shown
 from harness.world_generators import WorldSpec
 
 SCHEMA: Final = "wayproof/campaign/1"
@@ -196,8 +197,8 @@ def load_campaign(path: Path) -> CampaignFile:
     bases: dict[str, Base] = {}
     for index, entry in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)
-        for file in _files(entry, path.parent, lambda sentence, loc=loc: _fault(source, root, loc, sentence)):
-            found = _with_folder(strict_yaml.read(file), ("aircraft", "model"), file.parent)
+        for file in _files(entry, path.parent, partial(_fault, source, root, loc)):
+            found = _with_folder(_mapping(file), ("aircraft", "model"), file.parent)
             base = Base(file.name, str(file), found)
             if base.name in bases:
                 raise _fault(source, root, loc, f"is a second scenario called {base.name}; rename one")
@@ -230,20 +231,28 @@ def _fault(source: str, root: Node, loc: Loc, sentence: str) -> InputError:
     return InputError(fault_line(source, root.line_of(loc), loc, sentence))
 
 
-def _files(entry: str, folder: Path, fault: Any) -> Iterator[Path]:
+def _mapping(file: Path) -> Node:
+    root = strict_yaml.read(file)
+    if not isinstance(root.value, dict):
+        raise InputError(f"{file}:{root.line}: must be a mapping that begins with `schema:`")
+    return root
+
+
+def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list[Path]:
     """The scenario files that an entry means: a file, those of a folder, or a shipped one."""
-    path, shipped = folder / Path(entry).expanduser(), shipped_scenarios()
-    if path.is_file():
-        yield path
-    elif path.is_dir():
-        files = [file for file in sorted(path.glob("*.yaml")) if not is_campaign(file)]
-        if not files:
+    path, shipped = folder / entry, shipped_scenarios()
+    try:
+        if path.is_file():
+            return [path]
+        if path.is_dir():
+            if files := [file for file in sorted(path.glob("*.yaml")) if not is_campaign(file)]:
+                return files
             raise fault(f"is {entry!r}, a folder without scenario files (*.yaml)")
-        yield from files
-    elif entry in shipped:
-        yield shipped[entry]
-    else:
-        raise fault(f"is {entry!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}")
+    except OSError as error:
+        raise fault(f"is {shown(entry)}: {error.strerror}") from error
+    if entry in shipped:
+        return [shipped[entry]]
+    raise fault(f"is {entry!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}")
 
 
 def _with_folders(root: Node, folder: Path) -> Node:

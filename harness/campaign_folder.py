@@ -181,7 +181,7 @@ def _lines(journal: Path) -> Iterator[tuple[dict[str, Any], int]]:
                 line = json.loads(text) if text.endswith(b"\n") else None
             except ValueError:
                 line = None
-            if not isinstance(line, dict):
+            if not (isinstance(line, dict) and line.keys() >= {"run", "row", "times"}):
                 return
             end += len(text)
             yield line, end

@@ -2,7 +2,8 @@
 
 Case `c` is draw `c // combinations` of combination `c % combinations`; run `r` flies case `r // pairs` with
 planner and aircraft `r % pairs`. A case's streams are children of the campaign's root seed
-(`numpy.random.SeedSequence`, spawn key (case, stream)).
+(`numpy.random.SeedSequence`, spawn key (case, stream)). More draws leave the runs before them as they are, but
+for a Latin hypercube, whose slices depend on their number.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from harness.campaign_folder import RUNS, CampaignFolder
 from harness.campaign_runs import CampaignRuns
+from harness.record import RunFolderError
 from harness.sweep_flight import Answer, Job, failed
 from harness.sweep_workers import WorkerDiedError, Workers
 
@@ -35,8 +36,7 @@ def sweep(
         progress: told of every run that is over.
 
     Raises:
-        OSError: the folder, or a run folder in it, cannot be written.
-        RunFolderError: the same.
+        OSError: the folder, or a run folder in it, cannot be written; or who flies has gone.
     """
     jobs = _jobs(runs, folder)
     ahead = next(jobs, None)
@@ -83,6 +83,8 @@ def _answer(future: Future[Answer], run: int) -> Answer:
     except WorkerDiedError:
         reason = "the process that flew it died, each time that it was tried"
         return failed(run, reason, f"{reason}\n")
+    except RunFolderError as error:
+        raise OSError(str(error)) from error
 
 
 def _row(runs: CampaignRuns, answer: Answer) -> dict[str, Any]:

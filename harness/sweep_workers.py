@@ -61,7 +61,8 @@ class _Lane:
 
     def __init__(self, flights_each: int | None) -> None:
         self.busy = False
-        self._flights_each = flights_each
+        self._closed = False
+        self._flights_each = self._left = flights_each
         self._pool: ProcessPoolExecutor | None = None
 
     def start(self, job: Job) -> Future[Answer]:
@@ -71,18 +72,23 @@ class _Lane:
         return answer
 
     def _try(self, job: Job, answer: Future[Answer], tries: int) -> None:
-        if self._pool is None:
-            self._pool = ProcessPoolExecutor(
-                1,
-                mp_context=multiprocessing.get_context("spawn"),
-                initializer=_begin,
-                max_tasks_per_child=self._flights_each,
-            )
-        flown = self._pool.submit(fly_job, job)
+        try:
+            flown = self._process().submit(fly_job, job)
+        except BrokenProcessPool:
+            # It died while it had nothing to do.
+            self._pool = None
+            flown = self._process().submit(fly_job, job)
         flown.add_done_callback(lambda flown: self._over(flown, job, answer, tries - 1))
 
+    def _process(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            spawn = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin)
+            self._left = self._flights_each
+        return self._pool
+
     def _over(self, flown: Future[Answer], job: Job, answer: Future[Answer], tries: int) -> None:
-        if flown.cancelled():
+        if self._closed or flown.cancelled():
             answer.cancel()
             return
         error = flown.exception()
@@ -92,6 +98,10 @@ class _Lane:
                 self._try(job, answer, tries)
                 return
             error = WorkerDiedError()
+        elif self._left is not None:
+            self._left -= 1
+            if self._left == 0:
+                self._retire()
         self.busy = False
         if error is None:
             answer.set_result(flown.result())
@@ -99,8 +109,13 @@ class _Lane:
             answer.set_exception(error)
 
     def close(self) -> None:
+        self._closed = True
+        self._retire()
+
+    def _retire(self) -> None:
         if self._pool is not None:
             self._pool.shutdown(wait=False, cancel_futures=True)
+            self._pool = None
 
 
 class LocalWorkers:

@@ -242,6 +242,7 @@ def line_of(begin: str) -> int:
         ("[ring.yaml]", "[rong.yaml]", "campaign.yaml:4: scenarios[0]: is 'rong.yaml'; must be a scenario"),
         ("[ring.yaml]", "[ring.yaml, ring.yaml]", "scenarios[1]: is a second scenario called ring"),
         ("scenarios: [ring.yaml]", "draws: 1", "given twice"),
+        ("[ring.yaml]", "[list.yaml]", "list.yaml:1: must be a mapping"),
         ("  environment.wind.speed_mps", "  environment.wnd.speed_mps", "unknown key; did you mean wind"),
         ("[0, 4.5]", "[0, 45]", "campaign.yaml:12: grid.environment.wind.speed_mps[1]: is 45; must be below"),
         ("[0, 4.5]", "[]", "campaign.yaml:12: grid.environment.wind.speed_mps: has 0 items"),
@@ -281,12 +282,13 @@ def test_a_mistake_is_told_with_file_line_and_key(
 ) -> None:
     assert old in CAMPAIGN
     (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))
+    (place / "list.yaml").write_text("- schema: wayproof/scenario/1\n")
     out = place / "out"
     assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out)]) == 2
     told = capsys.readouterr()
     assert said in told.err
     assert told.out == ""
-    assert str(place / "campaign.yaml") in told.err
+    assert str(place) in told.err
     assert len(told.err.splitlines()) <= 5
     assert not out.exists(), "nothing is written"
 

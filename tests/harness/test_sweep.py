@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,8 @@ from harness.record import RunFolderError
 from harness.results import METRICS, RUN, TIMES, metric_cells
 from harness.run_folder import load_run
 from harness.scenario import load_scenario
-from harness.sweep_workers import ONE_THREAD
+from harness.sweep_flight import Job
+from harness.sweep_workers import ONE_THREAD, local_workers
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = """\
@@ -379,6 +382,20 @@ def test_a_worker_killed_in_mid_run_costs_nothing(long_campaign: Path) -> None:
     assert len(rows_of(out)) == 24
 
 
+def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    job = Job(0, runs.scenario(0), place / "run", "none", optimum=False)
+    with local_workers(1) as workers:
+        first = workers.start(job).result(timeout=60)
+        for child in multiprocessing.active_children():
+            child.kill()
+            child.join()
+        assert workers.free() == 1
+        time.sleep(0.5)
+        assert workers.start(job).result(timeout=60).row == first.row
+    assert multiprocessing.active_children() == []
+
+
 @pytest.mark.parametrize(("which", "kept"), [("all", {0, 1}), ("failures", {1}), ("none", set())])
 def test_recordings_are_kept_of_all_of_failures_or_of_none(place: Path, which: str, kept: set[int]) -> None:
     text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[{kind: rolling_window}]").replace(
@@ -466,13 +483,13 @@ def test_a_process_that_records_ends_after_some_flights(place: Path, monkeypatch
     monkeypatch.setattr(sweep_workers, "RECORDED_EACH", 2)
     (place / "campaign.yaml").write_text(f"{CAMPAIGN}recordings: failures\n")
     begun = []
-    executor = sweep_workers.ProcessPoolExecutor
+    executor = ProcessPoolExecutor
 
     def counting(*arguments: Any, **options: Any) -> Any:
-        begun.append(options["max_tasks_per_child"])
+        begun.append(arguments)
         return executor(*arguments, **options)
 
     monkeypatch.setattr(sweep_workers, "ProcessPoolExecutor", counting)
     assert sweep(place, "--workers", "1") == 0
-    assert begun == [2]
+    assert begun == [(1,)] * 4, "of one process each"
     assert len(rows_of(place / "out")) == 8
