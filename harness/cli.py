@@ -20,11 +20,12 @@ from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
 from harness.commands.options import BAD_INPUT, FAILED, Command, Group, flag
 from harness.commands.review import report, view
+from harness.commands.sweep import sweep
 
 INTERRUPTED: Final = 130
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
-for command in (fly, check, compare, validate, schema, view, report, export, bench, envelope):
+for command in (fly, check, compare, sweep, validate, schema, view, report, export, bench, envelope):
     app.command(cls=Command)(command)
 app.command("list", cls=Command)(list_names)
 

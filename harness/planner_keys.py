@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import cache
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from pydantic import ValidationError, create_model
@@ -57,6 +58,7 @@ def json_schema(common: dict[str, Any]) -> dict[str, Any]:
     return {"description": common["description"], "anyOf": kinds}
 
 
+@cache
 def _own_keys(kind: PlannerKind) -> type[Section]:
     """A planner's own keys as a section."""
     hints = get_type_hints(kind.config)

@@ -65,7 +65,7 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _complete(self, info: ValidationInfo) -> Scenario:
         """Fills in derived defaults, each after those it depends on, and checks across sections."""
-        found = _model(self.aircraft.model, (info.context or {}).get("folder"))
+        found = model_or_folder(self.aircraft.model, (info.context or {}).get("folder"))
         object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))
         self._set("aircraft", airspeed_mps=_cruise_mps(self.aircraft))
         performance = performance_of(self)
@@ -115,9 +115,7 @@ def load_scenario(path: Path, overrides: Sequence[tuple[str, str]] = ()) -> Scen
         InputError: the file cannot be read or is not a scenario; a line of its text names file, line and key.
     """
     root = strict_yaml.read(path)
-    for name, text in overrides:
-        root = _overridden(root, name, text)
-    return _validated(root, str(path), path.parent)
+    return _validated(overridden(root, overrides), str(path), path.parent)
 
 
 def parse_scenario(text: str, source: str = "scenario") -> Scenario:
@@ -140,9 +138,7 @@ def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = 
         InputError: it is not a scenario; its faults name the command line.
     """
     root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
-    for name, text in overrides:
-        root = _overridden(root, name, text)
-    return _validated(root, "command line")
+    return _validated(overridden(root, overrides), "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -213,14 +209,33 @@ def _validated(root: Node, source: str, folder: Path | None = None) -> Scenario:
         raise input_error(error, Scenario, root, source) from error
 
 
+def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
+    """A scenario's keys with some replaced, as `load_scenario` takes them.
+
+    Raises:
+        InputError: one is not a key path, has no value or leads nowhere.
+    """
+    for name, text in overrides:
+        root = _overridden(root, name, text)
+    return root
+
+
 def _overridden(root: Node, name: str, text: str) -> Node:
-    steps = name.replace("[", ".").replace("]", "").split(".")
-    if not all(steps):
-        raise InputError(f"command line: {name!r} is not a key path; write it as sensor.range_m")
+    try:
+        loc = strict_yaml.loc_of(name)
+    except ValueError as error:
+        raise InputError(f"command line: {error}") from error
     if not text.strip():
         raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
-    loc: Loc = tuple(int(step) if step.isdecimal() else step for step in steps)
-    new = strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE)
+    return with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
+
+
+def with_key(root: Node, loc: Loc, new: Node) -> Node:
+    """A scenario's keys with one replaced; a new `planner.kind` drops the own keys of the planner before.
+
+    Raises:
+        InputError: there is no such key, as far as it can be told without the scenario's types.
+    """
     if loc == ("planner", "kind"):
         root = _without_own_keys(root, new)
     return strict_yaml.replaced(root, loc, new)
@@ -235,7 +250,7 @@ def _without_own_keys(root: Node, kind: Node) -> Node:
     return strict_yaml.replaced(root, ("planner",), Node(common, planner.line))
 
 
-def _model(model: str, folder: Path | None) -> str:
+def model_or_folder(model: str, folder: Path | None) -> str:
     """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
     for place in (Path() if folder is None else folder, Path()):
         if ("/" in model or model not in _aircraft_names()) and (place / model).expanduser().is_dir():

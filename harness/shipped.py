@@ -8,10 +8,29 @@ from harness.strict_yaml import InputError
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """Scenario files by name; in a wheel they lie in this package, in a checkout beside it."""
-    here = Path(__file__).parent
-    folder = here / "scenarios" if (here / "scenarios").is_dir() else here.parent / "scenarios"
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+    """Scenario files by name."""
+    return {path.stem: path for path in sorted(_folder().glob("*.yaml"))}
+
+
+def shipped_campaigns() -> dict[str, Path]:
+    """Campaign files by name."""
+    return {path.stem: path for path in sorted(_folder().joinpath("campaigns").glob("*.yaml"))}
+
+
+def campaign_path(text: str) -> Path:
+    """The file that a command's CAMPAIGN means: a path, or the name or path of a shipped campaign.
+
+    Raises:
+        InputError: there is neither such a file nor such a shipped campaign.
+    """
+    path, shipped = Path(text), shipped_campaigns()
+    if path.is_file():
+        return path
+    inside = path.parent in (Path(), Path("scenarios/campaigns")) and path.suffix in ("", ".yaml")
+    if inside and path.stem in shipped and not path.exists():
+        return shipped[path.stem]
+    what = "is not a file" if path.exists() else "no such file"
+    raise InputError(f"{text}: {what}; give a campaign file or one of {', '.join(shipped)}")
 
 
 def scenario_path(text: str) -> Path:
@@ -39,3 +58,9 @@ def summary(path: Path) -> str:
     with path.open(encoding="utf-8") as file:
         line = next(line for line in file if not line.startswith("# yaml-language-server:"))
         return line.lstrip("# ").rstrip()
+
+
+def _folder() -> Path:
+    """In a wheel it lies in this package, in a checkout beside it."""
+    here = Path(__file__).parent
+    return here / "scenarios" if (here / "scenarios").is_dir() else here.parent / "scenarios"

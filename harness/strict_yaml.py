@@ -65,23 +65,56 @@ class Node:
             return Node(tuple(node.moved(line) for node in self.value), line)
         return Node(self.value, line)
 
+    def at(self, loc: Loc) -> Node | None:
+        """The value at `loc`; None where there is none."""
+        node: Node | None = self
+        for step in loc:
+            node = node.inner(step) if node else None
+        return node
+
     def line_of(self, loc: Loc) -> int:
         """Line of the value at `loc`, or of the innermost one on the way to it that exists."""
         node = self
         for step in loc:
-            inner = node.value
-            if isinstance(inner, dict) and step in inner:
-                node = inner[str(step)]
-            elif isinstance(inner, tuple) and isinstance(step, int) and step < len(inner):
-                node = inner[step]
-            else:
+            inner = node.inner(step)
+            if inner is None:
                 break
+            node = inner
         return node.line
+
+    def inner(self, step: str | int) -> Node | None:
+        """What a mapping has under a key, or a list at an index; None where there is nothing."""
+        if isinstance(self.value, dict):
+            return self.value.get(str(step)) if isinstance(step, str) else None
+        if isinstance(self.value, tuple) and isinstance(step, int) and step < len(self.value):
+            return self.value[step]
+        return None
+
+
+def node_of(plain: Any, line: int) -> Node:
+    """Plain values as a node, every part of it from `line`."""
+    if isinstance(plain, dict):
+        return Node({key: node_of(value, line) for key, value in plain.items()}, line)
+    if isinstance(plain, (list, tuple)):
+        return Node(tuple(node_of(value, line) for value in plain), line)
+    return Node(plain, line)
 
 
 def key_path(loc: Loc) -> str:
     """`("obstacles", 2, "circle")` as `obstacles[2].circle`."""
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in loc).lstrip(".")
+
+
+def loc_of(path: str) -> Loc:
+    """`obstacles[2].circle` as `("obstacles", 2, "circle")`.
+
+    Raises:
+        ValueError: a step is empty.
+    """
+    steps = path.replace("[", ".").replace("]", "").split(".")
+    if not all(steps):
+        raise ValueError(f"{path!r} is not a key path; write it as sensor.range_m")
+    return tuple(int(step) if step.isdecimal() else step for step in steps)
 
 
 def fault_line(source: str, line: int, loc: Loc, sentence: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.strict_yaml import InputError, Loc, Node, fault_line
@@ -55,8 +55,17 @@ def input_error(error: ValidationError, model: type[BaseModel], root: Node, sour
         root: the file.
         source: its name.
     """
-    faults = [_located(details, model) for details in error.errors(include_url=False)]
-    every = [fault_line(source, root.line_of(loc), loc, sentence) for loc, sentence in faults]
+    found = faults(error, model)
+    return in_lines([fault_line(source, root.line_of(loc), loc, sentence) for loc, sentence in found], source)
+
+
+def faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[Loc, str]]:
+    """Key and sentence of every fault."""
+    return [_located(details, model) for details in error.errors(include_url=False)]
+
+
+def in_lines(every: Sequence[str], source: str) -> InputError:
+    """Faults of a file as one error, each once, at most MAX_FAULTS lines."""
     lines = list(dict.fromkeys(every))
     if len(lines) > MAX_FAULTS:
         lines[MAX_FAULTS - 1 :] = [f"{source}: and {len(lines) - MAX_FAULTS + 1} more"]
@@ -87,7 +96,8 @@ def _known_keys(model: type[BaseModel], loc: Loc) -> tuple[str, ...]:
     schema = model.model_json_schema()
     part: Mapping[str, Any] = schema
     for step in loc:
-        part = part["items"] if isinstance(step, int) else part["properties"][step]
+        inner = part.get("properties", {})
+        part = part["items"] if isinstance(step, int) else inner.get(step) or part["additionalProperties"]
         for choice in part.get("anyOf", [part]):
             if "$ref" in choice:
                 part = schema["$defs"][choice["$ref"].rpartition("/")[2]]

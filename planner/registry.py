@@ -6,9 +6,11 @@ Another distribution adds a planner by an entry point in the group `wayproof.pla
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
 from planner import bug1, bug2, dubins_tree, rolling_window, rolling_window_config, tangent_bug, vfh_plus
@@ -88,9 +90,15 @@ BUILT_IN = (
 def planner_kinds() -> dict[str, PlannerKind]:
     """All planner kinds by name, built-in ones first."""
     kinds = {kind.kind: kind for kind in BUILT_IN}
-    for point in entry_points(group=GROUP):
+    for point in _outside(entry_points, tuple(sys.path)):
         outside = point.load()
         if not isinstance(outside, PlannerKind):
             raise TypeError(f"entry point {point.name!r} ({point.value}) is not a PlannerKind")
         kinds.setdefault(outside.kind, outside)
     return kinds
+
+
+@cache
+def _outside(find: Callable[..., EntryPoints], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""
+    return tuple(find(group=GROUP))

@@ -31,6 +31,8 @@ ALLOWED = {
         "yaml",
         "matplotlib",
         "jinja2",
+        "scipy",
+        "distributed",
         "planner",
         "aircraft",
     },
@@ -43,6 +45,8 @@ ONLY_IN = {
     "typer": ("harness/cli.py", "harness/commands/*.py"),
     "matplotlib": ("harness/figures.py",),
     "jinja2": ("harness/report.py",),
+    "scipy": ("harness/sampling.py",),
+    "distributed": ("harness/sweep_workers.py",),
     "ompl": ("planner/dubins_tree.py",),
     "harness.cli": ("harness/__main__.py",),
 }
@@ -56,6 +60,8 @@ LATE = {
     "matplotlib": ("harness/figures.py",),
     "jinja2": ("harness/report.py",),
     "ompl": (),
+    "scipy": (),
+    "distributed": (),
 }
 
 
@@ -139,6 +145,8 @@ def test_is_named_for_what_it_does(path: str) -> None:
         ("planner/dubins_tree.py", "from ompl import base"),
         ("harness/a.py", "def f():\n    from ompl import base"),
         ("harness/a.py", "def f():\n    import jinja2"),
+        ("harness/sampling.py", "from scipy.stats import qmc"),
+        ("harness/a.py", "def f():\n    import distributed"),
     ],
 )
 def test_a_breach_is_seen(path: str, source: str) -> None:

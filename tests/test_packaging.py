@@ -53,7 +53,8 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
         for path in (ROOT / room).rglob("*")
         if path.is_file() and "__pycache__" not in path.parts
     }
-    scenarios = {f"harness/scenarios/{path.name}" for path in (ROOT / "scenarios").iterdir()}
+    shipped = [path for path in (ROOT / "scenarios").rglob("*") if path.is_file()]
+    scenarios = {f"harness/{path.relative_to(ROOT)}" for path in shipped}
     assert held == sources | scenarios
     assert {"aircraft/systems/autopilot.xml", "aircraft/airframes.yaml", "planner/py.typed"} <= held
     assert {"LICENSE", "entry_points.txt", "METADATA"} <= notes
@@ -68,6 +69,7 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
     for code, arguments, shown in (
         (where, [], str(tmp_path / "site")),
         (command, ["fly", "aerosonde_forest", "--no-recording"], "reached: inside the goal circle"),
+        (command, ["sweep", "forest_planners"], "results: runs/forest_planners/results.parquet"),
     ):
         run = subprocess.run(
             [sys.executable, "-c", code, *arguments],

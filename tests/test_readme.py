@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shlex
@@ -11,6 +12,7 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pyarrow.parquet as pq
 import pytest
 
 from harness.cli import main
@@ -96,6 +98,22 @@ def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_pat
     refused = wayproof("fly my_world.yaml", tmp_path)
     assert refused.returncode == 2
     assert refused.stderr in blocks("text")
+
+
+def test_ones_own_campaign_is_flown_and_a_row_of_it_flown_again(tmp_path: Path) -> None:
+    (scenario,), (campaign,) = blocks("yaml"), blocks("yml")
+    (tmp_path / "my_world.yaml").write_text(scenario)
+    (tmp_path / "my_campaign.yaml").write_text(campaign)
+    assert "`wayproof sweep my_campaign.yaml`" in README
+    flown = wayproof("sweep my_campaign.yaml", tmp_path)
+    assert (flown.returncode, flown.stderr) == (0, "")
+    assert flown.stdout.startswith("my_campaign: 12 runs")
+    again = "fly --from runs/my_campaign/results.parquet --run 7"
+    assert f"`wayproof {again}`" in README
+    metrics = json.loads(wayproof(f"{again} --no-recording --json", tmp_path).stdout)
+    rows = pq.read_table(tmp_path / "runs/my_campaign/results.parquet").to_pylist()
+    assert metrics["digest"] == rows[7]["digest"]
+    assert [name for name in ("case", "cross_track_m.p95", "length_ratio") if name not in rows[7]] == []
 
 
 def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from harness.commands import options
 from harness.commands.options import (
     FAILED,
     JsonOption,
-    ScenarioArgument,
+    OptionalScenario,
     bad_input,
     flag,
     load,
@@ -30,7 +30,7 @@ FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 
 
 def fly(
-    scenario: ScenarioArgument,
+    scenario: OptionalScenario = None,
     planner: Annotated[
         str | None,
         typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=options.planners),
@@ -44,6 +44,11 @@ def fly(
         list[str] | None,
         typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
     ] = None,
+    results: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="A campaign's results.parquet, instead of SCENARIO."),
+    ] = None,
+    run: Annotated[int | None, typer.Option(metavar="K", help="With --from: which run.")] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/PLANNER-AIRCRAFT-SEED.")
     ] = None,
@@ -70,9 +75,14 @@ def fly(
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
     overrides = [("planner.kind", planner), ("aircraft.model", aircraft), ("seed", seed)]
     given = [(name, str(value)) for name, value in overrides if value is not None]
-    loaded = load(scenario, [*given, *map(setting, settings or ())])
+    given += map(setting, settings or ())
+    loaded, digest = _asked(scenario, results, run, given)
     folder = out or _default_folder(loaded)
     metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
+    if digest and not given and metrics["digest"] != digest:
+        typer.echo(
+            f"wayproof: run {run} was flown otherwise (digest {digest}): not with these versions", err=True
+        )
     if as_json:
         print_json(metrics)
     elif not quiet:
@@ -83,6 +93,23 @@ def fly(
     if view:
         open_viewer([folder])
     return FLY_STATUS.get(metrics["outcome"], FAILED)
+
+
+def _asked(
+    scenario: str | None, results: Path | None, run: int | None, overrides: list[tuple[str, str]]
+) -> tuple[Scenario, str | None]:
+    """What to fly, and the digest that a campaign's results have of it."""
+    if (scenario is None) == (results is None):
+        raise typer.BadParameter("give either a SCENARIO or --from with --run")
+    if (results is None) != (run is None):
+        raise typer.BadParameter("--from and --run go together")
+    if scenario is not None:
+        return load(scenario, overrides), None
+    from harness.replay import flown_run
+
+    assert results is not None
+    assert run is not None
+    return flown_run(results, run, overrides)
 
 
 def compare(

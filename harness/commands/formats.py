@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
@@ -10,9 +11,11 @@ from harness.commands.options import BAD_INPUT, load, print_json
 
 
 def validate(
-    files: Annotated[list[str], typer.Argument(metavar="FILE...", help="Scenario files or shipped names.")],
+    files: Annotated[
+        list[str], typer.Argument(metavar="FILE...", help="Scenario or campaign files, or shipped names.")
+    ],
 ) -> int:
-    """Checks scenario files without flying them.
+    """Checks scenario and campaign files without flying them; of a campaign, every run.
 
     For example: wayproof validate my_world.yaml paper_circles
     """
@@ -21,25 +24,46 @@ def validate(
     status = 0
     for file in files:
         try:
-            loaded = load(file)
+            found = _found(file)
         except InputError as error:
             typer.echo(str(error), err=True)
             status = BAD_INPUT
         else:
-            typer.echo(f"{file}: {loaded.name}, {len(loaded.obstacles)} obstacles: valid")
+            typer.echo(f"{file}: {found}: valid")
     return status
 
 
+def _found(file: str) -> str:
+    """What a valid file holds, in a few words."""
+    from harness.campaign import is_campaign
+    from harness.shipped import campaign_path, shipped_campaigns
+
+    if file in shipped_campaigns() or (Path(file).is_file() and is_campaign(Path(file))):
+        from harness.commands.sweep import checked
+
+        runs = checked(campaign_path(file))
+        return f"{runs.campaign.name}, {len(runs)} runs of {runs.cases} cases"
+    loaded = load(file)
+    return f"{loaded.name}, {len(loaded.obstacles)} obstacles"
+
+
 def schema(
-    kind: Annotated[Literal["scenario"], typer.Argument(help="The file format.")] = "scenario",
+    kind: Annotated[
+        Literal["scenario", "campaign"], typer.Argument(help="The file format.", show_default=True)
+    ] = "scenario",
 ) -> int:
     """Prints the JSON Schema of a file format, for editors.
 
     For example: wayproof schema > scenario.schema.json
     """
-    from harness.scenario import scenario_schema
+    if kind == "campaign":
+        from harness.campaign import campaign_schema
 
-    print_json(scenario_schema())
+        print_json(campaign_schema())
+    else:
+        from harness.scenario import scenario_schema
+
+        print_json(scenario_schema())
     return 0
 
 

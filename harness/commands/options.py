@@ -64,8 +64,8 @@ def aircraft(incomplete: str) -> list[str]:
     return [name for name in aircraft_names() if name.startswith(incomplete)]
 
 
-ScenarioArgument = Annotated[
-    str,
+OptionalScenario = Annotated[
+    str | None,
     typer.Argument(
         metavar="SCENARIO",
         help="A file, or a name that `wayproof list scenarios` prints.",

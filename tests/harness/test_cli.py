@@ -182,7 +182,7 @@ print(sorted({"jsbsim", "rerun", "pyarrow"} & set(sys.modules)), file=sys.stderr
         (["fly", "paper_circles", "--view", "--no-recording"], "nothing to view with --no-recording"),
         (["fly", "paper_circle"], "no such file; give a scenario file or one of aerosonde_forest"),
         (["fly", "one", "two"], "two"),
-        (["schema", "campaign"], "campaign"),
+        (["schema", "campaigns"], "campaigns"),
         (["list", "birds"], "birds"),
         (["validate"], "FILE"),
         (["view"], "RUN_DIR"),

@@ -1,0 +1,221 @@
+"""The folder of a campaign: `campaign.json` says what is flown, the journal what has been, two tables the results.
+
+Each run that is over is one line of the journal, flushed to the disk before the next; a process killed in the
+middle of a line leaves a torn one, which is dropped. The tables are made from the journal, and replaced whole.
+Whoever writes holds a lock on the file `lock` (flock), which ends with the process.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Final
+
+from harness.campaign_runs import CampaignRuns
+from harness.record import RunFolderError
+from harness.results import METRICS, RESULTS, RUN, SCHEMA, TIMES, TIMINGS, table
+from harness.run_folder import PARTIAL
+
+INDEX: Final = "campaign.json"
+JOURNAL: Final = "journal.jsonl"
+LOCK: Final = "lock"
+RUNS: Final = "runs"
+FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
+FLOWN_WITH: Final = ("wayproof", "jsbsim", "numpy", "shapely")
+"""What a flight's bits depend on: a campaign is not gone on with another version."""
+
+MAX_TOLD: Final = 3
+
+
+class CampaignFolder:
+    """The folder of a campaign that is being flown. Use as a context manager; the lock ends with it.
+
+    Attributes:
+        path: where it lies.
+        done: numbers of the runs that are over.
+    """
+
+    def __init__(self, path: Path, runs: CampaignRuns, *, resume: bool) -> None:
+        """Claims the folder: makes it, or goes on with it.
+
+        Args:
+            path: the folder; made with its parents where missing.
+            runs: the campaign.
+            resume: whether what the folder has of this campaign is kept and gone on with.
+
+        Raises:
+            RunFolderError: the folder holds something else, results without `resume` or those of another
+                campaign, another process is flying into it, or it cannot be written.
+        """
+        self.path, self._runs = path, runs
+        self._stack = ExitStack()
+        try:
+            self.done = self._claim(resume)
+            self._journal: IO[bytes] = self._stack.enter_context((path / JOURNAL).open("ab"))
+        except OSError as error:
+            self._stack.close()
+            raise RunFolderError(f"cannot write the campaign {path}: {error.strerror or error}") from error
+        except BaseException:
+            self._stack.close()
+            raise
+
+    def append(self, run: int, row: Mapping[str, Any], times: Mapping[str, Any]) -> None:
+        """Puts a run that is over on the disk."""
+        line = json.dumps({"run": run, "row": row, "times": times}, allow_nan=False)
+        self._journal.write(line.encode() + b"\n")
+        self._journal.flush()
+        os.fsync(self._journal.fileno())
+        self.done.add(run)
+
+    def write_tables(self) -> None:
+        """Makes `results.parquet` and `timings.parquet` from the journal."""
+        lines = {line["run"]: line for line, _ in _lines(self.path / JOURNAL)}
+        columns = RUN | self._runs.varied | METRICS
+        about = {"schema": SCHEMA, "runs": len(self._runs), **self._runs.file.plain()}
+        metadata = json.dumps(about, allow_nan=False)
+        for name, part, kinds in ((RESULTS, "row", columns), (TIMINGS, "times", TIMES)):
+            self._write_table(
+                name, [{"run": run, **line[part]} for run, line in lines.items()], kinds, metadata
+            )
+
+    def outcomes(self) -> dict[str, int]:
+        """How many of the runs that are over ended how, the most frequent first."""
+        lines = {line["run"]: line["row"]["outcome"] for line, _ in _lines(self.path / JOURNAL)}
+        return dict(Counter(lines.values()).most_common())
+
+    def __enter__(self) -> CampaignFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def _write_table(
+        self, name: str, rows: list[dict[str, Any]], columns: Mapping[str, str], metadata: str
+    ) -> None:
+        import pyarrow.parquet as pq
+
+        partial = self.path / (name + PARTIAL)
+        with partial.open("wb") as file:
+            pq.write_table(table(rows, columns, metadata), file, compression="zstd")
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(self.path / name)
+
+    def _claim(self, resume: bool) -> set[int]:
+        """Locks the folder, checks and writes its index; returns the runs that are over."""
+        path = self.path
+        if path.exists() and not path.is_dir():
+            raise RunFolderError(f"{path} is a file, not a folder for a campaign")
+        path.mkdir(parents=True, exist_ok=True)
+        if {each.name for each in path.iterdir()} - {LOCK, INDEX + PARTIAL} and _index(path) is None:
+            raise RunFolderError(
+                f"{path} is not empty and not a campaign's folder: choose another one or empty it first"
+            )
+        _lock(self._stack.enter_context((path / LOCK).open("w")), path)
+        now, before = self._about(), _index(path)
+        done, kept_bytes = set(), 0
+        for line, end in _lines(path / JOURNAL):
+            done.add(line["run"])
+            kept_bytes = end
+        if done and not resume:
+            raise RunFolderError(
+                f"{path} holds {len(done)} runs: go on with --resume, or choose another folder"
+            )
+        if done and before is not None and (changes := list(_changes(before, now))):
+            told = "; ".join(changes[:MAX_TOLD]) + ("; and more" if len(changes) > MAX_TOLD else "")
+            raise RunFolderError(
+                f"{path} is of another campaign: {told}; change it back or choose another folder"
+            )
+        if before != now:
+            _replace(path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
+        if (path / JOURNAL).exists():
+            os.truncate(path / JOURNAL, kept_bytes)
+        return done
+
+    def _about(self) -> dict[str, Any]:
+        """The content of `campaign.json`, as it is read back."""
+        about = {
+            "schema": FOLDER_SCHEMA,
+            "versions": {name: _version(name) for name in FLOWN_WITH},
+            **self._runs.file.plain(),
+        }
+        read: dict[str, Any] = json.loads(json.dumps(about))
+        return read
+
+
+def _index(path: Path) -> dict[str, Any] | None:
+    """The index of a campaign's folder; None where there is none that is ours."""
+    try:
+        index = json.loads((path / INDEX).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return index if isinstance(index, dict) and index.get("schema") == FOLDER_SCHEMA else None
+
+
+def _lock(file: IO[str], path: Path) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise RunFolderError(
+            f"{path} is being flown into by another process: wait for it or choose another folder"
+        ) from error
+
+
+def _lines(journal: Path) -> Iterator[tuple[dict[str, Any], int]]:
+    """Whole lines of a journal, and the byte at which each ends; a torn one ends it."""
+    if not journal.exists():
+        return
+    end = 0
+    with journal.open("rb") as file:
+        for text in file:
+            try:
+                line = json.loads(text) if text.endswith(b"\n") else None
+            except ValueError:
+                line = None
+            if not (isinstance(line, dict) and line.keys() >= {"run", "row", "times"}):
+                return
+            end += len(text)
+            yield line, end
+
+
+def _changes(before: Any, now: Any, where: str = "") -> Iterator[str]:
+    """What differs between two contents, a sentence each."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        for name in before.keys() | now.keys() if before.keys() != now.keys() else before:
+            yield from _changes(before.get(name), now.get(name), f"{where}.{name}".lstrip("."))
+    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        for index, pair in enumerate(zip(before, now, strict=True)):
+            yield from _changes(*pair, f"{where}[{index}]")
+    elif before != now:
+        yield f"{where} was {_shown(before)}, is {_shown(now)}"
+
+
+def _shown(value: Any) -> str:
+    text = "not there" if value is None else json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _version(distribution: str) -> str | None:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return None
+
+
+def _replace(path: Path, text: str) -> None:
+    """Writes a file so that it is either the old one or the whole new one."""
+    partial = path.with_name(path.name + PARTIAL)
+    with partial.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    partial.replace(path)

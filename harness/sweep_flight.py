@@ -1,0 +1,96 @@
+"""One run of a campaign, flown where it was sent to: a process of its own, here or on another machine."""
+
+from __future__ import annotations
+
+import re
+import traceback
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from harness.record import RunFolderError
+from harness.results import ERROR, metric_cells, time_cells
+from harness.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be flown.
+
+    Attributes:
+        run: its number.
+        scenario: what to fly, complete.
+        folder: the run folder, if it is kept.
+        recordings: when it is kept.
+        optimum: whether to compute the shortest path of the world.
+    """
+
+    run: int
+    scenario: Scenario
+    folder: Path
+    recordings: Literal["all", "failures", "none"]
+    optimum: bool
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a job.
+
+    Attributes:
+        run: its number.
+        row: cells of `results.parquet`, by column; those of the job itself are left out.
+        times: cells of `timings.parquet`.
+    """
+
+    run: int
+    row: dict[str, Any]
+    times: dict[str, Any]
+
+
+def fly_job(job: Job) -> Answer:
+    """Flies a job. What goes wrong in the flight is an answer too.
+
+    Raises:
+        OSError: the run folder cannot be written.
+        RunFolderError: the same.
+    """
+    try:
+        metrics = _flown(job)
+        cells = metric_cells(metrics, _optimum_m(job))
+    except (OSError, RunFolderError):
+        raise
+    except Exception as error:
+        return failed(job.run, f"{type(error).__name__}: {error}", traceback.format_exc())
+    return Answer(job.run, cells, time_cells(metrics))
+
+
+def failed(run: int, reason: str, error: str) -> Answer:
+    """The answer of a run that did not come to an end; without what differs from process to process."""
+    same = (re.sub(r"\b0x[0-9a-f]{6,16}\b", "0x...", text) for text in (" ".join(reason.split()), error))
+    return Answer(run, {"outcome": ERROR, **dict(zip(("reason", "error"), same, strict=True))}, {})
+
+
+def _flown(job: Job) -> dict[str, Any]:
+    from harness.closed_loop import fly
+    from harness.metrics import metrics
+    from harness.run import flight_limits, fly_to_folder, make_loop
+
+    if job.recordings == "all":
+        return fly_to_folder(job.scenario, job.folder, recording=True)
+    found = metrics(fly(make_loop(job.scenario)), flight_limits(job.scenario))
+    if job.recordings == "failures" and found["outcome"] != "reached":
+        # Failures are few: to fly them again costs less than to record every flight.
+        fly_to_folder(job.scenario, job.folder, recording=True)
+    return found
+
+
+def _optimum_m(job: Job) -> float | None:
+    if not job.optimum:
+        return None
+    from harness.optimum import shortest_path
+    from harness.world import World
+
+    world, mission = World.from_scenario(job.scenario), job.scenario.mission
+    return shortest_path(
+        world.obstacles, world.bounds_m, mission.start_m, mission.goal_m, job.scenario.planner.clearance_m
+    ).length_m

@@ -1,0 +1,265 @@
+"""Who flies the runs of a campaign: processes of this machine, or the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any, Final, Protocol
+
+from harness.strict_yaml import InputError
+from harness.sweep_flight import Answer, Job, fly_job
+
+ONE_THREAD: Final = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"
+)
+"""Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it."""
+
+RECORDED_EACH: Final = 25
+"""Flights of a process that records: rerun 0.41 keeps the layout of every recording, about 3 MB, for ever."""
+
+CONNECT_S: Final = 10.0
+WAITING_PER_THREAD: Final = 2
+SAME: Final = ("wayproof", "jsbsim", "numpy")
+
+
+class WorkerDiedError(Exception):
+    """The process that flew a run ended before the flight did, as often as it was tried."""
+
+
+class SchedulerGoneError(OSError):
+    """Nobody hands out jobs any more."""
+
+    def __init__(self) -> None:
+        super().__init__("the Dask scheduler has gone")
+
+
+class Workers(Protocol):
+    """Who flies."""
+
+    def free(self) -> int:
+        """How many jobs more may be handed out now; 0 or less for none."""
+        ...
+
+    def start(self, job: Job) -> Future[Answer]:
+        """Hands out a job; its future may raise WorkerDiedError or SchedulerGoneError."""
+        ...
+
+
+class _Lane:
+    """One process, one job at a time: when it dies, it is known of what."""
+
+    TRIES: Final = 2
+
+    def __init__(self, flights_each: int | None) -> None:
+        self.busy = False
+        self._closed = False
+        self._flights_each = self._left = flights_each
+        self._pool: ProcessPoolExecutor | None = None
+
+    def start(self, job: Job) -> Future[Answer]:
+        self.busy = True
+        answer: Future[Answer] = Future()
+        self._try(job, answer, self.TRIES)
+        return answer
+
+    def _try(self, job: Job, answer: Future[Answer], tries: int) -> None:
+        try:
+            flown = self._process().submit(fly_job, job)
+        except BrokenProcessPool:
+            # It died while it had nothing to do.
+            self._pool = None
+            flown = self._process().submit(fly_job, job)
+        flown.add_done_callback(lambda flown: self._over(flown, job, answer, tries - 1))
+
+    def _process(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            spawn = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin)
+            self._left = self._flights_each
+        return self._pool
+
+    def _over(self, flown: Future[Answer], job: Job, answer: Future[Answer], tries: int) -> None:
+        if self._closed or flown.cancelled():
+            answer.cancel()
+            return
+        error = flown.exception()
+        if isinstance(error, BrokenProcessPool):
+            self._pool = None
+            if tries:
+                self._try(job, answer, tries)
+                return
+            error = WorkerDiedError()
+        elif self._left is not None:
+            self._left -= 1
+            if self._left == 0:
+                self._retire()
+        self.busy = False
+        if error is None:
+            answer.set_result(flown.result())
+        else:
+            answer.set_exception(error)
+
+    def close(self) -> None:
+        self._closed = True
+        self._retire()
+
+    def _retire(self) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=False, cancel_futures=True)
+            self._pool = None
+
+
+class LocalWorkers:
+    """Processes of this machine."""
+
+    def __init__(self, number: int, flights_each: int | None) -> None:
+        self._lanes = [_Lane(flights_each) for _ in range(number)]
+
+    def free(self) -> int:
+        """Idle processes."""
+        return sum(not lane.busy for lane in self._lanes)
+
+    def start(self, job: Job) -> Future[Answer]:
+        """Hands a job to an idle process."""
+        return next(lane for lane in self._lanes if not lane.busy).start(job)
+
+    def close(self) -> None:
+        """Takes no more jobs."""
+        for lane in self._lanes:
+            lane.close()
+
+
+@contextmanager
+def local_workers(number: int, *, recording: bool = False) -> Iterator[Workers]:
+    """Processes of this machine; they end with the context, in mid-flight if need be.
+
+    Args:
+        number: of processes.
+        recording: whether they may write recordings; then a process ends after `RECORDED_EACH` flights.
+    """
+    before = set(multiprocessing.active_children())
+    kept = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(ONE_THREAD)
+    workers = LocalWorkers(number, RECORDED_EACH if recording else None)
+    try:
+        yield workers
+    finally:
+        workers.close()
+        for name, value in kept.items():
+            os.environ.pop(name)
+            if value is not None:
+                os.environ[name] = value
+        for child in set(multiprocessing.active_children()) - before:
+            child.terminate()
+            child.join()
+
+
+@contextmanager
+def dask_workers(address: str) -> Iterator[Workers]:
+    """The workers of a Dask cluster, as many as there are at any time.
+
+    A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given
+    up.
+
+    Args:
+        address: of the scheduler, as tcp://127.0.0.1:8786.
+
+    Raises:
+        InputError: Dask is not installed, no scheduler answers, or a worker has other versions than we.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError("wayproof: --scheduler needs Dask; pip install 'wayproof[cluster]'") from error
+    for logger in ("distributed", "distributed.client"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
+    try:
+        client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise InputError(f"wayproof: no Dask scheduler answers at {address}; start one there") from error
+    with client:
+        ours = _versions()
+        if not client.nthreads():
+            raise InputError(f"wayproof: {address} has no workers; start some, as `dask worker {address}`")
+        for worker, theirs in client.run(_versions).items():
+            if theirs != ours:
+                raise InputError(f"wayproof: the worker {worker} has {theirs}; must have {ours}")
+        yield DaskWorkers(client)
+
+
+class DaskWorkers:
+    """The workers of a Dask cluster."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._executor = client.get_executor(pure=False)
+        self._flying = 0
+        self._counted = threading.Lock()
+
+    def free(self) -> int:
+        """Room for jobs that fly and for as many that wait."""
+        try:
+            threads: int = sum(self._client.nthreads().values())
+        except OSError as error:
+            raise SchedulerGoneError from error
+        return WAITING_PER_THREAD * threads - self._flying
+
+    def start(self, job: Job) -> Future[Answer]:
+        """Hands a job to the scheduler."""
+        from distributed import KilledWorker
+
+        answer: Future[Answer] = Future()
+        self._count(1)
+
+        def over(flown: Future[Answer]) -> None:
+            self._count(-1)
+            if flown.cancelled():
+                answer.set_exception(SchedulerGoneError())
+            elif error := flown.exception():
+                answer.set_exception(WorkerDiedError() if isinstance(error, KilledWorker) else error)
+            else:
+                answer.set_result(flown.result())
+
+        self._executor.submit(fly_job, job).add_done_callback(over)
+        return answer
+
+    def _count(self, more: int) -> None:
+        with self._counted:
+            self._flying += more
+
+
+def _begin() -> None:
+    """What a process of ours does first."""
+    # An interrupt reaches the whole process group; the parent decides what it means.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Standard output is the parent's alone: what a planner prints goes to standard error.
+    os.dup2(2, 1)
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.join,), daemon=True).start()
+
+
+def _end_with(joined: Callable[[], None]) -> None:
+    """A parent that is killed takes its processes along."""
+    joined()
+    os._exit(1)
+
+
+def _versions() -> dict[str, str]:
+    """What a flight's bits depend on."""
+    found = {"python": sys.version.partition(" ")[0]}
+    for name in SAME:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

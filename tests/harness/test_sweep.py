@@ -1,0 +1,495 @@
+"""Campaigns flown: the same bytes whoever flies, crashes as rows, what is done kept, and one at a time."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from harness import sweep_workers
+from harness.campaign import load_campaign
+from harness.campaign_folder import CampaignFolder
+from harness.campaign_runs import CampaignRuns
+from harness.cli import main
+from harness.record import RunFolderError
+from harness.results import METRICS, RUN, TIMES, metric_cells
+from harness.run_folder import load_run
+from harness.scenario import load_scenario
+from harness.sweep_flight import Job
+from harness.sweep_workers import ONE_THREAD, local_workers
+
+ROOT = Path(__file__).parents[2]
+SCENARIO = """\
+schema: wayproof/scenario/1
+name: short
+area: {bounds_m: [0, 0, 2000, 2000]}
+obstacles:
+  - circle: {center_m: [1000, 1000], radius_m: 100}
+mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 60}
+sensor: {range_m: 900, rays: 360}
+planner: {clearance_m: 40}
+"""
+CAMPAIGN = """\
+schema: wayproof/campaign/1
+name: short
+seed: 5
+scenarios: [short.yaml]
+planners: [rolling_window, vfh_plus]
+grid:
+  environment.wind.speed_mps: [0, 5]
+random:
+  environment.wind.from_deg: {uniform: [0, 360]}
+draws: 2
+"""
+PLUGIN = """
+import os
+import signal
+
+from planner.registry import PlannerKind
+from planner.rolling_window import RollingWindow, RollingWindowConfig
+
+
+class Dies(RollingWindow):
+    def plan(self, request):
+        print("a planner that talks")
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Raises(RollingWindow):
+    def __init__(self, config, mission):
+        raise ValueError(f"not *to* be made: {object()}")
+
+
+DIES, RAISES = (
+    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Dies, Raises)
+)
+"""
+ENTRY_POINTS = "[wayproof.planners]\ndies = campaign_plugin:DIES\nraises = campaign_plugin:RAISES\n"
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    (tmp_path / "campaign.yaml").write_text(CAMPAIGN)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The campaign's folder, flown by one process without a break."""
+    place = tmp_path_factory.mktemp("unbroken")
+    (place / "short.yaml").write_text(SCENARIO)
+    (place / "campaign.yaml").write_text(CAMPAIGN)
+    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), "--workers", "1"]) == 0
+    return place / "out"
+
+
+def sweep(place: Path, *options: str) -> int:
+    return main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), *options])
+
+
+def rows_of(folder: Path, name: str = "results") -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = pq.read_table(folder / f"{name}.parquet").to_pylist()
+    return rows
+
+
+def results(folder: Path) -> bytes:
+    return (folder / "results.parquet").read_bytes()
+
+
+def start(place: Path, *options: str) -> subprocess.Popen[str]:
+    """The command in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "harness", "sweep", "campaign.yaml", "--out", "out", *options],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for(what: Callable[[], bool], seconds: float = 90.0) -> None:
+    until = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < until, "too long"
+        time.sleep(0.02)
+
+
+def journal_lines(folder: Path) -> int:
+    journal = folder / "journal.jsonl"
+    return journal.read_bytes().count(b"\n") if journal.exists() else 0
+
+
+def test_results_have_a_row_a_run_and_every_metric(unbroken: Path) -> None:
+    table = pq.read_table(unbroken / "results.parquet")
+    varied = ["environment.wind.speed_mps", "environment.wind.from_deg"]
+    assert table.column_names == [*RUN, *varied, *METRICS]
+    assert [str(table.schema.field(name).type) for name in ("run", "case", "seed", *varied)] == [
+        *["int64"] * 4,
+        "double",
+    ]
+    rows = rows_of(unbroken)
+    assert [row["run"] for row in rows] == list(range(8))
+    assert [row["case"] for row in rows] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert {row["outcome"] for row in rows} == {"reached"}
+    assert {row["error"] for row in rows} == {None}
+    for first, second in zip(rows[::2], rows[1::2], strict=True):
+        assert first["seed"] == second["seed"]
+        assert [first[name] for name in varied] == [second[name] for name in varied]
+    assert all(row["optimum_m"] > 1414 and 0.9 < row["length_ratio"] < 2 for row in rows)
+    times = rows_of(unbroken, "timings")
+    assert [list(row) for row in times] == [list(TIMES)] * 8
+    assert all(row["wall_s"] > 0 and row["compute_ms.max"] > 0 for row in times)
+
+
+def test_columns_are_what_metrics_json_has(place: Path) -> None:
+    assert main(["fly", str(place / "short.yaml"), "--out", str(place / "run"), "--no-recording"]) == 0
+    metrics = load_run(place / "run").metrics
+    cells = metric_cells(metrics, 1500.0)
+    assert cells.keys() | {"error"} == METRICS.keys()
+    assert cells["cross_track_m.p95"] == metrics["cross_track_m"]["p95"]
+    assert cells["trackability.legs"] == len(metrics["trackability"])
+    assert cells["length_ratio"] == metrics["flown_length_m"] / 1500.0
+    for name, value in cells.items():
+        kind = {"number": float, "int": int, "bool": bool, "text": str}[METRICS[name]]
+        assert value is None or type(value) is kind, name
+
+
+@pytest.mark.parametrize("workers", ["2", "4"])
+def test_the_bytes_are_the_same_at_any_number_of_workers(place: Path, unbroken: Path, workers: str) -> None:
+    assert sweep(place, "--workers", workers) == 0
+    assert results(place / "out") == results(unbroken)
+
+
+def test_a_row_is_flown_again_alone_from_the_results_alone(
+    place: Path, unbroken: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    elsewhere = place / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "r.parquet").write_bytes(results(unbroken))
+    monkeypatch.chdir(elsewhere)
+    assert (
+        main(["fly", "--from", "r.parquet", "--run", "6", "--out", "run", "--no-recording", "--quiet"]) == 0
+    )
+    row = rows_of(unbroken)[6]
+    again = load_run(elsewhere / "run")
+    assert again.metrics["digest"] == row["digest"]
+    assert load_scenario(elsewhere / "run" / "scenario.yaml").seed == row["seed"]
+    assert capsys.readouterr().err == ""
+    for arguments, said in (
+        (["--from", "r.parquet", "--run", "8"], "has no run 8; must be 0 to 7"),
+        (["--from", "r.parquet"], "--from and --run go together"),
+        (["paper_circles", "--from", "r.parquet", "--run", "1"], "either a SCENARIO or --from"),
+        (["--from", "run/track.parquet", "--run", "1"], "is not the results.parquet of a campaign"),
+        (["--from", "nowhere", "--run", "1"], "is not the results.parquet of a campaign"),
+    ):
+        assert main(["fly", *arguments]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_crashes_are_rows_with_their_tracebacks_and_end_nothing(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    info = place / "site" / "campaign_plugin-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: campaign_plugin\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    (place / "site" / "campaign_plugin.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(place / "site")
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[dies, rolling_window, raises]").replace(
+        "draws: 2", "draws: 1"
+    )
+    (place / "campaign.yaml").write_text(text)
+    told = []
+    for workers in ("1", "2"):
+        assert sweep(place, "--workers", workers, "--json") == 1
+        told.append(results(place / "out"))
+        for file in (place / "out").iterdir():
+            file.unlink()
+    assert told[0] == told[1]
+    (place / "r.parquet").write_bytes(told[0])
+    rows = pq.read_table(place / "r.parquet").to_pylist()
+    assert [row["outcome"] for row in rows] == ["error", "reached", "error"] * 2
+    died, _, raised = rows[:3]
+    assert "died" in died["error"]
+    assert died["reason"] == "the process that flew it died, each time that it was tried"
+    assert raised["error"].startswith("Traceback")
+    assert "campaign_plugin.py" in raised["error"]
+    assert raised["reason"] == "ValueError: not *to* be made: <object object at 0x...>"
+    assert raised["digest"] is None
+    out = capfd.readouterr().out
+    assert json.loads(out[: len(out) // 2])["outcomes"] == {"error": 4, "reached": 2}, (
+        "standard output is ours"
+    )
+
+
+@pytest.mark.parametrize("torn", [b'{"run": 99, "row": {"outc', b"\n", b"\x00\xff"])
+def test_resume_flies_only_what_is_missing_and_drops_a_torn_line(
+    place: Path, unbroken: Path, torn: bytes, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = place / "out"
+    out.mkdir()
+    (out / "campaign.json").write_bytes((unbroken / "campaign.json").read_bytes())
+    whole = (unbroken / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (out / "journal.jsonl").write_bytes(b"".join(whole[:6]) + torn)
+    assert sweep(place) == 2
+    assert "holds 6 runs: go on with --resume, or choose another folder" in capsys.readouterr().err
+    assert sweep(place, "--resume", "--workers", "1") == 0
+    assert results(out) == results(unbroken)
+    lines = (out / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    assert lines[:6] == whole[:6]
+    assert [json.loads(line)["run"] for line in lines[6:]] == [6, 7]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        ("campaign.yaml", "seed: 5", "seed: 6", "campaign.seed was 5, is 6"),
+        ("campaign.yaml", "draws: 2", "draws: 3", "campaign.draws was 2, is 3"),
+        ("campaign.yaml", "[0, 5]", "[0, 6]", "campaign.grid.environment.wind.speed_mps[1] was 5, is 6"),
+        ("short.yaml", "rays: 360", "rays: 720", "scenarios[0].keys.sensor.rays was 360, is 720"),
+        ("short.yaml", ", rays: 360", "", "scenarios[0].keys.sensor.rays was 360, is not there"),
+    ],
+)
+def test_resume_refuses_a_changed_campaign_and_says_what_changed(
+    place: Path,
+    unbroken: Path,
+    capsys: pytest.CaptureFixture[str],
+    file: str,
+    old: str,
+    new: str,
+    said: str,
+) -> None:
+    out = place / "out"
+    out.mkdir()
+    for name in ("campaign.json", "journal.jsonl", "results.parquet"):
+        (out / name).write_bytes((unbroken / name).read_bytes())
+    changed = (place / file).read_text().replace(old, new)
+    assert changed != (place / file).read_text()
+    (place / file).write_text(changed)
+    assert sweep(place, "--resume") == 2
+    assert said in capsys.readouterr().err
+    assert results(out) == results(unbroken), "nothing lost"
+    (place / file).write_text(changed.replace(new, old) if new else SCENARIO)
+    (place / file).write_text(f"# a comment is no change\n{(place / file).read_text()}")
+    assert sweep(place, "--resume") == 0
+
+
+def test_resume_refuses_other_versions(
+    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = place / "out"
+    out.mkdir()
+    index = json.loads((unbroken / "campaign.json").read_text())
+    index["versions"]["jsbsim"] = "1.0.0"
+    (out / "campaign.json").write_text(json.dumps(index))
+    (out / "journal.jsonl").write_bytes((unbroken / "journal.jsonl").read_bytes())
+    assert sweep(place, "--resume") == 2
+    assert 'versions.jsbsim was "1.0.0", is' in capsys.readouterr().err
+
+
+def test_a_folder_that_holds_other_things_is_refused(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (place / "out").mkdir()
+    (place / "out" / "thesis.tex").write_text("years of work")
+    assert sweep(place) == 2
+    assert "is not empty and not a campaign's folder" in capsys.readouterr().err
+    assert [each.name for each in (place / "out").iterdir()] == ["thesis.tex"]
+    (place / "out" / "thesis.tex").unlink()
+    (place / "out").rmdir()
+    (place / "out").write_text("a file")
+    assert sweep(place) == 2
+    assert "is a file" in capsys.readouterr().err
+
+
+def test_two_sweeps_into_one_folder_are_one_too_many(place: Path) -> None:
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    with (
+        CampaignFolder(place / "out", runs, resume=False),
+        pytest.raises(RunFolderError, match="is being flown into by another process"),
+    ):
+        CampaignFolder(place / "out", runs, resume=True)
+    with CampaignFolder(place / "out", runs, resume=True) as folder:
+        assert folder.done == set(), "the lock ends with its holder"
+
+
+@pytest.fixture
+def long_campaign(place: Path) -> Path:
+    """Some more runs, so that there is something to break off."""
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 6"))
+    return place
+
+
+def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(long_campaign: Path) -> None:
+    out = long_campaign / "out"
+    flying = start(long_campaign, "--workers", "2")
+    wait_for(lambda: journal_lines(out) >= 3)
+    flying.send_signal(signal.SIGINT)
+    told, said = flying.communicate(timeout=30)
+    assert flying.returncode == 130
+    assert said == "wayproof: interrupted; what is done is in out, --resume goes on\n"
+    assert told == ""
+    done = len(rows_of(out))
+    assert 3 <= done == journal_lines(out) < 24
+    assert sweep(long_campaign, "--resume", "--workers", "2") == 0
+    assert [row["run"] for row in rows_of(out)] == list(range(24))
+
+
+def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(long_campaign: Path) -> None:
+    import psutil
+
+    out = long_campaign / "out"
+    flying = start(long_campaign, "--workers", "2")
+    wait_for(lambda: journal_lines(out) >= 2)
+    children = psutil.Process(flying.pid).children(recursive=True)
+    flying.kill()
+    flying.communicate(timeout=30)
+    _, alive = psutil.wait_procs(children, timeout=10)
+    assert alive == []
+    kept = journal_lines(out)
+    assert sweep(long_campaign, "--resume", "--workers", "2", "--json") == 0
+    assert kept >= 2
+    broken = results(out)
+    assert main(["sweep", str(long_campaign / "campaign.yaml"), "--out", str(out / ".." / "whole")]) == 0
+    assert broken == results(long_campaign / "whole")
+
+
+def test_a_worker_killed_in_mid_run_costs_nothing(long_campaign: Path) -> None:
+    import psutil
+
+    out = long_campaign / "out"
+    flying = start(long_campaign, "--workers", "2")
+    wait_for(lambda: journal_lines(out) >= 2)
+    workers = [
+        child for child in psutil.Process(flying.pid).children() if "spawn_main" in " ".join(child.cmdline())
+    ]
+    assert len(workers) == 2
+    workers[0].kill()
+    assert flying.wait(timeout=120) == 0
+    flying.communicate()
+    assert {row["outcome"] for row in rows_of(out)} == {"reached"}
+    assert len(rows_of(out)) == 24
+
+
+def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    job = Job(0, runs.scenario(0), place / "run", "none", optimum=False)
+    with local_workers(1) as workers:
+        first = workers.start(job).result(timeout=60)
+        for child in multiprocessing.active_children():
+            child.kill()
+            child.join()
+        assert workers.free() == 1
+        time.sleep(0.5)
+        assert workers.start(job).result(timeout=60).row == first.row
+    assert multiprocessing.active_children() == []
+
+
+@pytest.mark.parametrize(("which", "kept"), [("all", {0, 1}), ("failures", {1}), ("none", set())])
+def test_recordings_are_kept_of_all_of_failures_or_of_none(place: Path, which: str, kept: set[int]) -> None:
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[{kind: rolling_window}]").replace(
+        "draws: 2", "draws: 1"
+    )
+    # In the second case there is no time to get there.
+    text = text.replace("  environment.wind.speed_mps: [0, 5]", "  mission.time_limit_s: [900, 5]")
+    (place / "campaign.yaml").write_text(f"{text}recordings: {which}\n")
+    assert sweep(place, "--workers", "1") == 0
+    rows = rows_of(place / "out")
+    assert [row["outcome"] for row in rows] == ["reached", "timeout"], "no failure of the sweep"
+    folders = {int(path.name): path for path in (place / "out").glob("runs/*")}
+    assert set(folders) == kept
+    for number, folder in folders.items():
+        assert load_run(folder).metrics["digest"] == rows[number]["digest"]
+        assert (folder / "flight.rrd").stat().st_size > 10_000
+
+
+def test_the_optimum_can_be_left_out(place: Path) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 1\noptimum: false"))
+    assert sweep(place) == 0
+    assert {(row["optimum_m"], row["length_ratio"]) for row in rows_of(place / "out")} == {(None, None)}
+
+
+def test_a_full_disk_is_told_and_what_is_done_stays(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append, left = CampaignFolder.append, [3]
+
+    def full(self: CampaignFolder, *given: Any) -> None:
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(28, "No space left on device")
+        append(self, *given)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CampaignFolder, "append", full)
+        assert sweep(place, "--workers", "1") == 1
+    assert "No space left on device; what is done is in" in capsys.readouterr().err
+    assert [row["run"] for row in rows_of(place / "out")] == [0, 1, 2]
+    assert sweep(place, "--resume", "--workers", "1") == 0
+    assert len(rows_of(place / "out")) == 8
+
+
+FLIGHTS_IN_ONE_PROCESS = """
+import json, sys
+from pathlib import Path
+
+import psutil
+
+from harness.campaign import load_campaign
+from harness.campaign_runs import CampaignRuns
+from harness.sweep_flight import Job, fly_job
+
+runs = CampaignRuns(load_campaign(Path("campaign.yaml")))
+grown = []
+for number in range(len(runs)):
+    answer = fly_job(Job(number, runs.scenario(number), Path("run"), "none", True))
+    assert answer.row["outcome"] == "reached", answer.row
+    grown.append(psutil.Process().memory_info().rss / 2**20)
+sys.stdout.write(json.dumps(grown))
+"""
+
+
+@pytest.mark.slow
+def test_a_worker_does_not_grow_over_500_flights(place: Path) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 128"))
+    flown = subprocess.run(
+        [sys.executable, "-c", FLIGHTS_IN_ONE_PROCESS],
+        cwd=place,
+        env={**os.environ, **ONE_THREAD, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert flown.returncode == 0, flown.stderr
+    used_mib = json.loads(flown.stdout)
+    assert len(used_mib) == 512
+    # The first flights fill caches and the heap; a leak of half a track a flight would show.
+    assert used_mib[-1] - used_mib[11] < 10.0
+
+
+def test_a_process_that_records_ends_after_some_flights(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweep_workers, "RECORDED_EACH", 2)
+    (place / "campaign.yaml").write_text(f"{CAMPAIGN}recordings: failures\n")
+    begun = []
+    executor = ProcessPoolExecutor
+
+    def counting(*arguments: Any, **options: Any) -> Any:
+        begun.append(arguments)
+        return executor(*arguments, **options)
+
+    monkeypatch.setattr(sweep_workers, "ProcessPoolExecutor", counting)
+    assert sweep(place, "--workers", "1") == 0
+    assert begun == [(1,)] * 4, "of one process each"
+    assert len(rows_of(place / "out")) == 8
