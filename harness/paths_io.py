@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
+from harness.input_file import InputError, read_text
 from harness.mission_items import Item, Waypoints, waypoints
-from harness.strict_yaml import InputError
 
 FloatArray = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def read_path(path: Path, any_altitude: bool = False) -> GivenPath:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(f"{path}: is none of {', '.join(READERS)}; save the path as one of them")
-    found = reader(_text(path), str(path))
+    found = reader(read_text(path, MAX_BYTES, "a path"), str(path))
     if len(found.positions) < 2:
         raise InputError(f"{path}: has {len(found.positions)} points; a path has at least 2")
     origin = None if found.local else found.positions[0]
@@ -75,21 +75,6 @@ def read_path(path: Path, any_altitude: bool = False) -> GivenPath:
             f"must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
         )
     return GivenPath(points, origin, _altitude(found.altitudes_m, any_altitude, str(path)))
-
-
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a file") from error
-    if len(data) > MAX_BYTES:
-        raise InputError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a path")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}:{line}: is not UTF-8 text; save the file as UTF-8") from error
 
 
 def _in_plane(positions: Sequence[tuple[float, float]], source: str) -> list[tuple[float, float]]:

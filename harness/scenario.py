@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import Strict, ValidationError, ValidationInfo, model_validator
+from pydantic import FailFast, Strict, ValidationError, ValidationInfo, model_validator
 
 from harness import planner_keys, strict_yaml
 from harness.scenario_checks import check_start_and_goal
@@ -50,7 +50,7 @@ class Scenario(Section):
     name: str = key("Names the run folder.", pattern=r"^[a-z0-9._-]*[a-z0-9][a-z0-9._-]*$", max_length=100)
     seed: int = key("Root seed; every random stream derives from it.", unit="1", default=1, ge=0, le=2**53)
     area: Area = key("The area of operations.")
-    obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(
         "Unknown to the planner until sensed.", default=()
     )
     mission: MissionSpec = key("From where to where.")
@@ -209,8 +209,8 @@ def _validated(root: Node, source: str, folder: Path | None = None) -> Scenario:
 
 def _overridden(root: Node, name: str, text: str) -> Node:
     steps = name.replace("[", ".").replace("]", "").split(".")
-    if not all(steps):
-        raise InputError(f"command line: {name!r} is not a key path; write it as sensor.range_m")
+    if not all(map(strict_yaml.is_key, steps)) or not all(steps) or len(steps) > strict_yaml.MAX_DEPTH:
+        raise InputError(f"command line: {name[:60]!r} is not a key path; write it as sensor.range_m")
     if not text.strip():
         raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
     loc: Loc = tuple(int(step) if step.isdecimal() else step for step in steps)

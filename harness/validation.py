@@ -55,11 +55,17 @@ def input_error(error: ValidationError, model: type[BaseModel], root: Node, sour
         root: the file.
         source: its name.
     """
-    faults = [_located(details, model) for details in error.errors(include_url=False)]
-    every = [fault_line(source, root.line_of(loc), loc, sentence) for loc, sentence in faults]
-    lines = list(dict.fromkeys(every))
-    if len(lines) > MAX_FAULTS:
-        lines[MAX_FAULTS - 1 :] = [f"{source}: and {len(lines) - MAX_FAULTS + 1} more"]
+    every = error.errors(include_url=False)
+    lines: list[str] = []
+    for place, details in enumerate(every):
+        loc, text = _located(details, model)
+        line = fault_line(source, root.line_of(loc), loc, text)
+        if line in lines:
+            continue
+        if len(lines) == MAX_FAULTS:
+            lines[-1:] = [f"{source}: and {len(every) - place + 1} more"]
+            break
+        lines.append(line)
     return InputError("\n".join(lines))
 
 
