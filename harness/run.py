@@ -24,7 +24,7 @@ from harness.metrics import metrics
 from harness.obstacle_map import ObstacleMap
 from harness.planner_keys import config_of
 from harness.range_sensor import RangeSensor
-from harness.record import AcceptedPlan, Flight, Track
+from harness.record import AcceptedPlan, Flight, Track, WriteError
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.scenario_sections import Environment
@@ -180,20 +180,29 @@ def fly_to_folder(
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
         RunFolderError: the folder holds something else or cannot be written.
+        WriteError: it could not be written to the end, a full disk perhaps.
     """
     loop = make(scenario)
     text = dump_scenario(scenario)
-    with ExitStack() as stack:
-        folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
-        observers: list[Observer] = [_Writer(folder), *watching]
-        log = _recording(scenario, text, loop, folder, pilot or scenario.planner.kind) if recording else None
-        if log is not None:
-            observers.append(log)
-        flight = flown_by(loop, observers, progress)
-        figures = measured_by(flight, flight_limits(scenario))
-        if log is not None:
-            log.close(figures)
-        folder.finish(flight.plans, figures)
+    try:
+        with ExitStack() as stack:
+            folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
+            observers: list[Observer] = [_Writer(folder), *watching]
+            log = (
+                _recording(scenario, text, loop, folder, pilot or scenario.planner.kind)
+                if recording
+                else None
+            )
+            if log is not None:
+                stack.callback(log.end)
+                observers.append(log)
+            flight = flown_by(loop, observers, progress)
+            figures = measured_by(flight, flight_limits(scenario))
+            if log is not None:
+                log.close(figures)
+            folder.finish(flight.plans, figures)
+    except OSError as error:
+        raise WriteError("the run", out, error) from error
     return figures
 
 

@@ -231,9 +231,14 @@ def _without_own_keys(root: Node, kind: Node) -> Node:
 
 def _model(model: str, folder: Path | None) -> str:
     """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
+    if "/" not in model and model in _aircraft_names():
+        return model
     for place in (Path() if folder is None else folder, Path()):
-        if ("/" in model or model not in _aircraft_names()) and (place / model).expanduser().is_dir():
-            return str((place / model).expanduser().resolve())
+        try:
+            if (place / model).expanduser().is_dir():
+                return str((place / model).expanduser().resolve())
+        except (OSError, RuntimeError):  # too long, not allowed, or the home of nobody: no folder
+            continue
     return model
 
 
