@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NoReturn
@@ -103,16 +103,16 @@ def _altitude(altitudes_m: Sequence[float], any_altitude: bool, source: str) -> 
 
 def _csv(text: str, source: str) -> Waypoints:
     rows = csv.reader(text.splitlines())
-    header = [name.strip().lower() for name in next(rows, [])]
+    header = [name.strip().lower() for name in next(_rows(rows, source), [])]
     names = next((pair for pair in (*LOCAL_COLUMNS, *DEGREE_COLUMNS) if set(pair) <= set(header)), None)
     if names is None:
         raise InputError(
-            f"{source}:1: has the columns {', '.join(header) or 'none'}; must have x_m,y_m or "
+            f"{source}:1: has the columns {_shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
             "latitude_deg,longitude_deg"
         )
     columns = [header.index(name) for name in names]
     positions = []
-    for row in rows:
+    for row in _rows(rows, source):
         if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(header):
@@ -123,6 +123,20 @@ def _csv(text: str, source: str) -> Waypoints:
         )
         positions.append((first, second))
     return Waypoints(names in LOCAL_COLUMNS, tuple(positions), ())
+
+
+def _rows(rows: Iterator[list[str]], source: str) -> Iterator[list[str]]:
+    """The same rows; what the csv module does not take, as a fault of the file."""
+    try:
+        yield from rows
+    except csv.Error as error:
+        raise InputError(f"{source}: is not CSV ({error})") from error
+
+
+def _shown(text: str) -> str:
+    """A text as a line can show it."""
+    short = text if len(text) <= 80 else f"{text[:77]}..."
+    return short if short.isprintable() else ascii(short)
 
 
 def _geojson(text: str, source: str) -> Waypoints:
@@ -163,7 +177,7 @@ def _line_strings(node: Any, source: str, key: str) -> list[tuple[str, Any]]:
         return found
     if kind in ("Point", "MultiPoint", "Polygon", "MultiPolygon", "MultiLineString"):
         return []
-    shown = f"the type {kind!r}" if kind else "no type"
+    shown = f"the type {_shown(str(kind))}" if kind else "no type"
     raise InputError(f"{source}: {f'{key}: ' if key else ''}has {shown}; must be a GeoJSON LineString")
 
 
@@ -187,7 +201,7 @@ def _plan_item(item: Any, number: int, source: str) -> Item:
     if not isinstance(item, dict):
         raise InputError(f"{source}: {key}: must be a mission item")
     if item.get("type") != "SimpleItem":
-        kind = item.get("complexItemType") or item.get("type") or "without a type"
+        kind = _shown(str(item.get("complexItemType") or item.get("type") or "without a type"))
         raise InputError(
             f"{source}: {key}: item {number + 1} is a complex item, {kind}; a path to be checked may only have "
             "MAV_CMD_NAV_WAYPOINT (16): remove the item"
@@ -232,6 +246,10 @@ def _json(text: str, source: str) -> Any:
         raise InputError(f"{source}:{error.lineno}: is not JSON ({error.msg})") from error
     except RecursionError as error:
         raise InputError(f"{source}: is nested too deeply; must be a path") from error
+    except InputError:
+        raise
+    except ValueError as error:  # what Python says of a number of thousands of digits
+        raise InputError(f"{source}: has a number that is too long; must be a path") from error
 
 
 def _number(value: Any, where: str) -> float:
@@ -241,7 +259,7 @@ def _number(value: Any, where: str) -> float:
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{where}: is {str(value)[:40]!r}; must be a finite number")
+        raise InputError(f"{where}: is {_shown(str(value))!r}; must be a finite number")
     return number
 
 
