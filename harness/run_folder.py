@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from harness.folder_lock import FolderLock
+from harness.input_file import read_text
 from harness.record import TRACK_FIELDS, AcceptedPlan, FloatArray, RunFolderError, Track, polyline
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ REPORT_FILES = tuple(
 )
 """What `wayproof report` adds to a run folder."""
 PARTIAL = ".partial"
+MAX_BYTES, MAX_JSON_BYTES = 64_000_000, 16_000_000
+"""Of a scenario and of a JSON file in the folder."""
 
 SCHEMA = "wayproof/run/1"
 DISTRIBUTIONS = ("wayproof", "jsbsim", "numpy", "shapely", "rerun-sdk", "pyarrow")
@@ -233,23 +236,34 @@ def load_run(path: Path) -> Run:
     import pyarrow.parquet as pq
 
     try:
-        for name, written in manifest.get("sha256", {}).items():
-            if _sha256(path / Path(name).name) != written:
+        sums = manifest.get("sha256", {})
+        for name in (TRACK, PLANS):
+            if not (path / name).is_file():
+                raise ValueError(f"{name} is missing or not a file")
+            if sums.get(name) not in (None, _sha256(path / name)):
                 raise ValueError(f"{name} is not what was written")
         table = pq.read_table(path / TRACK, columns=list(TRACK_FIELDS))
         return Run(
             folder=path,
-            scenario_yaml=(path / SCENARIO).read_text(encoding="utf-8"),
+            scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),
             manifest=manifest,
             track=Track(**{name: table[name].to_numpy() for name in TRACK_FIELDS}),
             plans=_plan_rows(pq.read_table(path / PLANS)),
-            metrics=json.loads((path / METRICS).read_text(encoding="utf-8")),
+            metrics=json.loads(read_text(path / METRICS, MAX_JSON_BYTES, "metrics, in JSON")),
         )
     except (OSError, pa.ArrowException, *WRONG_CONTENT) as error:
         raise damaged(path, error) from error
 
 
-WRONG_CONTENT: Final = (AttributeError, LookupError, TypeError, ValueError, ArithmeticError, MemoryError)
+WRONG_CONTENT: Final = (
+    RecursionError,
+    AttributeError,
+    LookupError,
+    TypeError,
+    ValueError,
+    ArithmeticError,
+    MemoryError,
+)
 """What reading values raises that are not what they should be."""
 
 
@@ -278,8 +292,8 @@ def _claim(path: Path) -> FolderLock:
 def _manifest(path: Path) -> dict[str, Any] | None:
     """The manifest of a run folder; None where there is none that is ours."""
     try:
-        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        manifest = json.loads(read_text(path / MANIFEST, MAX_JSON_BYTES, "a manifest, in JSON"))
+    except (ValueError, RecursionError):
         return None
     return manifest if isinstance(manifest, dict) and manifest.get("schema") == SCHEMA else None
 

@@ -169,17 +169,20 @@ def fuzzed(cases: int, strategy: st.SearchStrategy[Any], holds: Callable[[Any], 
     assert tried >= cases
 
 
-def taken_or_refused(path: Path, read: Callable[[], None]) -> None:
+def taken_or_refused(path: Path, read: Callable[[], object]) -> None:
     """A file is read, or refused as a person can use it, in good time."""
     begun = time.monotonic()
     try:
         read()
     except InputError as error:
-        lines = str(error).splitlines()
-        assert 1 <= len(lines) <= MOST_LINES
-        assert all(line.startswith((str(path), "command line")) for line in lines)
-        assert max(map(len, lines)) < LONGEST_LINE + len(str(path))
-        assert str(error).replace("\n", "").isprintable()
+        said = str(error)
+    else:
+        said = str(path)
+    lines = said.splitlines()
+    assert 1 <= len(lines) <= MOST_LINES
+    assert all(line.startswith((str(path), "command line")) for line in lines)
+    assert max(map(len, lines)) < LONGEST_LINE + len(str(path))
+    assert said.replace("\n", "").isprintable()
     assert time.monotonic() - begun < LONGEST_S
 
 
@@ -241,6 +244,6 @@ def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
     value = st.one_of(st.sampled_from(YAML_SNIPPETS), st.text(max_size=8))
 
     def holds(pairs: list[tuple[str, str]]) -> None:
-        taken_or_refused(path, lambda: dump_scenario(load_scenario(path, pairs)) and None)
+        taken_or_refused(path, lambda: dump_scenario(load_scenario(path, pairs)))
 
     fuzzed(cases, st.lists(st.tuples(name, value), min_size=1, max_size=2), holds)
