@@ -276,6 +276,8 @@ def damaged(path: Path, error: BaseException) -> RunFolderError:
 
 def _claim(path: Path) -> FolderLock:
     """Makes `path` a folder that this process alone may write to, or raises RunFolderError."""
+    if not str(path).isprintable():  # the libraries that write tables take names in UTF-8 only
+        raise RunFolderError(f"cannot write the run folder {str(path)!r}: its name must be printable")
     if path.exists() and not path.is_dir():
         raise RunFolderError(f"{path} is a file, not a folder for a run")
     path.mkdir(parents=True, exist_ok=True)

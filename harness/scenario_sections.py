@@ -229,7 +229,7 @@ class Sensor(Section):
         f"Scans per simulated second; must divide {SIMULATION_RATE_HZ} Hz.",
         unit="Hz",
         default=2.0,
-        gt=0,
+        ge=0.01,
         le=120,
     )
     range_noise_m: float = key(
