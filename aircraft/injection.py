@@ -47,7 +47,7 @@ def with_autopilot(model: Path) -> Iterator[Path]:
 
 @lru_cache(maxsize=8)
 def _with_system(model: bytes) -> bytes:
-    """The XML of a model that starts with the autopilot system and writes no files of its own."""
+    """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody."""
     root = ElementTree.fromstring(model)
     if root.tag != "fdm_config":
         raise ValueError(f"its root element is <{root.tag}>, not <fdm_config>")
@@ -57,9 +57,9 @@ def _with_system(model: bytes) -> bytes:
         if any(output.text == THROTTLE for output in component.findall("output")):
             for index in range(1, engines):
                 ElementTree.SubElement(component, "output").text = f"{THROTTLE}[{index}]"
-    # A model's own output would leave files where the command was given.
-    for output in root.findall("output"):
-        root.remove(output)
+    # A model's own output would leave files where the command was given; its input would listen on the network.
+    for port in (*root.findall("output"), *root.findall("input")):
+        root.remove(port)
     # Systems run in document order: commands before whatever of the model reads them.
     root.insert(0, system)
     derived: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)

@@ -11,6 +11,8 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
+from aircraft.foreign_model import faults
+
 OWN = Path(__file__).parent
 
 
@@ -71,10 +73,30 @@ def model_files(name: str) -> ModelFiles:
             main = home / name / f"{name}.xml"
             if main.is_file():
                 return _with_engines(main, wheel)
-    folder = Path(name).expanduser()
-    if folder.is_dir():
-        return _with_engines(_main_file(folder.resolve()), wheel)
-    raise AircraftError(f"unknown aircraft {name!r}")
+    folder = _folder(name)
+    if folder is None:
+        raise AircraftError(f"unknown aircraft {name[:100]!r}")
+    _refuse(folder)
+    found = _with_engines(_main_file(folder), wheel)
+    for other in (found.engines, found.systems):
+        if not other.is_relative_to(wheel) and not other.is_relative_to(folder):
+            _refuse(other)
+    return found
+
+
+def _folder(name: str) -> Path | None:
+    """The folder that a name means; None if it means none."""
+    try:
+        folder = Path(name).expanduser()
+        return folder.resolve() if folder.is_dir() else None
+    except (OSError, RuntimeError):  # too long, not allowed, or the home of nobody
+        return None
+
+
+def _refuse(folder: Path) -> None:
+    """Raises AircraftError if a folder holds what must not be loaded."""
+    for fault in faults(folder):
+        raise AircraftError(fault)
 
 
 @cache

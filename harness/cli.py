@@ -1,7 +1,7 @@
 """The command `wayproof`. Each command is a few lines round functions that are imported when they are needed.
 
 Standard output carries results, standard error everything else. Exit status: 0 done, 1 flown but the goal was
-not reached safely, 2 bad input or usage, 3 the goal is proved unreachable, 130 interrupted.
+not reached safely, 2 bad input or usage, 3 the goal is proved unreachable, 130 interrupted by Ctrl-C, 143 by SIGTERM.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from harness.commands.formats import list_names, schema, validate
 from harness.commands.options import BAD_INPUT, FAILED, Command, Group, flag
 from harness.commands.review import report, view
 from harness.commands.sweep import sweep
+from harness.signals import taken_as_interrupt
 
 INTERRUPTED: Final = 130
 
@@ -63,15 +64,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
+    words = [word for word in given if word != "--debug"]
+    with taken_as_interrupt() as came:
+        status = _run(words, debug)
+    return 128 + came[0] if came and status == INTERRUPTED else status
+
+
+def _run(words: Sequence[str], debug: bool) -> int:
     try:
-        status = app(
-            [word for word in given if word != "--debug"], prog_name="wayproof", standalone_mode=False
-        )
-        sys.stdout.flush()
+        status = app(words, prog_name="wayproof", standalone_mode=False)
+        _flush()
         return int(status or 0)
     except BrokenPipeError:
-        # The reader of our output has gone; the interpreter must not find that out again when it flushes.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -81,9 +85,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _report(error)
 
 
+def _flush() -> None:
+    """Writes out what was printed; what nobody takes the interpreter must not try to write again at its end."""
+    if sys.stdout is None:  # closed by whoever started us
+        return
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise
+
+
 def _report(error: Exception) -> int:
     """Says on standard error what went wrong and returns the exit status."""
-    from harness.strict_yaml import InputError
+    from harness.input_file import InputError
+    from harness.record import WriteError
 
     if isinstance(error, InputError):
         typer.echo(str(error), err=True)
@@ -92,6 +108,9 @@ def _report(error: Exception) -> int:
         text = " ".join(error.format_message().split())
         typer.echo(f"wayproof: {text} (see wayproof --help)", err=True)
         return BAD_INPUT
+    if isinstance(error, WriteError):
+        typer.echo(f"wayproof: {error}", err=True)
+        return FAILED
     if isinstance(error, OSError):
         typer.echo(f"wayproof: {error}", err=True)
         return BAD_INPUT

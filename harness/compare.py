@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from harness.chapters import Entry, chapter, entry, optimum_of
 from harness.compare_flights import Answer, Job, Progress, fly_all
 from harness.compare_rows import CRASHED, Row, to_csv, to_markdown
+from harness.folder_lock import FolderLock
 from harness.optimum import Optimum
 from harness.record import RunFolderError
 from harness.run_folder import RECORDING, REPORT, load_run
@@ -88,7 +89,23 @@ def compare(
         Job(each, out / each.name / each.planner.kind, recording, kinematic) for each in _distinct(scenarios)
     ]
     begun = Comparison(shlex.join(["wayproof", *sys.argv[1:]]), _now(), {}, kinematic, ())
-    _claim(out, begun)
+    lock = _claim(out, begun)
+    try:
+        return _compared(jobs, scenarios, out, begun, workers, progress)
+    finally:
+        lock.release()
+
+
+def _compared(
+    jobs: Sequence[Job],
+    scenarios: Sequence[Scenario],
+    out: Path,
+    begun: Comparison,
+    workers: int,
+    progress: Progress | None,
+) -> Comparison:
+    """Flies and writes everything, the folder being ours."""
+    kinematic = begun.kinematic
     answers = fly_all(jobs, workers, progress)
     by_name = _by_name(scenarios)
     optima = {name: optimum_of(own[0]) for name, own in by_name.items()}
@@ -127,19 +144,22 @@ def _distinct(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
     return scenarios
 
 
-def _claim(out: Path, begun: Comparison) -> None:
-    """Makes `out` the folder of this comparison, or raises RunFolderError."""
+def _claim(out: Path, begun: Comparison) -> FolderLock:
+    """Makes `out` the folder of this comparison alone, or raises RunFolderError."""
     if out.exists() and not out.is_dir():
         raise RunFolderError(f"{out} is a file, not a folder for a comparison")
     try:
         out.mkdir(parents=True, exist_ok=True)
+        lock = FolderLock(out)
         if any(out.iterdir()) and not _is_comparison(out):
+            lock.release()
             raise RunFolderError(
                 f"{out} is not empty and not a comparison: choose another folder or empty it first"
             )
         _write_index(out, begun, complete=False)
         for name in ("comparison.csv", "comparison.md", REPORT):
             (out / name).unlink(missing_ok=True)
+        return lock
     except OSError as error:
         raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
 

@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+_PAIRS_AT_ONCE = 1_000_000
+"""Points times edges whose distances are worked out together: what keeps memory small."""
+
 
 @dataclass(frozen=True)
 class Circle:
@@ -89,6 +92,10 @@ class Polygon:
 
         Inside is told by counting the edges that a ray crosses (Haines, Graphics Gems IV, 1994, I.4).
         """
+        rows = max(1, _PAIRS_AT_ONCE // self.edges_m.shape[1])
+        if len(east_m) > rows:
+            first = range(0, len(east_m), rows)
+            return np.concatenate([self.distance(east_m[i : i + rows], north_m[i : i + rows]) for i in first])
         start_east, start_north, end_east, end_north = self.edges_m
         along_east, along_north = end_east - start_east, end_north - start_north
         from_east, from_north = east_m[:, None] - start_east, north_m[:, None] - start_north

@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NoReturn
@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
+from harness.input_file import InputError, read_text
 from harness.mission_items import Item, Waypoints, waypoints
-from harness.strict_yaml import InputError
 
 FloatArray = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def read_path(path: Path, any_altitude: bool = False) -> GivenPath:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(f"{path}: is none of {', '.join(READERS)}; save the path as one of them")
-    found = reader(_text(path), str(path))
+    found = reader(read_text(path, MAX_BYTES, "a path"), str(path))
     if len(found.positions) < 2:
         raise InputError(f"{path}: has {len(found.positions)} points; a path has at least 2")
     origin = None if found.local else found.positions[0]
@@ -75,21 +75,6 @@ def read_path(path: Path, any_altitude: bool = False) -> GivenPath:
             f"must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
         )
     return GivenPath(points, origin, _altitude(found.altitudes_m, any_altitude, str(path)))
-
-
-def _text(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a file") from error
-    if len(data) > MAX_BYTES:
-        raise InputError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a path")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}:{line}: is not UTF-8 text; save the file as UTF-8") from error
 
 
 def _in_plane(positions: Sequence[tuple[float, float]], source: str) -> list[tuple[float, float]]:
@@ -118,16 +103,16 @@ def _altitude(altitudes_m: Sequence[float], any_altitude: bool, source: str) -> 
 
 def _csv(text: str, source: str) -> Waypoints:
     rows = csv.reader(text.splitlines())
-    header = [name.strip().lower() for name in next(rows, [])]
+    header = [name.strip().lower() for name in next(_rows(rows, source), [])]
     names = next((pair for pair in (*LOCAL_COLUMNS, *DEGREE_COLUMNS) if set(pair) <= set(header)), None)
     if names is None:
         raise InputError(
-            f"{source}:1: has the columns {', '.join(header) or 'none'}; must have x_m,y_m or "
+            f"{source}:1: has the columns {_shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
             "latitude_deg,longitude_deg"
         )
     columns = [header.index(name) for name in names]
     positions = []
-    for row in rows:
+    for row in _rows(rows, source):
         if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(header):
@@ -138,6 +123,20 @@ def _csv(text: str, source: str) -> Waypoints:
         )
         positions.append((first, second))
     return Waypoints(names in LOCAL_COLUMNS, tuple(positions), ())
+
+
+def _rows(rows: Iterator[list[str]], source: str) -> Iterator[list[str]]:
+    """The same rows; what the csv module does not take, as a fault of the file."""
+    try:
+        yield from rows
+    except csv.Error as error:
+        raise InputError(f"{source}: is not CSV ({error})") from error
+
+
+def _shown(text: str) -> str:
+    """A text as a line can show it."""
+    short = text if len(text) <= 80 else f"{text[:77]}..."
+    return short if short.isprintable() else ascii(short)
 
 
 def _geojson(text: str, source: str) -> Waypoints:
@@ -178,7 +177,7 @@ def _line_strings(node: Any, source: str, key: str) -> list[tuple[str, Any]]:
         return found
     if kind in ("Point", "MultiPoint", "Polygon", "MultiPolygon", "MultiLineString"):
         return []
-    shown = f"the type {kind!r}" if kind else "no type"
+    shown = f"the type {_shown(str(kind))}" if kind else "no type"
     raise InputError(f"{source}: {f'{key}: ' if key else ''}has {shown}; must be a GeoJSON LineString")
 
 
@@ -202,7 +201,7 @@ def _plan_item(item: Any, number: int, source: str) -> Item:
     if not isinstance(item, dict):
         raise InputError(f"{source}: {key}: must be a mission item")
     if item.get("type") != "SimpleItem":
-        kind = item.get("complexItemType") or item.get("type") or "without a type"
+        kind = _shown(str(item.get("complexItemType") or item.get("type") or "without a type"))
         raise InputError(
             f"{source}: {key}: item {number + 1} is a complex item, {kind}; a path to be checked may only have "
             "MAV_CMD_NAV_WAYPOINT (16): remove the item"
@@ -247,6 +246,10 @@ def _json(text: str, source: str) -> Any:
         raise InputError(f"{source}:{error.lineno}: is not JSON ({error.msg})") from error
     except RecursionError as error:
         raise InputError(f"{source}: is nested too deeply; must be a path") from error
+    except InputError:
+        raise
+    except ValueError as error:  # what Python says of a number of thousands of digits
+        raise InputError(f"{source}: has a number that is too long; must be a path") from error
 
 
 def _number(value: Any, where: str) -> float:
@@ -256,7 +259,7 @@ def _number(value: Any, where: str) -> float:
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{where}: is {str(value)[:40]!r}; must be a finite number")
+        raise InputError(f"{where}: is {_shown(str(value))!r}; must be a finite number")
     return number
 
 

@@ -7,6 +7,7 @@ x = east, y = north, z = up above mean sea level; course and heading clockwise f
 from __future__ import annotations
 
 import hashlib
+import os
 import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -50,6 +51,14 @@ CHORD_ERROR_M = 0.5
 
 class RunFolderError(ValueError):
     """A run folder cannot be made or read; the message is one sentence that says why."""
+
+
+class WriteError(OSError):
+    """What was flown could not be written; the message is one sentence that says what became of it."""
+
+    def __init__(self, what: str, folder: object, error: OSError) -> None:
+        reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())
+        super().__init__(f"cannot write {what} in {folder} ({reason}); it is marked incomplete")
 
 
 class Outcome(Enum):

@@ -19,6 +19,7 @@ import rerun as rr
 from aircraft.interface import AircraftState
 from harness import rerun_blueprint as look
 from harness.record import AcceptedPlan, FloatArray, Track
+from harness.rerun_file import RecordingFile
 from harness.rerun_plans import log_plan_style, send_plans
 from harness.rerun_scene import lines_2d, log_moving, log_obstacle, log_scene, log_summary, quaternions
 from harness.rerun_sensed import News, Sensed, returns_m
@@ -66,7 +67,7 @@ class RerunLog:
         self._rec = rr.RecordingStream("wayproof", recording_id=recording_id)
         self._rec.set_log_time_enabled(False)
         self._rec.set_log_tick_enabled(False)
-        self._rec.save(path, default_blueprint=look.blueprint(scene.frame))
+        self._file = RecordingFile(self._rec, path, look.blueprint(scene.frame))
         self._rec.send_recording_name(scene.name)
         span_m = scene.frame.span_m
         self._chord_error_m = 1e-5 * span_m
@@ -129,8 +130,16 @@ class RerunLog:
         self._send_series(block, times)
 
     def flush(self) -> None:
-        """Writes out all that has been logged; a process killed afterwards leaves at least that."""
-        self._rec.flush()
+        """Writes out all that has been logged; a process killed afterwards leaves about that.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        self._file.flush()
+
+    def end(self) -> None:
+        """Ends the file as it is, without summary; after `close` it does nothing."""
+        self._file.end()
 
     def close(self, metrics: Mapping[str, Any] | None = None) -> None:
         """Draws the whole track, writes verdicts and summary where there are metrics, and ends the file."""
@@ -148,8 +157,8 @@ class RerunLog:
             log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM})
             log_summary(self._rec, self._scene, metrics)
             self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
-        self._rec.flush()
-        self._rec.disconnect()
+        self._file.flush()
+        self._file.end()
 
     def _set_time(self, time_s: float) -> None:
         self._rec.set_time(look.TIMELINE, duration=np.timedelta64(round(time_s * 1e9), "ns"))

@@ -14,6 +14,7 @@ import rerun as rr
 from harness import rerun_blueprint as look
 from harness.compare_rows import escaped, number
 from harness.record import RunFolderError
+from harness.rerun_file import RecordingFile
 
 SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
 """Below PLAN and WORLD: what all runs of a scenario have in common."""
@@ -37,12 +38,13 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
 
     Raises:
         RunFolderError: a recording cannot be read.
+        OSError: the overlay cannot be written.
     """
     chunks = [_chunks(recording) for recording in recordings]
     runs = [f"runs/{place}/" for place in range(len(recordings))]
     title = ", ".join(names)
     with _stream(f"overlay: {title}") as rec:
-        rec.save(path, default_blueprint=look.blueprint(_frame(chunks[0], recordings[0]), runs))
+        file = RecordingFile(rec, path, look.blueprint(_frame(chunks[0], recordings[0]), runs))
         rec.send_recording_name(title)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
@@ -51,6 +53,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             _style(rec, run, place, name)
         summary = _summary(names, [_metrics(own) for own in chunks])
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
+        file.end()
 
 
 def send_recording(recording: Path, runs: int, address: str) -> None:

@@ -20,6 +20,8 @@ from harness.rerun_blueprint import Colour, Scene
 from harness.rerun_summary import summary
 
 CIRCLE_POINTS = 72
+LEAST_CIRCLE_POINTS, POINTS_OF_ALL = 12, 400_000
+"""Thousands of circles are drawn with fewer points each, so that their recording fits into memory."""
 AIRCRAFT_SHARE = 0.022
 """Wing span of the drawn aircraft as a share of the area: its true size could not be seen."""
 
@@ -47,9 +49,11 @@ def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
     _log_area(rec, scene)
     standing = [obstacle.shape for obstacle in scene.obstacles if obstacle.stands_for_ever]
     if standing:
-        outlines = lines_2d([_outline(shape) for shape in standing], look.OUTLINE, 1.5, 10)
+        points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
+        rings = [_outline(shape, points) for shape in standing]
+        outlines = lines_2d(rings, look.OUTLINE, 1.5, 10)
         rec.log(f"{look.PLAN}/outlines", outlines, static=True)
-        rims = _rims(standing, scene.obstacle_top_m, look.OUTLINE)
+        rims = _rims(rings, scene.obstacle_top_m, look.OUTLINE)
         rec.log(f"{look.WORLD}/outlines", rims, static=True)
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", standing, scene.obstacle_top_m, look.OBSTACLE)
     _log_aircraft(rec, scene)
@@ -77,7 +81,7 @@ def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     """Outlines a moving or timed obstacle from the current time on, where it is at its epoch."""
     shape = scene.obstacles[index].shape
     rec.log(f"{look.PLAN}/moving/{index}", lines_2d([_outline(shape)], look.MOVING_DIM, 1.5, 10))
-    rec.log(f"{look.WORLD}/moving/{index}", _rims([shape], scene.obstacle_top_m, look.MOVING_DIM))
+    rec.log(f"{look.WORLD}/moving/{index}", _rims([_outline(shape)], scene.obstacle_top_m, look.MOVING_DIM))
 
 
 def log_solids(
@@ -183,19 +187,17 @@ def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatA
     )
 
 
-def _rims(shapes: Sequence[Circle | Polygon], top_m: float, colour: Colour) -> rr.LineStrips3D:
+def _rims(outlines: Sequence[FloatArray], top_m: float, colour: Colour) -> rr.LineStrips3D:
     """Outlines on the ground and at the top."""
     rims = [
-        np.column_stack((ring, np.full(len(ring), height)))
-        for ring in map(_outline, shapes)
-        for height in (0.0, top_m)
+        np.column_stack((ring, np.full(len(ring), height))) for ring in outlines for height in (0.0, top_m)
     ]
     return rr.LineStrips3D(rims, colors=[colour], radii=rr.Radius.ui_points(0.5))
 
 
-def _outline(shape: Circle | Polygon) -> FloatArray:
+def _outline(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> FloatArray:
     if isinstance(shape, Circle):
-        return circle(shape.center_m, shape.radius_m)
+        return circle(shape.center_m, shape.radius_m, points)
     return np.array([*shape.vertices_m, shape.vertices_m[0]], dtype=np.float64)
 
 

@@ -23,7 +23,7 @@ from harness.closed_loop import Loop, Observer, Progress, fly
 from harness.metrics import metrics
 from harness.planner_keys import config_of
 from harness.range_sensor import RangeSensor
-from harness.record import AcceptedPlan, Flight, Track
+from harness.record import AcceptedPlan, Flight, Track, WriteError
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.scenario_sections import Environment
@@ -186,19 +186,29 @@ def fly_to_folder(
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
         RunFolderError: the folder holds something else or cannot be written.
+        WriteError: it could not be written to the end, a full disk perhaps.
     """
     loop = make(scenario)
-    with ExitStack() as stack:
-        folder = stack.enter_context(RunFolder.create(out, dump_scenario(scenario), [shlex.join(sys.argv)]))
-        observers: list[Observer] = [_Writer(folder), *watching]
-        log = _recording(scenario, loop, folder, pilot or scenario.planner.kind) if recording else None
-        if log is not None:
-            observers.append(log)
-        flight = flown_by(loop, observers, progress)
-        figures = measured_by(flight, flight_limits(scenario))
-        if log is not None:
-            log.close(figures)
-        folder.finish(flight.plans, figures)
+    text = dump_scenario(scenario)
+    try:
+        with ExitStack() as stack:
+            folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
+            observers: list[Observer] = [_Writer(folder), *watching]
+            log = (
+                _recording(scenario, text, loop, folder, pilot or scenario.planner.kind)
+                if recording
+                else None
+            )
+            if log is not None:
+                stack.callback(log.end)
+                observers.append(log)
+            flight = flown_by(loop, observers, progress)
+            figures = measured_by(flight, flight_limits(scenario))
+            if log is not None:
+                log.close(figures)
+            folder.finish(flight.plans, figures)
+    except OSError as error:
+        raise WriteError("the run", out, error) from error
     return figures
 
 
@@ -221,7 +231,7 @@ class _Writer:
         """Events belong to the recording."""
 
 
-def _recording(scenario: Scenario, loop: Loop, folder: RunFolder, pilot: str) -> Any:
+def _recording(scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pilot: str) -> Any:
     from harness.rerun_blueprint import Scene
     from harness.rerun_log import RerunLog
 
@@ -232,7 +242,7 @@ def _recording(scenario: Scenario, loop: Loop, folder: RunFolder, pilot: str) ->
         scenario.mission.start_m,
         flight_limits(scenario),
         tuple(loop.world.obstacles),
-        dump_scenario(scenario),
+        text,
     )
     return RerunLog(folder.recording_path, scene, recording_id=title)
 

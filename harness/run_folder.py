@@ -2,12 +2,14 @@
 
 The order of writing carries the meaning. The manifest comes first and says `complete: false`; every other
 file is written under a temporary name and renamed when it is whole; the manifest that says `complete: true`
-replaces the first one last of all. A process killed at any point leaves a folder that cannot be taken for a
-complete run.
+replaces the first one last of all, with checksums of the tables. A process killed at any point leaves a folder
+that cannot be taken for a complete run, and a table that was damaged afterwards is found out. One process at a
+time writes to a folder.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
@@ -18,10 +20,12 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from harness.folder_lock import FolderLock
+from harness.input_file import read_text
 from harness.record import TRACK_FIELDS, AcceptedPlan, FloatArray, RunFolderError, Track, polyline
 
 if TYPE_CHECKING:
@@ -45,6 +49,8 @@ REPORT_FILES = tuple(
 )
 """What `wayproof report` adds to a run folder."""
 PARTIAL = ".partial"
+MAX_BYTES, MAX_JSON_BYTES = 64_000_000, 16_000_000
+"""Of a scenario and of a JSON file in the folder."""
 
 SCHEMA = "wayproof/run/1"
 DISTRIBUTIONS = ("wayproof", "jsbsim", "numpy", "shapely", "rerun-sdk", "pyarrow")
@@ -109,9 +115,10 @@ class RunFolder:
     Left without `finish` (an error, Ctrl-C), the folder stays marked incomplete.
     """
 
-    def __init__(self, path: Path, manifest: dict[str, Any]) -> None:
+    def __init__(self, path: Path, manifest: dict[str, Any], lock: FolderLock) -> None:
         self.path = path
         self._manifest = manifest
+        self._lock = lock
         self._track_writer: Any = None
 
     @classmethod
@@ -124,7 +131,8 @@ class RunFolder:
             command: command line, for the manifest.
 
         Raises:
-            RunFolderError: the path is a file, a folder with other things in it, or cannot be written.
+            RunFolderError: the path is a file, a folder with other things in it or that another process is
+                writing to, or cannot be written.
         """
         manifest = {
             "schema": SCHEMA,
@@ -143,15 +151,15 @@ class RunFolder:
             },
         }
         try:
-            _claim(path)
-            _replace(path / MANIFEST, _json(manifest))
+            lock = _claim(path)
+            replace_text(path / MANIFEST, _json(manifest))
             for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, *REPORT_FILES):
                 (path / name).unlink(missing_ok=True)
                 (path / (name + PARTIAL)).unlink(missing_ok=True)
-            _replace(path / SCENARIO, scenario_yaml)
+            replace_text(path / SCENARIO, scenario_yaml)
         except OSError as error:
             raise RunFolderError(f"cannot write the run folder {path}: {error.strerror or error}") from error
-        return cls(path, manifest)
+        return cls(path, manifest, lock)
 
     @property
     def recording_path(self) -> Path:
@@ -192,8 +200,9 @@ class RunFolder:
         os.replace(self.path / (TRACK + PARTIAL), self.path / TRACK)
         pq.write_table(_plans_table(plans), self.path / (PLANS + PARTIAL), compression=COMPRESSION)
         os.replace(self.path / (PLANS + PARTIAL), self.path / PLANS)
-        _replace(self.path / METRICS, text)
-        _replace(self.path / MANIFEST, _json({**self._manifest, "complete": True}))
+        replace_text(self.path / METRICS, text)
+        sums = {name: _sha256(self.path / name) for name in (TRACK, PLANS)}
+        replace_text(self.path / MANIFEST, _json({**self._manifest, "complete": True, "sha256": sums}))
 
     def __enter__(self) -> RunFolder:
         return self
@@ -201,7 +210,10 @@ class RunFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._close_track()
+        try:
+            self._close_track()
+        finally:
+            self._lock.release()
 
     def _close_track(self) -> None:
         if self._track_writer is not None and self._track_writer.is_open:
@@ -224,36 +236,66 @@ def load_run(path: Path) -> Run:
     import pyarrow.parquet as pq
 
     try:
+        sums = manifest.get("sha256", {})
+        for name in (TRACK, PLANS):
+            if not (path / name).is_file():
+                raise ValueError(f"{name} is missing or not a file")
+            if sums.get(name) not in (None, _sha256(path / name)):
+                raise ValueError(f"{name} is not what was written")
         table = pq.read_table(path / TRACK, columns=list(TRACK_FIELDS))
         return Run(
             folder=path,
-            scenario_yaml=(path / SCENARIO).read_text(encoding="utf-8"),
+            scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),
             manifest=manifest,
             track=Track(**{name: table[name].to_numpy() for name in TRACK_FIELDS}),
             plans=_plan_rows(pq.read_table(path / PLANS)),
-            metrics=json.loads((path / METRICS).read_text(encoding="utf-8")),
+            metrics=json.loads(read_text(path / METRICS, MAX_JSON_BYTES, "metrics, in JSON")),
         )
-    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
-        raise RunFolderError(f"the run in {path} is damaged: {error}") from error
+    except (OSError, pa.ArrowException, *WRONG_CONTENT) as error:
+        raise damaged(path, error) from error
 
 
-def _claim(path: Path) -> None:
-    """Makes `path` a folder that may be written to, or raises RunFolderError."""
+WRONG_CONTENT: Final = (
+    RecursionError,
+    AttributeError,
+    LookupError,
+    TypeError,
+    ValueError,
+    ArithmeticError,
+    MemoryError,
+)
+"""What reading values raises that are not what they should be."""
+
+
+def damaged(path: Path, error: BaseException) -> RunFolderError:
+    """Says that a run folder's content is not that of a run."""
+    text = " ".join(str(error).split())[:200]
+    reason = text if isinstance(error, OSError | ValueError) else f"{type(error).__name__} {text}"
+    return RunFolderError(f"the run in {path} is damaged: {reason}; fly it again")
+
+
+def _claim(path: Path) -> FolderLock:
+    """Makes `path` a folder that this process alone may write to, or raises RunFolderError."""
+    if not str(path).isprintable():  # the libraries that write tables take names in UTF-8 only
+        raise RunFolderError(f"cannot write the run folder {str(path)!r}: its name must be printable")
     if path.exists() and not path.is_dir():
         raise RunFolderError(f"{path} is a file, not a folder for a run")
     path.mkdir(parents=True, exist_ok=True)
+    lock = FolderLock(path)
     others = {entry.name for entry in path.iterdir()} - {MANIFEST + PARTIAL}
     if others and _manifest(path) is None:
+        lock.release()
         raise RunFolderError(
             f"{path} is not empty and not a run folder: choose another folder or empty it first"
         )
+    return lock
 
 
 def _manifest(path: Path) -> dict[str, Any] | None:
     """The manifest of a run folder; None where there is none that is ours."""
     try:
-        manifest = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        manifest = json.loads(read_text(path / MANIFEST, MAX_JSON_BYTES, "a manifest, in JSON"))
+    except (ValueError, RecursionError):
         return None
     return manifest if isinstance(manifest, dict) and manifest.get("schema") == SCHEMA else None
 
@@ -269,7 +311,12 @@ def _json(content: Mapping[str, Any]) -> str:
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def _replace(path: Path, text: str) -> None:
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def replace_text(path: Path, text: str) -> None:
     """Writes a file so that it is either the old one or the whole new one."""
     partial = path.with_name(path.name + PARTIAL)
     partial.write_text(text, encoding="utf-8")

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from harness.chapters import entry, optimum_of, run_chapter
 from harness.compare_rows import to_csv, to_markdown
+from harness.input_file import InputError
 from harness.record import RunFolderError
 from harness.report import run_html
-from harness.run_folder import REPORT, SCENARIO, load_run
+from harness.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run, replace_text
 from harness.scenario import parse_scenario
 
 
@@ -21,6 +22,17 @@ def write_report(folder: Path) -> Path:
         RunFolderError: the folder holds no complete run, or cannot be written.
     """
     run = load_run(folder)
+    try:
+        return _written(run, folder)
+    except InputError:
+        raise
+    except OSError as error:
+        raise RunFolderError(f"cannot write the report in {folder}: {error.strerror or error}") from error
+    except WRONG_CONTENT as error:
+        raise damaged(folder, error) from error
+
+
+def _written(run: Run, folder: Path) -> Path:
     scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO))
     optimum = optimum_of(scenario)
     flight = entry(scenario, run, optimum)
@@ -28,21 +40,18 @@ def write_report(folder: Path) -> Path:
     _, *arguments = shlex.split(manifest["command"][0])
     command = shlex.join(["wayproof", *arguments])
     versions = {name: version for name, version in manifest["versions"].items() if version}
-    try:
-        text = run_html(
-            run_chapter(scenario, flight, optimum),
-            run.metrics["trackability"],
-            aircraft=Path(scenario.aircraft.model).name,
-            scenario_yaml=run.scenario_yaml,
-            command=command,
-            versions=versions,
-            platform=manifest["platform"]["system"],
-            written=manifest["started_utc"],
-        )
-        page.with_suffix(".csv").write_text(to_csv([flight.row]), encoding="utf-8")
-        repeat = f"## How to repeat it\n\n    {command}\n\nDigest of the track: `{flight.row.digest}`\n"
-        page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
-        page.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise RunFolderError(f"cannot write the report in {folder}: {error.strerror or error}") from error
+    text = run_html(
+        run_chapter(scenario, flight, optimum),
+        run.metrics["trackability"],
+        aircraft=Path(scenario.aircraft.model).name,
+        scenario_yaml=run.scenario_yaml,
+        command=command,
+        versions=versions,
+        platform=manifest["platform"]["system"],
+        written=manifest["started_utc"],
+    )
+    page.with_suffix(".csv").write_text(to_csv([flight.row]), encoding="utf-8")
+    repeat = f"## How to repeat it\n\n    {command}\n\nDigest of the track: `{flight.row.digest}`\n"
+    page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
+    replace_text(page, text)
     return page

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-from pydantic import Strict, ValidationError, ValidationInfo, model_validator
+from pydantic import FailFast, Strict, ValidationError, ValidationInfo, model_validator
 
 from harness import planner_keys, strict_yaml
 from harness.scenario_checks import check_start_and_goal
@@ -50,7 +50,7 @@ class Scenario(Section):
     name: str = key("Names the run folder.", pattern=r"^[a-z0-9._-]*[a-z0-9][a-z0-9._-]*$", max_length=100)
     seed: int = key("Root seed; every random stream derives from it.", unit="1", default=1, ge=0, le=2**53)
     area: Area = key("The area of operations.")
-    obstacles: Annotated[tuple[Obstacle, ...], Strict(False)] = key(
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(
         "Unknown to the planner until sensed.", default=()
     )
     mission: MissionSpec = key("From where to where.")
@@ -252,9 +252,14 @@ def _without_own_keys(root: Node, kind: Node) -> Node:
 
 def model_or_folder(model: str, folder: Path | None) -> str:
     """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
+    if "/" not in model and model in _aircraft_names():
+        return model
     for place in (Path() if folder is None else folder, Path()):
-        if ("/" in model or model not in _aircraft_names()) and (place / model).expanduser().is_dir():
-            return str((place / model).expanduser().resolve())
+        try:
+            if (place / model).expanduser().is_dir():
+                return str((place / model).expanduser().resolve())
+        except (OSError, RuntimeError):  # too long, not allowed, or the home of nobody: no folder
+            continue
     return model
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, FailFast, Field, Strict, field_validator, model_validator
 
 SIMULATION_RATE_HZ: Final = 120
 """Integration steps per simulated second; every other rate must divide it."""
@@ -93,7 +93,7 @@ class Circle(Section):
 class Polygon(Section):
     """A simple polygon, convex or not, its vertices in either direction; kept without a closing vertex."""
 
-    vertices_m: Annotated[tuple[Point, ...], Strict(False)] = key(
+    vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast()] = key(
         "Vertices in order round the shape: east, north; the first may be repeated at the end.",
         unit="m",
         min_length=3,
@@ -199,7 +199,10 @@ class AircraftSpec(Section):
     """What flies, and how fast."""
 
     model: str = key(
-        "A name that `wayproof list aircraft` prints, or a folder.", default="aerosonde", min_length=1
+        "A name that `wayproof list aircraft` prints, or a folder.",
+        default="aerosonde",
+        min_length=1,
+        max_length=1000,
     )
     airspeed_mps: float = key(
         "True airspeed, held throughout; must lie in the aircraft's range.",
@@ -226,7 +229,7 @@ class Sensor(Section):
         f"Scans per simulated second; must divide {SIMULATION_RATE_HZ} Hz.",
         unit="Hz",
         default=2.0,
-        gt=0,
+        ge=0.01,
         le=120,
     )
     range_noise_m: float = key(

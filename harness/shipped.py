@@ -41,10 +41,15 @@ def scenario_path(text: str) -> Path:
     Raises:
         InputError: there is neither such a file nor such a shipped scenario.
     """
-    path = Path(text)
-    if path.is_file():
-        return path
-    shipped = shipped_scenarios()
+    path, shipped = Path(text), shipped_scenarios()
+    try:
+        if path.is_file():
+            return path
+        path.exists()
+    except OSError as error:
+        raise InputError(
+            f"{text}: cannot be read ({error.strerror}); give a scenario file or one of {', '.join(shipped)}"
+        ) from error
     inside = path.parent in (Path(), Path("scenarios")) and path.suffix in ("", ".yaml")
     if inside and path.stem in shipped and not path.exists():
         return shipped[path.stem]

@@ -2,7 +2,8 @@
 
 Plain scalars are resolved by the core schema of YAML 1.2 (https://yaml.org/spec/1.2.2/#103-core-schema):
 `1e3` is a number; `on`, `yes` and `1_000` are text. Duplicate keys, anchors, aliases, merge keys, tags and a
-second document are errors.
+second document are errors. Size, depth and number of values are bounded, so that no file takes memory or time
+without end.
 """
 
 from __future__ import annotations
@@ -15,8 +16,15 @@ from typing import Any, Final, TypeAlias
 
 import yaml
 
+from harness.input_file import InputError as InputError
+from harness.input_file import read_text
+
 MAX_BYTES: Final = 32_000_000
+MAX_VALUES: Final = 2_000_000
+"""Enough for 100,000 obstacles with four corners each."""
 MAX_DEPTH: Final = 20
+MAX_KEYS: Final = 1000
+MAX_KEY_LENGTH: Final = 100
 COMMAND_LINE: Final = 0
 """The `line` of a value that came from the command line."""
 
@@ -31,10 +39,6 @@ _BASED: Final = re.compile(r"0o[0-7]{1,18}|0x[0-9a-fA-F]{1,15}")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 _UNPRINTABLE: Final = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-class InputError(ValueError):
-    """Input that cannot be used. Its text is what a person reads: one line a fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +113,11 @@ def loc_of(path: str) -> Loc:
     """`obstacles[2].circle` as `("obstacles", 2, "circle")`.
 
     Raises:
-        ValueError: a step is empty.
+        ValueError: a step is empty, or no key; or there are too many.
     """
     steps = path.replace("[", ".").replace("]", "").split(".")
-    if not all(steps):
-        raise ValueError(f"{path!r} is not a key path; write it as sensor.range_m")
+    if not all(steps) or not all(map(is_key, steps)) or len(steps) > MAX_DEPTH:
+        raise ValueError(f"{path[:60]!r} is not a key path; write it as sensor.range_m")
     return tuple(int(step) if step.isdecimal() else step for step in steps)
 
 
@@ -129,23 +133,7 @@ def read(path: Path) -> Node:
     Raises:
         InputError: the file cannot be opened, is too large, is not UTF-8 text or is not strict YAML.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a file") from error
-    if len(data) > MAX_BYTES:
-        raise InputError(f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a scenario, in YAML")
-    if b"\0" in data:
-        raise InputError(f"{path}: is not a text file; must be YAML in UTF-8")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise InputError(
-            f"{path}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
-        ) from error
-    return parse(text, str(path))
+    return parse(read_text(path, MAX_BYTES, "a scenario, in YAML"), str(path))
 
 
 def parse(text: str, source: str) -> Node:
@@ -187,8 +175,9 @@ class _Composer:
     """Builds nodes from the events of one document."""
 
     def __init__(self, text: str, source: str) -> None:
-        self.lines = text.split("\n")
+        self.text = text
         self.source = source
+        self.values = 0
         self.events: Iterator[yaml.Event] = yaml.parse(text, Loader=_LOADER)
 
     def document(self) -> Node:
@@ -212,8 +201,9 @@ class _Composer:
         except yaml.MarkedYAMLError as error:
             opened = (error.context or "").startswith(("while parsing a flow", "while scanning a quoted"))
             mark = error.context_mark if opened and error.context_mark else error.problem_mark
-            line = min(mark.line + 1, len(self.lines)) if mark else 1
-            if "\t" in self.lines[line - 1]:
+            lines = self.text.split("\n")
+            line = min(mark.line + 1, len(lines)) if mark else 1
+            if "\t" in lines[line - 1]:
                 sentence = "has a tab; indent with spaces"
             else:
                 sentence = f"is not YAML ({error.problem}); check indentation, colons, brackets and quotes"
@@ -221,8 +211,11 @@ class _Composer:
 
     def node(self, event: yaml.Event, loc: Loc, line: int) -> Node:
         if isinstance(event, yaml.AliasEvent):
-            raise self.fault(_line(event), loc, f"is the alias *{event.anchor}; write the value out")
+            raise self.fault(_line(event), loc, f"is the alias *{event.anchor:.40}; write the value out")
         self.check_bare(event, loc)
+        self.values += 1
+        if self.values > MAX_VALUES:
+            raise self.fault(_line(event), loc[:3], f"is value {MAX_VALUES + 1} of the file; must be fewer")
         if len(loc) > MAX_DEPTH:
             raise self.fault(
                 _line(event), loc[:3], f"is nested deeper than {MAX_DEPTH} levels; must be flatter"
@@ -239,9 +232,9 @@ class _Composer:
     def check_bare(self, event: yaml.Event, loc: Loc) -> None:
         """Refuses anchors and tags."""
         if isinstance(event, yaml.NodeEvent) and event.anchor is not None:
-            raise self.fault(_line(event), loc, f"has the anchor &{event.anchor}; write every value out")
+            raise self.fault(_line(event), loc, f"has the anchor &{event.anchor:.40}; write every value out")
         if isinstance(event, (yaml.ScalarEvent, yaml.CollectionStartEvent)) and event.tag is not None:
-            raise self.fault(_line(event), loc, f"has the tag {event.tag}; write the plain value")
+            raise self.fault(_line(event), loc, f"has the tag {event.tag:.60}; write the plain value")
 
     def mapping(self, loc: Loc) -> dict[str, Node]:
         nodes: dict[str, Node] = {}
@@ -250,12 +243,16 @@ class _Composer:
             if not isinstance(event, yaml.ScalarEvent):
                 raise self.fault(line, loc, "has a key that is not plain text; must be `key: value`")
             key = str(event.value)
+            if not is_key(key):
+                raise self.fault(line, loc, f"has the key {key[:40]!r}; {KEY_RULE}")
             self.check_bare(event, (*loc, key))
             if key == "<<":
                 raise self.fault(line, loc, "has the merge key <<; write the keys out")
             if key in nodes:
                 first = nodes[key].line
                 raise self.fault(line, (*loc, key), f"is given twice, first in line {first}; keep one")
+            if len(nodes) == MAX_KEYS:
+                raise self.fault(line, loc, f"has more than {MAX_KEYS} keys; must have fewer")
             nodes[key] = self.node(self.next((*loc, key)), (*loc, key), line)
         return nodes
 
@@ -268,6 +265,14 @@ class _Composer:
 
 def _line(event: yaml.Event) -> int:
     return event.start_mark.line + 1 if event.start_mark else 1
+
+
+def is_key(text: str) -> bool:
+    """Whether a key can be shown in a line."""
+    return len(text) <= MAX_KEY_LENGTH and text.isprintable()
+
+
+KEY_RULE: Final = f"a key must be printable and at most {MAX_KEY_LENGTH} characters long"
 
 
 def replaced(node: Node, loc: Loc, new: Node) -> Node:
@@ -296,17 +301,21 @@ def _replaced(node: Node, loc: Loc, depth: int, new: Node) -> Node:
     raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], "no such key; see `wayproof schema`"))
 
 
-class _Dumper(yaml.SafeDumper):
+_BaseDumper: Final[Any] = yaml.CSafeDumper if yaml.__with_libyaml__ else yaml.SafeDumper
+
+
+class _Dumper(_BaseDumper):  # type: ignore[misc]
     """Writes text in quotes wherever a YAML 1.2 reader would take it for something else."""
 
 
-def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+def _represent_text(dumper: Any, text: str) -> yaml.ScalarNode:
     style = None if isinstance(value_of(text), str) else "'"
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+    node: yaml.ScalarNode = dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+    return node
 
 
 _Dumper.add_representer(str, _represent_text)
-_Dumper.add_representer(tuple, yaml.SafeDumper.represent_list)
+_Dumper.add_representer(tuple, _BaseDumper.represent_list)
 
 
 def dump(value: Any) -> str:

@@ -85,8 +85,9 @@ def _located(details: ErrorDetails, model: type[BaseModel]) -> tuple[Loc, str]:
     if isinstance(cause, KeyFault):
         return (*loc, *cause.loc), str(cause)
     if details["type"] == "missing" and isinstance(loc[-1], int):
-        given = details["input"]
-        return loc[:-1], f"is {list(given)}; must have more numbers, see `wayproof schema`"
+        given = str(list(details["input"]))
+        short = given if len(given) <= 80 else f"{given[:77]}..."
+        return loc[:-1], f"is {short}; must have more numbers, see `wayproof schema`"
     known = _known_keys(model, loc[:-1]) if details["type"] == "extra_forbidden" else ()
     return loc, sentence(details, known)
 

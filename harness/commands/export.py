@@ -27,14 +27,19 @@ def export(
 
     For example: wayproof export runs/my_run --format plan --out way.plan
     """
+    from harness.input_file import InputError
     from harness.path_export import exported
     from harness.record import RunFolderError
-    from harness.run_folder import load_run
+    from harness.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:
         text = exported(load_run(run_dir), form, what, tolerance_m)
+    except InputError:
+        raise
     except RunFolderError as error:
         raise bad_input(error) from error
+    except WRONG_CONTENT as error:
+        raise bad_input(damaged(run_dir, error)) from error
     if out is None:
         typer.echo(text, nl=False)
     else:

@@ -145,7 +145,7 @@ def compare(
     from aircraft.airframes import AircraftError
     from harness.compare import compare as fly_and_compare
     from harness.compare_terminal import comparison_bar, print_comparison
-    from harness.record import RunFolderError
+    from harness.record import RunFolderError, WriteError
 
     try:
         with comparison_bar(loaded) as report:
@@ -159,6 +159,8 @@ def compare(
             )
     except (RunFolderError, AircraftError) as error:
         raise bad_input(error) from error
+    except OSError as error:
+        raise WriteError("the comparison", out, error) from error
     except KeyboardInterrupt:
         typer.echo(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
         raise

@@ -1,0 +1,95 @@
+"""Looks through the folder of somebody's JSBSim model before anything else reads it.
+
+JSBSim reads XML with nothing to bound it: a deep file overflows its stack, and what a file refers to may lie
+anywhere. The checks here are made on the text of the files, by expat, without building a tree.
+"""
+
+from __future__ import annotations
+
+import os
+import xml.parsers.expat as expat
+from collections.abc import Iterator
+from pathlib import Path, PurePath
+
+MAX_FILES = 1000
+MAX_BYTES = 5_000_000
+MAX_ENTITY = 100
+MAX_DEPTH = 60
+"""Of elements; the deepest of JSBSim's own models has 13."""
+
+
+def faults(folder: Path) -> Iterator[str]:
+    """What keeps a folder from being loaded, as sentences that begin with the file's name.
+
+    Args:
+        folder: of a model, of engines or of systems. Only regular files count; other things are never opened.
+    """
+    files = 0
+    for home, _, names in os.walk(folder):
+        for name in sorted(names):
+            path = Path(home, name)
+            files += 1
+            if files > MAX_FILES:
+                yield f"{folder}: has more than {MAX_FILES} files; must be the folder of one aircraft"
+                return
+            if name.lower().endswith(".xml") and path.is_file():
+                yield from _file_faults(path)
+
+
+def _file_faults(path: Path) -> Iterator[str]:
+    if path.stat().st_size > MAX_BYTES:
+        yield f"{path}: is larger than {MAX_BYTES // 10**6} MB; must be a JSBSim file"
+        return
+    look = _Look()
+    try:
+        look.read(path.read_bytes())
+    except expat.ExpatError:
+        return  # whoever loads the model says where it is broken
+    except OSError as error:
+        yield f"{path}: cannot be read ({error.strerror})"
+    except ForeignError as error:
+        yield f"{path}:{look.line}: {error}"
+
+
+class ForeignError(ValueError):
+    """Something that a model may not have."""
+
+
+class _Look:
+    """Goes through one file."""
+
+    def __init__(self) -> None:
+        self._parser = expat.ParserCreate()
+        self._depth = 0
+        self._parser.StartElementHandler = self._begin
+        self._parser.EndElementHandler = self._end
+        self._parser.EntityDeclHandler = self._entity
+
+    @property
+    def line(self) -> int:
+        """Where it is, or stopped."""
+        return self._parser.CurrentLineNumber
+
+    def read(self, data: bytes) -> None:
+        """Goes to the end; raises ForeignError or ExpatError."""
+        self._parser.Parse(data, True)
+
+    def _begin(self, name: str, attributes: dict[str, str]) -> None:
+        self._depth += 1
+        if self._depth > MAX_DEPTH:
+            raise ForeignError(f"is nested deeper than {MAX_DEPTH} elements; must be flatter")
+        file = PurePath(attributes.get("file", ""))
+        if file.is_absolute() or ".." in file.parts:
+            raise ForeignError(
+                f'<{name:.40} file="{str(file)[:80]}"> leads out of the folder; '
+                "copy the file into it and give its name"
+            )
+
+    def _end(self, name: str) -> None:
+        self._depth -= 1
+
+    def _entity(self, name: str, parameter: bool, value: str | None, *_: object) -> None:
+        if parameter or value is None or "&" in value or len(value) > MAX_ENTITY:
+            raise ForeignError(
+                f"declares the entity {name:.40}, which is not a short text of its own; write it out"
+            )

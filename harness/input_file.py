@@ -1,0 +1,61 @@
+"""Reads a file that somebody gives, without trust: it may be a pipe, a device, huge, or no text at all."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Final
+
+
+class InputError(ValueError):
+    """Input that cannot be used. Its text is what a person reads: one line a fault."""
+
+
+_KINDS: Final = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def read_text(path: Path, max_bytes: int, what: str) -> str:
+    """The text of a regular file, without a byte order mark.
+
+    Args:
+        path: the file.
+        max_bytes: the largest that is read.
+        what: what the file should be, for faults: "a scenario, in YAML".
+
+    Raises:
+        InputError: it cannot be opened, is not a regular file, is too large or is not UTF-8 text.
+    """
+    try:
+        with open(path, "rb", opener=_at_once) as file:
+            kind = stat.S_IFMT(os.fstat(file.fileno()).st_mode)
+            if kind != stat.S_IFREG:
+                shown = _KINDS.get(kind, "something else")
+                raise InputError(f"{path}: is {shown}, not a file; give the path of a file")
+            data = file.read(max_bytes + 1)
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
+    if len(data) > max_bytes:
+        raise InputError(f"{path}: is larger than {max_bytes // 10**6} MB; must be {what}")
+    if b"\0" in data:
+        raise InputError(f"{path}: is not a text file; must be {what}, as UTF-8")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{path}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
+        ) from error
+
+
+def _at_once(path: str, flags: int) -> int:
+    """Opens a file; opening a pipe that nobody writes to would wait for ever."""
+    return os.open(path, flags | os.O_NONBLOCK)

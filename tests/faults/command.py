@@ -1,0 +1,66 @@
+"""The command in a process of its own, for what can only be done to a process."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+FOREST = ROOT / "scenarios" / "aerosonde_forest.yaml"
+TIMEOUT_S = 120.0
+
+
+def start(folder: Path, *arguments: str, file_bytes: int | None = None, **keys: Any) -> subprocess.Popen[str]:
+    """Starts the command in a folder.
+
+    Args:
+        folder: where it is given.
+        arguments: after `wayproof`.
+        file_bytes: no file may become larger than this.
+        **keys: of `subprocess.Popen`.
+    """
+
+    def limit() -> None:
+        if file_bytes is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (file_bytes, file_bytes))
+
+    return subprocess.Popen(
+        [sys.executable, "-m", "harness", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        preexec_fn=limit if file_bytes is not None else None,
+        text=True,
+        **{
+            "stdin": subprocess.DEVNULL,
+            "stdout": subprocess.PIPE,
+            "stderr": subprocess.PIPE,
+            **keys,
+        },
+    )
+
+
+def run(folder: Path, *arguments: str, **keys: Any) -> tuple[int, str, str]:
+    """Exit status, standard output and standard error of a command."""
+    process = start(folder, *arguments, **keys)
+    try:
+        out, err = process.communicate(timeout=TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise
+    return process.returncode, out, err
+
+
+def wait_until(true: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    """Waits for something that a process does."""
+    until = time.monotonic() + TIMEOUT_S
+    while not true():
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < until
+        time.sleep(0.005)

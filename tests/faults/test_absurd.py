@@ -1,0 +1,160 @@
+"""Scenarios that are valid or nearly so, and absurd: refused with a reason, or flown in bounded time and memory."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import time
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from harness.run_folder import load_run
+from tests.faults.command import FOREST, start
+
+GIB = 2**30
+HEAD = """\
+schema: wayproof/scenario/1
+name: absurd
+area: {bounds_m: [0, 0, 400000, 400000]}
+mission: {start_m: [1000, 1000], goal_m: [20000, 20000], time_limit_s: 15}
+"""
+
+
+def circles(number: int) -> str:
+    draw = random.Random(1).uniform
+    rows = (
+        f"  - circle: {{center_m: [{draw(30e3, 4e5):.2f}, {draw(30e3, 4e5):.2f}], radius_m: {draw(10, 300):.2f}}}\n"
+        for _ in range(number)
+    )
+    return HEAD + "obstacles:\n" + "".join(rows)
+
+
+def squares(number: int) -> str:
+    draw = random.Random(1).uniform
+    corners = ((x, y) for x, y in ((draw(30e3, 4e5), draw(30e3, 4e5)) for _ in range(number)))
+    rows = (
+        f"  - polygon: {{vertices_m: [[{x:.1f}, {y:.1f}], [{x + 50:.1f}, {y:.1f}], [{x:.1f}, {y + 50:.1f}]]}}\n"
+        for x, y in corners
+    )
+    return HEAD + "obstacles:\n" + "".join(rows)
+
+
+def star(corners: int) -> str:
+    """One polygon."""
+    rows = []
+    for number in range(corners):
+        angle = math.tau * number / corners
+        radius = 5000 + 50 * math.sin(500 * angle)
+        rows.append(f"[{4e4 + radius * math.cos(angle):.6f}, {4e4 + radius * math.sin(angle):.6f}]")
+    return HEAD + f"obstacles:\n  - polygon: {{vertices_m: [{', '.join(rows)}]}}\n"
+
+
+def cost(folder: Path, *arguments: str) -> tuple[int, float, int]:
+    """Exit status, seconds and the largest resident memory (bytes) of a command."""
+    begun = time.monotonic()
+    with (folder / "said.txt").open("w") as said:
+        process = start(folder, *arguments, stdout=said, stderr=said)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    return process.returncode, time.monotonic() - begun, used.ru_maxrss * 1024
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("world", [circles, squares, star])
+def test_a_hundred_thousand_are_flown(world: object, tmp_path: Path) -> None:
+    assert callable(world)
+    (tmp_path / "w.yaml").write_text(world(100_000))
+    status, seconds, peak = cost(tmp_path, "fly", "w.yaml", "--out", "run", "--quiet")
+    assert status == 1, (tmp_path / "said.txt").read_text()
+    assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
+    print(f"{seconds:.1f} s, {peak / 2**20:.0f} MiB")
+    assert seconds < 240.0
+    assert peak < GIB
+
+
+HUGE = {
+    "numbers in a list": HEAD + "obstacles: [" + "1, " * 5_000_000 + "1]\n",
+    "wrong obstacles": HEAD + "obstacles:\n" + "- circl: {}\n" * 600_000,
+    "half wrong obstacles": circles(50_000) + "  - {}\n" * 50_000,
+    "keys": HEAD + "".join(f"k{n}: 1\n" for n in range(1_000_000)),
+    "lines": "ab\n" * 10_000_000,
+    "a key": HEAD + "? " + "a" * 20_000_000 + "\n: 1\n",
+    "a value": HEAD.replace("absurd", "a" * 20_000_000),
+    "brackets": "a: " + "[" * 30_000_000,
+    "an anchor": "a: &" + "a" * 20_000_000 + " 1\n",
+    "more than is read": "#" * 40_000_000,
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HUGE)
+def test_a_huge_file_is_refused_soon(name: str, tmp_path: Path) -> None:
+    (tmp_path / "w.yaml").write_text(HUGE[name])
+    status, seconds, peak = cost(tmp_path, "validate", "w.yaml")
+    said = (tmp_path / "said.txt").read_text()
+    assert status == 2, said[:2000]
+    assert said.startswith("w.yaml:")
+    assert len(said) < 2000
+    print(f"{seconds:.1f} s, {peak / 2**20:.0f} MiB")
+    assert seconds < 60.0
+    assert peak < GIB
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "sentence"),
+    [
+        ("area.bounds_m", "[0, 0, 1e9, 1e9]", "at most 1000000"),
+        ("mission.time_limit_s", "1e12", "at most 10000000"),
+        ("sensor.rays", "1000000000", "at most 100000"),
+        ("sensor.rays", "9" * 60, "must be"),
+        ("sensor.rate_hz", "1e9", "at most 120"),
+        ("sensor.rate_hz", "1e-9", "must be at least"),
+        ("sensor.range_m", "1e12", "at most 1000000"),
+        ("sensor.range_m", "1e-9", "too short"),
+        ("sensor.latency_s", "1e9", "at most 60"),
+        ("obstacles[0].circle.radius_m", "1e12", "at most 1000000"),
+        ("mission.altitude_m", "1e9", "at most 20000"),
+        ("planner.compute_latency_s", "1e9", "at most 60"),
+        ("aircraft.airspeed_mps", "1e-9", "cannot hold"),
+        ("aircraft.model", "/", "must be the folder of one aircraft"),
+        ("aircraft.model", "../../../../../../../../etc", "JSBSim model"),
+        ("aircraft.model", "~nobody-of-this-name", "unknown aircraft"),
+        ("name", "../../etc", "must match"),
+        ("name", "a/b", "must match"),
+        ("planner.kind", "../x", "must be one of"),
+    ],
+)
+def test_a_value_beyond_reason_is_refused(
+    key: str, value: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["fly", str(FOREST), "--set", f"{key}={value}", "--out", str(tmp_path / "run")]
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert key.partition("[")[0] in said
+    assert sentence in said
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("obstacles[0].circle.radius_m", "1e-9"),
+        ("area.bounds_m", "[-1e6, -1e6, 1e6, 1e6]"),
+        ("sensor.rays", "100000"),
+        ("sensor.rate_hz", "120"),
+        ("sensor.rate_hz", "0.01"),
+        ("sensor.range_m", "1e6"),
+        ("planner.clearance_m", "0"),
+        ("seed", "9007199254740992"),
+    ],
+)
+def test_the_outermost_values_are_flown(key: str, value: str, tmp_path: Path) -> None:
+    keys = ["--set", f"{key}={value}", "--set", "mission.time_limit_s=3"]
+    status, seconds, peak = cost(tmp_path, "fly", str(FOREST), *keys, "--out", "run", "--quiet")
+    assert status == 1, (tmp_path / "said.txt").read_text()
+    assert load_run(tmp_path / "run").metrics["outcome"] in ("timeout", "planner_failed")
+    assert seconds < 60.0
+    assert peak < GIB

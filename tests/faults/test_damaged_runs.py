@@ -1,0 +1,161 @@
+"""Run folders that were damaged after they were written, given to whatever reads them."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from harness.cli import main
+from harness.record import RunFolderError
+from harness.rerun_overlay import write_overlay
+from harness.rerun_viewer import recording_of
+from tests.faults.hostile import JSON_SNIPPETS, KEYS, as_json, spoilt, spoilt_bytes
+
+FILES = ("track.parquet", "plans.parquet", "metrics.json", "manifest.json", "scenario.yaml")
+TREES = {"metrics.json": (JSON_SNIPPETS, as_json), "manifest.json": (JSON_SNIPPETS, as_json)}
+
+
+@st.composite
+def damage(draw: st.DrawFn, whole: Path, name: str) -> bytes:
+    """What a file of a run becomes: bytes changed, and in JSON values too."""
+    data = (whole / name).read_bytes()
+    if name in TREES and draw(st.booleans()):
+        snippets, write = TREES[name]
+        return write(draw(spoilt(json.loads(data), snippets, KEYS))).encode("utf-8", "surrogatepass")
+    how = draw(st.sampled_from(("pieces", "flip", "flip", "cut")))
+    if how == "pieces":
+        return draw(spoilt_bytes(data))
+    at = draw(st.integers(0, len(data) - 1))
+    return (
+        data[:at]
+        if how == "cut"
+        else data[:at] + bytes([data[at] ^ draw(st.integers(1, 255))]) + data[at + 1 :]
+    )
+
+
+@pytest.mark.parametrize("cases", [8, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", FILES)
+def test_export_and_report_of_a_damaged_run(
+    name: str, cases: int, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(a_run, copy)
+    (copy / "flight.rrd").unlink()
+    manifest = json.loads((copy / "manifest.json").read_text())
+    del manifest["sha256"]
+    formats = ("plan", "waypoints", "geojson", "kml", "acmi")
+
+    @settings(
+        max_examples=cases,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(
+        damage(a_run, name), st.booleans(), st.sampled_from(formats), st.sampled_from(("flown", "planned"))
+    )
+    def each(data: bytes, summed: bool, form: str, what: str, reported: int) -> None:
+        (copy / "manifest.json").write_bytes(
+            (a_run / "manifest.json").read_bytes() if summed else json.dumps(manifest).encode()
+        )
+        (copy / name).write_bytes(data)
+        read_or_refused(["export", str(copy), "--format", form, "--what", what], copy, capsys)
+        if reported == 0:
+            read_or_refused(["report", str(copy)], copy, capsys)
+        (copy / name).write_bytes((a_run / name).read_bytes())
+
+    each()
+
+
+def read_or_refused(arguments: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status = main(arguments)
+    said = capsys.readouterr()
+    assert status in (0, 2), said.err
+    assert "Traceback" not in said.err
+    assert (status == 0) == (said.err == "")
+    lines = said.err.splitlines()
+    assert len(lines) <= 5
+    assert all(str(folder) in line and len(line) < 800 for line in lines) or "ACMI" in said.err
+
+
+@pytest.mark.parametrize("name", ["track.parquet", "plans.parquet"])
+def test_one_bit_of_a_table_is_enough(
+    name: str, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(a_run, copy)
+    data = bytearray((copy / name).read_bytes())
+    data[len(data) // 2] ^= 1
+    (copy / name).write_bytes(data)
+    assert main(["report", str(copy)]) == 2
+    assert f"{copy} is damaged: {name} is not what was written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("cases", [10, pytest.param(250, marks=pytest.mark.slow)])
+def test_view_of_a_damaged_recording(cases: int, a_run: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "run"
+    copy.mkdir()
+
+    @settings(
+        max_examples=cases,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(damage(a_run, "flight.rrd"))
+    def each(data: bytes) -> None:
+        (copy / "flight.rrd").write_bytes(data)
+        recordings = [recording_of(a_run), recording_of(copy)]
+        try:
+            write_overlay(recordings, ["whole", "damaged"], tmp_path / "overlay.rrd")
+        except RunFolderError as error:
+            said = str(error)
+        else:
+            said = str(copy)
+        assert str(copy) in said
+        assert len(said.splitlines()) == 1
+
+    each()
+
+
+def pipe(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def loop(path: Path) -> None:
+    path.symlink_to(path)
+
+
+def device(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [
+        *((name, make) for name in FILES for make in (pipe, loop, device, Path.mkdir, Path.touch)),
+        *(("flight.rrd", make) for make in (pipe, loop, device, Path.mkdir)),
+    ],
+)
+def test_something_else_in_place_of_a_file(
+    name: str, make: Any, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(a_run, copy)
+    (copy / name).unlink()
+    make(copy / name)
+    for arguments in (["report", str(copy)], ["view", str(copy), str(a_run)]):
+        if (name == "flight.rrd") == (arguments[0] == "view"):
+            assert main(arguments) == 2
+            said = capsys.readouterr().err
+            assert str(copy) in said
+            assert len(said.splitlines()) == 1

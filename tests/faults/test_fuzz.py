@@ -1,0 +1,249 @@
+"""Files that people could give, spoilt in every way: each is taken, or refused in a few lines that name it.
+
+A reader of another kind of file is one entry of `READERS`. The larger numbers of cases run with `-m slow`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from harness import strict_yaml
+from harness.given_path import fly_by
+from harness.input_file import InputError
+from harness.path_flight import scenario_for
+from harness.paths_io import read_path
+from harness.scenario import dump_scenario, load_scenario, parse_scenario
+from tests.faults.hostile import (
+    CELLS,
+    JSON_SNIPPETS,
+    KEYS,
+    YAML_SNIPPETS,
+    Raw,
+    as_json,
+    as_yaml,
+    places,
+    spoilt,
+    spoilt_bytes,
+)
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+LONGEST_S = 10.0
+"""For one small file, on a machine that others use too."""
+LONGEST_LINE, MOST_LINES = 600, 5
+
+
+def plain(value: Any) -> Any:
+    """With lists for tuples and raw pieces for numbers and names, as they were written."""
+    if isinstance(value, dict):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(each) for each in value]
+    return value
+
+
+EVERYTHING = plain(strict_yaml.read(SCENARIOS / "one_of_everything.yaml").plain())
+LEAST = {
+    "schema": "wayproof/scenario/1",
+    "name": "least",
+    "area": {"bounds_m": [0, 0, 8000, 6000]},
+    "mission": {"start_m": [500, 3000], "goal_m": [7500, 3000]},
+}
+LINE = [[8.0, 47.0], [8.01, 47.0], [8.02, 47.01]]
+GEOJSON = {
+    "type": "FeatureCollection",
+    "features": [
+        {"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": LINE}}
+    ],
+}
+PLAN = {
+    "fileType": "Plan",
+    "mission": {
+        "plannedHomePosition": [47.0, 8.0, 400],
+        "items": [
+            {
+                "type": "SimpleItem",
+                "command": 16,
+                "frame": 3,
+                "doJumpId": 1,
+                "params": [0, 0, 0, None, *place, 120],
+            }
+            for place in ([47.0, 8.0], [47.0, 8.01], [47.01, 8.02])
+        ],
+    },
+}
+CSV = [["x_m", "y_m"], ["0", "0"], ["500", "0"], ["900", "700"]]
+WAYPOINTS = [
+    ["QGC WPL 110"],
+    *(
+        f"{n} 0 {0 if n == 0 else 3} 16 0 0 0 0 47.{n} 8.0 {400 if n == 0 else 120} 1".split()
+        for n in range(3)
+    ),
+]
+
+
+def read_scenario(path: Path) -> None:
+    """Loads a scenario; one that is taken is the same when it is written out and read again."""
+    taken = load_scenario(path)
+    assert parse_scenario(dump_scenario(taken)) == taken
+
+
+def read_given_path(path: Path) -> None:
+    """Reads a path and makes of it what `check` flies."""
+    given = read_path(path, any_altitude=True)
+    scenario_for("path", given.points_m, {})
+    way = fly_by(given.points_m, 100.0, 5.0)
+    assert len(way.segments) >= 1
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A kind of file.
+
+    Attributes:
+        name: of the file.
+        read: reads it; raises InputError or nothing.
+        valid: a file of this kind, as a tree or as rows.
+        write: turns a spoilt tree into text.
+        snippets: what values are replaced by.
+    """
+
+    name: str
+    read: Callable[[Path], None]
+    valid: Any
+    write: Callable[[Any], str]
+    snippets: tuple[str, ...]
+
+
+def rows(between: str) -> Callable[[Any], str]:
+    def write(value: Any) -> str:
+        listed = value if isinstance(value, list) else [value]
+        cells = [row if isinstance(row, list) else [row] for row in listed]
+        return "\n".join(between.join(_cell(cell) for cell in row) for row in cells) + "\n"
+
+    return write
+
+
+def _cell(cell: Any) -> str:
+    return (
+        cell.text if isinstance(cell, Raw) else " ".join(map(_cell, cell)) if isinstance(cell, list) else cell
+    )
+
+
+READERS = {
+    "scenario": Reader("s.yaml", read_scenario, EVERYTHING, as_yaml, YAML_SNIPPETS),
+    "short scenario": Reader("s.yaml", read_scenario, LEAST, as_yaml, YAML_SNIPPETS),
+    "geojson": Reader("p.geojson", read_given_path, GEOJSON, as_json, JSON_SNIPPETS),
+    "plan": Reader("p.plan", read_given_path, PLAN, as_json, JSON_SNIPPETS),
+    "csv": Reader("p.csv", read_given_path, CSV, rows(","), CELLS),
+    "waypoints": Reader("p.waypoints", read_given_path, WAYPOINTS, rows("\t"), CELLS),
+}
+CASES = [25, pytest.param(1500, marks=pytest.mark.slow)]
+
+
+def fuzzed(cases: int, strategy: st.SearchStrategy[Any], holds: Callable[[Any], None]) -> None:
+    """Tries a property on so many cases, the same ones every time."""
+    tried = 0
+
+    @settings(
+        max_examples=cases,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(strategy)
+    def each(case: Any) -> None:
+        nonlocal tried
+        tried += 1
+        holds(case)
+
+    each()
+    assert tried >= cases
+
+
+def taken_or_refused(path: Path, read: Callable[[], object]) -> None:
+    """A file is read, or refused as a person can use it, in good time."""
+    begun = time.monotonic()
+    try:
+        read()
+    except InputError as error:
+        said = str(error)
+    else:
+        said = str(path)
+    lines = said.splitlines()
+    assert 1 <= len(lines) <= MOST_LINES
+    assert all(line.startswith((str(path), "command line")) for line in lines)
+    assert max(map(len, lines)) < LONGEST_LINE + len(str(path))
+    assert said.replace("\n", "").isprintable()
+    assert time.monotonic() - begun < LONGEST_S
+
+
+@pytest.mark.parametrize("kind", READERS)
+def test_the_unspoilt_file_is_taken(kind: str, tmp_path: Path) -> None:
+    reader = READERS[kind]
+    path = tmp_path / reader.name
+    path.write_text(reader.write(reader.valid))
+    reader.read(path)
+
+
+@pytest.mark.parametrize("cases", CASES)
+@pytest.mark.parametrize("kind", READERS)
+def test_a_file_with_wrong_things_in_it(kind: str, cases: int, tmp_path: Path) -> None:
+    reader = READERS[kind]
+    path = tmp_path / reader.name
+
+    def holds(tree: Any) -> None:
+        path.write_bytes(reader.write(tree).encode("utf-8", "surrogatepass"))
+        taken_or_refused(path, lambda: reader.read(path))
+
+    fuzzed(cases, spoilt(reader.valid, reader.snippets, KEYS), holds)
+
+
+@pytest.mark.parametrize("cases", [15, pytest.param(700, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", READERS)
+def test_a_file_that_is_torn(kind: str, cases: int, tmp_path: Path) -> None:
+    reader = READERS[kind]
+    path = tmp_path / reader.name
+
+    def holds(data: bytes) -> None:
+        path.write_bytes(data)
+        taken_or_refused(path, lambda: reader.read(path))
+
+    fuzzed(cases, spoilt_bytes(reader.write(reader.valid).encode()), holds)
+
+
+def _dotted(place: tuple[Any, ...]) -> str:
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
+
+
+@pytest.mark.parametrize("cases", [25, pytest.param(1500, marks=pytest.mark.slow)])
+def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
+    path = tmp_path / "s.yaml"
+    path.write_text(as_yaml(EVERYTHING))
+    known = st.sampled_from(list(filter(None, map(_dotted, places(EVERYTHING)))))
+    odd = st.sampled_from(
+        (
+            *KEYS,
+            "a" * 5000,
+            "a." * 3000 + "a",
+            "obstacles[" + "9" * 5000 + "]",
+            "obstacles[99]",
+            "obstacles[-1]",
+        )
+    )
+    joined = st.builds("{}.{}".format, known, odd)
+    name = st.one_of(known, known, odd, joined, st.text(max_size=8))
+    value = st.one_of(st.sampled_from(YAML_SNIPPETS), st.text(max_size=8))
+
+    def holds(pairs: list[tuple[str, str]]) -> None:
+        taken_or_refused(path, lambda: dump_scenario(load_scenario(path, pairs)))
+
+    fuzzed(cases, st.lists(st.tuples(name, value), min_size=1, max_size=2), holds)

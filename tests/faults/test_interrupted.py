@@ -1,0 +1,156 @@
+"""Ctrl-C, SIGTERM, output that nobody takes, a full disk, two at once: one line, nothing lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from harness.folder_lock import FolderLock
+from harness.record import RunFolderError
+from harness.run_folder import load_run
+from tests.faults.command import FOREST, ROOT, run, start, wait_until
+
+FLY = ("fly", str(FOREST), "--out", "run")
+SHORT = ("--set", "mission.time_limit_s=15")
+LONG = ("fly", "paper_circles", "--out", "run", "--quiet")
+
+
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("recording", [(), ("--no-recording",)], ids=["recording", "no recording"])
+def test_a_signal_in_flight_is_said_in_a_line(
+    signum: signal.Signals, recording: tuple[str, ...], tmp_path: Path
+) -> None:
+    process = start(tmp_path, *LONG, *recording)
+    wait_until((tmp_path / "run" / "track.parquet.partial").exists, process)
+    process.send_signal(signum)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 128 + signum
+    assert out == ""
+    assert err == "wayproof: interrupted; the run in run is marked incomplete\n"
+    with pytest.raises(RunFolderError, match="incomplete"):
+        load_run(tmp_path / "run")
+    assert run(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
+    assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
+
+
+def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
+    process = start(
+        tmp_path,
+        "compare",
+        "paper_circles",
+        "--planners",
+        "bug2,rolling_window",
+        "--out",
+        "c",
+        "--workers",
+        "2",
+    )
+    runs = [tmp_path / "c" / "paper_circles" / kind / "manifest.json" for kind in ("bug2", "rolling_window")]
+    wait_until(lambda: all(each.exists() for each in runs), process)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 143
+    assert err == "wayproof: interrupted; the comparison in c is marked incomplete\n"
+    assert json.loads((tmp_path / "c" / "comparison.json").read_text())["complete"] is False
+    for each in runs:
+        FolderLock(each.parent).release()
+
+
+@pytest.mark.parametrize("size", [60_000, 300_000])
+def test_a_full_disk(size: int, tmp_path: Path) -> None:
+    """No file may grow beyond some bytes, which a write finds out as it would a full disk."""
+    status, out, err = run(tmp_path, *FLY, file_bytes=size)
+    assert (status, out) == (1, "")
+    assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
+    with pytest.raises(RunFolderError, match="incomplete"):
+        load_run(tmp_path / "run")
+    assert run(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
+    assert load_run(tmp_path / "run").manifest["complete"] is True
+
+
+def test_a_disk_that_is_full_for_the_track_alone(tmp_path: Path) -> None:
+    status, _, err = run(tmp_path, *FLY, "--no-recording", file_bytes=60_000)
+    assert status == 1
+    assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
+
+
+def test_a_disk_that_is_full_for_a_report(a_run: Path, tmp_path: Path) -> None:
+    shutil.copytree(a_run, tmp_path / "run")
+    status, _, err = run(tmp_path, "report", "run", file_bytes=20_000)
+    assert (status, err) == (2, "wayproof: cannot write the report in run: File too large\n")
+    assert not (tmp_path / "run" / "report.html").exists()
+    assert run(tmp_path, "report", "run")[0] == 0
+
+
+def test_two_flights_into_one_folder(tmp_path: Path) -> None:
+    first = start(tmp_path, *LONG)
+    wait_until((tmp_path / "run" / "scenario.yaml").exists, first)
+    status, out, err = run(tmp_path, *FLY, *SHORT)
+    assert (status, out) == (2, "")
+    assert err == (
+        "wayproof: another wayproof is writing to run: wait until it has ended or choose another folder\n"
+    )
+    first.kill()
+    first.communicate()
+    assert run(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1, "a killed process leaves no lock"
+    assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
+
+
+def test_two_comparisons_into_one_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "c").mkdir()
+    lock = FolderLock(tmp_path / "c")
+    assert main(["compare", str(FOREST), "--planners", "bug2", "--out", str(tmp_path / "c")]) == 2
+    assert "another wayproof is writing to" in capsys.readouterr().err
+    lock.release()
+    assert list((tmp_path / "c").iterdir()) == []
+
+
+def test_a_scenario_changed_and_deleted_while_it_is_flown(tmp_path: Path) -> None:
+    scenario = tmp_path / "mine.yaml"
+    scenario.write_text(FOREST.read_text())
+    process = start(tmp_path, "fly", "mine.yaml", "--out", "run", "--quiet", "--no-recording")
+    wait_until((tmp_path / "run" / "scenario.yaml").exists, process)
+    scenario.write_text("spoilt: [")
+    scenario.unlink()
+    assert (process.wait(timeout=60), process.communicate()) == (0, ("", ""))
+    assert run(tmp_path, "fly", str(FOREST), "--out", "same", "--quiet", "--no-recording")[0] == 0
+    assert load_run(tmp_path / "run").metrics["digest"] == load_run(tmp_path / "same").metrics["digest"]
+
+
+def test_output_that_nobody_takes(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    status, _, err = run(tmp_path, *FLY, *SHORT, "--no-recording", stdout=writer)
+    os.close(writer)
+    assert (status, err) == (1, "")
+    assert load_run(tmp_path / "run").manifest["complete"] is True
+
+
+def test_output_onto_a_full_disk(tmp_path: Path) -> None:
+    with open("/dev/full", "w") as full:
+        status, _, err = run(tmp_path, "schema", stdout=full)
+    assert (status, err) == (2, "wayproof: [Errno 28] No space left on device\n")
+
+
+@pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
+def test_streams_that_are_closed(closed: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "harness", *FLY, *SHORT, "--no-recording"]
+    done = subprocess.run(
+        ["sh", "-c", f'"$@" {closed}', "sh", *words],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (1, "")
+    assert load_run(tmp_path / "run").manifest["complete"] is True
