@@ -197,11 +197,11 @@ def fly_to_folder(
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
         RunFolderError: the folder holds something else or cannot be written.
     """
-    loop = make(scenario)
+    loop, text = make(scenario), dump_scenario(scenario)
     with ExitStack() as stack:
-        folder = stack.enter_context(RunFolder.create(out, dump_scenario(scenario), [shlex.join(sys.argv)]))
+        folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
         observers: list[Observer] = [_Writer(folder), *watching]
-        log = _recording(scenario, loop, folder, pilot or scenario.planner.kind) if recording else None
+        log = _recording(scenario, text, loop, folder, pilot or scenario.planner.kind) if recording else None
         if log is not None:
             observers.append(log)
         flight = flown_by(loop, observers, progress)
@@ -231,7 +231,7 @@ class _Writer:
         """Events belong to the recording."""
 
 
-def _recording(scenario: Scenario, loop: Loop, folder: RunFolder, pilot: str) -> Any:
+def _recording(scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pilot: str) -> Any:
     from harness.rerun_blueprint import Scene
     from harness.rerun_log import RerunLog
 
@@ -242,7 +242,7 @@ def _recording(scenario: Scenario, loop: Loop, folder: RunFolder, pilot: str) ->
         scenario.mission.start_m,
         flight_limits(scenario),
         tuple(loop.world.obstacles),
-        dump_scenario(scenario),
+        text,
     )
     return RerunLog(folder.recording_path, scene, recording_id=title)
 

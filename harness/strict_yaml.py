@@ -263,8 +263,8 @@ def _replaced(node: Node, loc: Loc, depth: int, new: Node) -> Node:
     raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], "no such key; see `wayproof schema`"))
 
 
-class _Dumper(yaml.SafeDumper):
-    """Writes text in quotes wherever a YAML 1.2 reader would take it for something else."""
+# Writes text in quotes wherever a YAML 1.2 reader would take it for something else.
+_Dumper: Any = type("_Dumper", (yaml.CSafeDumper if yaml.__with_libyaml__ else yaml.SafeDumper,), {})
 
 
 def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
