@@ -22,7 +22,7 @@ from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.closed_loop import Loop, Observer, Progress, fly
 from harness.metrics import metrics
 from harness.obstacle_map import ObstacleMap
-from harness.planner_keys import config_of
+from harness.planner_keys import planner_of
 from harness.range_sensor import RangeSensor
 from harness.record import AcceptedPlan, Flight, Track
 from harness.reflection_map import ReflectionMap
@@ -32,7 +32,6 @@ from harness.scenario_sections import Environment
 from harness.trackability import FlightLimits
 from harness.world import World
 from planner.interface import Mission
-from planner.registry import planner_kinds
 
 if TYPE_CHECKING:
     from aircraft.interface import AircraftState
@@ -67,7 +66,7 @@ def make_loop(
         world=world,
         sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
         seen=empty_map(scenario, mission),
-        planner=planner_kinds()[scenario.planner.kind].make(config_of(scenario.planner), mission),
+        planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
         follower=PathFollower(airframe(scenario.aircraft.model).guidance_limits),
         mission=mission,
