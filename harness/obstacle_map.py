@@ -96,7 +96,7 @@ class ObstacleMap:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         self._scans += 1
-        nearest = float(np.minimum.reduce(scan.ranges_m))
+        nearest = scan.nearest_m
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
             if self._unconfirmed or not abs(sensor - self._taken_at) < min(SAME_PLACE * nearest, self._cell):
