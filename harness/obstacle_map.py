@@ -33,7 +33,7 @@ DETAIL = ((5.0, 4), (2.0, 16))
 """Outlines are kept in detail up to so many clearances away, in so many cells to one along a side."""
 CORNER = 0.3
 """Sine of the turn from which on a wall has a corner."""
-SAME_PLACE = 1.0 / 32.0
+SAME_PLACE = 1.0 / 16.0
 """Hits that are seen from where others were seen, but for this share of the least range, tell nothing more."""
 LOOK_THROUGH_EVERY = 6
 """Every so many scans the points in range are asked whether they were looked through."""
@@ -47,10 +47,15 @@ class ObstacleMap:
         clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way
             between them and are joined. Edge points lie about a quarter of it apart.
         range_m: sensing range.
+        doubtful: the sensor may return what is not there: a single hit is not believed.
     """
 
     def __init__(
-        self, bounds_m: tuple[float, float, float, float], clearance_m: float, range_m: float
+        self,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        range_m: float,
+        doubtful: bool = True,
     ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
         span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
@@ -73,6 +78,7 @@ class ObstacleMap:
         self._join = 2.0 * clearance_m
         self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
         self._range = range_m
+        self._first_score = 1 if doubtful else CONFIRMED
         self._revision = 0
         self._taken_back_at = 0
         self._scans = 0
@@ -180,7 +186,8 @@ class ObstacleMap:
                     sure = known[within]
                     counted = np.concatenate((counted, fine))
                     found = np.concatenate((found, at))
-                    again.append((fine[sure], at[sure]))
+                    if self._first_score < CONFIRMED:
+                        again.append((fine[sure], at[sure]))
         if len(counted):
             self._count_hits(counted, found)
         for fine, at in again:
@@ -198,18 +205,15 @@ class ObstacleMap:
         return reach < x < width - reach and reach < y < height - reach
 
     def _count_hits(self, keys: NDArray[np.int64], places: ComplexArray) -> None:
-        """Counts hits: a cell gets a point with the first and is an edge from the second scan on."""
+        """Counts hits: a cell gets a point with the first, and is an edge as soon as it is believed."""
         score = self._score.take(keys)
         uncertain = (score < CERTAIN).nonzero()[0]
         if not len(uncertain):
             return
         keys, score = keys[uncertain], score[uncertain]
-        self._score[keys] = score + 1  # duplicates of a cell count once a scan
-        self._unconfirmed |= bool(score.min() < CONFIRMED - 1)
-        raised = keys[score == CONFIRMED - 1]
-        if len(raised):
-            self._revision += 1
-            self._since[self._slot[raised]] = self._revision
+        risen = np.maximum(score + 1, self._first_score)
+        self._score[keys] = risen  # duplicates of a cell count once a scan
+        self._unconfirmed |= bool(risen.min() < CONFIRMED)
         fresh = (score == 0).nonzero()[0]
         if len(fresh):
             fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
@@ -224,6 +228,10 @@ class ObstacleMap:
             self._points[new] = places[list(first.values())] + self._origin
             self._since[new] = 0
             self._count = new.stop
+        raised = keys[(score < CONFIRMED) & (risen >= CONFIRMED)]
+        if len(raised):
+            self._revision += 1
+            self._since[self._slot[raised]] = self._revision
 
     def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
         """Numbers of the cells of a finer grid at some places."""

@@ -84,7 +84,7 @@ def empty_map(scenario: Scenario, mission: Mission) -> ObstacleMap | ReflectionM
     )
     if noise_m > NOISY * mission.clearance_m:
         return ReflectionMap(*known, noise_m)
-    return ObstacleMap(*known)
+    return ObstacleMap(*known, doubtful=scenario.sensor.false_return > 0)
 
 
 def kinematic_loop(scenario: Scenario) -> Loop:
