@@ -16,10 +16,11 @@ from aircraft.airframes import FIGURES, AircraftError, Airframe, Entry
 from aircraft.autopilot import Derivatives, Gains, gains
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import GRAVITY_MPS2, PathFollower, arc_point
+from aircraft.guidance import GRAVITY_MPS2, UPDATE_RATE_HZ, PathFollower, arc_point
 from aircraft.interface import AircraftState, Command, Route
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,
+    STEP_RATE_HZ,
     angle_of_attack_rad,
     linearised,
     mass_kg,
@@ -69,7 +70,7 @@ ROLL_IN_DEG = 30.0
 KEPT_SPEED_SHARE = 0.03
 KEPT_ALTITUDE_M = 2.0
 KEPT_ROLL_DEG = 1.5
-UPDATE_STEPS = 6
+UPDATE_STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ
 
 
 def survey(entry: Entry, files: ModelFiles) -> dict[str, Any]:

@@ -18,7 +18,6 @@ from harness.sensed_world import SensedWorld
 from harness.world import World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
-LOG_RATE_HZ = 10
 PROGRESS_EVERY_S = 5.0
 LONGEST_UNCHECKED_S = 5.0
 """Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
@@ -79,7 +78,7 @@ class Loop:
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
     """Flies a mission to its end.
 
-    Everything happens at whole steps of the flight model: guidance and log at their rates, a scan at the
+    Everything happens at whole steps of the flight model: guidance and log at one rate, a scan at the
     sensor's. A scan or a plan that is late takes effect at the first of these steps after its delay. Time is a
     count of steps.
 
@@ -101,7 +100,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     roll_command, cross_track, station = 0.0, math.nan, math.nan
     next_report = 0.0
     while True:
-        scan_due, guide_due, log_due, steps = next(strides)
+        scan_due, tick, steps = next(strides)
         state = model.state()
         verdict = judge.verdict(state)
         if verdict is not None:
@@ -116,13 +115,12 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             verdict = plans.ask(state, station)
             if verdict is not None:
                 break
-        if guide_due:
+        if tick:
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
             if plans.index >= 0:
                 roll_command, cross_track, station = follower.update(state)[:3]
             model.command(Command(roll_command, loop.altitude_m, mission.speed_mps))
-        if log_due:
             log.add(state, roll_command, cross_track, station, plans.index)
             if progress is not None and state.time_s >= next_report:
                 progress(state.time_s, judge.to_go_m(state), plans.state)
@@ -145,21 +143,15 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     )
 
 
-def _strides(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[bool, bool, bool, int]]:
-    """What happens at a step (scan, guidance, log), and how many steps of the flight model come after it.
+def _strides(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[bool, bool, int]]:
+    """What happens at a step (scan, tick of guidance and log), and how many steps of the model come after it.
 
     One tuple for every step at which something happens, until all of it begins again.
     """
-    scan, guide, log = (
-        _whole(step_rate_hz, rate, name)
-        for rate, name in ((scan_rate_hz, "scan"), (UPDATE_RATE_HZ, "guidance"), (LOG_RATE_HZ, "log"))
-    )
-    again = math.lcm(scan, guide, log)
-    happens = sorted({step for rate in (scan, guide, log) for step in range(0, again + 1, rate)})
-    return [
-        (step % scan == 0, step % guide == 0, step % log == 0, after - step)
-        for step, after in itertools.pairwise(happens)
-    ]
+    scan = _whole(step_rate_hz, scan_rate_hz, "scan")
+    tick = _whole(step_rate_hz, UPDATE_RATE_HZ, "guidance")
+    happens = sorted({step for stride in (scan, tick) for step in range(0, math.lcm(scan, tick) + 1, stride)})
+    return [(step % scan == 0, step % tick == 0, after - step) for step, after in itertools.pairwise(happens)]
 
 
 def _whole(step_rate_hz: int, rate_hz: float, name: str) -> int:

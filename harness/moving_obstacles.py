@@ -26,7 +26,7 @@ COMPARED_S = 12.0
 """Scans are compared with those taken so long before,"""
 SLOW_MPS = 5.0
 """and as much longer as something so slow takes to leave the noise."""
-LOOK_EVERY_S = 1.5
+LOOK_EVERY_S = 3.0
 FEWEST = 3
 """Neighbouring rays that must tell the same."""
 LEAST_MPS = 0.5
@@ -117,9 +117,9 @@ class MovingObstacles:
         moving: BoolArray | None = None
         if self._tracks:
             moving = self._follow(scan)
-        self._before.append(scan)
         if scan.time_s - self._looked_s >= LOOK_EVERY_S:
             self._looked_s = scan.time_s
+            self._before.append(scan)
             while len(self._before) > 1 and self._before[1].time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()
             self._look(scan, self._before[0], moving)

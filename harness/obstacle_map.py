@@ -31,7 +31,7 @@ DETAIL = ((5.0, 4), (2.0, 16))
 """Outlines are kept in detail up to so many clearances away, in so many cells to one along a side."""
 CORNER = 0.3
 """Sine of the turn from which on a wall has a corner."""
-SAME_PLACE = 1.0 / 32.0
+SAME_PLACE = 1.0 / 16.0
 """Hits that are seen from where others were seen, but for this share of the least range, tell nothing more."""
 LOOK_THROUGH_EVERY = 6
 """Every so many scans the points in range are asked whether they were looked through."""
@@ -45,7 +45,7 @@ class ObstacleMap:
         clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way
             between them and are joined. Edge points lie about a quarter of it apart.
         range_m: sensing range.
-        false_returns: the sensor is known to return ranges where nothing is.
+        doubtful: the sensor may return what is not there: a single hit is not believed.
     """
 
     def __init__(
@@ -53,8 +53,7 @@ class ObstacleMap:
         bounds_m: tuple[float, float, float, float],
         clearance_m: float,
         range_m: float,
-        *,
-        false_returns: bool = False,
+        doubtful: bool = True,
     ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
         span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
@@ -76,7 +75,8 @@ class ObstacleMap:
         self._count = 0
         self._join = 2.0 * clearance_m
         self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
-        self._range, self._false_returns = range_m, false_returns
+        self._range = range_m
+        self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED
         self._revision = 0
         self._taken_back_at = 0
         self._scans = 0
@@ -99,7 +99,7 @@ class ObstacleMap:
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan, but for some of its rays."""
         self._scans += 1
-        nearest = float(np.minimum.reduce(scan.ranges_m))
+        nearest = scan.nearest_m
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
             if self._unconfirmed or not abs(sensor - self._taken_at) < min(SAME_PLACE * nearest, self._cell):
@@ -135,7 +135,7 @@ class ObstacleMap:
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
         self._unconfirmed = False
-        taken = _supported(scan, self._join) if self._false_returns else scan.ranges_m < math.inf
+        taken = _supported(scan, self._join) if self._doubtful else scan.ranges_m < math.inf
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
         if not len(hits):
             return
@@ -189,7 +189,8 @@ class ObstacleMap:
                     sure = known[within]
                     counted = np.concatenate((counted, fine))
                     found = np.concatenate((found, at))
-                    again.append((fine[sure], at[sure]))
+                    if self._first_score < CONFIRMED:
+                        again.append((fine[sure], at[sure]))
         if len(counted):
             self._count_hits(counted, found)
         for fine, at in again:
@@ -207,18 +208,15 @@ class ObstacleMap:
         return reach < x < width - reach and reach < y < height - reach
 
     def _count_hits(self, keys: NDArray[np.int64], places: ComplexArray) -> None:
-        """Counts hits: a cell gets a point with the first and is an edge from the second scan on."""
+        """Counts hits: a cell gets a point with the first, and is an edge as soon as it is believed."""
         score = self._score.take(keys)
         uncertain = (score < CERTAIN).nonzero()[0]
         if not len(uncertain):
             return
         keys, score = keys[uncertain], score[uncertain]
-        self._score[keys] = score + 1  # duplicates of a cell count once a scan
-        self._unconfirmed |= bool(score.min() < CONFIRMED - 1)
-        raised = keys[score == CONFIRMED - 1]
-        if len(raised):
-            self._revision += 1
-            self._since[self._slot[raised]] = self._revision
+        risen = np.maximum(score + 1, self._first_score)
+        self._score[keys] = risen  # duplicates of a cell count once a scan
+        self._unconfirmed |= bool(risen.min() < CONFIRMED)
         fresh = (score == 0).nonzero()[0]
         if len(fresh):
             fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
@@ -233,6 +231,10 @@ class ObstacleMap:
             self._points[new] = places[list(first.values())] + self._origin
             self._since[new] = 0
             self._count = new.stop
+        raised = keys[(score < CONFIRMED) & (risen >= CONFIRMED)]
+        if len(raised):
+            self._revision += 1
+            self._since[self._slot[raised]] = self._revision
 
     def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
         """Numbers of the cells of a finer grid at some places."""

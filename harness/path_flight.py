@@ -14,7 +14,7 @@ import numpy as np
 
 from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.interface import Command, Route
-from harness.closed_loop import LOG_RATE_HZ, Loop, Observer, Progress
+from harness.closed_loop import Loop, Observer, Progress
 from harness.given_path import CutCorner, FloatArray, FlyBy, fly_by
 from harness.metrics import metrics
 from harness.record import AcceptedPlan, Flight, Outcome, TrackLog
@@ -147,8 +147,7 @@ def fly_along(
         guided = follower.update(state)
         model.command(Command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps))
         outcome = _outcome(model.fault(), guided.past_end, state.time_s, limit_s)
-        if outcome is not None or updates % (UPDATE_RATE_HZ // LOG_RATE_HZ) == 0:
-            log.add(state, guided.roll_command_rad, guided.cross_track_m, guided.station_m, 0)
+        log.add(state, guided.roll_command_rad, guided.cross_track_m, guided.station_m, 0)
         if progress is not None and updates % round(PROGRESS_EVERY_S * UPDATE_RATE_HZ) == 0:
             progress(state.time_s, path.length_m - guided.station_m, "following")
         if outcome is not None:

@@ -13,7 +13,7 @@ from harness.validation import KeyFault, first_fault, unknown_key
 from planner.registry import PlannerKind, planner_kinds
 
 if TYPE_CHECKING:
-    from planner.interface import Mission
+    from planner.interface import Mission, Planner
 
 
 def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
@@ -43,9 +43,10 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
     return spec.model_copy(update={name: getattr(config, name) for name in known})
 
 
-def config_of(spec: PlannerSpec) -> Any:
-    """The config that the `make` of the planner's kind takes, from a section that `resolved` returned."""
-    return planner_kinds()[spec.kind].config(**spec.own)
+def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
+    """The planner for one flight, from a section that `resolved` returned."""
+    kind = planner_kinds()[spec.kind]
+    return kind.make(kind.config(**spec.own), mission)
 
 
 def json_schema(common: dict[str, Any]) -> dict[str, Any]:

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.world import Surroundings, World
+from harness.world import Faces, Surroundings, World
 
 if TYPE_CHECKING:
     from harness.scenario_sections import Sensor
@@ -47,6 +48,7 @@ class RangeScan:
         fan: (n,) unit vectors of the rays as the nose sees them, to its right + i ahead.
         ranges_m: (n,) measured ranges, +inf where nothing came back.
         max_range_m: no return is longer.
+        nearest_m: no return is shorter; +inf if nothing came back.
     """
 
     time_s: float
@@ -59,8 +61,10 @@ class RangeScan:
     fan: ComplexArray
     ranges_m: FloatArray
     max_range_m: float
+    nearest_m: float = field(init=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "nearest_m", float(self.ranges_m.min(initial=math.inf)))
         for name in ("fan", "ranges_m"):
             array = getattr(self, name)
             if array.flags.writeable:
@@ -80,6 +84,39 @@ class RangeScan:
         turned: ComplexArray = self.fan * cmath.rect(1.0, -self.heading_rad)
         turned.setflags(write=False)
         return turned.view(np.float64).reshape(-1, 2)
+
+
+_NOT_READ: FloatArray = np.zeros(0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Unread(RangeScan):
+    """A scan whose rays are followed when somebody first reads their ranges: few scans are news to anybody.
+
+    Attributes:
+        face_m: distance to the nearest face in range, ahead or not; +inf if there is none.
+        follow: gives the ranges.
+    """
+
+    ranges_m: FloatArray = field(default_factory=lambda: _NOT_READ)
+    face_m: float
+    follow: Callable[[], FloatArray]
+
+    def __post_init__(self) -> None:
+        if self.ranges_m is not _NOT_READ:
+            super().__post_init__()
+            return
+        object.__delattr__(self, "ranges_m")
+        object.__setattr__(self, "nearest_m", self.face_m)
+
+    def __getattr__(self, name: str) -> FloatArray:
+        """The ranges, when they are first read."""
+        if name != "ranges_m":
+            raise AttributeError(name)
+        ranges = self.follow()
+        ranges.setflags(write=False)
+        object.__setattr__(self, "ranges_m", ranges)
+        return ranges
 
 
 class RangeSensor:
@@ -118,15 +155,18 @@ class RangeSensor:
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
         )
+        self._flawed = config.range_noise_m > 0 or config.dropout > 0 or config.false_return > 0
         self._surroundings: Surroundings | None = None
         self._listed_at = (math.nan, math.nan, math.nan)
 
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
         """Looks around from a place, at a time."""
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
-        ranges = self._degraded(self._true_ranges(east_m, north_m, time_s, sin, cos))
-        ranges.setflags(write=False)
-        return RangeScan(
+        faces = self._near(east_m, north_m, time_s).faces(time_s)
+        follow = partial(self._true_ranges, faces, east_m, north_m, sin, cos)
+        # What is drawn at random is drawn now, scan by scan.
+        ranges = self._degraded(follow()) if self._flawed else _NOT_READ
+        return _Unread(
             time_s=time_s,
             available_s=time_s + self._config.latency_s,
             east_m=east_m,
@@ -137,6 +177,8 @@ class RangeSensor:
             fan=self._rays,
             ranges_m=ranges,
             max_range_m=self._config.range_m,
+            face_m=self._nearest(faces, east_m, north_m),
+            follow=follow,
         )
 
     def _near(self, east: float, north: float, time: float) -> Surroundings:
@@ -150,9 +192,20 @@ class RangeSensor:
             self._listed_at = (east, north, time)
         return self._surroundings
 
-    def _true_ranges(self, east: float, north: float, time: float, sin: float, cos: float) -> FloatArray:
+    def _nearest(self, faces: Faces, east: float, north: float) -> float:
+        """Distance to the nearest face, ahead or not; +inf beyond the range."""
+        nearest = math.inf
+        for x, y, radius in faces.circles:
+            nearest = min(nearest, abs(math.hypot(x - east, y - north) - radius))
+        if faces.edges_m.shape[1]:
+            edges = faces.edges_m[::2] + 1j * faces.edges_m[1::2] - complex(east, north)
+            start, along = edges[0], edges[1] - edges[0]
+            share = -(start * along.conj()).real / (along * along.conj()).real
+            nearest = min(nearest, float(np.abs(start + np.clip(share, 0.0, 1.0) * along).min()))
+        return nearest if nearest <= self._config.range_m else math.inf
+
+    def _true_ranges(self, faces: Faces, east: float, north: float, sin: float, cos: float) -> FloatArray:
         """(n,) ranges to the nearest face, +inf beyond the range; sine and cosine of the heading."""
-        faces = self._near(east, north, time).faces(time)
         ranges = self._nothing.copy()
         for circle in faces.circles:
             self._hit_circle(ranges, circle, complex(east, north), complex(cos, sin))

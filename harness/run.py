@@ -21,7 +21,7 @@ from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.closed_loop import Loop, Observer, Progress, fly
 from harness.metrics import metrics
-from harness.planner_keys import config_of
+from harness.planner_keys import planner_of
 from harness.range_sensor import RangeSensor
 from harness.record import AcceptedPlan, Flight, Track, WriteError
 from harness.run_folder import RunFolder
@@ -30,7 +30,6 @@ from harness.scenario_sections import Environment
 from harness.sensed_world import SensedWorld
 from harness.trackability import FlightLimits
 from harness.world import World
-from planner.registry import planner_kinds
 
 if TYPE_CHECKING:
     from aircraft.interface import AircraftState
@@ -68,7 +67,7 @@ def make_loop(
             noise_m=scenario.sensor.range_noise_m,
             false_returns=scenario.sensor.false_return > 0.0,
         ),
-        planner=planner_kinds()[scenario.planner.kind].make(config_of(scenario.planner), mission),
+        planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
         follower=PathFollower(airframe(scenario.aircraft.model).guidance_limits),
         mission=mission,

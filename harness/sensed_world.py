@@ -66,7 +66,7 @@ class SensedWorld:
         self._edges: Edges = (
             ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
             if noisy
-            else ObstacleMap(bounds_m, clearance_m, range_m, false_returns=false_returns)
+            else ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
         )
         self._moving = None if noisy else MovingObstacles(clearance_m, noise_m)
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)

@@ -301,11 +301,8 @@ def _replaced(node: Node, loc: Loc, depth: int, new: Node) -> Node:
     raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], "no such key; see `wayproof schema`"))
 
 
-_BaseDumper: Final[Any] = yaml.CSafeDumper if yaml.__with_libyaml__ else yaml.SafeDumper
-
-
-class _Dumper(_BaseDumper):  # type: ignore[misc]
-    """Writes text in quotes wherever a YAML 1.2 reader would take it for something else."""
+# Writes text in quotes wherever a YAML 1.2 reader would take it for something else.
+_Dumper: Any = type("_Dumper", (yaml.CSafeDumper if yaml.__with_libyaml__ else yaml.SafeDumper,), {})
 
 
 def _represent_text(dumper: Any, text: str) -> yaml.ScalarNode:
@@ -315,7 +312,7 @@ def _represent_text(dumper: Any, text: str) -> yaml.ScalarNode:
 
 
 _Dumper.add_representer(str, _represent_text)
-_Dumper.add_representer(tuple, _BaseDumper.represent_list)
+_Dumper.add_representer(tuple, _Dumper.represent_list)
 
 
 def dump(value: Any) -> str:

@@ -197,6 +197,23 @@ def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequen
     return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
 
 
+def world_rows(result: Sequence[Mapping[str, Any]]) -> tuple[Sequence[str], list[Sequence[str]]]:
+    """Headings and rows of the table of `wayproof bench worlds`."""
+    rows: list[Sequence[str]] = [
+        (
+            f"{row['obstacles']:,}",
+            f"{row['load_s']:.2f}",
+            f"{row['write_s']:.2f}",
+            f"{row['loop_ms']:.2f}",
+            f"{row['closed_loop_ratio']:.2f}",
+            f"{row['planner_p99_ms']:.1f}",
+            f"{row['peak_mib']:,.0f}",
+        )
+        for row in result
+    ]
+    return ("obstacles", "load s", "write s", "loop ms/s", "of bare", "planner p99 ms", "peak MiB"), rows
+
+
 def plain(text: str) -> str:
     """`text` with nothing in it that rich would take for markup."""
     return text.replace("[", "\\[")

@@ -1,9 +1,8 @@
 """The true world: obstacles, area bounds, contact. Only the sensor and the judges of a flight may see it.
 
 Frame: local ENU plane, x = east, y = north, metres; times are simulated seconds. A world never changes: every
-answer is a function of its arguments alone. Obstacles are first sorted by the distance to their rounded boxes
-(for a circle the distance itself, for a polygon a lower bound); exact geometry is asked only of those that
-this bound cannot rule out.
+answer is a function of its arguments alone. Exact geometry is asked only of obstacles that their bounds cannot rule
+out.
 """
 
 from __future__ import annotations
@@ -20,6 +19,8 @@ from numpy.typing import NDArray
 from harness.obstacle import Circle, Obstacle, Polygon
 
 if TYPE_CHECKING:
+    from shapely import STRtree
+
     from harness.scenario import Scenario
 
 __all__ = ["Circle", "Faces", "Obstacle", "Polygon", "Surroundings", "World"]
@@ -64,10 +65,11 @@ class _Motions:
         present: BoolArray = (self._rows[3] <= stop_s) & (start_s <= self._rows[4])
         return present
 
-    def present_throughout(self, start_s: float, stop_s: float) -> BoolArray:
-        """(n,) whether there during the whole of an interval."""
-        throughout: BoolArray = (self._rows[3] <= start_s) & (stop_s <= self._rows[4])
-        return throughout
+    def gaps(self, boxes: FloatArray, east: float, north: float, time_s: float) -> FloatArray:
+        """(n,) lower bound of the distance to each thing, there or not, by its rounded box (5, n) at the epoch."""
+        if self.matter:
+            boxes = np.vstack((boxes[:2] + self.shifts(time_s), boxes[2:]))
+        return _gaps(boxes, east, north)
 
     def next_start(self, time_s: float) -> float:
         """First time after `time_s` at which something appears, else +inf."""
@@ -119,6 +121,9 @@ class Surroundings:
 class World:
     """Obstacles in a rectangular area, as they truly are.
 
+    Those that stand for ever are found through a tree of their boxes, so that an answer costs the same in a world
+    of ten and of a hundred thousand; those that move or come and go are all looked at every time.
+
     Args:
         obstacles: their order gives their index.
         bounds_m: xmin, ymin, xmax, ymax of the area.
@@ -127,14 +132,11 @@ class World:
     def __init__(self, obstacles: Iterable[Obstacle], bounds_m: tuple[float, float, float, float]) -> None:
         self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
         self.bounds_m = bounds_m
-        self._motions = _Motions.of(self.obstacles)
         self._boxes = np.array([o.shape.rounded_box for o in self.obstacles]).reshape(-1, 5).T.copy()
-        self._is_circle = np.array([isinstance(o.shape, Circle) for o in self.obstacles], dtype=np.bool_)
-        self._edges = np.hstack([np.zeros((4, 0)), *(o.shape.edges_m for o in self.obstacles)])
-        edge_counts = [o.shape.edges_m.shape[1] for o in self.obstacles]
-        self._edge_owner: IntArray = np.repeat(
-            np.arange(len(edge_counts)), np.array(edge_counts, dtype=np.intp)
-        )
+        stands = np.array([o.stands_for_ever for o in self.obstacles], dtype=np.bool_)
+        self._standing, self._changing = np.flatnonzero(stands), np.flatnonzero(~stands)
+        self._motions = _Motions.of(self.obstacles[index] for index in self._changing.tolist())
+        self._tree = _tree(self._boxes[:, self._standing])
 
     @classmethod
     def from_scenario(cls, scenario: Scenario) -> World:
@@ -151,7 +153,7 @@ class World:
             obstacles.append(Obstacle(shape, each.velocity_mps or (0.0, 0.0), each.active_s))
         return cls(obstacles, scenario.area.bounds_m)
 
-    @property
+    @cached_property
     def max_obstacle_speed_mps(self) -> float:
         """Speed of the fastest obstacle.
 
@@ -170,12 +172,14 @@ class World:
 
     def clearance_at(self, east_m: float, north_m: float, time_s: float) -> float:
         """`clearance` of one point, in metres."""
-        gaps = self._gaps(east_m, north_m, time_s)
         point, time = np.array([[east_m, north_m]]), np.array([time_s])
         best = math.inf
-        while len(gaps) and gaps[nearest := int(gaps.argmin())] < best:
-            best = min(best, float(self.obstacles[nearest].distance(point, time)[0]))
-            gaps[nearest] = math.inf
+        for index in self._nearest(east_m, north_m, 0.0):
+            best = min(best, float(self.obstacles[index].distance(point, time)[0]))
+        if len(self._changing):
+            gaps = self._motions.gaps(self._boxes[:, self._changing], east_m, north_m, time_s)
+            for index in self._changing[gaps <= best].tolist():
+                best = min(best, float(self.obstacles[index].distance(point, time)[0]))
         return best
 
     def clearance(self, points_m: FloatArray, times_s: FloatArray) -> FloatArray:
@@ -200,7 +204,7 @@ class World:
     def near(self, east_m: float, north_m: float, radius_m: float, time_s: float) -> tuple[int, ...]:
         """Indices of the obstacles there at a time that come within a radius of a point, in rising order."""
         point, time = np.array([[east_m, north_m]]), np.array([time_s])
-        close = np.flatnonzero(self._gaps(east_m, north_m, time_s) <= radius_m + _ROUNDING_M)
+        close = np.union1d(self._listed(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
         return tuple(i for i in close.tolist() if self.obstacles[i].distance(point, time)[0] <= radius_m)
 
     def surroundings(
@@ -212,47 +216,68 @@ class World:
         long as it stays in a smaller circle (a neighbour list; Verlet 1967, doi:10.1103/PhysRev.159.98).
         """
         middle, half_s = (start_s + stop_s) / 2, (stop_s - start_s) / 2
-        reach = radius_m + _ROUNDING_M + self._motions.speeds_mps * half_s
-        close = (self._gaps(east_m, north_m, middle) <= reach) & self._motions.present(start_s, stop_s)
-        circles = np.flatnonzero(close & self._is_circle)
-        edges = np.flatnonzero(close[self._edge_owner])
-        owners = self._edge_owner[edges]
-        ends = self._edges[:, edges] + np.tile(self._motions.shifts(middle)[:, owners], (2, 1))
+        listed = np.union1d(self._listed(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
+        obstacles = [self.obstacles[index] for index in listed.tolist()]
+        boxes, motions = self._boxes[:, listed], _Motions.of(obstacles)
+        reach = radius_m + _ROUNDING_M + motions.speeds_mps * half_s
+        close = (motions.gaps(boxes, east_m, north_m, middle) <= reach) & motions.present(start_s, stop_s)
+        is_circle = np.array([isinstance(o.shape, Circle) for o in obstacles], dtype=np.bool_)
+        circles, polygons = np.flatnonzero(close & is_circle), np.flatnonzero(close & ~is_circle)
+        edges_of = [obstacles[index].shape.edges_m for index in polygons.tolist()]
+        edges = np.hstack([np.zeros((4, 0)), *edges_of])
+        owners = np.repeat(polygons, np.array([each.shape[1] for each in edges_of], dtype=np.intp))
+        ends = edges + np.tile(motions.shifts(middle)[:, owners], (2, 1))
         edge_boxes = np.vstack(((ends[:2] + ends[2:]) / 2, np.abs(ends[2:] - ends[:2]) / 2, 0 * owners))
         within = _gaps(edge_boxes, east_m, north_m) <= reach[owners]
-        edges, owners = edges[within], owners[within]
         return Surroundings(
-            Faces(self._boxes[:, circles][[0, 1, 4]], self._edges[:, edges]),
-            self._motions.take(circles),
-            self._motions.take(owners),
+            Faces(boxes[:, circles][[0, 1, 4]], edges[:, within]),
+            motions.take(circles),
+            motions.take(owners[within]),
         )
 
-    def _gaps(self, east: float, north: float, time: float) -> FloatArray:
-        """(n,) lower bound of the distance to each obstacle, there or not; for a circle the distance."""
-        boxes = self._boxes
-        if self._motions.matter:
-            boxes = np.vstack((boxes[:2] + self._motions.shifts(time), boxes[2:]))
-        return _gaps(boxes, east, north)
+    def _listed(self, east: float, north: float, reach: float) -> IntArray:
+        """Indices of the standing obstacles that may come within a reach of a point, and some more."""
+        import shapely
+
+        corners = east - reach, north - reach, east + reach, north + reach
+        listed: IntArray = self._standing[self._tree.query(shapely.box(*corners))]
+        return listed
+
+    def _nearest(self, east: float, north: float, slack: float) -> list[int]:
+        """Indices of the standing obstacles that may be the nearest one to a point within a slack of a place."""
+        import shapely
+
+        if not len(self._standing):
+            return []
+        probe = self.obstacles[self._standing[self._tree.nearest(shapely.Point(east, north))]]
+        nearest = float(probe.distance(np.array([[east, north]]), np.zeros(1))[0])
+        listed = self._listed(east, north, max(nearest, 0.0) + 2.0 * slack + _ROUNDING_M)
+        return [int(index) for index in listed]
 
     def _block_clearance(self, points: FloatArray, times: FloatArray) -> FloatArray:
         """`clearance` for finite rows near one another."""
         low, high = points.min(axis=0), points.max(axis=0)
         (east, north), half_m = ((low + high) / 2).tolist(), math.hypot(*(high - low)) / 2
-        start, stop = float(times.min()), float(times.max())
-        middle, half_s = (start + stop) / 2, (stop - start) / 2
-        # Between the middle and any row, the distance to an obstacle changes by no more than this.
-        slack = half_m + self._motions.speeds_mps * half_s
-        gaps = self._gaps(east, north, middle) - slack
-        bound = math.inf
-        steady = np.flatnonzero(self._motions.present_throughout(start, stop))
-        if len(steady):
-            probe = int(steady[gaps[steady].argmin()])
-            nearest = self.obstacles[probe].distance(np.array([[east, north]]), np.array([middle]))[0]
-            bound = nearest + slack[probe] + _ROUNDING_M
         result = np.full(len(points), math.inf)
-        for index in np.flatnonzero((gaps <= bound) & self._motions.present(start, stop)).tolist():
+        for index in self._nearest(east, north, half_m):
             np.minimum(result, self.obstacles[index].distance(points, times), out=result)
+        if len(self._changing):
+            start, stop = float(times.min()), float(times.max())
+            gaps = self._motions.gaps(self._boxes[:, self._changing], east, north, (start + stop) / 2)
+            gaps -= half_m + self._motions.speeds_mps * (stop - start) / 2
+            near = (gaps <= result.max() + _ROUNDING_M) & self._motions.present(start, stop)
+            for index in self._changing[near].tolist():
+                np.minimum(result, self.obstacles[index].distance(points, times), out=result)
         return result
+
+
+def _tree(boxes: FloatArray) -> STRtree:
+    """The bounds of rounded boxes (5, n), to be asked for those near a place."""
+    import shapely
+
+    east, north, half_width, half_height, rounding = boxes
+    width, height = half_width + rounding, half_height + rounding
+    return shapely.STRtree(shapely.box(east - width, north - height, east + width, north + height))
 
 
 def _gaps(boxes: FloatArray, east: float, north: float) -> FloatArray:

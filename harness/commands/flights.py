@@ -176,7 +176,9 @@ def bench(
     scenario: Annotated[
         str,
         typer.Argument(
-            metavar="[SCENARIO]", help="A file or shipped name; or the word tracking.", show_default=True
+            metavar="[SCENARIO]",
+            help="A file or shipped name; or the word tracking or worlds.",
+            show_default=True,
         ),
     ] = "paper_circles",
     aircraft: Annotated[
@@ -185,19 +187,28 @@ def bench(
     seeds: Annotated[
         int | None, typer.Option(metavar="N", min=1, help="With tracking: courses a case. Default: 20.")
     ] = None,
+    most: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=10, help="With worlds: no more obstacles. Default: 100000."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> int:
     """What the loop costs on this machine against bare JSBSim, block by block.
 
     `bench tracking` measures how close an aircraft stays to random courses of 14 turns in calm air, wind and
     turbulence, the worst of all courses of a case; its exit status is 1 if that is more than promised.
+    `bench worlds` measures the same flight in worlds of 10 to 100,000 obstacles at one density.
 
     For example: wayproof bench aerosonde_forest --json
     """
+    if most and scenario != "worlds":
+        raise typer.BadParameter("--most goes with `bench worlds`")
     if scenario == "tracking":
         return bench_tracking(aircraft or "aerosonde", seeds or 20, as_json)
     if aircraft or seeds:
         raise typer.BadParameter("--aircraft and --seeds go with `bench tracking`")
+    if scenario == "worlds":
+        return bench_worlds(most, as_json)
     loaded = load(scenario)
 
     from aircraft.airframes import AircraftError
@@ -233,6 +244,20 @@ def bench_tracking(name: str, seeds: int, as_json: bool) -> int:
         title = f"{result['aircraft']} at {result['airspeed_mps']:g} m/s, worst of {seeds} courses a case"
         print_grid(title, *tracking_rows(result))
     return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
+
+
+def bench_worlds(most: int | None, as_json: bool) -> int:
+    """The table of what the number of obstacles costs."""
+    from harness import bench_worlds as worlds
+    from harness.terminal import print_grid, step_bar, world_rows
+
+    with step_bar() as report:
+        result = worlds.bench_worlds(most or worlds.COUNTS[-1], report)
+    if as_json:
+        print_json({"worlds": result})
+    else:
+        print_grid("the same flight in worlds of one density", *world_rows(result))
+    return 0
 
 
 def _default_folder(scenario: Scenario) -> Path:

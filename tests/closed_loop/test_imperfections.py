@@ -52,11 +52,11 @@ def test_is_reached_and_safe(
 def test_a_late_scan_and_a_late_plan_take_effect_late(
     small_world: SmallWorld, flown_by_point_mass: FlyPointMass
 ) -> None:
-    late = small_world(*WORLD, sensor={"latency_s": 0.75}, planner={"compute_latency_s": 0.5})
+    late = small_world(*WORLD, sensor={"latency_s": 0.7}, planner={"compute_latency_s": 0.5})
     at_once = small_world(*WORLD)
     assert flown_by_point_mass(at_once).plans[0].time_s == 0.0
     first = flown_by_point_mass(late).plans[0]
-    assert first.time_s == 1.25
+    assert first.time_s == 1.2
 
 
 def test_noise_is_that_of_the_seed(small_world: SmallWorld, flown_by_point_mass: FlyPointMass) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions
 from harness import run
@@ -89,7 +90,7 @@ def test_collision_ends_the_flight_at_the_edge(
     assert metrics["reason"].startswith("inside an obstacle by ")
     track = flown_by_point_mass(scenario).track
     assert (track.clearance_m[:-1] >= 0.0).all()
-    assert -25.0 * 0.05 - 0.1 <= track.clearance_m[-1] < 0.0
+    assert -25.0 / UPDATE_RATE_HZ - 0.1 <= track.clearance_m[-1] < 0.0
 
 
 def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(
@@ -106,8 +107,8 @@ def test_leaving_the_area(fly: Fly, answering: Install, small_world: SmallWorld)
     answering(straight_on)
     status, metrics = fly(small_world(planner={"kind": "stand_in"}, mission={"course_deg": 270.0}))
     assert (status, metrics["outcome"]) == (1, "out_of_bounds")
-    assert metrics["reason"] == "left the area at (-1, 300) m"
-    assert metrics["flight_time_s"] == pytest.approx(300.0 / 25.0, abs=0.06)
+    assert metrics["reason"] == "left the area at (-2, 300) m"
+    assert metrics["flight_time_s"] == pytest.approx(300.0 / 25.0, abs=0.11)
 
 
 def test_timeout(fly: Fly, small_world: SmallWorld) -> None:

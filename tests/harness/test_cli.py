@@ -328,6 +328,8 @@ def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[
     [
         (["bench", "paper_circles", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
         (["bench", "tracking", "--aircraft", "kite"], "unknown aircraft 'kite'"),
+        (["bench", "worlds", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
+        (["bench", "paper_circles", "--most", "100"], "--most goes with `bench worlds`"),
     ],
 )
 def test_bench_refuses_what_makes_no_sense(
@@ -335,6 +337,14 @@ def test_bench_refuses_what_makes_no_sense(
 ) -> None:
     assert main(arguments) == 2
     assert said in capsys.readouterr().err
+
+
+def test_bench_worlds_prints_a_row_a_world(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "worlds", "--most", "10"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2].startswith(" obstacles   load s")
+    assert lines[4].split()[0] == "10"
+    assert len(lines[4].split()) == 7
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

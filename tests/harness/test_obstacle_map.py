@@ -31,8 +31,8 @@ SEEDS = st.integers(0, 2**32 - 1)
 Edit = Callable[[int, FloatArray], None]
 
 
-def empty_map() -> ObstacleMap:
-    return ObstacleMap(BOUNDS, CLEARANCE, RANGE)
+def empty_map(doubtful: bool = True) -> ObstacleMap:
+    return ObstacleMap(BOUNDS, CLEARANCE, RANGE, doubtful=doubtful)
 
 
 def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
@@ -59,8 +59,8 @@ def scans(
     return [eye.scan(*place, heading_rad, start_s + 0.5 * i) for i, place in enumerate(places)]
 
 
-def fed(*sequences: list[RangeScan]) -> ObstacleMap:
-    seen = empty_map()
+def fed(*sequences: list[RangeScan], doubtful: bool = True) -> ObstacleMap:
+    seen = empty_map(doubtful)
     for scan in (scan for sequence in sequences for scan in sequence):
         seen.update(scan)
     return seen
@@ -144,6 +144,15 @@ def test_edges_of_lone_obstacles_lie_on_them() -> None:
     points = edges(fed(scans(sensor(world), on_circle(40))))
     assert len(points) > 30
     assert np.abs(distance_to(world, points)).max() < 0.5 * SPACING
+
+
+def test_a_sensor_that_returns_nothing_false_is_believed_at_once() -> None:
+    eye = sensor(world_of(WALL))
+    first, second = scans(eye, [MIDDLE, MIDDLE])
+    at_once, later = fed([first], doubtful=False), fed([first, second])
+    assert len(edges(at_once)) > 0
+    assert cells(edges(at_once)) == cells(edges(later))
+    assert at_once.revision == 1
 
 
 def test_a_wall_is_known_at_the_second_look() -> None:
@@ -233,12 +242,13 @@ def test_range_noise_leaves_walls_where_they_are() -> None:
     assert np.diff(np.sort(edges(seen)[:, 0])).max() < 2.0 * SPACING
 
 
-def test_an_obstacle_that_has_gone_is_forgotten() -> None:
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_an_obstacle_that_has_gone_is_forgotten(doubtful: bool) -> None:
     gone = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 30.0))
     stays = Obstacle(Circle((5000.0, 3500.0), 400.0))
     eye = sensor(World([gone, stays], BOUNDS))
     there = scans(eye, on_circle(60))
-    seen = fed(there)
+    seen = fed(there, doubtful=doubtful)
     assert (edges(seen)[:, 1] > 5500.0).sum() > 10
     kept = edges(seen)[edges(seen)[:, 1] < 4500.0]
     for scan in scans(eye, on_circle(60) * 4, start_s=31.0):
@@ -249,10 +259,11 @@ def test_an_obstacle_that_has_gone_is_forgotten() -> None:
     assert seen.taken_back_at > 0
 
 
-def test_an_obstacle_that_moves_leaves_no_trail() -> None:
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_an_obstacle_that_moves_leaves_no_trail(doubtful: bool) -> None:
     world = World([Obstacle(Circle((3500.0, 6500.0), 400.0), velocity_mps=(10.0, 0.0))], BOUNDS)
     taken = scans(sensor(world), on_circle(80) * 8)
-    seen = fed(taken)
+    seen = fed(taken, doubtful=doubtful)
     time = taken[-1].time_s
     points = edges(seen)
     off = np.abs(world.clearance(points, np.full(len(points), time)))
@@ -261,11 +272,12 @@ def test_an_obstacle_that_moves_leaves_no_trail() -> None:
     assert off.max() < 3.0 * 180.0
 
 
-def test_what_comes_back_is_an_edge_again_and_only_once() -> None:
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_what_comes_back_is_an_edge_again_and_only_once(doubtful: bool) -> None:
     comes_and_goes = [
         Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(200.0 * i, 200.0 * i + 60.0)) for i in range(4)
     ]
-    eye, seen = sensor(World(comes_and_goes, BOUNDS)), empty_map()
+    eye, seen = sensor(World(comes_and_goes, BOUNDS)), empty_map(doubtful)
     for i in range(4):
         for scan in scans(eye, on_circle(60), 200.0 * i):
             seen.update(scan)

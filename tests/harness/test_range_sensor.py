@@ -294,3 +294,34 @@ def test_a_scan_cannot_be_changed_and_keeps_no_array_of_others() -> None:
     copied = dataclasses.replace(scan, ranges_m=given_m)
     given_m[0] = 9.0
     assert copied.ranges_m.tolist() == [1.0, 2.0, 3.0]
+
+
+@given(st.integers(0, 10_000), st.sampled_from([360.0, 90.0]))
+@settings(deadline=None, max_examples=40)
+def test_no_return_is_nearer_than_the_scan_says_before_its_rays_are_followed(seed: int, field: float) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
+    scan = sensor(world, field_of_view_deg=field).scan(0.0, 0.0, rng.uniform(0.0, math.tau), 0.0)
+    nearest = scan.nearest_m
+    least = float(scan.ranges_m.min())
+    assert nearest <= least + 1e-6
+    if field == 360.0 and least < math.inf:
+        assert nearest > 0.95 * least - 1.0
+    assert dataclasses.replace(scan, ranges_m=scan.ranges_m + 5.0).nearest_m == least + 5.0
+
+
+def test_a_scan_that_is_read_late_shows_the_time_at_which_it_was_taken() -> None:
+    moving = Obstacle(Circle((0.0, 500.0), 100.0), velocity_mps=(0.0, 10.0))
+    eye = sensor(World([moving], BOUNDS), rays=3)
+    early = eye.scan(0.0, 0.0, 0.0, 0.0)
+    eye.scan(0.0, 0.0, 0.0, 20.0).ranges_m.sum()
+    assert early.ranges_m[1] == pytest.approx(400.0)
+
+
+def test_flaws_are_drawn_as_scans_are_taken_not_as_they_are_read() -> None:
+    eyes = [sensor(EMPTY, false_return=0.5) for _ in range(2)]
+    first, second = (eyes[0].scan(0.0, 0.0, 0.0, time) for time in (0.0, 0.5))
+    late = second.ranges_m.tolist(), first.ranges_m.tolist()
+    at_once = [eyes[1].scan(0.0, 0.0, 0.0, time).ranges_m.tolist() for time in (0.0, 0.5)]
+    assert late == (at_once[1], at_once[0])
+    assert first.nearest_m == min(at_once[0])

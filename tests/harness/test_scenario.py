@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
-from harness import planner_keys
 from harness.scenario import (
     Scenario,
     dump_scenario,
@@ -96,9 +95,8 @@ def test_mission_of_tells_the_planner_what_the_scenario_says() -> None:
 
 def test_the_planners_config_is_complete_and_resolved() -> None:
     scenario = parse_scenario(WITH_PLANNER)
-    config = planner_keys.config_of(scenario.planner)
-    wanted = planner_kinds()["rolling_window"].config(candidates=9).resolved(mission_of(scenario))
-    assert config == wanted
+    config = planner_kinds()["rolling_window"].config
+    assert config(**scenario.planner.own) == config(candidates=9).resolved(mission_of(scenario))
 
 
 def test_numbers_are_those_of_yaml_1_2() -> None:
