@@ -28,6 +28,7 @@ COMMANDS = (
     "fly",
     "check",
     "compare",
+    "falsify",
     "validate",
     "schema",
     "list",
