@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.campaign_runs import IntArray
+from harness.campaign_table import IntArray
 
 MOST_NUMBERS: Final = 8
 """A key with more different numbers is taken as drawn at random."""

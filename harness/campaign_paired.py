@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from harness.campaign_runs import RESULTS, Runs
+from harness.campaign_table import RESULTS, Runs
 from harness.record import FloatArray
 from harness.strict_yaml import InputError
 

@@ -39,7 +39,7 @@ def report(
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
     """
-    from harness.campaign_runs import RESULTS
+    from harness.campaign_table import RESULTS
     from harness.record import RunFolderError
     from harness.run_report import write_report
 

@@ -27,10 +27,11 @@ from tests.page import shown
 
 SCHEMA = pa.schema(
     [(name, pa.int64()) for name in ("run", "case", "seed")]
-    + [(name, pa.string()) for name in ("scenario", "world", "planner", "aircraft", "outcome", "reason")]
-    + [("environment.wind.speed_mps", pa.float64()), ("sensor.rays", pa.int64()), ("error", pa.string())]
+    + [(name, pa.string()) for name in ("scenario", "world", "planner", "aircraft")]
+    + [("environment.wind.speed_mps", pa.float64()), ("sensor.rays", pa.int64())]
+    + [(name, pa.string()) for name in ("outcome", "reason", "error")]
     + [(name, pa.float64()) for name in ("flown_length_m", "min_clearance_m", "clearance_violation_s")]
-    + [("cross_track_m.p95", pa.float64()), ("trackable", pa.bool_())]
+    + [("cross_track_m.p95", pa.float64()), ("trackability.legs", pa.int64()), ("trackable", pa.bool_())]
     + [("optimum_m", pa.float64()), ("length_ratio", pa.float64()), ("wanted_clearance_m", pa.float64())]
 )
 WIND = "environment.wind.speed_mps"
@@ -56,6 +57,7 @@ def row(run: int, outcome: str = "reached", /, **other: Any) -> dict[str, Any]:
         "min_clearance_m": 100.0 if flown else None,
         "clearance_violation_s": 0.0 if flown else None,
         "cross_track_m.p95": 0.1 if flown else None,
+        "trackability.legs": 3 if flown else None,
         "trackable": True if flown else None,
         "optimum_m": 1000.0,
         "length_ratio": 1.1 if outcome == "reached" else None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,12 +91,10 @@ def load_tables(folder: Path) -> tuple[pa.Table, pa.Table | None]:
 
 
 def varied_keys(results: pa.Table) -> list[str]:
-    """Columns that say what was varied: key paths of a scenario, and names with more than one value."""
-    from harness.scenario import Scenario
-
+    """Columns that say what was varied: names with more than one value, and the key paths before `outcome`."""
+    before = itertools.takewhile(lambda name: name != "outcome", results.column_names)
     names = [name for name in NAMED if name in results.column_names and len(results[name].unique()) > 1]
-    paths = [name for name in results.column_names if "." in name]
-    return names + [name for name in paths if name.split(".")[0].split("[")[0] in Scenario.model_fields]
+    return names + [name for name in before if name not in (*NAMED, "run", "case", "seed")]
 
 
 def runs_of(results: pa.Table, timings: pa.Table | None, keys: Sequence[str]) -> Runs:
