@@ -13,9 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from harness.campaign_table import RESULTS, Runs
+from harness.campaign_table import Runs
 from harness.record import FloatArray
-from harness.strict_yaml import InputError
 
 CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 9999
@@ -66,25 +65,23 @@ class Duel:
     length: Estimate
 
 
-def duels(runs: Runs) -> tuple[Duel, ...]:
+def duels(runs: Runs) -> tuple[tuple[Duel, ...], tuple[str, ...]]:
     """Every planner against every other, in the order in which they first appear.
 
-    Raises:
-        InputError: a planner flew a case twice with the same aircraft.
+    Returns:
+        The pairs; and the planners that are in none because they flew a case more than once with the same
+        aircraft, as one does that is named twice with different keys.
     """
     flown: dict[str, dict[tuple[int, str], int]] = {}
+    unpaired: dict[str, None] = {}
     for row, (planner, aircraft) in enumerate(
         zip(runs.names["planner"], runs.names["aircraft"], strict=True)
     ):
         case = int(runs.case[row]), aircraft
-        before = flown.setdefault(planner, {}).setdefault(case, row)
-        if before != row:
-            raise InputError(
-                f"wayproof: {RESULTS}: runs {runs.run[before]} and {runs.run[row]} are both case {case[0]} of "
-                f"{planner} with {aircraft}; a case is flown once"
-            )
-    pairs = itertools.combinations(flown, 2)
-    return tuple(_duel(runs, first, second, flown) for first, second in pairs)
+        if flown.setdefault(planner, {}).setdefault(case, row) != row:
+            unpaired[planner] = None
+    pairs = itertools.combinations([planner for planner in flown if planner not in unpaired], 2)
+    return tuple(_duel(runs, first, second, flown) for first, second in pairs), tuple(unpaired)
 
 
 def _duel(runs: Runs, first: str, second: str, flown: Mapping[str, Mapping[tuple[int, str], int]]) -> Duel:

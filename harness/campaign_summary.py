@@ -130,6 +130,7 @@ class Summary:
         lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
         worst: collisions first, then other failures, then what came closest to an obstacle.
         duels: planners on the same cases.
+        unpaired: planners that are in no duel, because they flew a case more than once with one aircraft.
     """
 
     name: str
@@ -141,6 +142,7 @@ class Summary:
     lengths: Mapping[str, tuple[float, ...]]
     worst: tuple[WorstRun, ...]
     duels: tuple[Duel, ...]
+    unpaired: tuple[str, ...]
 
 
 def summarise(
@@ -164,6 +166,7 @@ def summarise(
             raise InputError(f"wayproof: --by {','.join(each)}: must be one key, or two different ones")
     asked = dict.fromkeys([*keys, *itertools.chain(*chosen), *NAMED])
     runs = runs_of(results, timings, list(asked))
+    pairs, unpaired = duels(runs)
     singles = dict.fromkeys(itertools.chain(*chosen))
     return Summary(
         name=folder.resolve().name,
@@ -174,7 +177,8 @@ def summarise(
         curves=tuple(table(runs, [key, "planner"]) for key in singles if key != "planner"),
         lengths=_lengths(runs),
         worst=_worst(runs, folder, keys),
-        duels=duels(runs),
+        duels=pairs,
+        unpaired=unpaired if len(set(runs.names["planner"])) > 1 else (),
     )
 
 

@@ -174,10 +174,13 @@ def test_rows_that_share_no_case_make_no_pair(tmp_path: Path) -> None:
     assert (duel.pairs, duel.success.value, duel.length.value) == (0, None, None)
 
 
-def test_a_case_flown_twice_is_refused(tmp_path: Path) -> None:
-    rows = [row(0), row(7, case=0)]
-    with pytest.raises(InputError, match="runs 0 and 7 are both case 0 of rolling_window with aerosonde"):
-        summarise(campaign(tmp_path, rows))
+def test_a_planner_that_flew_a_case_twice_is_not_paired(tmp_path: Path) -> None:
+    rows = [row(0), row(1, case=0), row(2, case=0, planner="bug2"), row(3, case=0, planner="bug1")]
+    summary = summarise(campaign(tmp_path, rows))
+    assert summary.unpaired == ("rolling_window",)
+    assert [(duel.first, duel.second, duel.pairs) for duel in summary.duels] == [("bug2", "bug1", 1)]
+    page = write_summary(summary, tmp_path).read_text()
+    assert "rolling_window flew some cases more than once" in page
 
 
 def test_the_bootstrap_interval_is_that_of_the_binomial_where_it_is_known() -> None:
