@@ -174,7 +174,10 @@ def _columns(figures: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _margin(scenario: Scenario, figures: Mapping[str, Any], until: Until) -> float:
-    """How far a flight was from failing: the least of its room to obstacles, its time left and its track, 0 to 1."""
+    """How far a flight was from failing, 0 to 1: the mean of its time left, its room to obstacles and its track.
+
+    The mean, for the least of them is often the room, which a good planner keeps the same.
+    """
     margins = [1.0 - figures["flight_time_s"] / (scenario.mission.time_limit_s or 1.0)]
     clearance_m, wanted_m = figures["min_clearance_m"], scenario.planner.clearance_m or 1.0
     if clearance_m is not None:
@@ -182,7 +185,7 @@ def _margin(scenario: Scenario, figures: Mapping[str, Any], until: Until) -> flo
     off_m = figures["cross_track_m"]["max"]
     if until == "untrackable" and off_m is not None:
         margins.append(1.0 - off_m / (scenario.trackability.cross_track_m or 1.0))
-    return float(min(max(min(margins), 0.0), 1.0))
+    return sum(min(max(float(each), 0.0), 1.0) for each in margins) / len(margins)
 
 
 def _breaking(

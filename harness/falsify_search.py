@@ -229,8 +229,10 @@ def _taken_back(tries: _Tries, tolerance: float) -> None:
         for key in sorted(range(len(before)), key=lambda each: -before[each]):
             assert point is not None
             milder = tries.snapped(_with(point, key, max(0.0, point[key] - tolerance)))
-            if rounds == 0 or (milder != point and tries.verdict(milder).failed):
+            if rounds == 0:
                 point = _least(tries, point, key, tolerance)
+            elif milder != point and tries.verdict(milder).failed:
+                point = _least(tries, milder, key, tolerance)
         if rounds > 0 and point == before:
             return
 
