@@ -118,7 +118,7 @@ QUESTIONS = (
     Question(
         "Clearance",
         "Least distance to an obstacle edge in m; share of the runs that were ever below the wanted one",
-        "clear m, <",
+        "clear m",
         lambda cell: (
             f"{_clearance(cell)} m, {percent(cell.below_wanted)} below"
             if cell.below_wanted is not None

@@ -16,6 +16,7 @@ NAME_WIDTH = 16
 """A longer label goes on in the next line."""
 
 SHOWN_WORST = 5
+LEGEND = "length: median/p95; clear: least, runs below the wanted; planner: p50/p99/max"
 
 
 def print_summary(summary: Summary, all_tables: bool = False) -> None:
@@ -38,6 +39,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         grid = _columns("")
         grid.add_row("all runs", *_cells(summary.total))
         console.print(grid, width=width)
+    console.print(f" {LEGEND}", style="dim", highlight=False, width=width)
     for duel in summary.duels:
         console.print(
             f"{escape(duel.first)} against {escape(duel.second)}, {duel.pairs} pairs: reached "
