@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -64,7 +65,7 @@ class Runs:
         """Number of runs."""
         return len(self.run)
 
-    @property
+    @cached_property
     def reached(self) -> NDArray[np.bool_]:
         """Whether each run reached its goal."""
         return np.array([outcome == "reached" for outcome in self.names["outcome"]], dtype=bool)
