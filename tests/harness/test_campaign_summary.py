@@ -352,3 +352,9 @@ def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: 
         seen = shown(chromium, page, width_px)
         assert (seen.said, seen.asked_for, seen.overflow_px) == ((), (), 0)
         assert (seen.figures, seen.missing) == (len(summary.curves) + 1, 0)
+
+
+def test_an_inner_edge_belongs_to_the_group_above() -> None:
+    axis, index = grouped("key", [float(value) for value in range(9)])
+    assert axis.edges == (0.0, 2.0, 4.0, 6.0, 8.0)
+    assert index.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 3]
