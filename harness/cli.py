@@ -16,6 +16,7 @@ import typer
 from harness.commands.check import check
 from harness.commands.envelope import envelope
 from harness.commands.export import export
+from harness.commands.falsify import falsify
 from harness.commands.flights import bench, compare, fly
 from harness.commands.formats import list_names, schema, validate
 from harness.commands.options import BAD_INPUT, FAILED, Command, Group, flag
@@ -26,7 +27,7 @@ from harness.signals import taken_as_interrupt
 INTERRUPTED: Final = 130
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
-for command in (fly, check, compare, sweep, validate, schema, view, report, export, bench, envelope):
+for command in (fly, check, compare, sweep, falsify, validate, schema, view, report, export, bench, envelope):
     app.command(cls=Command)(command)
 app.command("list", cls=Command)(list_names)
 

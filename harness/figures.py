@@ -114,7 +114,7 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 
 def overview(scene: Scene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
-    with _styled(_map_height_in(scene) + LEGEND_ROW_IN * math.ceil((3 + len(runs)) / 2)) as figure:
+    with styled(_map_height_in(scene) + LEGEND_ROW_IN * math.ceil((3 + len(runs)) / 2)) as figure:
         axes = figure.add_subplot()
         legend = _map(axes, scene)
         for index, run in runs:
@@ -137,7 +137,7 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
     row = run.planned.tightest
     below_in = [] if row is None else [CLOSE_UP_IN]
     map_in = _map_height_in(scene)
-    with _styled(map_in + sum(below_in) + 3 * LEGEND_ROW_IN) as figure:
+    with styled(map_in + sum(below_in) + 3 * LEGEND_ROW_IN) as figure:
         rows = figure.add_gridspec(1 + len(below_in), 2, height_ratios=[map_in, *below_in])
         axes = figure.add_subplot(rows[0, :])
         legend = _map(axes, scene)
@@ -156,7 +156,7 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
 
 def profiles(scene: Scene, runs: Numbered) -> Figure:
     """Curvature and cross-track error along the way, two strips a planner."""
-    with _styled(0.9 + 2.1 * len(runs)) as figure:
+    with styled(0.9 + 2.1 * len(runs)) as figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
         for place, (index, run) in enumerate(runs):
             bend, cross = strips[2 * place], strips[2 * place + 1]
@@ -165,13 +165,13 @@ def profiles(scene: Scene, runs: Numbered) -> Figure:
             flown = _flown_curvature(run.track) * scene.turn_radius_m
             most = float(np.nanmax(np.abs(planned), initial=0.0))
             bend.plot(*_extremes(distance, planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
-            bend.plot(*_extremes(distance, flown), color=_colour(index), lw=0.9, label="flown")
+            bend.plot(*_extremes(distance, flown), color=colour(index), lw=0.9, label="flown")
             _limits(bend, flown)
             bend.set_ylabel("curvature · R")
-            bend.set_title(run.planner, loc="left", color=_colour(index))
+            bend.set_title(run.planner, loc="left", color=colour(index))
             bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
             cross.axhline(0.0, color="0.8", lw=0.6)
-            cross.plot(*_extremes(distance, run.track.cross_track_m), color=_colour(index), lw=0.9)
+            cross.plot(*_extremes(distance, run.track.cross_track_m), color=colour(index), lw=0.9)
             cross.set_ylabel("cross-\ntrack, m")
         strips[-1].set_xlabel("distance flown, km")
         figure.align_ylabels()
@@ -198,7 +198,8 @@ def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
 
 
 @contextmanager
-def _styled(height_in: float) -> Iterator[Figure]:
+def styled(height_in: float) -> Iterator[Figure]:
+    """A figure in our style, as wide as all of them."""
     with mpl.rc_context(STYLE):
         yield Figure(figsize=(WIDTH_IN, height_in), layout="compressed")
 
@@ -257,14 +258,14 @@ def _outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
 def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
     """Draws a track and the place of its tightest planned turn; the first planner's lies on top."""
     points = _thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
-    style: dict[str, Any] = {"color": _colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
+    style: dict[str, Any] = {"color": colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
     if run.outcome != "reached":
-        axes.plot(*points[-1] / 1e3, "X", color=_colour(index), ms=7, mec="white", mew=0.6, zorder=7)
+        axes.plot(*points[-1] / 1e3, "X", color=colour(index), ms=7, mec="white", mew=0.6, zorder=7)
     row = run.planned.tightest
     if row is not None:
         place = run.planned.east_m[row] / 1e3, run.planned.north_m[row] / 1e3
-        axes.plot(*place, "o", mfc="none", mec=_colour(index), mew=1.2, ms=9, zorder=8)
+        axes.plot(*place, "o", mfc="none", mec=colour(index), mew=1.2, ms=9, zorder=8)
     return line
 
 
@@ -297,12 +298,12 @@ def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> 
             axes.add_patch(_outline(obstacle, grown, **style))
     planned = np.column_stack((run.planned.east_m, run.planned.north_m))
     flown = np.column_stack((run.track.east_m, run.track.north_m))
-    for points, colour, width, dashes in (
-        (flown, _colour(index), 1.8, "-"),
+    for points, ink, width, dashes in (
+        (flown, colour(index), 1.8, "-"),
         (planned, "black", 0.9, PLANNED_DASHES),
     ):
         near = (np.abs(points - middle) < 2 * half).all(axis=1)
-        axes.plot(*np.where(near[:, None], points, np.nan).T / 1e3, color=colour, lw=width, ls=dashes)
+        axes.plot(*np.where(near[:, None], points, np.nan).T / 1e3, color=ink, lw=width, ls=dashes)
     (east, north), half_km = middle / 1e3, half / 1e3
     axes.set(xlim=(east - half_km, east + half_km), ylim=(north - half_km, north + half_km), aspect="equal")
     axes.set_xticks([])
@@ -322,7 +323,7 @@ def _curvature_near(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: in
     along = distance[near] - distance[row]
     flown = (_flown_curvature(run.track) * scene.turn_radius_m)[near]
     planned = (run.planned.curvature_1pm * scene.turn_radius_m)[near]
-    axes.plot(along, flown, color=_colour(index), lw=1.5)
+    axes.plot(along, flown, color=colour(index), lw=1.5)
     axes.plot(along, planned, color="black", lw=0.9, ls=PLANNED_DASHES)
     _limits(axes, flown)
     most = float(np.nanmax(np.abs(planned), initial=0.0))
@@ -370,5 +371,6 @@ def _round_length_m(half_m: float) -> float:
     return float(max(step * size for step in (1, 2, 5) if step * size <= third))
 
 
-def _colour(index: int) -> str:
+def colour(index: int) -> str:
+    """Of a planner, by its number."""
     return COLOURS[index % len(COLOURS)]

@@ -63,7 +63,7 @@ def report_html(
         written: date and time.
         kinematic: a point flew instead of the aircraft.
     """
-    return _rendered(
+    return rendered(
         "comparison.html",
         chapters=chapters,
         command=command,
@@ -96,7 +96,7 @@ def run_html(
         platform: what it flew on.
         written: date and time of the flight.
     """
-    return _rendered(
+    return rendered(
         "run.html",
         chapter=chapter,
         row=chapter.rows[0],
@@ -111,7 +111,8 @@ def run_html(
     )
 
 
-def _rendered(template: str, **values: Any) -> str:
+def rendered(template: str, **values: Any) -> str:
+    """A page from one of our templates, with values by the names that it uses."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("harness"),
         autoescape=True,

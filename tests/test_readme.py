@@ -138,6 +138,22 @@ def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tm
         assert wayproof(command, tmp_path).returncode == 0
 
 
+def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
+    (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", README)
+    (shown,) = (block for block in blocks("text") if "mildest failure" in block)
+    searched = wayproof(command, tmp_path)
+    assert (searched.returncode, searched.stderr) == (0, "")
+    names = [line[:29].strip() for line in shown.splitlines()[2:5]]
+    assert [line[:29].strip() for line in searched.stdout.splitlines()[2:5]] == names
+    again, last = shown.splitlines()[-2:]
+    assert again in searched.stdout.splitlines()
+    assert searched.stdout.splitlines()[-1].startswith(last.partition("=")[0])
+    flown = wayproof(f"{again.removeprefix('again: wayproof ')} --no-recording --json --out again", tmp_path)
+    assert flown.returncode == 1
+    found = json.loads((tmp_path / "runs/aerosonde_forest/falsify/falsify.json").read_text())["found"]
+    assert json.loads(flown.stdout)["digest"] == found["digest"]
+
+
 def test_ones_own_planner_is_found_and_flown(tmp_path: Path) -> None:
     (planner,), (project,), (scenario,) = blocks("python"), blocks("toml"), blocks("yaml")
     assert len([line for line in planner.splitlines() if line.strip()]) < 30

@@ -25,21 +25,48 @@ def view(
 
 
 def report(
-    run: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="The folder of a complete run.")],
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN_DIR", help="The folder of a complete run, or of a campaign.")
+    ],
+    by: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY[,KEY]", help="Of a campaign: a table by these keys; can be repeated."),
+    ] = None,
 ) -> int:
-    """Writes report.html, one self-contained page, into a run folder.
+    """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
-    The figures are there as SVG and PNG too, the table as CSV and Markdown.
+    The figures of a run are there as SVG and PNG too, its table as CSV and Markdown.
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
     """
+    from harness.campaign_table import RESULTS
     from harness.record import RunFolderError
     from harness.run_report import write_report
 
+    if (run / RESULTS).is_file():
+        return _summary(run, by)
+    if by:
+        raise typer.BadParameter(
+            f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
+        )
     try:
         typer.echo(f"report: {write_report(run)}")
     except RunFolderError as error:
         raise bad_input(error) from error
+    return 0
+
+
+def _summary(folder: Path, by: Sequence[str] | None) -> int:
+    """The answers of a campaign once more, by other keys."""
+    from harness.campaign_report import write_summary
+    from harness.campaign_summary import summarise
+    from harness.campaign_terminal import print_summary
+
+    chosen = [[key.strip() for key in each.split(",")] for each in by] if by else None
+    summary = summarise(folder, by=chosen)
+    page = write_summary(summary, folder)
+    print_summary(summary, all_tables=by is not None)
+    typer.echo(f"summary: {page}")
     return 0
 
 

@@ -1,0 +1,70 @@
+"""Figures of a campaign: success against a varied key, and how long the ways were. Drawn without a screen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from harness.campaign_summary import CURVE_POINTS, Table
+from harness.figures import DASHES, colour, styled
+
+HEIGHT_IN = 2.9
+ROTATED_FROM = 5
+"""From so many groups on, their labels stand slanted."""
+
+
+def success(table: Table) -> Figure:
+    """Share of goals reached against the groups of a key, with Wilson intervals, a line for each planner."""
+    labels = table.rows.labels
+    planners = table.columns.labels if table.columns else ("",)
+    with styled(HEIGHT_IN) as figure:
+        axes = figure.add_subplot()
+        for index, planner in enumerate(planners):
+            own = [(place, cells[index]) for place, cells in enumerate(table.cells) if cells[index].runs]
+            shift = 0.12 * (index - (len(planners) - 1) / 2)
+            shares = [
+                (cell.success or 0.0, cell.success_low or 0.0, cell.success_high or 0.0) for _, cell in own
+            ]
+            value, low, high = 100.0 * np.array(shares).reshape(-1, 3).T
+            axes.errorbar(
+                [place + shift for place, _ in own],
+                value,
+                yerr=np.maximum([value - low, high - value], 0.0),
+                color=colour(index),
+                ls=DASHES[index % len(DASHES)] if table.rows.numeric else "",
+                marker="o",
+                ms=3.5,
+                lw=1.0,
+                capsize=2.5,
+                label=planner,
+            )
+        slanted = len(labels) > ROTATED_FROM or max(map(len, labels), default=0) > 16
+        axes.set_xticks(
+            range(len(labels)), labels, rotation=30 if slanted else 0, ha="right" if slanted else "center"
+        )
+        axes.set(xlim=(-0.5, len(labels) - 0.5), ylim=(-3, 103), xlabel=table.rows.key, ylabel="reached, %")
+        axes.grid(axis="y", color="0.9", lw=0.6)
+        _legend(figure, planners)
+    return figure
+
+
+def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
+    """Share of the goals reached with at most a length over the optimum, a line for each planner."""
+    shares = np.linspace(0.0, 100.0, CURVE_POINTS)
+    with styled(HEIGHT_IN) as figure:
+        axes = figure.add_subplot()
+        for index, (planner, ratios) in enumerate(curves.items()):
+            axes.plot(
+                ratios, shares, color=colour(index), ls=DASHES[index % len(DASHES)], lw=1.3, label=planner
+            )
+        axes.set(xlabel="flown length over the clairvoyant optimum", ylabel="share of goals reached, %")
+        axes.grid(color="0.9", lw=0.6)
+        _legend(figure, tuple(curves))
+    return figure
+
+
+def _legend(figure: Figure, planners: Sequence[str]) -> None:
+    if len(planners) > 1:
+        figure.legend(loc="outside lower center", ncols=3, frameon=False)

@@ -1,0 +1,82 @@
+"""The page and the file of a campaign's answers: `summary.html`, which needs nothing but itself, and `summary.json`."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from harness.campaign_questions import QUESTIONS, difference, percent, ratio, shade
+from harness.campaign_summary import Summary
+from harness.compare_rows import number
+from harness.report import Picture, rendered
+from harness.strict_yaml import InputError
+
+PAGE = "summary.html"
+PLAIN = "summary.json"
+SCHEMA = "wayproof/campaign-summary/1"
+
+
+def write_summary(summary: Summary, folder: Path) -> Path:
+    """Writes the page and the same answers as JSON into a campaign's folder; returns the path of the page.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    page = folder / PAGE
+    try:
+        _replace(folder / PLAIN, json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
+        _replace(page, summary_html(summary))
+    except OSError as error:
+        raise InputError(
+            f"wayproof: cannot write the summary in {folder}: {error.strerror or error}"
+        ) from error
+    return page
+
+
+def plain(summary: Summary) -> dict[str, Any]:
+    """The content of `summary.json`."""
+    return {"schema": SCHEMA, **asdict(summary)}
+
+
+def summary_html(summary: Summary) -> str:
+    """The text of `summary.html`."""
+    return rendered(
+        "campaign.html",
+        summary=summary,
+        questions=QUESTIONS,
+        pictures=list(_pictures(summary)) if summary.total.runs else [],
+        difference=difference,
+        ratio=ratio,
+        percent=percent,
+        number=number,
+        shade=shade,
+    )
+
+
+def _pictures(summary: Summary) -> Iterator[Picture]:
+    from harness import campaign_figures
+    from harness.figures import svg
+
+    for table in summary.curves:
+        yield Picture(
+            svg(campaign_figures.success(table)),
+            f"Share of goals reached against {table.rows.key}",
+            f"Goals reached against {table.rows.key}, with Wilson's 95 % intervals.",
+        )
+    if summary.lengths:
+        yield Picture(
+            svg(campaign_figures.lengths(summary.lengths)),
+            "Distribution of the flown length over the clairvoyant optimum",
+            "How long the ways were: the share of the goals reached with at most this length over the optimum.",
+        )
+
+
+def _replace(path: Path, text: str) -> None:
+    """Writes a file so that it is either the old one or the whole new one."""
+    partial = path.with_name(f"{path.name}.partial")
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, path)

@@ -1,0 +1,150 @@
+"""The command `falsify`: the mildest condition that makes a run fail."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+import typer
+
+from harness.commands import options
+from harness.commands.options import JsonOption, ScenarioArgument, bad_input, load, print_json, setting
+
+if TYPE_CHECKING:
+    from harness.falsify import Until
+    from harness.scenario import Scenario
+
+RUNS_A_KEY: Final = 40
+
+
+def falsify(
+    scenario: ScenarioArgument,
+    vary: Annotated[
+        list[str],
+        typer.Option(metavar="KEY.PATH=LO:HI", help="From the mild end LO to HI; can be repeated."),
+    ],
+    planner: Annotated[
+        str | None,
+        typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=options.planners),
+    ] = None,
+    aircraft: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=options.aircraft),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
+    ] = None,
+    until: Annotated[
+        Literal["failed", "untrackable"], typer.Option(help="Not reached, or a leg not tracked either.")
+    ] = "failed",
+    runs: Annotated[
+        int | None, typer.Option(metavar="N", min=2, help=f"Conditions at most. Default: {RUNS_A_KEY} a key.")
+    ] = None,
+    seeds: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Flights a condition; it fails when one does.")
+    ] = 1,
+    tolerance: Annotated[
+        float, typer.Option(metavar="SHARE", help="Narrow down to this share of each range.")
+    ] = 0.01,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/falsify.")] = None,
+    as_json: JsonOption = False,
+) -> int:
+    """The mildest condition that makes the run fail, and the scenario that does.
+
+    LO is the mild end; LO > HI where smaller is harder. Of several keys, a condition is as hard as the key that is
+    furthest from its mild end.
+
+    For example: wayproof falsify aerosonde_forest --vary environment.wind.speed_mps=0:20
+
+    Exit status:
+
+    0 searched, whether something failed or not; the last line says which
+
+    2 bad input or usage, nothing written
+    """
+    if not 0.0 < tolerance < 1.0:
+        raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
+    ranges = [_range(text) for text in vary]
+    overrides = [("planner.kind", planner), ("aircraft.model", aircraft), ("seed", seed)]
+    given = [(name, str(value)) for name, value in overrides if value is not None]
+    fixed = [*given, *map(setting, settings or ())]
+    return _search(
+        scenario, fixed, ranges, until, runs or RUNS_A_KEY * len(ranges), seeds, tolerance, out, as_json
+    )
+
+
+def _search(
+    scenario: str,
+    fixed: list[tuple[str, str]],
+    ranges: list[tuple[str, float, float]],
+    until: Until,
+    runs: int,
+    seeds: int,
+    tolerance: float,
+    out: Path | None,
+    as_json: bool,
+) -> int:
+    from harness.falsify import falsify as search
+    from harness.falsify_folder import FALSIFIED, TRIALS
+    from harness.falsify_keys import vary_of
+    from harness.falsify_terminal import breaking_rows, last_line
+    from harness.record import RunFolderError
+    from harness.terminal import print_table, step_bar
+
+    def loaded(replaced: Any) -> Scenario:
+        return load(scenario, [*fixed, *replaced])
+
+    varied = vary_of(loaded, ranges)
+    folder = out or Path("runs") / loaded(()).name / "falsify"
+    try:
+        with step_bar() as report:
+            found = search(
+                loaded,
+                varied,
+                folder,
+                flown=_flown,
+                until=until,
+                conditions=runs,
+                seeds=seeds,
+                tolerance=tolerance,
+                progress=report,
+            )
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    except KeyboardInterrupt:
+        typer.echo(f"wayproof: interrupted; the flights so far are in {folder / TRIALS}", err=True)
+        raise
+    if as_json:
+        print_json(found.plain())
+        return 0
+    print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
+    if found.found is not None:
+        typer.echo(f"again: wayproof fly {folder / FALSIFIED}")
+    typer.echo(last_line(found))
+    return 0
+
+
+def _flown(scenario: Scenario) -> dict[str, Any]:
+    from harness.closed_loop import fly
+    from harness.metrics import metrics
+    from harness.run import flight_limits, make_loop
+
+    return metrics(fly(make_loop(scenario)), flight_limits(scenario))
+
+
+def _range(text: str) -> tuple[str, float, float]:
+    """KEY.PATH=LO:HI as its three parts."""
+    key, equals, ends = text.partition("=")
+    low, colon, high = ends.partition(":")
+    try:
+        mild, hard = float(low), float(high)
+    except ValueError:
+        mild = hard = math.nan
+    if not (key.strip() and equals and colon and math.isfinite(mild) and math.isfinite(hard)):
+        raise typer.BadParameter(f"{text!r} is not KEY.PATH=LO:HI with two numbers", param_hint="--vary")
+    if key.strip() == "seed":
+        raise typer.BadParameter("a seed is no condition; --seeds flies several", param_hint="--vary")
+    return key.strip(), mild, hard
