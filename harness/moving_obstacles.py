@@ -214,7 +214,7 @@ class MovingObstacles:
             a, c = a + hold + 2.0 * ends, c + hold + 2.0 * ends
             det = a * c - b * b
             shift += complex(c * right.real - b * right.imag, a * right.imag - b * right.real) / det
-        mine = near[inside]
+        mine = np.asarray(near[inside])
         moved = track.base + track.velocity * (scan.time_s - track.outline_s) + shift
         track.shifts.append((scan.time_s, moved))
         while track.shifts[-1][0] - track.shifts[0][0] > HISTORY_S:

@@ -23,7 +23,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from planner.curves import Point, along, on_loiter, pose_at, sample
-from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus
+from planner.interface import (
+    BoolArray,
+    FloatArray,
+    Mission,
+    MovingEdges,
+    Plan,
+    Planner,
+    PlanRequest,
+    PlanStatus,
+)
 from planner.registry import PlannerKind
 
 Circle = tuple[float, float, float]
@@ -60,6 +69,8 @@ class InRange:
 
     spacing_m = SPACING_M
     taken_back_at = 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, circles: Sequence[Circle], range_m: float) -> None:
         self.revision = 0
@@ -99,6 +110,8 @@ class Given:
     spacing_m = SPACING_M
     revision = 1
     taken_back_at = 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, points_m: FloatArray) -> None:
         self._points = points_m

@@ -32,7 +32,6 @@ ALLOWED = {
         "yaml",
         "matplotlib",
         "jinja2",
-        "scipy",
         "distributed",
         "planner",
         "aircraft",
@@ -62,7 +61,6 @@ LATE = {
     "matplotlib": ("harness/figures.py", "harness/campaign_figures.py", "harness/falsify_figure.py"),
     "jinja2": ("harness/report.py",),
     "ompl": (),
-    "scipy": (),
     "distributed": (),
 }
 

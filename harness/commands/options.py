@@ -64,14 +64,13 @@ def aircraft(incomplete: str) -> list[str]:
     return [name for name in aircraft_names() if name.startswith(incomplete)]
 
 
-OptionalScenario = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="SCENARIO",
-        help="A file, or a name that `wayproof list scenarios` prints.",
-        autocompletion=_shipped,
-    ),
-]
+_SCENARIO: Any = typer.Argument(
+    metavar="SCENARIO",
+    help="A file, or a name that `wayproof list scenarios` prints.",
+    autocompletion=_shipped,
+)
+ScenarioArgument = Annotated[str, _SCENARIO]
+OptionalScenario = Annotated[str | None, _SCENARIO]
 JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
 
 

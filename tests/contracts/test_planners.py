@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from harness.obstacle import Circle, Obstacle, Polygon
-from harness.obstacle_map import ObstacleMap
 from harness.range_sensor import RangeSensor
 from harness.scenario_sections import Sensor
+from harness.sensed_world import SensedWorld
 from harness.world import World
 from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
 from planner.curves import on_loiter, pose_at
@@ -46,7 +46,7 @@ class Flight:
     def __init__(self, kind: str, obstacles: tuple[Obstacle, ...]) -> None:
         world = World(obstacles, MISSION.bounds_m)
         self.planner = make(KINDS[kind], MISSION)
-        self.seen = ObstacleMap(MISSION.bounds_m, MISSION.clearance_m, MISSION.sensor_range_m)
+        self.seen = SensedWorld(MISSION.bounds_m, MISSION.clearance_m, MISSION.sensor_range_m)
         config = Sensor(range_m=MISSION.sensor_range_m, rays=360)
         self._sensor = RangeSensor(world, config, np.random.SeedSequence(1))
         self.request = PlanRequest(0.0, START, AHEAD, self.seen)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planner.curves import Segment
-from planner.interface import BoolArray, FloatArray, Path, SeenWorld
+from planner.interface import BoolArray, FloatArray, MovingEdges, Path, SeenWorld
 
 MakePoints = Callable[..., FloatArray]
 
@@ -37,6 +37,8 @@ class Known:
     """Edge points that are all known from the beginning, in space that is seen to be free."""
 
     spacing_m, revision, taken_back_at = 50.0, 1, 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, points: FloatArray) -> None:
         self._points = points

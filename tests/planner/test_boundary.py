@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner.boundary import GrownObstacles
 from planner.curves import sample
-from planner.interface import BoolArray, FloatArray, Mission, Path
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path
 
 MISSION = Mission(
     (9000.0, 9000.0), 50.0, (0.0, 0.0, 10_000.0, 10_000.0), 200.0, 100.0, 25.0, 1.0, 3.0, 3000.0
@@ -25,6 +25,8 @@ MakePoints = Callable[..., FloatArray]
 
 class Seen:
     spacing_m = 50.0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, points: FloatArray) -> None:
         self.points, self.revision, self.taken_back_at = points, 1, 0

@@ -18,7 +18,16 @@ from planner.boundary import margin_of
 from planner.bug1 import Bug1, Bug1Config
 from planner.bug2 import Bug2, Bug2Config, crossings
 from planner.curves import Point, pose_at
-from planner.interface import BoolArray, FloatArray, Mission, Plan, Planner, PlanRequest, PlanStatus
+from planner.interface import (
+    BoolArray,
+    FloatArray,
+    Mission,
+    MovingEdges,
+    Plan,
+    Planner,
+    PlanRequest,
+    PlanStatus,
+)
 from planner.tangent_bug import TangentBug, TangentBugConfig
 
 MakePoints = Callable[..., FloatArray]
@@ -51,6 +60,8 @@ class Range:
 
     spacing_m = SPACING
     taken_back_at = 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, points: FloatArray, range_m: float) -> None:
         self._points, self._range = points, range_m

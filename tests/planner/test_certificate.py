@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner.certificate import DISC, Certified, Certifier, least_sensor_range_m
 from planner.curves import Limits, along, between, end_of, pose_at, poses_at, sample
-from planner.interface import BoolArray, FloatArray, Path
+from planner.interface import BoolArray, FloatArray, MovingEdges, Path
 from planner.route_optimisation import Terrain
 
 AssertFlyable = Callable[[Path, float], None]
@@ -35,6 +35,8 @@ class FreeDiscs:
     """Space seen to be free: some discs."""
 
     spacing_m, revision, taken_back_at = SPACING, 0, 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, discs: FloatArray) -> None:
         self._discs = discs

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from planner import dubins_tree
 from planner.curves import Pose, along
 from planner.dubins_tree import DubinsTree, DubinsTreeConfig, dubins
-from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
 
 MakePoints = Callable[..., FloatArray]
 
@@ -41,6 +41,8 @@ class Seen:
     spacing_m = 50.0
     revision = 1
     taken_back_at = 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, points: FloatArray) -> None:
         self._points = points

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from planner.interface import BoolArray, FloatArray
+from planner.interface import BoolArray, FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
 
 CLEARANCE = 100.0
@@ -21,6 +21,8 @@ class Batches:
     """A seen world whose edge points come in batches and may be taken back."""
 
     spacing_m = CLEARANCE / 4.0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self) -> None:
         self.revision = 0

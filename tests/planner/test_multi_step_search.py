@@ -14,7 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.curves import Point
-from planner.interface import FloatArray
+from planner.interface import FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track, search
 from planner.window import Window
@@ -29,6 +29,8 @@ class _Still:
     """Edge points that are all known from the start."""
 
     spacing_m, revision, taken_back_at = SPACING, 1, 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, points: FloatArray) -> None:
         self._points = points

@@ -14,7 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.curves import end_of, pose_at, poses_at, sample
-from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
 from planner.rolling_window import RollingWindow
 from planner.rolling_window_config import RollingWindowConfig
 
@@ -41,6 +41,8 @@ class Seen:
 
     spacing_m = SPACING
     taken_back_at = 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, truth: FloatArray, range_m: float = MISSION.sensor_range_m) -> None:
         self.revision = 0

@@ -9,7 +9,7 @@ import pytest
 import shapely
 
 from planner.curves import pose_at
-from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanRequest, PlanStatus
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanRequest, PlanStatus
 from planner.vfh_plus import VfhPlus, VfhPlusConfig
 
 MakePoints = Callable[..., FloatArray]
@@ -30,6 +30,8 @@ START = (2000.0, 5000.0)
 
 class Seen:
     spacing_m = 50.0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, points: FloatArray) -> None:
         self._points, self.revision, self.taken_back_at = points, 1, 0

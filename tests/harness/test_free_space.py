@@ -1,4 +1,4 @@
-"""Space seen to be free, by the obstacle map, against the true world."""
+"""Space seen to be free, against the true world."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harness.obstacle_map import ObstacleMap
+from harness.free_space import FreeSpace
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.scenario_sections import Sensor
 from harness.world import Circle, Obstacle, Polygon, World
@@ -78,8 +78,8 @@ def random_world(seed: int) -> World:
     return world_of(*shapes)
 
 
-def fed(taken: Iterable[RangeScan]) -> ObstacleMap:
-    seen = ObstacleMap(BOUNDS, CLEARANCE, RANGE)
+def fed(taken: Iterable[RangeScan]) -> FreeSpace:
+    seen = FreeSpace(BOUNDS, CLEARANCE, RANGE)
     for scan in taken:
         seen.update(scan)
     return seen
@@ -90,7 +90,7 @@ def test_a_lost_return_shows_no_free_space_behind_the_wall() -> None:
     ranges = first.ranges_m.copy()
     ranges[np.argmin(np.abs(first.directions[:, 0]) - first.directions[:, 1])] = math.inf
     behind = np.column_stack((np.full(60, 5000.0), np.linspace(6010.0, 7500.0, 60)))
-    assert not fed([replace(first, ranges_m=ranges)]).seen_free(behind).any()
+    assert not fed([replace(first, ranges_m=ranges)]).contains(behind).any()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -98,7 +98,7 @@ def test_with_a_fifth_of_the_returns_lost_what_is_behind_walls_stays_unknown(see
     world = world_of(WALL)
     seen = fed(scans(sensor(world, seed, dropout=0.2), on_circle(100, 600.0)))
     points = np.random.default_rng(seed).uniform(2000.0, 8000.0, (20_000, 2))
-    assert distance_to(world, points[seen.seen_free(points)]).min() > 0.0
+    assert distance_to(world, points[seen.contains(points)]).min() > 0.0
 
 
 @settings(deadline=None, max_examples=30)
@@ -107,7 +107,7 @@ def test_seen_free_is_true_only_where_there_is_nothing(seed: int, field: float, 
     world = random_world(seed)
     seen = fed(scans(sensor(world, field_of_view_deg=field), on_circle(6, 500.0), heading_rad=heading))
     points = np.random.default_rng(seed).uniform(1000.0, 9000.0, (20_000, 2))
-    free = seen.seen_free(points)
+    free = seen.contains(points)
     assert free.any()
     assert distance_to(world, points[free]).min() > 0.0
 
@@ -128,33 +128,33 @@ def test_most_of_what_is_plainly_visible_is_seen_free(seed: int) -> None:
     gap = shapely.distance(lines, shapely.union_all(shapes))
     in_range = np.hypot(*(points - MIDDLE).T) < RANGE - 2.0 * FREE_CELL
     plain = in_range & (gap > 2.0 * FREE_CELL)
-    assert seen.seen_free(points[plain]).mean() > 0.97
-    assert not seen.seen_free(points[gap == 0.0]).any()
+    assert seen.contains(points[plain]).mean() > 0.97
+    assert not seen.contains(points[gap == 0.0]).any()
 
 
 def test_nothing_beyond_the_range_is_known() -> None:
     seen = fed(scans(sensor(world_of()), [MIDDLE]))
     points = np.random.default_rng(3).uniform(0.0, 10_000.0, (20_000, 2))
     away = np.hypot(*(points - MIDDLE).T)
-    free = seen.seen_free(points)
+    free = seen.contains(points)
     assert away[free].max() <= RANGE
     assert free[away < RANGE - 2.0 * FREE_CELL].all()
 
 
 def test_nothing_is_known_before_the_first_scan_nor_outside_the_area() -> None:
     outside = np.array([(-10.0, 5000.0), (5000.0, 10_010.0), (1e7, 1e7), (-1e7, 0.0)])
-    assert not ObstacleMap(BOUNDS, CLEARANCE, RANGE).seen_free(np.array([MIDDLE, *outside])).any()
+    assert not FreeSpace(BOUNDS, CLEARANCE, RANGE).contains(np.array([MIDDLE, *outside])).any()
     seen = fed(scans(sensor(world_of()), [(100.0, 5000.0), (5000.0, 9900.0)]))
-    assert not seen.seen_free(outside).any()
-    assert seen.seen_free(np.array([(150.0, 5000.0)])).all()
-    assert seen.seen_free(np.zeros((0, 2))).shape == (0,)
+    assert not seen.contains(outside).any()
+    assert seen.contains(np.array([(150.0, 5000.0)])).all()
+    assert seen.contains(np.zeros((0, 2))).shape == (0,)
 
 
 def test_beyond_where_rays_are_as_far_apart_as_the_clearance_nothing_is_known() -> None:
     # 40 rays: 0.157 rad apart, 200 m at a distance of 1273 m.
     seen = fed(scans(sensor(world_of(), rays=40), [MIDDLE]))
     points = np.random.default_rng(3).uniform(0.0, 10_000.0, (20_000, 2))
-    free = seen.seen_free(points)
+    free = seen.contains(points)
     assert free.any()
     assert np.hypot(*(points - MIDDLE).T)[free].max() <= CLEARANCE / (math.tau / 40) + 1e-6
 
@@ -173,7 +173,7 @@ def test_outside_the_field_of_view_nothing_is_known(heading_deg: float, field_de
     outside = off_nose > math.radians(field_deg) / 2
     # A whole cell is marked or not: beside the edge of the field no more than a cell.
     beside = away * np.sin(np.minimum(off_nose - math.radians(field_deg) / 2, math.pi / 2))
-    free = seen.seen_free(points)
+    free = seen.contains(points)
     assert free.any()
     assert not free[outside & (beside > FREE_CELL * math.sqrt(2.0)) & (away > 2 * FREE_CELL)].any()
     known = seen.edges_since(-1)
@@ -193,6 +193,6 @@ def test_what_hides_just_beside_the_field_of_view_is_not_in_free_space(side: flo
     world = world_of(*shapes)
     seen = fed(scans(sensor(world, field_of_view_deg=90.0), [MIDDLE]))
     points = np.random.default_rng(7).uniform(2000.0, 8000.0, (60_000, 2))
-    free = seen.seen_free(points)
+    free = seen.contains(points)
     assert free.any()
     assert distance_to(world, points[free]).min() > 0.0
