@@ -7,6 +7,7 @@ waits without end. So rerun writes into a pipe, and a thread of ours moves what 
 from __future__ import annotations
 
 import os
+import struct
 import threading
 from pathlib import Path
 
@@ -14,6 +15,10 @@ import rerun as rr
 from rerun.blueprint import Blueprint
 
 _AT_ONCE_BYTES = 1 << 20
+_HEADER_BYTES = 12
+"""What an .rrd file begins with."""
+_MESSAGE = struct.Struct("<QQ")
+"""What each message in it begins with: its kind, and the number of bytes that follow."""
 
 
 class RecordingFile:
@@ -62,15 +67,43 @@ class RecordingFile:
         self._check()
 
     def _move(self) -> None:
+        waiting = bytearray()
+        begin = _HEADER_BYTES
         while data := os.read(self._out, _AT_ONCE_BYTES):
-            # After a fault the pipe is emptied all the same: rerun must never wait.
-            while data and self._fault is None:
-                try:
-                    data = data[self._file.write(data) :]
-                except OSError as error:
-                    self._fault = error
+            waiting += data
+            # Whole messages only: a recording that ends in the middle of one cannot be read.
+            end = end_of_whole(waiting, begin)
+            self._write(waiting[:end])
+            del waiting[:end]
+            begin = max(begin - end, 0)
+        self._write(waiting)
         os.close(self._out)
+
+    def _write(self, data: bytearray) -> None:
+        """Writes to the file; after a fault nothing more, but what rerun sends is taken: it must never wait."""
+        while data and self._fault is None:
+            try:
+                data = data[self._file.write(data) :]
+            except OSError as error:
+                self._fault = error
 
     def _check(self) -> None:
         if self._fault is not None:
             raise OSError(self._fault.errno, self._fault.strerror, str(self._path))
+
+
+def end_of_whole(data: bytearray, begin: int) -> int:
+    """Where the last whole message ends.
+
+    Args:
+        data: part of a recording.
+        begin: where its first message begins.
+    """
+    end = 0
+    while begin + _MESSAGE.size <= len(data):
+        _, length = _MESSAGE.unpack_from(data, begin)
+        begin += _MESSAGE.size + length
+        if begin > len(data):
+            break
+        end = begin
+    return end

@@ -22,10 +22,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import quote
 
-from harness.record import RunFolderError
 from harness.rerun_blueprint import TIMELINE
 from harness.rerun_overlay import send_recording, write_overlay
-from harness.run_folder import RECORDING
+from harness.run_folder import RECORDING, recording_of
 
 LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
@@ -124,18 +123,6 @@ def run_names(run_dirs: Sequence[Path]) -> list[str]:
     return [
         name if names.count(name) == 1 else f"{name} ({place})" for place, name in enumerate(names, start=1)
     ]
-
-
-def recording_of(run_dir: Path) -> Path:
-    """The recording in a run folder.
-
-    Raises:
-        RunFolderError: there is none.
-    """
-    path = run_dir / RECORDING
-    if not path.is_file():
-        raise RunFolderError(f"{run_dir} has no {RECORDING}: not a run folder, or flown with --no-recording")
-    return path
 
 
 def screenshot(

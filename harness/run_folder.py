@@ -2,9 +2,9 @@
 
 The order of writing carries the meaning. The manifest comes first and says `complete: false`; every other
 file is written under a temporary name and renamed when it is whole; the manifest that says `complete: true`
-replaces the first one last of all, with checksums of the tables. A process killed at any point leaves a folder
-that cannot be taken for a complete run, and a table that was damaged afterwards is found out. One process at a
-time writes to a folder.
+replaces the first one last of all, with checksums of tables and recording. A process killed at any point leaves
+a folder that cannot be taken for a complete run, and one that was damaged afterwards is found out. One process
+at a time writes to a folder.
 """
 
 from __future__ import annotations
@@ -202,7 +202,8 @@ class RunFolder:
         pq.write_table(_plans_table(plans), self.path / (PLANS + PARTIAL), compression=COMPRESSION)
         os.replace(self.path / (PLANS + PARTIAL), self.path / PLANS)
         replace_text(self.path / METRICS, text)
-        sums = {name: _sha256(self.path / name) for name in (TRACK, PLANS)}
+        tables = (TRACK, PLANS, RECORDING)
+        sums = {name: _sha256(self.path / name) for name in tables if (self.path / name).exists()}
         replace_text(self.path / MANIFEST, _json({**self._manifest, "complete": True, "sha256": sums}))
 
     def __enter__(self) -> RunFolder:
@@ -237,12 +238,8 @@ def load_run(path: Path) -> Run:
     import pyarrow.parquet as pq
 
     try:
-        sums = manifest.get("sha256", {})
         for name in (TRACK, PLANS):
-            if not (path / name).is_file():
-                raise ValueError(f"{name} is missing or not a file")
-            if sums.get(name) not in (None, _sha256(path / name)):
-                raise ValueError(f"{name} is not what was written")
+            _check(path / name, manifest)
         table = pq.read_table(path / TRACK, columns=list(TRACK_FIELDS))
         return Run(
             folder=path,
@@ -273,6 +270,30 @@ def damaged(path: Path, error: BaseException) -> RunFolderError:
     text = " ".join(str(error).split())[:200]
     reason = text if isinstance(error, OSError | ValueError) else f"{type(error).__name__} {text}"
     return RunFolderError(f"the run in {path} is damaged: {reason}; fly it again")
+
+
+def recording_of(path: Path) -> Path:
+    """The recording in a run folder, whose run may be incomplete.
+
+    Raises:
+        RunFolderError: there is none, or it is not the one that the run wrote.
+    """
+    recording = path / RECORDING
+    if not recording.is_file():
+        raise RunFolderError(f"{path} has no {RECORDING}: not a run folder, or flown with --no-recording")
+    try:
+        _check(recording, _manifest(path) or {})
+    except (OSError, *WRONG_CONTENT) as error:
+        raise damaged(path, error) from error
+    return recording
+
+
+def _check(path: Path, manifest: Mapping[str, Any]) -> None:
+    """Raises ValueError if a file is not the one that the manifest knows, if it knows one."""
+    if not path.is_file():
+        raise ValueError(f"{path.name} is missing or not a file")
+    if manifest.get("sha256", {}).get(path.name) not in (None, _sha256(path)):
+        raise ValueError(f"{path.name} is not what was written")
 
 
 def _claim(path: Path) -> FolderLock:

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from harness.cli import main
 from harness.record import RunFolderError
+from harness.rerun_file import end_of_whole
 from harness.rerun_overlay import write_overlay
-from harness.rerun_viewer import recording_of
+from harness.run_folder import recording_of
 from tests.faults.hostile import JSON_SNIPPETS, KEYS, as_json, spoilt, spoilt_bytes
 
 FILES = ("track.parquet", "plans.parquet", "metrics.json", "manifest.json", "scenario.yaml")
@@ -60,7 +61,11 @@ def test_export_and_report_of_a_damaged_run(
         suppress_health_check=list(HealthCheck),
     )
     @given(
-        damage(a_run, name), st.booleans(), st.sampled_from(formats), st.sampled_from(("flown", "planned"))
+        damage(a_run, name),
+        st.booleans(),
+        st.sampled_from(formats),
+        st.sampled_from(("flown", "planned")),
+        st.integers(0, 7),
     )
     def each(data: bytes, summed: bool, form: str, what: str, reported: int) -> None:
         (copy / "manifest.json").write_bytes(
@@ -99,10 +104,13 @@ def test_one_bit_of_a_table_is_enough(
     assert f"{copy} is damaged: {name} is not what was written" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("cases", [10, pytest.param(250, marks=pytest.mark.slow)])
-def test_view_of_a_damaged_recording(cases: int, a_run: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("cases", [10, pytest.param(300, marks=pytest.mark.slow)])
+def test_view_of_a_damaged_recording(
+    cases: int, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     copy = tmp_path / "run"
-    copy.mkdir()
+    shutil.copytree(a_run, copy)
+    whole = (copy / "flight.rrd").read_bytes()
 
     @settings(
         max_examples=cases,
@@ -111,20 +119,40 @@ def test_view_of_a_damaged_recording(cases: int, a_run: Path, tmp_path: Path) ->
         database=None,
         suppress_health_check=list(HealthCheck),
     )
-    @given(damage(a_run, "flight.rrd"))
+    @given(damage(a_run, "flight.rrd").filter(lambda data: data != whole))
     def each(data: bytes) -> None:
         (copy / "flight.rrd").write_bytes(data)
-        recordings = [recording_of(a_run), recording_of(copy)]
-        try:
-            write_overlay(recordings, ["whole", "damaged"], tmp_path / "overlay.rrd")
-        except RunFolderError as error:
-            said = str(error)
-        else:
-            said = str(copy)
-        assert str(copy) in said
-        assert len(said.splitlines()) == 1
+        assert main(["view", str(copy), str(a_run)]) == 2
+        said = capsys.readouterr().err
+        assert (
+            said
+            == f"wayproof: the run in {copy} is damaged: flight.rrd is not what was written; fly it again\n"
+        )
 
     each()
+
+
+@pytest.mark.parametrize("pieces", [1, 7, 4096, 1 << 20])
+def test_a_recording_of_which_only_a_part_has_come_ends_with_a_whole_message(
+    pieces: int, a_run: Path, tmp_path: Path
+) -> None:
+    """What a killed process leaves: rerun cannot read a recording that ends in the middle of a message."""
+    data = (a_run / "flight.rrd").read_bytes()[:300_000]
+    begin, waiting, written = 12, bytearray(), bytearray()
+    for first in range(0, len(data), pieces):
+        waiting += data[first : first + pieces]
+        end = end_of_whole(waiting, begin)
+        written += waiting[:end]
+        del waiting[:end]
+        begin = max(begin - end, 0)
+    assert data.startswith(written)
+    assert 100_000 < len(written) < len(data)
+    cut = tmp_path / "flight.rrd"
+    cut.write_bytes(written)
+    write_overlay([recording_of(a_run), cut], ["whole", "cut"], tmp_path / "overlay.rrd")
+    cut.write_bytes(data)
+    with pytest.raises(RunFolderError, match="cannot read the recording"):
+        write_overlay([recording_of(a_run), cut], ["whole", "cut"], tmp_path / "overlay.rrd")
 
 
 def pipe(path: Path) -> None:
