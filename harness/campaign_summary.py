@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from harness.campaign_groups import Axis, grouped
 from harness.campaign_paired import CONFIDENCE, Duel, duels
-from harness.campaign_table import ERROR, NAMED, RESULTS, Runs, load_tables, runs_of, varied_keys
+from harness.campaign_table import NAMED, Runs, load_tables, runs_of, varied_keys
 from harness.record import FloatArray
+from harness.results import ERROR, RESULTS
 from harness.run_folder import RECORDING
 from harness.strict_yaml import InputError
 

@@ -13,18 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.record import FloatArray
+from harness.results import RESULTS, TIMINGS
 from harness.strict_yaml import InputError
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-RESULTS: Final = "results.parquet"
-TIMINGS: Final = "timings.parquet"
 NAMED: Final = ("planner", "aircraft", "world", "scenario")
 """Columns of names: varied keys where they have more than one value."""
-
-ERROR: Final = "error"
-"""Outcome of a run that crashed; the other outcomes are those of `metrics.json`."""
 
 IntArray: TypeAlias = NDArray[np.int64]
 
@@ -124,7 +120,7 @@ def runs_of(results: pa.Table, timings: pa.Table | None, keys: Sequence[str]) ->
         flown_length_m=_column(results, "flown_length_m"),
         length_ratio=_column(results, "length_ratio"),
         min_clearance_m=_column(results, "min_clearance_m"),
-        wanted_clearance_m=_column(results, _wanted(results)),
+        wanted_clearance_m=_column(results, "wanted_clearance_m"),
         clearance_violation_s=_column(results, "clearance_violation_s"),
         trackable=_column(results, "trackable"),
         planner_ms={
@@ -132,10 +128,6 @@ def runs_of(results: pa.Table, timings: pa.Table | None, keys: Sequence[str]) ->
             for name in ("p50", "p99", "max")
         },
     )
-
-
-def _wanted(results: pa.Table) -> str:
-    return "wanted_clearance_m" if "wanted_clearance_m" in results.column_names else "planner.clearance_m"
 
 
 def _column(table: pa.Table | None, name: str) -> FloatArray:

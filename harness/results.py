@@ -54,6 +54,7 @@ METRICS: Final = {
     "trackability.not_trackable": "int",
     "trackability.causes": "text",
     "replans": "int",
+    "wanted_clearance_m": "number",
     "optimum_m": "number",
     "length_ratio": "number",
     "digest": "text",
@@ -62,8 +63,9 @@ METRICS: Final = {
 """Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
 
 Of the legs of `trackability` there are their number, that of those not trackable, and their causes, each once;
-`optimum_m` is the shortest path of a point that knows the world and keeps the clearance, `length_ratio` the
-flown length over it where the goal was reached; `error` is a traceback.
+`wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the
+world and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a
+traceback.
 """
 
 TIMES: Final = {
@@ -77,11 +79,14 @@ TIMES: Final = {
 """Columns of `timings.parquet`."""
 
 
-def metric_cells(metrics: Mapping[str, Any], optimum_m: float | None) -> dict[str, Any]:
+def metric_cells(
+    metrics: Mapping[str, Any], wanted_clearance_m: float | None, optimum_m: float | None
+) -> dict[str, Any]:
     """The content of `metrics.json` as cells of a row, by column.
 
     Args:
         metrics: the content.
+        wanted_clearance_m: distance from obstacles that the planner was to keep.
         optimum_m: length of the shortest path; None where there is none or it is not wanted.
     """
     legs = metrics["trackability"]
@@ -93,6 +98,7 @@ def metric_cells(metrics: Mapping[str, Any], optimum_m: float | None) -> dict[st
         "trackability.legs": len(legs),
         "trackability.not_trackable": sum(not leg["trackable"] for leg in legs),
         "trackability.causes": "; ".join(causes),
+        "wanted_clearance_m": wanted_clearance_m,
         "optimum_m": optimum_m,
         "length_ratio": metrics["flown_length_m"] / optimum_m if reached and optimum_m else None,
     }

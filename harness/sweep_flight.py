@@ -56,7 +56,7 @@ def fly_job(job: Job) -> Answer:
     """
     try:
         metrics = _flown(job)
-        cells = metric_cells(metrics, _optimum_m(job))
+        cells = metric_cells(metrics, job.scenario.planner.clearance_m, _optimum_m(job))
     except (OSError, RunFolderError):
         raise
     except Exception as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
@@ -22,10 +22,8 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.campaign_runs import CampaignRuns, Run
-from harness.results import ERROR
 from harness.strict_yaml import Scalar
 from harness.sweep_flight import Answer
-from harness.terminal import print_table
 
 FIRST, LAST = 15, 5
 """Of more runs than both, so many are shown."""
@@ -96,20 +94,6 @@ def _bar(unit: str) -> Iterator[Progress | None]:
     )
     with Progress(*columns, console=console, transient=True, speed_estimate_period=120.0) as bar:
         yield bar
-
-
-def print_outcomes(name: str, outcomes: Mapping[str, int]) -> None:
-    """How many runs of a campaign ended how, on standard output."""
-    total = max(sum(outcomes.values()), 1)
-    rows = {
-        outcome: f"[{_STYLE.get(outcome, 'bold red')}]{number}[/], {number / total:.1%}"
-        for outcome, number in outcomes.items()
-    }
-    title = f"{name}: {sum(outcomes.values())} runs"
-    Console().print(title, highlight=False, markup=False)
-    print_table("", rows)
-    if ERROR in outcomes:
-        Console(stderr=True).print("runs crashed: their rows have the tracebacks", highlight=False)
 
 
 def print_runs(runs: CampaignRuns) -> None:

@@ -39,8 +39,8 @@ def report(
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
     """
-    from harness.campaign_table import RESULTS
     from harness.record import RunFolderError
+    from harness.results import RESULTS
     from harness.run_report import write_report
 
     if (run / RESULTS).is_file():

@@ -59,6 +59,9 @@ def sweep(
     """
     if scheduler and workers:
         raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
+    from harness.campaign_report import write_summary
+    from harness.campaign_summary import summarise
+    from harness.campaign_terminal import print_summary
     from harness.shipped import campaign_path
 
     runs = checked(campaign_path(campaign))
@@ -67,13 +70,13 @@ def sweep(
         return 0
     folder = out or Path("runs") / runs.campaign.name
     told = _fly(runs, folder, workers or os.cpu_count() or 1, scheduler, resume=resume, silent=quiet)
+    summary = summarise(folder)
+    page = write_summary(summary, folder)
     if as_json:
         print_json({"results": str(folder / "results.parquet"), "runs": len(runs), "outcomes": told})
     elif not quiet:
-        from harness.sweep_terminal import print_outcomes
-
-        print_outcomes(runs.campaign.name, told)
-        typer.echo(f"results: {folder / 'results.parquet'}")
+        print_summary(summary)
+        typer.echo(f"summary: {page}")
     return FAILED if "error" in told else 0
 
 

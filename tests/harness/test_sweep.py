@@ -157,7 +157,7 @@ def test_results_have_a_row_a_run_and_every_metric(unbroken: Path) -> None:
 def test_columns_are_what_metrics_json_has(place: Path) -> None:
     assert main(["fly", str(place / "short.yaml"), "--out", str(place / "run"), "--no-recording"]) == 0
     metrics = load_run(place / "run").metrics
-    cells = metric_cells(metrics, 1500.0)
+    cells = metric_cells(metrics, 60.0, 1500.0)
     assert cells.keys() | {"error"} == METRICS.keys()
     assert cells["cross_track_m.p95"] == metrics["cross_track_m"]["p95"]
     assert cells["trackability.legs"] == len(metrics["trackability"])
