@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -11,6 +12,7 @@ from typing import Any, Final
 from harness.campaign_folder import RUNS, CampaignFolder
 from harness.campaign_runs import CampaignRuns
 from harness.record import RunFolderError
+from harness.results import ERROR
 from harness.sweep_flight import Answer, Job, failed
 from harness.sweep_workers import WorkerDiedError, Workers
 
@@ -51,6 +53,9 @@ def sweep(
                 time.sleep(LOOK_S)
             for future in wait(flying, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
                 answer = _answer(future, flying.pop(future))
+                if answer.row["outcome"] == ERROR:
+                    # What a crash has left is no whole run folder.
+                    shutil.rmtree(folder.path / RUNS / str(answer.run), ignore_errors=True)
                 folder.append(answer.run, _row(runs, answer), answer.times)
                 if progress is not None:
                     progress(answer)

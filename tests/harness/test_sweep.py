@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -209,15 +210,15 @@ def test_crashes_are_rows_with_their_tracebacks_and_end_nothing(
     (place / "site" / "campaign_plugin.py").write_text(PLUGIN)
     monkeypatch.syspath_prepend(place / "site")
     text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[dies, rolling_window, raises]").replace(
-        "draws: 2", "draws: 1"
+        "draws: 2", "draws: 1\nrecordings: all"
     )
     (place / "campaign.yaml").write_text(text)
     told = []
     for workers in ("1", "2"):
         assert sweep(place, "--workers", workers, "--json") == 1
         told.append(results(place / "out"))
-        for file in (place / "out").iterdir():
-            file.unlink()
+        assert {each.name for each in (place / "out" / "runs").iterdir()} == {"1", "4"}, "whole ones only"
+        shutil.rmtree(place / "out")
     assert told[0] == told[1]
     (place / "r.parquet").write_bytes(told[0])
     rows = pq.read_table(place / "r.parquet").to_pylist()
