@@ -95,12 +95,12 @@ class _Unread(RangeScan):
 
     Attributes:
         face_m: distance to the nearest face in range, ahead or not; +inf if there is none.
-        follow: gives the ranges.
+        follow: gives the ranges; None once it has.
     """
 
     ranges_m: FloatArray = field(default_factory=lambda: _NOT_READ)
     face_m: float
-    follow: Callable[[], FloatArray]
+    follow: Callable[[], FloatArray] | None
 
     def __post_init__(self) -> None:
         if self.ranges_m is not _NOT_READ:
@@ -113,9 +113,12 @@ class _Unread(RangeScan):
         """The ranges, when they are first read."""
         if name != "ranges_m":
             raise AttributeError(name)
+        assert self.follow is not None
         ranges = self.follow()
         ranges.setflags(write=False)
         object.__setattr__(self, "ranges_m", ranges)
+        # Who keeps a scan keeps nothing of the world.
+        object.__setattr__(self, "follow", None)
         return ranges
 
 

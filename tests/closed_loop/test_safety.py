@@ -186,7 +186,10 @@ def test_the_invariant_sees_a_plan_that_is_not_safe(small_world: SmallWorld) -> 
         fly(replace(blind, time_limit_s=120.0), [invariant])
 
 
-def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(small_world: SmallWorld) -> None:
+@pytest.mark.parametrize("told", [True, False])
+def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(
+    told: bool, small_world: SmallWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # A ring appears that the aircraft has no room to turn in, within what was certified to be free. It is open
     # behind the aircraft, so that nothing proves that there is no way.
     at_s, count, radius, open_from, open_to = 20.0, 24, 75.0, 12, 19
@@ -206,7 +209,15 @@ def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(small_world
         for i in range(count)
         if not open_from <= i < open_to
     ]
-    flight = fly(make_loop(scenario_with(small_world, ring), PointMass))
+    if not told:
+        monkeypatch.setattr(SensedWorld, "surprised_s", -math.inf)
+    events = Events()
+    flight = fly(make_loop(scenario_with(small_world, ring), PointMass), [events])
+    if told:
+        # The map says that something appeared: no fault of the planner's, which goes on as best it can.
+        assert flight.outcome is Outcome.COLLISION
+        assert any("something has appeared" in text for text in events.texts)
+        return
     assert flight.outcome is Outcome.PLANNER_FAILED, flight.reason
     assert "CertificateBroken" in flight.reason
     assert "certified to be free" in flight.reason
