@@ -306,4 +306,5 @@ def within(known: ComplexArray, points_m: FloatArray, within_m: float) -> NDArra
     near = np.zeros(len(slots), dtype=np.bool_)
     for point in points_m[:, 0] + 1j * points_m[:, 1]:
         near |= np.abs(known[slots] - point) <= within_m
-    return slots[near]
+    found: NDArray[np.intp] = slots[near]
+    return found
