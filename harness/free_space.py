@@ -11,6 +11,8 @@ from harness.range_sensor import RangeScan, all_round, clockwise_from
 from planner.interface import BoolArray, FloatArray
 
 MOST_CELLS = 1_000_000
+NARROWEST_RAD = 1e-3
+"""What something hides is told by bearings no finer than this."""
 
 
 class FreeSpace:
@@ -44,11 +46,7 @@ class FreeSpace:
         if self._reach != reach:
             self._reach, self._disc = reach, _disc(math.ceil(reach / self._cell) + 1)
         # The disc's corner lies at this cell; some of it may lie outside the area.
-        across = len(self._disc) // 2
-        x_first = math.floor((scan.east_m - self._x0) / self._cell) - across
-        y_first = math.floor((scan.north_m - self._y0) / self._cell) - across
-        x_low, x_high = max(x_first, 0), min(x_first + len(self._disc), self._nx)
-        y_low, y_high = max(y_first, 0), min(y_first + len(self._disc), self._ny)
+        x_first, y_first, x_low, x_high, y_low, y_high = self._window(scan, len(self._disc) // 2)
         if x_low >= x_high or y_low >= y_high:
             return
         seen = self._seen[x_low:x_high, y_low:y_high]
@@ -83,36 +81,48 @@ class FreeSpace:
             edges_m: (k, 2) its edge points.
 
         Returns:
-            Whether any of it does.
+            Whether any of it does: an edge point with free cells all about it.
         """
         around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
         places = (edges_m[:, None] + around).reshape(-1, 2)
         edges_m = edges_m[self.contains(places).reshape(-1, len(around)).all(axis=1)]
         if not len(edges_m):
             return False
-        column, row = self._seen.nonzero()
-        x = (column + 0.5) * self._cell + (self._x0 - scan.east_m)
-        y = (row + 0.5) * self._cell + (self._y0 - scan.north_m)
-        distance = np.hypot(x, y)
-        east, north = (edges_m - (scan.east_m, scan.north_m)).T
-        half_rad = np.arcsin(
-            np.minimum(1.5 * self._cell / np.maximum(np.hypot(east, north), self._cell), 1.0)
-        )
+        _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
+        seen = self._seen[x_low:x_high, y_low:y_high]
+        column, row = seen.nonzero()
+        x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
+        y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
         # Bearings are told by slices; each is hidden from the nearest edge on.
-        width = max(scan.spacing_rad, 1e-3)
-        slices = math.ceil(math.tau / width)
-        hidden_from = np.full(slices, math.inf)
-        middle = np.arctan2(east, north)
-        for at, half, away in zip(
-            middle.tolist(), half_rad.tolist(), np.hypot(east, north).tolist(), strict=True
-        ):
-            which = np.arange(math.floor((at - half) / width), math.ceil((at + half) / width) + 1) % slices
-            hidden_from[which] = np.minimum(hidden_from[which], away)
-        mine = np.floor(np.arctan2(x, y) / width).astype(np.int64) % slices
-        hidden = distance > hidden_from[mine] - self._cell
-        self._seen[column[hidden], row[hidden]] = False
-        self._last = (math.inf, math.inf)
+        width = max(scan.spacing_rad, NARROWEST_RAD)
+        hidden_from = self._hidden_from(edges_m - (scan.east_m, scan.north_m), width)
+        mine = np.floor(np.arctan2(x, y) / width).astype(np.int64) % len(hidden_from)
+        hidden = np.hypot(x, y) > hidden_from[mine] - self._cell
+        seen[column[hidden], row[hidden]] = False
+        self._last = (math.inf, math.inf)  # what the next scan looks through is free at once
         return True
+
+    def _hidden_from(self, offsets_m: FloatArray, width_rad: float) -> FloatArray:
+        """(s,) the distance from which on edge points, (k, 2) from the sensor, hide each slice of the bearings."""
+        distance = np.hypot(offsets_m[:, 0], offsets_m[:, 1])
+        half_rad = np.arcsin(np.minimum(1.5 * self._cell / np.maximum(distance, self._cell), 1.0))
+        bearing = np.arctan2(offsets_m[:, 0], offsets_m[:, 1])
+        first = np.floor((bearing - half_rad) / width_rad).astype(np.int64)
+        last = np.ceil((bearing + half_rad) / width_rad).astype(np.int64)
+        hidden_from = np.full(math.ceil(math.tau / width_rad), math.inf)
+        for low, high, away in zip(first.tolist(), last.tolist(), distance.tolist(), strict=True):
+            which = np.arange(low, high + 1) % len(hidden_from)
+            hidden_from[which] = np.minimum(hidden_from[which], away)
+        return hidden_from
+
+    def _window(self, scan: RangeScan, across: int) -> tuple[int, int, int, int, int, int]:
+        """First column and row within so many cells of the sensor, and the spans of those on the grid."""
+        x_first = math.floor((scan.east_m - self._x0) / self._cell) - across
+        y_first = math.floor((scan.north_m - self._y0) / self._cell) - across
+        size = 2 * across + 1
+        x_low, x_high = max(x_first, 0), min(x_first + size, self._nx)
+        y_low, y_high = max(y_first, 0), min(y_first + size, self._ny)
+        return x_first, y_first, x_low, x_high, y_low, y_high
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""

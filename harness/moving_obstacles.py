@@ -1,10 +1,12 @@
 """Which of what is seen moves, and how: by comparing scans.
 
-A return from a place that a scan of some seconds before looked through tells of something that moves there, or that
+A return from a place that two scans of some seconds before looked through tells of something that moves there, or that
 has just appeared. The run of returns about it is followed from scan to scan: the translation that lays the
-outline seen first upon the one seen now (point-to-line registration; Y. Chen and G. Medioni, "Object modelling by
-registration of multiple range images", 1992) grows in proportion to time where it moves, and not at all where it
-only appeared. Assumed: obstacles that move do so without turning, no faster than `MOST_MPS`.
+outline seen first upon the one seen now (`harness.registration`) grows in proportion to time where it moves, and not
+at all where it only appeared. Assumed: obstacles that move do so without turning, no faster than `MOST_MPS`. What
+draws straight back from the sensor comes to no place that was looked through: it is left to the map, where it fades.
+
+Points are complex: east + i north, m.
 """
 
 from __future__ import annotations
@@ -12,23 +14,19 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from harness.range_sensor import RangeScan, all_round, clockwise_from
+from harness.range_sensor import RangeScan, all_round, clockwise_from, supported
+from harness.registration import FEWEST, ComplexArray, IntArray, Outline, ends_of, register
 from planner.interface import BoolArray, FloatArray, MovingEdges
-
-ComplexArray = NDArray[np.complex128]
 
 COMPARED_S = 12.0
 """Scans are compared with those taken so long before,"""
 SLOW_MPS = 5.0
 """and as much longer as something so slow takes to leave the noise."""
 LOOK_EVERY_S = 3.0
-FEWEST = 3
-"""Neighbouring rays that must tell the same."""
 LEAST_MPS = 0.5
 """What is slower than this stands still."""
 MOST_MPS = 30.0
@@ -38,54 +36,93 @@ SURE = 4.0
 """In standard errors of the velocity."""
 UNDECIDED_S = 30.0
 """What cannot be told to move for so long is taken to stand still."""
+LOST_S = 2.0
+"""What may move and is not seen for so long is not followed any more."""
+COASTS_S = 15.0
+"""What is known to move is believed to move on for so long."""
 NEW_OUTLINE_S = 12.0
 """Outlines are compared with one no older than this."""
 HISTORY_S = 40.0
 """Velocity is that of so long a time."""
-COASTS_S = 15.0
-"""What is not seen any more is believed to move on for so long."""
-ROUNDS = 3
-"""Registrations in a row, each with the nearest points of the one before."""
-STRAIGHT = 0.9
-"""Cosine of the turn between neighbours: places that bend more than that are no good for registration."""
-ENDS = 0.01
-"""Along a flat face only its two ends tell a shift: they have this share of the weight of all that lies between."""
-STIFF = 1e-4
-"""So much holds the shift at the prediction."""
+FEWEST_SHIFTS = 4
+"""Velocity is told by so many at least."""
 
 
-@dataclass
+@dataclass(eq=False)
 class _Track:
     """One run of returns that is followed.
 
     Attributes:
-        outline: places at `outline_s`, in the order of the rays.
+        outline: as it was at `outline_s`.
+        begun_s: when it was seen first.
         base: translation from its first outline to this one.
         shifts: (time, translation) from the first outline on.
-        velocity: east + i north.
+        velocity: east + i north, m/s.
         error_mps: standard error of it.
         seen_s: when it was last seen.
         moves: it is known to.
     """
 
-    outline: ComplexArray
+    outline: Outline
     outline_s: float
-    base: complex
-    begun_s: float
-    shifts: deque[tuple[float, complex]]
+    begun_s: float = field(init=False)
+    base: complex = 0j
+    shifts: deque[tuple[float, complex]] = field(init=False)
     velocity: complex = 0j
     error_mps: float = math.inf
-    seen_s: float = -math.inf
+    seen_s: float = field(init=False)
     moves: bool = False
 
-    def at(self, time_s: float) -> ComplexArray:
-        """Where the outline is at a time."""
-        moved: ComplexArray = self.outline + self.velocity * (time_s - self.outline_s)
-        return moved
+    def __post_init__(self) -> None:
+        self.begun_s = self.seen_s = self.outline_s
+        self.shifts = deque([(self.outline_s, self.base)])
+
+    def at(self, time_s: float) -> Outline:
+        """The outline where it is at a time."""
+        return self.outline.moved(self.velocity * (time_s - self.outline_s))
+
+    def note(self, time_s: float, further: complex) -> None:
+        """Takes in that the outline was found elsewhere than expected by a shift."""
+        moved = self.base + self.velocity * (time_s - self.outline_s) + further
+        self.shifts.append((time_s, moved))
+        while time_s - self.shifts[0][0] > HISTORY_S:
+            self.shifts.popleft()
+        if len(self.shifts) >= FEWEST_SHIFTS:
+            self._measure()
+
+    def renew(self, outline: Outline, time_s: float) -> None:
+        """Goes on with an outline as it was just found."""
+        self.outline, self.outline_s, self.base = outline, time_s, self.shifts[-1][1]
+
+    def decide(self, sure_m: float) -> None:
+        """Decides whether it moves: surely, and further than returns err."""
+        moved_m = abs(self.shifts[-1][1] - self.shifts[0][1])
+        sure = abs(self.velocity) >= LEAST_MPS + SURE * self.error_mps
+        self.moves = self.moves or (sure and moved_m > sure_m)
+
+    def surely_stands(self) -> bool:
+        """Whether its velocity is surely too little."""
+        return abs(self.velocity) + SURE * self.error_mps < LEAST_MPS
+
+    def _measure(self) -> None:
+        """Velocity: the slope of the shifts over time."""
+        times, shifts = (np.array(each) for each in zip(*self.shifts, strict=True))
+        times = times - times.mean()
+        spread = float((times * times).sum())
+        velocity = complex((times * shifts).sum() / spread)
+        off = shifts - shifts.mean() - velocity * times
+        self.error_mps = math.sqrt(float((np.abs(off) ** 2).sum()) / (len(off) - 2) / spread)
+        # The outline stays where it has been found.
+        last_s, last = self.shifts[-1]
+        base = last - velocity * (last_s - self.outline_s)
+        self.outline, self.base = self.outline.moved(base - self.base), base
+        self.velocity = velocity * min(1.0, MOST_MPS / max(abs(velocity), MOST_MPS))
 
 
 class MovingObstacles:
     """Finds and follows what moves.
+
+    In a still world this costs a look at one scan every `LOOK_EVERY_S`; ranges of others are not read.
 
     Args:
         clearance_m: wanted distance from obstacles; runs of returns break where they are further apart.
@@ -100,144 +137,107 @@ class MovingObstacles:
         self._before: deque[RangeScan] = deque()
         self._looked_s = -math.inf
         self._tracks: list[_Track] = []
+        self._new: list[_Track] = []
         self._time_s = 0.0
 
     @property
     def found(self) -> tuple[MovingEdges, ...]:
         """What is known to move, as it was at the time of the last scan."""
         return tuple(
-            MovingEdges(self._time_s, _pairs(track.at(self._time_s)), _pair(track.velocity))
+            MovingEdges(
+                self._time_s,
+                _pairs(track.at(self._time_s).points),
+                (track.velocity.real, track.velocity.imag),
+            )
             for track in self._tracks
             if track.moves
         )
 
+    @property
+    def trail_m(self) -> FloatArray:
+        """(k, 2) places, one a gate, where what the last scan showed to move was before; mostly none."""
+        step_s = [self._gate / max(abs(track.velocity), LEAST_MPS) for track in self._new]
+        past = [
+            track.at(time_s).points
+            for track, step in zip(self._new, step_s, strict=True)
+            for time_s in np.arange(self._time_s, track.begun_s - self._compared_s - step, -step)
+        ]
+        points = _pairs(np.concatenate([np.zeros(0, dtype=np.complex128), *past]))
+        return points[np.unique(np.floor(points / self._gate), axis=0, return_index=True)[1]]
+
     def update(self, scan: RangeScan) -> BoolArray | None:
         """Takes in one scan: (n,) which of its rays met something that moves; None where none did."""
         self._time_s = scan.time_s
-        moving: BoolArray | None = None
-        if self._tracks:
-            moving = self._follow(scan)
+        self._new = []
+        moving = self._follow(scan) if self._tracks else None
         if scan.time_s - self._looked_s >= LOOK_EVERY_S:
             self._looked_s = scan.time_s
-            self._before.append(scan)
-            while len(self._before) > 1 and self._before[1].time_s <= scan.time_s - self._compared_s:
+            while len(self._before) > 2 and self._before[1].time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()
-            self._look(scan, self._before[0], moving)
+            if len(self._before) >= 2 and scan.nearest_m < math.inf:
+                self._look(scan, moving)
+            self._before.append(scan)
         return moving
 
-    def _look(self, scan: RangeScan, before: RangeScan, moving: BoolArray | None) -> None:
+    def _look(self, scan: RangeScan, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before."""
-        hits = (scan.ranges_m < math.inf).nonzero()[0]
-        if not len(hits) or before is scan:
-            return
-        places = scan.from_sensor_m(hits) + complex(scan.east_m, scan.north_m)
-        appeared = _looked_through(before, places, self._sure)
-        if moving is not None:
-            appeared &= ~moving[hits]
+        hits, places = self._returns(scan)
+        appeared = np.ones(len(hits), dtype=np.bool_) if moving is None else ~moving[hits]
+        for before in (self._before[0], self._before[1]):
+            appeared[appeared] = _looked_through(before, places[appeared], self._sure)
         if np.count_nonzero(appeared) < FEWEST:
             return
         closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
         for run in _runs(hits, places, self._apart, closed):
             if _in_a_row(appeared[run]) >= FEWEST and not self._is_followed(places[run], scan.time_s):
-                shifts = deque([(scan.time_s, 0j)])
-                track = _Track(places[run], scan.time_s, 0j, scan.time_s, shifts, seen_s=scan.time_s)
-                self._tracks.append(track)
+                ends = ends_of(scan, int(hits[run[0]]), int(hits[run[-1]]), self._apart)
+                self._tracks.append(_Track(Outline(places[run], ends), scan.time_s))
+
+    def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
+        """Rays that returned something, but for false returns, and where."""
+        hits = supported(scan, self._apart).nonzero()[0]
+        return hits, scan.from_sensor_m(hits) + complex(scan.east_m, scan.north_m)
 
     def _is_followed(self, places: ComplexArray, time_s: float) -> bool:
         middle = places[len(places) // 2]
-        return any(np.abs(track.at(time_s) - middle).min() < self._gate for track in self._tracks)
+        return any(np.abs(track.at(time_s).points - middle).min() < self._gate for track in self._tracks)
 
     def _follow(self, scan: RangeScan) -> BoolArray | None:
         """Moves the tracks on; which rays met one that moves."""
-        sensor = complex(scan.east_m, scan.north_m)
-        hits = (scan.ranges_m < math.inf).nonzero()[0]
-        places = scan.from_sensor_m(hits) + sensor
+        hits, places = self._returns(scan)
         moving = np.zeros(len(scan.ranges_m), dtype=np.bool_)
         kept: list[_Track] = []
         for track in self._tracks:
-            mine = self._register(track, hits, places, scan)
-            age = scan.time_s - track.begun_s
-            if len(mine) >= FEWEST:
-                track.seen_s = scan.time_s
-            if scan.time_s - track.seen_s > (COASTS_S if track.moves else 2.0):
+            mine = self._found_again(track, hits, places, scan)
+            if scan.time_s - track.seen_s > (COASTS_S if track.moves else LOST_S):
                 continue
-            if age >= DECIDED_S:
-                doubt = SURE * track.error_mps
-                if abs(track.velocity) + doubt < LEAST_MPS or (age > UNDECIDED_S and not track.moves):
+            age_s, known = scan.time_s - track.begun_s, track.moves
+            if age_s >= DECIDED_S:
+                track.decide(self._sure)
+                if track.surely_stands() or (age_s > UNDECIDED_S and not track.moves):
                     continue
-                track.moves |= abs(track.velocity) >= LEAST_MPS + doubt
             kept.append(track)
             if track.moves:
                 moving[hits[mine]] = True
+                self._new += [] if known else [track]
         self._tracks = kept
         return moving if moving.any() else None
 
-    def _register(
-        self, track: _Track, hits: NDArray[np.intp], places: ComplexArray, scan: RangeScan
-    ) -> NDArray[np.intp]:
-        """Finds the shift of an outline; returns which of the places belong to it."""
-        outline, mine = track.at(scan.time_s), np.zeros(0, dtype=np.intp)
-        gate = self._gate + (MOST_MPS * 0.5 if len(track.shifts) < 4 else 0.0)
-        low_e, high_e = outline.real.min() - gate, outline.real.max() + gate
-        low_n, high_n = outline.imag.min() - gate, outline.imag.max() + gate
-        near = (
-            (places.real > low_e) & (places.real < high_e) & (places.imag > low_n) & (places.imag < high_n)
-        ).nonzero()[0]
-        if len(near) < FEWEST or len(outline) < FEWEST:
-            return mine
-        sensor = complex(scan.east_m, scan.north_m)
-        ahead = outline[len(outline) // 2] - sensor
-        near = near[np.argsort(-np.angle((places[near] - sensor) * ahead.conjugate()))]  # clockwise
-        along = np.empty_like(outline)
-        along[1:-1] = outline[2:] - outline[:-2]
-        along[0], along[-1] = outline[1] - outline[0], outline[-1] - outline[-2]
-        along /= np.maximum(np.abs(along), 1e-9)
-        straight = np.zeros(len(outline), dtype=np.bool_)
-        straight[1:-1] = (along[2:] * along[:-2].conj()).real > STRAIGHT
-        reach = 1.5 * float(np.median(np.abs(np.diff(outline)))) + 1e-6
-        shift = 0j
-        for _ in range(ROUNDS):
-            apart = places[near, None] - (outline + shift)
-            nearest = np.abs(apart).argmin(axis=1)
-            off = apart[np.arange(len(near)), nearest] * along[nearest].conj()  # along + i across
-            inside = (np.abs(off.imag) < gate) & (np.abs(off.real) < reach + gate * 0.2)
-            inner = inside & straight[nearest] & (np.abs(off.real) < reach)
-            if np.count_nonzero(inner) < FEWEST:
-                return mine
-            normal = 1j * along[nearest[inner]]
-            across = off.imag[inner]
-            a, b, c = (normal.real**2).sum(), (normal.real * normal.imag).sum(), (normal.imag**2).sum()
-            right = (normal * across).sum()
-            first, last = places[near[inside][[0, -1]]] - outline[[0, -1]] - shift
-            hold, ends = STIFF * (a + c), ENDS * (a + c)
-            right += ends * (first + last) - hold * shift
-            a, c = a + hold + 2.0 * ends, c + hold + 2.0 * ends
-            det = a * c - b * b
-            shift += complex(c * right.real - b * right.imag, a * right.imag - b * right.real) / det
-        mine = np.asarray(near[inside])
-        moved = track.base + track.velocity * (scan.time_s - track.outline_s) + shift
-        track.shifts.append((scan.time_s, moved))
-        while track.shifts[-1][0] - track.shifts[0][0] > HISTORY_S:
-            track.shifts.popleft()
-        if scan.time_s - track.outline_s > NEW_OUTLINE_S and len(mine) >= FEWEST:
-            track.outline, track.outline_s, track.base = places[mine], scan.time_s, moved
-        self._measure(track)
+    def _found_again(self, track: _Track, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+        """Finds an outline in a scan; which of the places belong to it."""
+        unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
+        gate = self._gate + unknown_mps * (scan.time_s - track.seen_s)
+        laid = register(track.at(scan.time_s), hits, places, scan, gate, self._apart)
+        if laid is None:
+            return np.zeros(0, dtype=np.intp)
+        track.note(scan.time_s, laid.shift)
+        mine = laid.members
+        if len(mine) >= FEWEST:
+            track.seen_s = scan.time_s
+            if scan.time_s - track.outline_s > NEW_OUTLINE_S:
+                ends = ends_of(scan, int(hits[mine[0]]), int(hits[mine[-1]]), self._apart)
+                track.renew(Outline(places[mine], ends), scan.time_s)
         return mine
-
-    def _measure(self, track: _Track) -> None:
-        """Velocity: the slope of the shifts over time."""
-        if len(track.shifts) < 4:
-            return
-        times, shifts = (np.array(each) for each in zip(*track.shifts, strict=True))
-        times = times - times.mean()
-        velocity = complex((times * shifts).sum() / (times * times).sum())
-        # The outline stays where it has been found.
-        last_s, last = track.shifts[-1]
-        track.outline = track.outline + (last - track.base) - velocity * (last_s - track.outline_s)
-        track.base = last - velocity * (last_s - track.outline_s)
-        off = shifts - shifts.mean() - velocity * times
-        track.error_mps = math.sqrt(float((np.abs(off) ** 2).sum() / (len(off) - 2) / (times * times).sum()))
-        track.velocity = velocity if abs(velocity) <= MOST_MPS else velocity * (MOST_MPS / abs(velocity))
 
 
 def _looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
@@ -255,9 +255,7 @@ def _looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> Boo
     return through
 
 
-def _runs(
-    hits: NDArray[np.intp], places: ComplexArray, apart_m: float, closed: bool
-) -> list[NDArray[np.intp]]:
+def _runs(hits: IntArray, places: ComplexArray, apart_m: float, closed: bool) -> list[IntArray]:
     """Returns of neighbouring rays that lie near to each other, run by run."""
     breaks = ((np.abs(np.diff(places)) > apart_m) | (np.diff(hits) > 2)).nonzero()[0] + 1
     runs = np.split(np.arange(len(hits)), breaks)
@@ -276,8 +274,5 @@ def _in_a_row(flags: Sequence[bool] | BoolArray) -> int:
 
 
 def _pairs(points: ComplexArray) -> FloatArray:
+    """(k, 2) east and north of points."""
     return np.column_stack((points.real, points.imag))
-
-
-def _pair(number: complex) -> tuple[float, float]:
-    return number.real, number.imag

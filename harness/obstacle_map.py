@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.range_sensor import RangeScan, all_round, clockwise_from
+from harness.range_sensor import RangeScan, all_round, clockwise_from, supported
 from planner.interface import BoolArray, FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -123,11 +123,12 @@ class ObstacleMap:
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Forgets all that is no further from some points, (k, 2)."""
-        known = self._points[: self._count]
-        for point in points_m[:, 0] + 1j * points_m[:, 1]:
-            self._score[self._key[: self._count][np.abs(known - point) <= within_m]] = 0
-        self._revision += 1
-        self._taken_back_at = self._revision
+        slots = within(self._points[: self._count], points_m, within_m)
+        slots = slots[self._score[self._key[slots]] > 0]
+        if len(slots):
+            self._score[self._key[slots]] = 0
+            self._revision += 1
+            self._taken_back_at = self._revision
 
     def _take_in(self, scan: RangeScan, nearest_m: float, ignored: BoolArray | None) -> None:
         """Counts hits; where they are news, also what lies between them; and near outlines in detail.
@@ -135,7 +136,7 @@ class ObstacleMap:
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
         self._unconfirmed = False
-        taken = _supported(scan, self._join) if self._doubtful else scan.ranges_m < math.inf
+        taken = supported(scan, self._join) if self._doubtful else scan.ranges_m < math.inf
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
         if not len(hits):
             return
@@ -295,15 +296,15 @@ def _pairs(points: ComplexArray) -> FloatArray:
     return points.view(np.float64).reshape(-1, 2)
 
 
-def _supported(scan: RangeScan, apart_m: float) -> BoolArray:
-    """(n,) which rays returned something that one of the two to either side returned, too: no false return."""
-    ranges = scan.ranges_m if all_round(scan) else np.concatenate((scan.ranges_m, np.full(2, math.inf)))
-    hit = ranges < math.inf
-    finite = np.where(hit, ranges, -math.inf)
-    supported = np.zeros(len(ranges), dtype=np.bool_)
-    for side in (1, 2):
-        # Where one of two is missing, they are infinitely far apart.
-        with np.errstate(invalid="ignore"):
-            alike = np.abs(finite - np.roll(finite, side)) < apart_m
-        supported |= alike | np.roll(alike, -side)
-    return (supported & hit)[: len(scan.ranges_m)]
+def within(known: ComplexArray, points_m: FloatArray, within_m: float) -> NDArray[np.intp]:
+    """(k,) which of (n,) known points, east + i north, lie no further than that from one of (m, 2) points."""
+    if not len(points_m):
+        return np.zeros(0, dtype=np.intp)
+    (west, south), (east, north) = points_m.min(axis=0) - within_m, points_m.max(axis=0) + within_m
+    x, y = known.real, known.imag
+    slots = ((x >= west) & (x <= east) & (y >= south) & (y <= north)).nonzero()[0]
+    near = np.zeros(len(slots), dtype=np.bool_)
+    for point in points_m[:, 0] + 1j * points_m[:, 1]:
+        near |= np.abs(known[slots] - point) <= within_m
+    found: NDArray[np.intp] = slots[near]
+    return found

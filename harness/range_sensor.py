@@ -344,3 +344,17 @@ def clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> Flo
     turns = (np.arctan2(east, north) - start_rad) * (1.0 / math.tau)
     turned: FloatArray = (turns - np.floor(turns)) * math.tau
     return turned
+
+
+def supported(scan: RangeScan, apart_m: float) -> NDArray[np.bool_]:
+    """(n,) which rays returned something that one of the two to either side returned, too: no false return."""
+    ranges = scan.ranges_m if all_round(scan) else np.concatenate((scan.ranges_m, np.full(2, math.inf)))
+    hit = ranges < math.inf
+    finite = np.where(hit, ranges, -math.inf)
+    supported = np.zeros(len(ranges), dtype=np.bool_)
+    for side in (1, 2):
+        # Where one of two is missing, they are infinitely far apart.
+        with np.errstate(invalid="ignore"):
+            alike = np.abs(finite - np.roll(finite, side)) < apart_m
+        supported |= alike | np.roll(alike, -side)
+    return (supported & hit)[: len(scan.ranges_m)]

@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.obstacle_map import within
 from harness.range_sensor import RangeScan, all_round, clockwise_from
 from planner.interface import BoolArray, FloatArray
 
@@ -105,13 +106,12 @@ class ReflectionMap:
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Forgets all that is no further from some points, (k, 2)."""
-        known = self._points[: self._count]
-        for point in points_m[:, 0] + 1j * points_m[:, 1]:
-            near = np.abs(known - point) <= within_m
-            self._counts[: self._count][near] = 0.0
-            self._edge[: self._count][near] = False
-        self._revision += 1
-        self._taken_back_at = self._revision
+        slots = within(self._points[: self._count], points_m, within_m)
+        if len(slots):
+            self._counts[slots] = 0.0
+            self._edge[slots] = False
+            self._revision += 1
+            self._taken_back_at = self._revision
 
     def _add_cells(self, scan: RangeScan, hits: NDArray[np.intp]) -> None:
         """Cells that returned a ray for the first time get a slot."""

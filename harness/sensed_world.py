@@ -70,7 +70,6 @@ class SensedWorld:
         )
         self._moving = None if noisy else MovingObstacles(clearance_m, noise_m)
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
-        self._known_to_move = 0
         self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
 
@@ -117,12 +116,9 @@ class SensedWorld:
         before = self.revision
         self._edges.update(scan, ignored)
         fresh = [self.edges_since(before)] if self.revision != before else []
-        found = self.moving
-        if len(found) > self._known_to_move:
-            for each in found:
-                self._edges.forget(each.points_m, self._clearance + math.hypot(*each.velocity_mps))
-        self._known_to_move = len(found)
-        for edges in (*fresh, *(each.points_m for each in found)):
+        if self._moving and len(trail_m := self._moving.trail_m):
+            self._edges.forget(trail_m, self._clearance)
+        for edges in (*fresh, *(each.points_m for each in self.moving)):
             if self._free.take_back(scan, edges):
                 self._surprised_s = scan.available_s
         self._free.update(scan)

@@ -19,7 +19,7 @@ class Course:
     Attributes:
         path: from where the aircraft was when it was found.
         nodes: its track points, the goal last.
-        known: how many of the remembered edge points it was found with.
+        known: how many of the remembered edge points, of what stands still, it was found with.
         shortest: none shorter was known. That stays so while nothing cuts it: more obstacles shorten no way.
         to_goal: it leads to the goal, not only into a turn.
     """

@@ -27,12 +27,12 @@ class Deliberation:
 
     Args:
         local: does the work.
-        known: number of edge points that it begins with.
+        known: number of edge points, of what stands still, that it begins with.
         effort: how often the work of a wide search is doubled.
         closed: asked before more work than usual: whether it is proved that there is no way.
 
     Attributes:
-        known: number of edge points that it began with.
+        known: number of edge points, of what stands still, that it began with.
         done: whether all ways have been looked for.
         stuck: the first way that was found and could not be taken.
         tracks: candidates looked at so far.
@@ -80,9 +80,7 @@ class Deliberation:
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
             before, known = len(self.tracks), self._local.known
-            route = yield from self._local.route(
-                attempt, known, self._effort, self._now, self.tracks, self._closed
-            )
+            route = yield from self._local.route(attempt, self._effort, self._now, self.tracks, self._closed)
             if len(self.tracks) == before:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:

@@ -62,12 +62,12 @@ class Watch:
         """Its certified part does so, or its turn."""
 
     def begin(self, effect: Effect, points_m: FloatArray) -> None:
-        """A new plan is in effect: it may be cut by what came in while it was looked for, of (m, 2) edges."""
+        """A new plan is in effect: it may be cut by what came in while it was looked for, of (m, 2) still edges."""
         self.cut_m = self.cut_at(effect.course, points_m)
         self.broken = self.cut_m < effect.leaves_m
 
     def cut_at(self, course: Course, points_m: FloatArray) -> float:
-        """Station at which a course comes too near to one of (m, 2) edges that it was not found with."""
+        """Station at which a course comes too near to one of (m, 2) still edges that it was not found with."""
         return first_breach(course.path, points_m[course.known :], self._keep)
 
     def look(self, effect: Effect, here_m: float, position: Point, fresh_m: FloatArray) -> bool:

@@ -132,13 +132,12 @@ class LocalPlanning:
 
     @property
     def known(self) -> int:
-        """How many edge points are remembered."""
-        return len(self._memory.points_m)
+        """How many edge points are remembered that stand still."""
+        return self._memory.known
 
     def route(
         self,
         attempt: Attempt,
-        known: int,
         effort: int,
         now: Now,
         tracks: list[Track],
@@ -151,7 +150,6 @@ class LocalPlanning:
 
         Args:
             attempt: how far from obstacles.
-            known: with how many of the edge points, the first to be remembered.
             effort: how often the work of a wide search is doubled.
             now: tells where a plan would begin, and what is flown: the other side of something is taken only for
                 a shorter way.
@@ -162,7 +160,7 @@ class LocalPlanning:
             None after each step of work.
         """
         start, _ = now()
-        points = self._memory.points_m[:known]
+        points = self._memory.points_m
         room = self._room(start, points)
         window = self.window(start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room))
         begun = start
@@ -222,10 +220,9 @@ class LocalPlanning:
         return None
 
     def window(self, start: Start, keep_m: FloatArray) -> Window:
-        """The planning window about the start of a plan, with the first (m,) points that are remembered."""
-        memory, known = self._memory, len(keep_m)
-        points, labels = memory.points_m[:known], memory.labels[:known].copy()
-        return Window(start.pose[:2], self._window_m, points, labels, memory.cell_m, keep_m)
+        """The planning window about the start of a plan, with what is to be kept from each of the (m,) points."""
+        points, labels = self._memory.points_m, self._memory.labels.copy()
+        return Window(start.pose[:2], self._window_m, points, labels, self._memory.cell_m, keep_m)
 
     def terrain(self, keep_m: float) -> Terrain:
         """Where a curve may lie that keeps one distance from all edge points."""

@@ -40,20 +40,25 @@ class ObstacleMemory:
         self._labels = np.zeros(256, dtype=np.intp)
         self._genuine = np.zeros(256, dtype=np.bool_)
         self._count = 0
-        self._moving = 0
+        self._with_moving: tuple[FloatArray, IntArray] | None = None
         self._of_cell: dict[tuple[int, int], int] = {}
         self._next = 0
         self._revision = -1
 
     @property
+    def known(self) -> int:
+        """How many of the points stand still: the first ones. They stay in their order until all is learnt anew."""
+        return self._count
+
+    @property
     def points_m(self) -> FloatArray:
-        """(m, 2) edge points, those of what moves last."""
-        return self._points[: self._count + self._moving]
+        """(m, 2) edge points, those of what moves last; what comes in later does not change what was given."""
+        return self._all()[0]
 
     @property
     def labels(self) -> IntArray:
         """(m,) the obstacle that each point belongs to."""
-        return self._labels[: self._count + self._moving]
+        return self._all()[1]
 
     @property
     def genuine_m(self) -> FloatArray:
@@ -63,7 +68,6 @@ class ObstacleMemory:
     def refuse(self, place: tuple[float, float]) -> None:
         """Remembers a place as if there were an edge: it is not to be gone to again."""
         self._add(np.array([place]), genuine=False)
-        self._append(self._outlines)
 
     def forgive(self) -> None:
         """Forgets what was refused: at the next call of `take_in` all that was seen is learnt anew."""
@@ -82,11 +86,9 @@ class ObstacleMemory:
         fresh = self._take_in(seen)
         outlines = [each.points_m for each in seen.moving] if met is None else met
         if self._alike(outlines):
-            outlines = self._outlines
-        elif len(outlines):
-            fresh = np.concatenate((fresh, *outlines))
-        self._append(outlines)
-        return fresh
+            return fresh
+        self._outlines, self._with_moving = tuple(outlines), None
+        return np.concatenate((fresh, *outlines))
 
     def _alike(self, outlines: Sequence[FloatArray]) -> bool:
         """Whether what moves is where it was, but for a little."""
@@ -99,15 +101,18 @@ class ObstacleMemory:
         ]
         return max(corners, default=0.0) < MOVED * self.cell_m
 
-    def _append(self, outlines: Sequence[FloatArray]) -> None:
-        """Puts the points of what moves after all others: an obstacle each."""
-        self._outlines, self._moving = outlines, 0
-        for number, outline in enumerate(outlines):
-            begin = self._count + self._moving
-            self._grow(begin + len(outline))
-            new = slice(begin, begin + len(outline))
-            self._points[new], self._labels[new], self._genuine[new] = outline, FIRST_MOVING - number, False
-            self._moving += len(outline)
+    def _all(self) -> tuple[FloatArray, IntArray]:
+        """Points and labels, those of what moves after all others: an obstacle each."""
+        points, labels = self._points[: self._count], self._labels[: self._count]
+        if not self._outlines:
+            return points, labels
+        if self._with_moving is None:
+            numbers = [np.full(len(outline), FIRST_MOVING - i) for i, outline in enumerate(self._outlines)]
+            self._with_moving = (
+                np.concatenate((points, *self._outlines)),
+                np.concatenate((labels, *numbers)),
+            )
+        return self._with_moving
 
     def _take_in(self, seen: SeenWorld) -> FloatArray:
         if seen.taken_back_at > self._revision >= 0:
@@ -122,6 +127,7 @@ class ObstacleMemory:
 
     def _add(self, fresh: FloatArray, genuine: bool) -> None:
         total = self._count + len(fresh)
+        self._with_moving = None
         self._grow(total)
         new = slice(self._count, total)
         self._points[new] = fresh

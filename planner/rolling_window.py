@@ -33,7 +33,7 @@ from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
 from planner.encounters import encounters
 from planner.hold import hold
-from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus, SeenWorld
+from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track
@@ -143,7 +143,7 @@ class RollingWindow:
         watch = self._watch
         if self._thinking is not None:
             return True
-        if self._effort == MOST_EFFORT and self._searched_with == len(self._memory.points_m):
+        if self._effort == MOST_EFFORT and self._searched_with == self._memory.known:
             return since >= math.tau * self._mission.turn_radius_m
         wrong = min(watch.cut_m, effect.leaves_m) - here
         near = wrong < self._urgent_m
@@ -159,7 +159,7 @@ class RollingWindow:
         """The plan in effect."""
         if self._proposed is not None and request.flown is self._proposed.plan:
             self._effect, self._proposed = self._proposed, None
-            self._watch.begin(self._effect, self._memory.points_m)
+            self._watch.begin(self._effect, self._standing_m())
             self._searched_at_m = self._refused_at_m = 0.0
         return self._effect
 
@@ -168,7 +168,7 @@ class RollingWindow:
         start = self._start(request, effect, here)
         ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
         serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
-        known = len(self._memory.points_m)
+        known = self._memory.known
         whole = ahead is not None and ahead.to_goal and ahead.nodes[-1] == self._mission.goal_m
         worth_m = ahead.path.length_m * (1.0 - BETTER) if ahead is not None and whole else math.inf
         if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
@@ -208,8 +208,12 @@ class RollingWindow:
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        cut_m = self._watch.cut_at(course, self._memory.points_m)
+        cut_m = self._watch.cut_at(course, self._standing_m())
         return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
+
+    def _standing_m(self) -> FloatArray:
+        """(m, 2) edge points of what stands still: what moves is looked at whenever it has moved on."""
+        return self._memory.points_m[: self._memory.known]
 
     def _leads_on(self, certified: Certified, course: Course) -> bool:
         """Whether a certified plan gets anywhere: past its first turn, or to the goal."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from planner.interface import BoolArray, FloatArray, MovingEdges
-from planner.memory import ObstacleMemory
+from planner.memory import MOVED, ObstacleMemory
 
 CLEARANCE = 100.0
 SEEDS = st.integers(0, 2**32 - 1)
@@ -146,3 +146,91 @@ def test_what_is_taken_back_is_forgotten(known_before: bool) -> None:
     np.testing.assert_array_equal(memory.points_m, ends)
     assert len(set(memory.labels.tolist())) == 2
     assert len(memory.take_in(seen)) == 0
+
+
+def ring(east_m: float, north_m: float, count: int = 12) -> FloatArray:
+    angle = math.tau * np.arange(count) / count
+    return np.column_stack((east_m + 60.0 * np.cos(angle), north_m + 60.0 * np.sin(angle)))
+
+
+def test_what_moves_comes_last_and_is_an_obstacle_of_its_own_each() -> None:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    still, first, second = scattered(1, 30, 500.0), ring(10.0, 20.0), ring(30.0, 20.0, 5)
+    seen.add(still)
+    fresh = memory.take_in(seen, [first, second])
+    np.testing.assert_array_equal(fresh, np.concatenate((still, first, second)))
+    np.testing.assert_array_equal(memory.points_m, fresh)
+    np.testing.assert_array_equal(memory.genuine_m, still)
+    assert memory.known == 30
+    assert memory.labels.shape == (47,)
+    assert len(set(memory.labels[30:42].tolist())) == len(set(memory.labels[42:].tolist())) == 1
+    assert not set(memory.labels[:30].tolist()) & set(memory.labels[30:].tolist())
+    assert memory.labels[30] != memory.labels[42]
+
+
+def test_where_it_moves_on_it_is_replaced_and_told_anew() -> None:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    seen.add(scattered(1, 30, 500.0))
+    memory.take_in(seen, [ring(0.0, 0.0)])
+    less, more = 0.9 * MOVED * memory.cell_m, 1.1 * MOVED * memory.cell_m
+    assert len(memory.take_in(seen, [ring(less, 0.0)])) == 0
+    np.testing.assert_array_equal(memory.points_m[30:], ring(0.0, 0.0))
+    # Slow ones do not creep away: what counts is how far it is from where it was told.
+    np.testing.assert_array_equal(memory.take_in(seen, [ring(more, 0.0)]), ring(more, 0.0))
+    np.testing.assert_array_equal(memory.points_m[30:], ring(more, 0.0))
+    assert len(memory.take_in(seen, [ring(more, 0.0)])) == 0
+    np.testing.assert_array_equal(
+        memory.take_in(seen, [ring(more, 0.0, 9)] * 2), np.tile(ring(more, 0.0, 9), (2, 1))
+    )
+    assert memory.take_in(seen, []).shape == (0, 2)
+    assert len(memory.points_m) == len(memory.labels) == memory.known == 30
+
+
+def test_without_being_told_where_it_is_met_it_is_where_it_is() -> None:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    seen.moving = (MovingEdges(3.0, ring(0.0, 0.0), (1.0, 0.0)),)
+    np.testing.assert_array_equal(memory.take_in(seen), ring(0.0, 0.0))
+
+
+@settings(deadline=None, max_examples=50)
+@given(seed=SEEDS)
+def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_order(seed: int) -> None:
+    """A search takes several scans: meanwhile obstacles move, others come into view, a place is refused."""
+    rng = np.random.default_rng(seed)
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    given_points, before, refused = memory.points_m, memory.points_m.copy(), 0
+    for step in range(8):
+        known = memory.points_m[: memory.known].copy()
+        if rng.random() < 0.5:
+            seen.add(rng.uniform(-900.0, 900.0, (int(rng.integers(1, 400)), 2)))
+        if rng.random() < 0.2:
+            memory.refuse((float(step), 0.0))
+            refused += 1
+        moving = [
+            ring(*rng.uniform(-900.0, 900.0, 2), int(rng.integers(1, 30))) for _ in range(rng.integers(0, 4))
+        ]
+        memory.take_in(seen, moving)
+        np.testing.assert_array_equal(given_points, before)
+        np.testing.assert_array_equal(memory.points_m[: len(known)], known)
+        np.testing.assert_array_equal(
+            memory.points_m[memory.known :], np.concatenate([np.zeros((0, 2)), *moving])
+        )
+        assert memory.points_m.shape == (len(memory.labels), 2)
+        assert len(memory.genuine_m) == memory.known - refused == len(seen.edges_since(-1))
+        given_points, before = memory.points_m, memory.points_m.copy()
+
+
+def test_what_moves_outlasts_what_is_taken_back_and_what_is_forgiven() -> None:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    seen.add(scattered(1, 30, 500.0))
+    memory.take_in(seen, [ring(0.0, 0.0)])
+    seen.take_back(scattered(1, 7, 500.0))
+    memory.take_in(seen, [ring(0.0, 0.0)])
+    np.testing.assert_array_equal(memory.points_m[7:], ring(0.0, 0.0))
+    memory.refuse((900.0, 900.0))
+    assert memory.known == 8
+    np.testing.assert_array_equal(memory.points_m[8:], ring(0.0, 0.0))
+    memory.forgive()
+    memory.take_in(seen, [ring(0.0, 0.0)])
+    assert memory.known == 7
+    np.testing.assert_array_equal(memory.points_m[7:], ring(0.0, 0.0))

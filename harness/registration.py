@@ -1,0 +1,154 @@
+"""How far an outline has moved, told by the returns of a later scan.
+
+The translation is sought that lays the outline upon the returns (point-to-line registration; Y. Chen and G. Medioni,
+"Object modelling by registration of multiple range images", 1992). A flat face tells nothing of a shift along
+itself; there its ends do, where they are ends: what is hidden, out of range or out of view further on has none.
+
+Points are complex: east + i north, m.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.range_sensor import RangeScan, all_round
+
+ComplexArray = NDArray[np.complex128]
+IntArray = NDArray[np.intp]
+Ends = tuple[bool, bool]
+
+FEWEST = 3
+"""Neighbouring rays that must tell the same."""
+ROUNDS = 3
+"""Registrations in a row, each with the nearest points of the one before."""
+STRAIGHT = 0.9
+"""Cosine of the turn between neighbours: places that bend more than that are no good for registration."""
+BESIDE = 0.2
+"""So much of the gate a return may lie beyond the points of the outline, along it."""
+ENDS = 0.01
+"""Each end has this share of the weight of all that lies between."""
+STIFF = 1e-4
+"""So much holds the shift at the prediction."""
+FARTHEST = 0.95
+"""Share of the sensing range: an outline that is lost further away does not end there."""
+
+
+class Outline(NamedTuple):
+    """A run of returns from neighbouring rays.
+
+    Attributes:
+        points: (m,) places, clockwise as the sensor saw them.
+        ends: whether the first and the last of them are where the thing ends.
+    """
+
+    points: ComplexArray
+    ends: Ends
+
+    def moved(self, by: complex) -> Outline:
+        """The outline elsewhere."""
+        return Outline(self.points + by, self.ends)
+
+
+class Laid(NamedTuple):
+    """An outline laid upon returns.
+
+    Attributes:
+        shift: translation, east + i north, m.
+        members: (k,) which of the returns belong to it, clockwise.
+    """
+
+    shift: complex
+    members: IntArray
+
+
+def ends_of(scan: RangeScan, first_ray: int, last_ray: int, apart_m: float) -> Ends:
+    """Whether what some neighbouring rays returned ends with them: beyond, rays go on further by `apart_m`."""
+    return _is_end(scan, first_ray, -1, apart_m), _is_end(scan, last_ray, 1, apart_m)
+
+
+def register(
+    outline: Outline, hits: IntArray, places: ComplexArray, scan: RangeScan, gate_m: float, apart_m: float
+) -> Laid | None:
+    """Lays an outline upon the returns of a scan.
+
+    Args:
+        outline: where it is expected.
+        hits: (n,) rays of the scan that returned something.
+        places: (n,) where they did.
+        scan: the scan.
+        gate_m: returns further from the outline are not its.
+        apart_m: beyond an end, rays go on further by this.
+
+    Returns:
+        How; None where too few of the returns are near.
+    """
+    near = _about(outline.points, places, gate_m)
+    if min(len(near), len(outline.points)) < FEWEST:
+        return None
+    sensor = complex(scan.east_m, scan.north_m)
+    ahead = (outline.points[len(outline.points) // 2] - sensor).conjugate()
+    near = near[np.argsort(-np.angle((places[near] - sensor) * ahead))]
+    along, straight = _tangents(outline.points)
+    reach = 1.5 * float(np.median(np.abs(np.diff(outline.points)))) + 1e-6
+    shift = 0j
+    for _ in range(ROUNDS):
+        apart = places[near, None] - (outline.points + shift)
+        nearest = np.abs(apart).argmin(axis=1)
+        off = apart[np.arange(len(near)), nearest] * along[nearest].conj()  # along + i across
+        inside = (np.abs(off.imag) < gate_m) & (np.abs(off.real) < reach + BESIDE * gate_m)
+        inner = inside & straight[nearest] & (np.abs(off.real) < reach)
+        if np.count_nonzero(inner) < FEWEST:
+            return None
+        members = near[inside]
+        seen_ends = ends_of(scan, int(hits[members[0]]), int(hits[members[-1]]), apart_m)
+        ends = [
+            places[members[i]] - outline.points[i] - shift
+            for i, was, still in zip((0, -1), outline.ends, seen_ends, strict=True)
+            if was and still
+        ]
+        # An end that is far off is another one: faces come into view and go out of it.
+        ends = [end for end in ends if abs(end) < reach + BESIDE * gate_m]
+        shift += _least_squares(1j * along[nearest[inner]], off.imag[inner], ends, shift)
+    return Laid(shift, np.asarray(members, dtype=np.intp))
+
+
+def _least_squares(
+    normals: ComplexArray, across: NDArray[np.float64], ends: list[complex], shift: complex
+) -> complex:
+    """The further shift that suits best: points to their lines, ends to ends, and not far from none at all."""
+    a, b, c = (normals.real**2).sum(), (normals.real * normals.imag).sum(), (normals.imag**2).sum()
+    hold, pull = STIFF * (a + c), ENDS * (a + c)
+    right = complex((normals * across).sum()) + pull * sum(ends) - hold * shift
+    a, c = a + hold + pull * len(ends), c + hold + pull * len(ends)
+    return complex(c * right.real - b * right.imag, a * right.imag - b * right.real) / float(a * c - b * b)
+
+
+def _about(points: ComplexArray, places: ComplexArray, gate_m: float) -> IntArray:
+    """Which places lie in the upright box round some points, or no further off than the gate."""
+    inside = np.ones(len(places), dtype=np.bool_)
+    for of_points, of_places in ((points.real, places.real), (points.imag, places.imag)):
+        inside &= (of_places > of_points.min() - gate_m) & (of_places < of_points.max() + gate_m)
+    return inside.nonzero()[0]
+
+
+def _tangents(points: ComplexArray) -> tuple[ComplexArray, NDArray[np.bool_]]:
+    """(m,) unit vectors along an outline, and whether it is straight there; at its ends it is not."""
+    along = np.empty_like(points)
+    along[1:-1] = points[2:] - points[:-2]
+    along[0], along[-1] = points[1] - points[0], points[-1] - points[-2]
+    along /= np.maximum(np.abs(along), 1e-9)
+    straight = np.zeros(len(points), dtype=np.bool_)
+    straight[1:-1] = (along[2:] * along[:-2].conj()).real > STRAIGHT
+    return along, straight
+
+
+def _is_end(scan: RangeScan, ray: int, side: int, apart_m: float) -> bool:
+    beyond = np.array((ray + side, ray + 2 * side))
+    rays = len(scan.ranges_m)
+    if not all_round(scan) and not ((beyond >= 0) & (beyond < rays)).all():
+        return False
+    own = float(scan.ranges_m[ray])
+    return own < FARTHEST * scan.max_range_m and bool((scan.ranges_m[beyond % rays] > own + apart_m).all())
