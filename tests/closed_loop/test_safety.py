@@ -27,6 +27,7 @@ from harness.range_sensor import RangeScan
 from harness.record import AcceptedPlan, Flight, Outcome, Track
 from harness.run import make_loop
 from harness.scenario import Scenario, dump_scenario
+from harness.sensed_world import SensedWorld
 from harness.world import World
 from planner.clearance import distances
 from planner.curves import on_loiter, pose_at, sample
@@ -91,6 +92,19 @@ class Invariant:
 
     def on_event(self, time_s: float, text: str) -> None:
         pass
+
+
+class Events(Invariant):
+    """Only listens."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        """Plans may be unsafe here."""
+
+    def on_event(self, time_s: float, text: str) -> None:
+        self.texts.append(text)
 
 
 def watched(scenario: Scenario) -> tuple[Flight, Invariant]:
