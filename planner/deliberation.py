@@ -18,7 +18,7 @@ from planner.local_planning import LocalPlanning, Start
 from planner.multi_step_search import Track
 from planner.route_optimisation import Route
 
-POINTS_A_STEP = 2000
+POINTS_A_STEP = 6000
 """A step among so many edge points is twice the work of one among a few."""
 
 

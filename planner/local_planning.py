@@ -34,7 +34,7 @@ WIDER = 4
 OPTIMISING = 3
 """Optimising a route is as much work as so many steps of the search."""
 
-SWITCH = 0.01
+SWITCH = 0.03
 """The other way round is taken only where it saves this share of the distance left."""
 
 RETRACE = 0.25

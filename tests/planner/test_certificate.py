@@ -225,3 +225,13 @@ def test_no_further_than_the_horizon() -> None:
 def test_the_least_sensor_range_reaches_over_a_turn_to_the_side() -> None:
     least = least_sensor_range_m(100.0, 40.0, 25.0, 2.0)
     assert least == pytest.approx(2.0 * DISC * 100.0 + 40.0 + 50.0)
+
+
+def test_nothing_is_certified_beyond_where_a_path_is_cut() -> None:
+    space = FreeDiscs(np.array([(700.0, 0.0, 3000.0)]))
+    whole = CERTIFIER.certify(STRAIGHT, space, terrain())
+    cut = CERTIFIER.certify(STRAIGHT, space, terrain(), 600.0)
+    assert whole is not None
+    assert cut is not None
+    assert whole.leaves_m > 1400.0
+    assert 500.0 < cut.leaves_m <= 600.0

@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+import planner.deliberation
 import planner.local_planning
 from planner.course import Course
 from planner.curves import Pose
 from planner.deliberation import Deliberation
-from planner.interface import FloatArray, Mission, SeenWorld
+from planner.interface import BoolArray, FloatArray, Mission, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import search
@@ -115,3 +116,61 @@ def test_walled_in_the_proof_ends_it(ring: MakePoints, known: Known) -> None:
     courses, _ = all_courses(deliberation(known(ring(0.0, 0.0, 3000.0, 50.0)), closed), 40, lambda: START)
     assert courses == []
     assert asked
+
+
+class Growing:
+    """Edge points of which more and more are in sight."""
+
+    spacing_m, taken_back_at = 50.0, 0
+
+    def __init__(self, *scans: FloatArray) -> None:
+        self._scans, self.revision = scans, 1
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return np.concatenate([np.zeros((0, 2)), *self._scans[max(revision, 0) : self.revision]])
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.ones(len(points_m), dtype=np.bool_)
+
+
+def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(wall: MakePoints) -> None:
+    """The near end of a wall is passed although more of the wall behind that end is seen before the search ends."""
+    across = wall((3000.0, -700.0), (3000.0, 6000.0), 50.0)
+    behind = wall((3000.0, -700.0), (6000.0, -700.0), 50.0)
+    seen, memory = Growing(across, behind), ObstacleMemory(MISSION.clearance_m)
+    memory.take_in(seen)
+    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    thinking = Deliberation(local, len(memory.points_m), 0, lambda: False)
+    assert not list(thinking.courses(START, None, 2))
+    seen.revision = 2
+    memory.take_in(seen)
+    later = Start((100.0, 0.0), Pose(100.0, 0.0, 1.0, 0.0))
+    course = next(iter(thinking.courses(later, None, 10**6)))
+    assert course.known == len(across)
+    assert course.shortest
+    assert min(north for _, north in course.nodes) < -800.0
+    assert course.path.length_m < 12_500.0
+
+
+def test_among_many_edge_points_a_portion_is_fewer_steps(
+    trap: SeenWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, few = all_courses(deliberation(trap), 20, lambda: START)
+    monkeypatch.setattr(planner.deliberation, "POINTS_A_STEP", 50)
+    _, many = all_courses(deliberation(trap), 20, lambda: START)
+    assert many > 2 * few
+
+
+@pytest.mark.parametrize("flown_before", [False, True])
+def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
+    wall: MakePoints, known: Known, flown_before: bool
+) -> None:
+    memory = ObstacleMemory(MISSION.clearance_m)
+    memory.take_in(known(wall((6000.0, -2000.0), (6000.0, 2100.0), 50.0)))
+    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    if flown_before:
+        for share in np.linspace(0.3, 1.0, 60).tolist():
+            local.trail.add((6000.0 * share, -2200.0 * share))
+    thinking = Deliberation(local, len(memory.points_m), 0, lambda: False)
+    course = next(iter(thinking.courses(START, None, 10**6)))
+    assert (course.nodes[0][1] > 0.0) is flown_before

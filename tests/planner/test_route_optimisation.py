@@ -174,3 +174,18 @@ def test_what_lies_further_off_does_not_matter_to_a_short_path(seed: int, count:
     short = Path(np.array([(0.0, 0.0, 0.6, 0.8, 1 / 400.0, reach)]))
     assert near.admits(short) == all_of_it.admits(short)
     assert len(near.points_m) == len(near.keep_m) <= count
+
+
+def test_a_turn_round_something_is_flown_on_where_its_track_points_lie_outside(
+    assert_flyable: AssertFlyable,
+) -> None:
+    """Half-way round a post the first track points could be reached only by a turn against the one that is flown."""
+    around, limits, post = 321.0, Limits(110.0, 15.5), terrain(np.zeros((1, 2)), 312.0)
+    begin = Pose(-0.593 * around, -math.sqrt(1.0 - 0.593**2) * around, math.sqrt(1.0 - 0.593**2), -0.593)
+    nodes = [begin[:2], (-138.0, -301.5), (17.0, -332.0), (169.0, -287.5), (822.0, 275.0), (3000.0, 2600.0)]
+    route = optimise(begin, 1.0 / around, nodes, limits, 9.0, post)
+    assert route is not None
+    assert_flyable(route.path, limits.radius_m)
+    assert post.admits(route.path)
+    assert route.path.segments[0, 4] == pytest.approx(1.0 / around)
+    assert route.path.length_m < 4800.0
