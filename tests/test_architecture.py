@@ -45,7 +45,12 @@ ONLY_IN = {
     "typer": ("harness/cli.py", "harness/commands/*.py"),
     "matplotlib": ("harness/figures.py", "harness/campaign_figures.py", "harness/falsify_figure.py"),
     "jinja2": ("harness/report.py",),
-    "scipy": ("harness/sampling.py",),
+    "scipy": (
+        "harness/sampling.py",
+        "harness/campaign_paired.py",
+        "harness/campaign_summary.py",
+        "harness/falsify_search.py",
+    ),
     "distributed": ("harness/sweep_workers.py",),
     "ompl": ("planner/dubins_tree.py",),
     "harness.cli": ("harness/__main__.py",),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import pairwise
 
@@ -13,7 +14,7 @@ import planner.local_planning
 from planner.course import Course
 from planner.curves import Pose
 from planner.deliberation import Deliberation
-from planner.interface import BoolArray, FloatArray, Mission, SeenWorld
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import search
@@ -122,6 +123,8 @@ class Growing:
     """Edge points of which more and more are in sight."""
 
     spacing_m, taken_back_at = 50.0, 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
 
     def __init__(self, *scans: FloatArray) -> None:
         self._scans, self.revision = scans, 1
