@@ -26,6 +26,7 @@ COMPARED_S = 12.0
 """Scans are compared with those taken so long before,"""
 SLOW_MPS = 5.0
 """and as much longer as something so slow takes to leave the noise."""
+NOWHERE = np.zeros((0, 2))
 LOOK_EVERY_S = 3.0
 LEAST_MPS = 0.5
 """What is slower than this stands still."""
@@ -156,13 +157,15 @@ class MovingObstacles:
     @property
     def trail_m(self) -> FloatArray:
         """(k, 2) places, one a gate, where what the last scan showed to move was before; mostly none."""
+        if not self._new:
+            return NOWHERE
         step_s = [self._gate / max(abs(track.velocity), LEAST_MPS) for track in self._new]
         past = [
             track.at(time_s).points
             for track, step in zip(self._new, step_s, strict=True)
             for time_s in np.arange(self._time_s, track.begun_s - self._compared_s - step, -step)
         ]
-        points = _pairs(np.concatenate([np.zeros(0, dtype=np.complex128), *past]))
+        points = _pairs(np.concatenate(past))
         return points[np.unique(np.floor(points / self._gate), axis=0, return_index=True)[1]]
 
     def update(self, scan: RangeScan) -> BoolArray | None:
@@ -176,7 +179,8 @@ class MovingObstacles:
                 self._before.popleft()
             if len(self._before) >= 2 and scan.nearest_m < math.inf:
                 self._look(scan, moving)
-            self._before.append(scan)
+            if len(scan.ranges_m):  # read: a scan that is kept keeps nothing of the world
+                self._before.append(scan)
         return moving
 
     def _look(self, scan: RangeScan, moving: BoolArray | None) -> None:
