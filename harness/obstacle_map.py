@@ -14,13 +14,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.edge_grid import EdgeGrid
 from harness.range_sensor import RangeScan, all_round, clockwise_from, supported
 from planner.interface import BoolArray, FloatArray
 
 ComplexArray = NDArray[np.complex128]
 """Points of the plane as east + i north: one number each."""
 
-MOST_CELLS = 4_000_000
 CONFIRMED = 2
 """An edge is believed from this score on; a hit adds one, a look through takes one."""
 CERTAIN = 6
@@ -55,18 +55,11 @@ class ObstacleMap:
         range_m: float,
         doubtful: bool = True,
     ) -> None:
-        xmin, ymin, xmax, ymax = bounds_m
-        span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
-        self._cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
-        border = 2.0 * clearance_m + self._cell
-        self._origin = complex(xmin - border, ymin - border)
-        self._nx, self._ny = (
-            math.ceil((high - low + 2.0 * border) / self._cell) for low, high in ((xmin, xmax), (ymin, ymax))
-        )
+        grid = EdgeGrid.over(bounds_m, clearance_m)
+        self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
         self._coarse = self._nx * self._ny
-        self._fine: dict[
-            tuple[int, int, int], int
-        ] = {}  # fine cells that were hit, numbered after the coarse ones
+        # Fine cells that were hit, numbered after the coarse ones.
+        self._fine: dict[tuple[int, int, int], int] = {}
         self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # by cell
         self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
         self._points = np.zeros(1024, dtype=np.complex128)  # by slot

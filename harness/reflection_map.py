@@ -16,11 +16,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.edge_grid import EdgeGrid
 from harness.obstacle_map import within
 from harness.range_sensor import RangeScan, all_round, clockwise_from
 from planner.interface import BoolArray, FloatArray
 
-MOST_CELLS = 4_000_000
 LEAST_STOPPED = 5.0
 """An edge stopped so many rays at least."""
 STOPPED_SHORT = 0.25
@@ -52,14 +52,8 @@ class ReflectionMap:
         range_m: float,
         noise_m: float,
     ) -> None:
-        xmin, ymin, xmax, ymax = bounds_m
-        span = max(xmax - xmin, ymax - ymin) + 4.0 * clearance_m
-        self._cell = max(clearance_m / 4.0, span / math.sqrt(MOST_CELLS))
-        border = 2.0 * clearance_m + self._cell
-        self._origin = complex(xmin - border, ymin - border)
-        self._nx, self._ny = (
-            math.ceil((high - low + 2.0 * border) / self._cell) for low, high in ((xmin, xmax), (ymin, ymax))
-        )
+        grid = EdgeGrid.over(bounds_m, clearance_m)
+        self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
         self._noise, self._range = noise_m, range_m
         self._least_share = min(REFLECTIVITY, HAZARD * self._cell / noise_m)
         self._slot = np.full(self._nx * self._ny, -1, dtype=np.int32)  # by cell
@@ -67,7 +61,7 @@ class ReflectionMap:
         self._points = np.zeros(1024, dtype=np.complex128)  # by slot, as all that follows: middle of the cell
         self._counts = np.zeros(
             (1024, 3), dtype=np.float32
-        )  # rays reflected, passed through, ended before it
+        )  # rays it stopped, let through, that ended before
         self._edge = np.zeros(1024, dtype=np.bool_)
         self._since = np.zeros(1024, dtype=np.int64)  # revision at which it last became an edge
         self._revision = self._taken_back_at = 0

@@ -8,8 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from harness.commands import options
-from harness.commands.options import JsonOption, ScenarioArgument, bad_input, load, print_json, setting
+from harness.commands.options import (
+    AircraftOption,
+    JsonOption,
+    PlannerOption,
+    ScenarioArgument,
+    SeedOption,
+    SettingsOption,
+    bad_input,
+    load,
+    print_json,
+    setting,
+)
 
 if TYPE_CHECKING:
     from harness.falsify import Until
@@ -24,19 +34,10 @@ def falsify(
         list[str],
         typer.Option(metavar="KEY.PATH=LO:HI", help="From the mild end LO to HI; can be repeated."),
     ],
-    planner: Annotated[
-        str | None,
-        typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=options.planners),
-    ] = None,
-    aircraft: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=options.aircraft),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
-    ] = None,
+    planner: PlannerOption = None,
+    aircraft: AircraftOption = None,
+    seed: SeedOption = None,
+    settings: SettingsOption = None,
     until: Annotated[
         Literal["failed", "untrackable"], typer.Option(help="Not reached, or a leg not tracked either.")
     ] = "failed",

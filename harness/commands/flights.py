@@ -8,11 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from harness.commands import options
 from harness.commands.options import (
     FAILED,
+    AircraftOption,
     JsonOption,
     OptionalScenario,
+    PlannerOption,
+    SeedOption,
+    SettingsOption,
     bad_input,
     flag,
     load,
@@ -31,19 +34,10 @@ FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 
 def fly(
     scenario: OptionalScenario = None,
-    planner: Annotated[
-        str | None,
-        typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=options.planners),
-    ] = None,
-    aircraft: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=options.aircraft),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
-    ] = None,
+    planner: PlannerOption = None,
+    aircraft: AircraftOption = None,
+    seed: SeedOption = None,
+    settings: SettingsOption = None,
     results: Annotated[
         Path | None,
         typer.Option("--from", metavar="FILE", help="A campaign's results.parquet, instead of SCENARIO."),

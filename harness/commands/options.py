@@ -71,6 +71,17 @@ _SCENARIO: Any = typer.Argument(
 )
 ScenarioArgument = Annotated[str, _SCENARIO]
 OptionalScenario = Annotated[str | None, _SCENARIO]
+PlannerOption = Annotated[
+    str | None, typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=planners)
+]
+AircraftOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=aircraft)
+]
+SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]
+SettingsOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
+]
 JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
 
 
