@@ -234,6 +234,9 @@ class MovingObstacles:
             kept.append(track)
             if track.moves:
                 moving[hits[mine]] = True
+                for end in mine[[0, -1]] if len(mine) else ():
+                    # What is seen at a glance beyond its ends is its, too.
+                    moving[hits[np.abs(places - places[end]) < self._gate]] = True
                 self._new += [] if known else [track]
         self._tracks = kept
         return moving if moving.any() else None
