@@ -28,6 +28,10 @@ SLOW_MPS = 5.0
 """and as much longer as something so slow takes to leave the noise."""
 NOWHERE = np.zeros((0, 2))
 LOOK_EVERY_S = 3.0
+MISSING = 3
+"""A run of returns goes on where no more of them in a row are lost."""
+ABREAST = 2
+"""A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
 LEAST_MPS = 0.5
 """What is slower than this stands still."""
 MOST_MPS = 30.0
@@ -131,6 +135,7 @@ class MovingObstacles:
     """
 
     def __init__(self, clearance_m: float, noise_m: float) -> None:
+        self._noise = noise_m
         self._apart = clearance_m + 6.0 * noise_m
         self._sure = 4.0 * noise_m + 0.02 * clearance_m
         self._compared_s = COMPARED_S + self._sure / SLOW_MPS
@@ -194,13 +199,23 @@ class MovingObstacles:
         closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
         for run in _runs(hits, places, self._apart, closed):
             if _in_a_row(appeared[run]) >= FEWEST and not self._is_followed(places[run], scan.time_s):
-                ends = ends_of(scan, int(hits[run[0]]), int(hits[run[-1]]), self._apart)
-                self._tracks.append(_Track(Outline(places[run], ends), scan.time_s))
+                self._tracks.append(_Track(self._outline(scan, hits[run], places[run]), scan.time_s))
 
     def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
         """Rays that returned something, but for false returns, and where."""
         hits = supported(scan, self._apart).nonzero()[0]
         return hits, scan.from_sensor_m(hits) + complex(scan.east_m, scan.north_m)
+
+    def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:
+        """The outline that neighbouring returns show: where they lie closer than they err, means of several."""
+        away = np.abs(places - complex(scan.east_m, scan.north_m)).mean()
+        several = math.ceil(2.0 * self._noise / max(scan.spacing_rad * float(away), 1e-9))
+        points = places
+        if several > 1:
+            first = np.arange(0, len(places), several)
+            means = np.add.reduceat(places, first) / np.diff(np.append(first, len(places)))
+            points = np.concatenate((places[:1], means, places[-1:]))
+        return Outline(points, ends_of(scan, int(hits[0]), int(hits[-1]), self._apart))
 
     def _is_followed(self, places: ComplexArray, time_s: float) -> bool:
         middle = places[len(places) // 2]
@@ -223,6 +238,9 @@ class MovingObstacles:
             kept.append(track)
             if track.moves:
                 moving[hits[mine]] = True
+                for end in mine[[0, -1]] if len(mine) else ():
+                    # What is seen at a glance beyond its ends is its, too.
+                    moving[hits[np.abs(places - places[end]) < self._gate]] = True
                 self._new += [] if known else [track]
         self._tracks = kept
         return moving if moving.any() else None
@@ -239,29 +257,28 @@ class MovingObstacles:
         if len(mine) >= FEWEST:
             track.seen_s = scan.time_s
             if scan.time_s - track.outline_s > NEW_OUTLINE_S:
-                ends = ends_of(scan, int(hits[mine[0]]), int(hits[mine[-1]]), self._apart)
-                track.renew(Outline(places[mine], ends), scan.time_s)
+                track.renew(self._outline(scan, hits[mine], places[mine]), scan.time_s)
         return mine
 
 
 def _looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
-    """(k,) whether a scan looked through places: with three neighbouring rays, and surely."""
+    """(k,) whether a scan looked through places, surely: with the ray towards each and two to either side."""
     offsets = places - complex(scan.east_m, scan.north_m)
     distance = np.abs(offsets)
     rays = len(scan.ranges_m)
     bearing = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
     ray = np.rint(bearing / scan.spacing_rad).astype(np.int64)
-    ring = np.concatenate((scan.ranges_m[-1:], scan.ranges_m, scan.ranges_m[:2]))
-    beside = np.minimum(np.minimum(ring[:-2], ring[1:-1]), ring[2:])
-    through = (beside.take(ray, mode="clip") > distance + sure_m) & (distance + sure_m < scan.max_range_m)
+    beside = ray[:, None] + np.arange(-ABREAST, ABREAST + 1)
+    least = scan.ranges_m.take(beside, mode="wrap").min(axis=1)
+    through: BoolArray = (least > distance + sure_m) & (distance + sure_m < scan.max_range_m)
     if not all_round(scan):
-        through &= (ray >= 1) & (ray < rays - 1)
+        through &= (ray >= ABREAST) & (ray < rays - ABREAST)
     return through
 
 
 def _runs(hits: IntArray, places: ComplexArray, apart_m: float, closed: bool) -> list[IntArray]:
     """Returns of neighbouring rays that lie near to each other, run by run."""
-    breaks = ((np.abs(np.diff(places)) > apart_m) | (np.diff(hits) > 2)).nonzero()[0] + 1
+    breaks = ((np.abs(np.diff(places)) > apart_m) | (np.diff(hits) > MISSING + 1)).nonzero()[0] + 1
     runs = np.split(np.arange(len(hits)), breaks)
     if closed and len(runs) > 1 and abs(places[-1] - places[0]) <= apart_m:
         runs = [np.concatenate((runs[-1], runs[0])), *runs[1:-1]]

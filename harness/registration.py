@@ -32,6 +32,8 @@ ENDS = 0.01
 """Each end has this share of the weight of all that lies between."""
 STIFF = 1e-4
 """So much holds the shift at the prediction."""
+BEYOND = 5
+"""So many rays beyond an end are looked at: that all of them are lost by chance is hardly possible."""
 FARTHEST = 0.95
 """Share of the sensing range: an outline that is lost further away does not end there."""
 
@@ -146,7 +148,7 @@ def _tangents(points: ComplexArray) -> tuple[ComplexArray, NDArray[np.bool_]]:
 
 
 def _is_end(scan: RangeScan, ray: int, side: int, apart_m: float) -> bool:
-    beyond = np.array((ray + side, ray + 2 * side))
+    beyond = ray + side * np.arange(1, BEYOND + 1)
     rays = len(scan.ranges_m)
     if not all_round(scan) and not ((beyond >= 0) & (beyond < rays)).all():
         return False

@@ -207,8 +207,7 @@ def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_o
             memory.refuse((float(step), 0.0))
             refused += 1
         moving = [
-            ring(float(east), float(north), int(rng.integers(1, 30)))
-            for east, north in rng.uniform(-900.0, 900.0, (int(rng.integers(0, 4)), 2))
+            ring(rng.uniform(-900.0, 900.0), 0.0, int(rng.integers(1, 30))) for _ in range(rng.integers(0, 4))
         ]
         memory.take_in(seen, moving)
         np.testing.assert_array_equal(given_points, before)

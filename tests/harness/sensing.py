@@ -1,0 +1,65 @@
+"""What tests of the map share: a sensor that flies through a world."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.obstacle import Circle, Obstacle, Polygon
+from harness.range_sensor import RangeScan, RangeSensor
+from harness.scenario_sections import Sensor
+from harness.world import World
+
+FloatArray = NDArray[np.float64]
+
+BOUNDS = (0.0, 0.0, 6000.0, 6000.0)
+CLEARANCE, RANGE = 40.0, 1500.0
+SPEED = 25.0
+SCAN_S = 0.5
+
+
+def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
+    return RangeSensor(world, Sensor(**{"range_m": RANGE} | keys), np.random.SeedSequence(seed))
+
+
+def world_of(*obstacles: Obstacle | Circle | Polygon) -> World:
+    return World([each if isinstance(each, Obstacle) else Obstacle(each) for each in obstacles], BOUNDS)
+
+
+def block(west: float, south: float, east: float, north: float) -> Polygon:
+    return Polygon(((west, south), (east, south), (east, north), (west, north)))
+
+
+def regular(east: float, north: float, radius_m: float, corners: int, turn_rad: float = 0.0) -> Polygon:
+    angles = turn_rad + math.tau * np.arange(corners) / corners
+    return Polygon(
+        tuple((east + radius_m * math.cos(a), north + radius_m * math.sin(a)) for a in angles.tolist())
+    )
+
+
+def flight(
+    eye: RangeSensor,
+    seconds: float,
+    start: tuple[float, float] = (3000.0, 1500.0),
+    course_rad: float = 0.0,
+    turn_rad_s: float = 0.0,
+    start_s: float = 0.0,
+    speed: float = SPEED,
+) -> Iterator[RangeScan]:
+    """Scans of an aircraft that flies straight on, or turns to the right."""
+    (east, north), course = start, course_rad
+    for i in range(round(seconds / SCAN_S)):
+        yield eye.scan(east, north, course, start_s + SCAN_S * i)
+        course += turn_rad_s * SCAN_S
+        east += speed * SCAN_S * math.sin(course)
+        north += speed * SCAN_S * math.cos(course)
+
+
+def off(world: World, points: FloatArray, time_s: float = 0.0) -> FloatArray:
+    """(k,) distance of points from the nearest true edge, negative inside."""
+    distance: FloatArray = world.clearance(points, np.full(len(points), time_s))
+    return distance

@@ -1,0 +1,241 @@
+"""What moves is found, and nothing else is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness import range_sensor
+from harness.moving_obstacles import COASTS_S, MovingObstacles
+from harness.obstacle import Circle, Obstacle, Polygon
+from harness.range_sensor import RangeScan
+from harness.world import World
+from planner.interface import MovingEdges
+from tests.harness.sensing import CLEARANCE, SCAN_S, SPEED, block, flight, off, regular, sensor, world_of
+
+SEEDS = st.integers(0, 2**32 - 1)
+START = (3000.0, 1500.0)
+Found = list[tuple[float, tuple[MovingEdges, ...]]]
+
+
+def watched(scans: Iterable[RangeScan], noise_m: float = 0.0) -> Found:
+    """What is known to move after each scan, and the time of that."""
+    seen = MovingObstacles(CLEARANCE, noise_m)
+    found: Found = []
+    for scan in scans:
+        seen.update(scan)
+        found.append((scan.time_s, seen.found))
+    return found
+
+
+def errors(found: Found, velocity: complex) -> list[float]:
+    """How far off each velocity is, m/s."""
+    return [abs(complex(*each.velocity_mps) - velocity) for _, all_found in found for each in all_found]
+
+
+def passing(
+    speed_mps: float, turned_rad: float, away_m: float, bearing_rad: float, size: float, corners: int
+) -> tuple[World, complex]:
+    """An obstacle that comes nearer or crosses, and its velocity (east + i north).
+
+    It is `away_m` from the aircraft after 20 s, in a direction; there it moves towards the aircraft, but for an angle.
+    """
+    direction = complex(math.sin(bearing_rad), math.cos(bearing_rad))
+    velocity = -speed_mps * direction * complex(math.cos(turned_rad), math.sin(turned_rad))
+    place = complex(*START) + 1j * SPEED * 20.0 + away_m * direction - velocity * 20.0
+    shape: Circle | Polygon = Circle((place.real, place.imag), size)
+    if corners > 2:
+        shape = regular(place.real, place.imag, size, corners, bearing_rad + turned_rad)
+    return world_of(Obstacle(shape, velocity_mps=(velocity.real, velocity.imag))), velocity
+
+
+@settings(deadline=None, max_examples=40)
+@given(
+    speed=st.floats(1.0, 10.0),
+    turned=st.floats(-1.4, 1.4),
+    away=st.floats(400.0, 800.0),
+    bearing=st.floats(-1.1, 1.1),
+    size=st.floats(50.0, 150.0),
+    corners=st.sampled_from([0, 0, 3, 4, 5]),
+)
+def test_velocity_is_told_to_half_a_metre_a_second(
+    speed: float, turned: float, away: float, bearing: float, size: float, corners: int
+) -> None:
+    world, velocity = passing(speed, turned, away, bearing, size, corners)
+    found = watched(flight(sensor(world), 40.0, START))
+    assert any(all_found for time_s, all_found in found if time_s <= 30.0)
+    assert max(len(all_found) for _, all_found in found) <= 2
+    off_mps = errors(found, velocity)
+    assert np.median(off_mps) < 0.5
+    # Passed closely, an obstacle shows other faces than before: for a moment that looks like motion.
+    assert max(off_mps) < 5.0
+
+
+@pytest.mark.parametrize("corners", [0, 4])
+@pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}, {"field_of_view_deg": 180.0}])
+def test_it_is_where_it_is_told_to_be(corners: int, flaws: dict[str, Any]) -> None:
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, corners)
+    found = watched(flight(sensor(world, **flaws), 35.0, START))
+    first_s = next(time_s for time_s, all_found in found if all_found)
+    assert first_s <= 20.0
+    assert max(errors(found, velocity)) < 2.0
+    assert max(errors(found[-10:], velocity)) < 0.2
+    for time_s, all_found in found:
+        for each in all_found:
+            assert each.time_s == time_s
+            assert np.abs(off(world, each.points_m, time_s)).max() < 0.3 * CLEARANCE
+
+
+@pytest.mark.parametrize("noise_m", [1.0, 4.0])
+def test_with_noise_it_takes_longer_but_is_found(noise_m: float) -> None:
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    found = watched(flight(sensor(world, range_noise_m=noise_m), 40.0, START), noise_m)
+    assert next(time_s for time_s, all_found in found if all_found) <= 25.0
+    assert max(errors(found, velocity)) < 2.0
+
+
+def random_still_world(seed: int) -> World:
+    rng = np.random.default_rng(seed)
+    shapes: list[Circle | Polygon] = []
+    for _ in range(int(rng.integers(3, 14))):
+        east, north, size = rng.uniform(1500.0, 4500.0), rng.uniform(1500.0, 5500.0), rng.uniform(20.0, 300.0)
+        corners, turn = int(rng.integers(3, 7)), rng.uniform(0.0, math.tau)
+        long, high = rng.uniform(50.0, 1500.0), rng.uniform(20.0, 200.0)
+        kinds: tuple[Circle | Polygon, ...] = (
+            Circle((east, north), size),
+            regular(east, north, size, corners, turn),
+            block(east, north, east + long, north + high),
+        )
+        shapes.append(kinds[int(rng.integers(3))])
+    return world_of(*shapes)
+
+
+STILL: list[dict[str, Any]] = [
+    {},
+    {"dropout": 0.1, "false_return": 0.01},
+    {"range_noise_m": 2.0, "field_of_view_deg": 180.0},
+    {"range_noise_m": 4.0, "dropout": 0.1, "false_return": 0.01},
+    {"rays": 180},
+]
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=SEEDS,
+    flaws=st.sampled_from(STILL),
+    turn=st.sampled_from([0.0, 0.0, 0.05, -0.16]),
+    course=st.floats(-0.6, 0.6),
+)
+def test_nothing_moves_in_a_still_world(seed: int, flaws: dict[str, Any], turn: float, course: float) -> None:
+    world, outside = random_still_world(seed), []
+    for scan in flight(sensor(world, seed, **flaws), 90.0, (3000.0, 1000.0), course, turn):
+        if world.clearance_at(scan.east_m, scan.north_m, 0.0) < 20.0:
+            break
+        outside.append(scan)
+    noise_m = flaws.get("range_noise_m", 0.0)
+    assert not any(all_found for _, all_found in watched(outside, noise_m))
+
+
+@pytest.mark.parametrize("flaws", STILL)
+@pytest.mark.parametrize("corners", [0, 4])
+def test_what_appears_does_not_move(corners: int, flaws: dict[str, Any]) -> None:
+    shape = Circle((2830.0, 2400.0), 80.0) if corners == 0 else regular(2830.0, 2400.0, 80.0, corners, 0.3)
+    world = world_of(Obstacle(shape, active_s=(15.0, 500.0)))
+    found = watched(flight(sensor(world, **flaws), 60.0, START), flaws.get("range_noise_m", 0.0))
+    assert not any(all_found for _, all_found in found)
+
+
+def test_what_draws_back_is_left_to_the_map() -> None:
+    world = world_of(Obstacle(Circle((3000.0, 2200.0), 100.0), velocity_mps=(0.0, 8.0)))
+    assert not any(all_found for _, all_found in watched(flight(sensor(world), 40.0, START)))
+
+
+def test_what_leaves_sight_moves_on_for_a_while() -> None:
+    """It goes behind a wall."""
+    velocity = 8.0 + 0.0j
+    moves = Obstacle(Circle((2700.0, 2600.0), 40.0), velocity_mps=(8.0, 0.0))
+    world = world_of(moves, block(3000.0, 2300.0, 3600.0, 2350.0))
+    found = watched(flight(sensor(world), 80.0, (3000.0, 1900.0), speed=2.0))
+    times = [time_s for time_s, all_found in found if all_found]
+    hidden_s = 43.0  # wholly behind the wall from then on
+    assert times[0] < 25.0
+    assert hidden_s < times[-1] < hidden_s + COASTS_S
+    assert np.diff(times).max() == SCAN_S
+    last = next(all_found for time_s, all_found in reversed(found) if all_found)
+    assert abs(complex(*last[0].velocity_mps) - velocity) < 1.0
+    away = off(World([moves], world.bounds_m), last[0].points_m, times[-1])
+    assert np.abs(away).max() < 40.0
+
+
+def test_latency_changes_nothing_but_when_it_is_known() -> None:
+    world, _ = passing(8.0, 0.7, 500.0, 0.3, 100.0, 4)
+    prompt = watched(flight(sensor(world), 30.0, START))
+    late = watched(flight(sensor(world, latency_s=2.0), 30.0, START))
+    for (time_s, one), (other_s, other) in zip(prompt, late, strict=True):
+        assert time_s == other_s
+        assert [each.velocity_mps for each in one] == [each.velocity_mps for each in other]
+
+
+def test_rays_that_met_it_are_told() -> None:
+    world, _ = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    still = block(2000.0, 2900.0, 4000.0, 2950.0)
+    both = World([*world.obstacles, Obstacle(still)], world.bounds_m)
+    seen = MovingObstacles(CLEARANCE, 0.0)
+    told = 0
+    for scan in flight(sensor(both), 30.0, START):
+        moving = seen.update(scan)
+        assert (moving is None) or moving.any()
+        if moving is not None:
+            told += 1
+            rays = np.flatnonzero(moving)
+            where = scan.from_sensor_m(rays) + complex(scan.east_m, scan.north_m)
+            points = np.column_stack((where.real, where.imag))
+            assert np.abs(off(world, points, scan.time_s)).max() < 1.0
+            of_it = np.abs(world.clearance(*_all_hits(scan))) < 1.0
+            assert len(rays) >= 0.7 * of_it.sum()
+    assert told > 20
+
+
+def _all_hits(scan: RangeScan) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    rays = np.flatnonzero(scan.ranges_m < math.inf)
+    where = scan.from_sensor_m(rays) + complex(scan.east_m, scan.north_m)
+    return np.column_stack((where.real, where.imag)), np.full(len(rays), scan.time_s)
+
+
+def test_where_it_was_is_told_when_it_is_found() -> None:
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    seen, told = MovingObstacles(CLEARANCE, 0.0), []
+    for scan in flight(sensor(world), 30.0, START):
+        seen.update(scan)
+        if len(seen.trail_m):
+            told.append((scan.time_s, seen.trail_m))
+    ((time_s, trail),) = told
+    assert np.unique(np.floor(trail / (0.5 * CLEARANCE)), axis=0).shape == trail.shape
+    # All along, for as long as it took to be found.
+    for ago_s in np.arange(0.0, 12.0, 1.0):
+        (points,) = (each.points_m for each in seen.found)
+        back = points - np.array((velocity.real, velocity.imag)) * (30.0 - SCAN_S - time_s + ago_s)
+        away = np.hypot(*(back[:, None] - trail).transpose(2, 0, 1)).min(axis=1)
+        assert away.max() < CLEARANCE
+
+
+def test_in_a_still_world_few_scans_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    read = []
+    follow = range_sensor.RangeSensor._true_ranges
+
+    def counted(self: range_sensor.RangeSensor, *arguments: Any) -> Any:
+        read.append(arguments)
+        return follow(self, *arguments)
+
+    monkeypatch.setattr(range_sensor.RangeSensor, "_true_ranges", counted)
+    watched(flight(sensor(world_of(Circle((3300.0, 2500.0), 150.0))), 60.0, START))
+    assert 10 <= len(read) <= 60.0 / 3.0
+    read.clear()
+    watched(flight(sensor(world_of(Circle((5500.0, 5500.0), 50.0))), 60.0, START))
+    assert not read

@@ -1,0 +1,186 @@
+"""Edges, what moves and free space, put together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.free_space import FreeSpace
+from harness.obstacle import Circle, Obstacle
+from harness.range_sensor import RangeScan
+from harness.sensed_world import SensedWorld
+from harness.world import World
+from planner.interface import SeenWorld
+from tests.harness.sensing import (
+    BOUNDS,
+    CLEARANCE,
+    RANGE,
+    FloatArray,
+    block,
+    flight,
+    off,
+    regular,
+    sensor,
+    world_of,
+)
+
+FREE_CELL = CLEARANCE / 2.0
+START = (3000.0, 1500.0)
+
+
+def empty_world(noise_m: float = 0.0, false_returns: bool = False) -> SensedWorld:
+    return SensedWorld(BOUNDS, CLEARANCE, RANGE, noise_m=noise_m, false_returns=false_returns)
+
+
+def fed(scans: Iterable[RangeScan]) -> SensedWorld:
+    seen = empty_world()
+    for scan in scans:
+        seen.update(scan)
+    return seen
+
+
+def lattice() -> FloatArray:
+    """Places all about, a quarter of a cell of free space apart at least."""
+    return np.random.default_rng(1).uniform(1500.0, 4500.0, (20_000, 2))
+
+
+def test_it_is_all_that_a_planner_may_know() -> None:
+    seen: SeenWorld = empty_world()
+    assert (seen.revision, seen.taken_back_at, seen.moving, seen.surprised_s) == (0, 0, (), -math.inf)
+    assert seen.spacing_m == CLEARANCE / 4.0
+    assert seen.edges_since(-1).shape == (0, 2)
+    assert not seen.seen_free(np.array([START])).any()
+
+
+@pytest.mark.parametrize("corners", [0, 4])
+def test_edges_of_what_moves_are_not_among_the_still_ones_and_leave_no_trail(corners: int) -> None:
+    shape = Circle((2700.0, 2400.0), 60.0) if corners == 0 else regular(2700.0, 2400.0, 60.0, corners, 0.2)
+    world = world_of(Obstacle(shape, velocity_mps=(8.0, -2.0)), block(2000.0, 2600.0, 4000.0, 2700.0))
+    mover, still = (World(world.obstacles[part], BOUNDS) for part in (slice(1), slice(1, None)))
+    seen, found_s = empty_world(), []
+    for scan in flight(sensor(world), 45.0, (3000.0, 1500.0), speed=5.0):
+        seen.update(scan)
+        found_s += [scan.time_s] if seen.moving else []
+        if seen.moving:
+            edges = seen.edges_since(-1)
+            strays = edges[np.abs(off(still, edges)) > CLEARANCE]
+            # At once: it is not waited for looks through its trail. Single rays may meet its ends at a glance.
+            assert len(strays) <= 4
+            assert np.abs(off(mover, strays, scan.time_s)).max(initial=0.0) < 1.5 * CLEARANCE
+            assert np.abs(off(world, seen.moving[0].points_m, scan.time_s)).max() < 0.3 * CLEARANCE
+    assert found_s[0] < 20.0
+    assert found_s[-1] == 44.5
+    assert (np.abs(off(still, seen.edges_since(-1))) < 1.0).sum() > 50
+
+
+def test_free_space_is_taken_back_where_something_appears_and_in_its_shadow_only() -> None:
+    pops = Obstacle(Circle((3100.0, 2200.0), 60.0), active_s=(20.0, 500.0))
+    eye = sensor(world_of(pops))
+    before = fed(flight(eye, 20.0, START))
+    last = [*flight(eye, 20.0, START)][-1]
+    place = complex(last.east_m, last.north_m)
+    points = lattice()
+    points = points[before.seen_free(points)]
+    assert before.surprised_s == -math.inf
+    # A scan from there at the time.
+    after = fed(
+        [*flight(eye, 20.0, START), *flight(eye, 1.0, (place.real, place.imag), start_s=20.0, speed=0.0)]
+    )
+    gone = points[~after.seen_free(points)]
+    away = gone[:, 0] - 3100.0 + 1j * (gone[:, 1] - 2200.0)
+    towards = complex(3100.0, 2200.0) - place
+    along, across = (
+        (away * towards.conjugate() / abs(towards)).real,
+        (away * towards.conjugate() / abs(towards)).imag,
+    )
+    widening = 60.0 * (1.0 + np.maximum(along, 0.0) / abs(towards))
+    assert after.surprised_s == 20.0
+    assert along.min() > -60.0 - 3.0 * FREE_CELL
+    assert (np.abs(across) < widening + 3.0 * FREE_CELL * (1.0 + np.maximum(along, 0.0) / abs(towards))).all()
+    # Within and right behind it all of it.
+    inside = np.hypot(points[:, 0] - 3100.0, points[:, 1] - 2200.0) < 60.0
+    offset = points[:, 0] - place.real + 1j * (points[:, 1] - place.imag)
+    turned = offset * towards.conjugate() / abs(towards)
+    shadow = (turned.real > abs(towards)) & (np.abs(turned.imag) < 50.0) & (np.abs(turned) < RANGE)
+    assert inside.any()
+    assert shadow.any()
+    assert not after.seen_free(points[inside | shadow]).any()
+
+
+@settings(deadline=None, max_examples=15)
+@given(seed=st.integers(0, 2**32 - 1), appears_s=st.sampled_from([5.0, 10.0, 15.0]))
+def test_what_is_seen_free_is_free_of_what_has_appeared_in_view(seed: int, appears_s: float) -> None:
+    rng = np.random.default_rng(seed)
+    place, size = (rng.uniform(2300.0, 3700.0), rng.uniform(2200.0, 3200.0)), rng.uniform(30.0, 150.0)
+    shape = Circle(place, size) if rng.random() < 0.5 else regular(*place, size, int(rng.integers(3, 7)))
+    world = world_of(Obstacle(shape, active_s=(appears_s, 500.0)))
+    taken = [*flight(sensor(world), 20.0, START)]
+    seen = fed(taken)
+    points = lattice()
+    free = points[seen.seen_free(points)]
+    last = taken[-1]
+    offset = free[:, 0] - last.east_m + 1j * (free[:, 1] - last.north_m)
+    assert len(free) > 1000
+    # Beyond the range nobody can know; further than the rays are dense nothing was marked.
+    in_view = np.abs(offset) < 0.9 * RANGE
+    assert off(world, free[in_view], last.time_s).min() > -FREE_CELL
+
+
+def test_nothing_surprises_in_a_still_world() -> None:
+    world = world_of(
+        block(2400.0, 2500.0, 3600.0, 2600.0), Circle((3200.0, 2000.0), 90.0), Circle((2500.0, 1900.0), 40.0)
+    )
+    for turn in (0.0, 0.1, -0.1):
+        assert fed(flight(sensor(world), 30.0, START, turn_rad_s=turn)).surprised_s == -math.inf
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 2.0])
+def test_it_is_surprised_when_the_scan_is_there(latency_s: float) -> None:
+    pops = Obstacle(regular(3000.0, 2300.0, 60.0, 4), active_s=(12.0, 500.0))
+    seen = fed(flight(sensor(world_of(pops), latency_s=latency_s), 13.0, START))
+    assert seen.surprised_s == 12.0 + latency_s
+
+
+def test_what_moves_takes_free_space_back_and_gives_it_again() -> None:
+    moves = Obstacle(Circle((2700.0, 2200.0), 60.0), velocity_mps=(8.0, 0.0))
+    world, seen = world_of(moves), empty_world()
+    for scan in flight(sensor(world), 60.0, START, speed=3.0):
+        seen.update(scan)
+        place = moves.shape.center_m[0] + 8.0 * scan.time_s if isinstance(moves.shape, Circle) else 0.0
+        if scan.time_s > 20.0:
+            face = np.array([(place, 2200.0 - 50.0), (place, 2200.0)])
+            assert not seen.seen_free(face).any()
+    assert seen.seen_free(np.array([(2800.0, 2200.0), (2900.0, 2200.0)])).all()
+    assert seen.surprised_s > 40.0
+
+
+def test_with_much_noise_nothing_is_followed() -> None:
+    moves = Obstacle(Circle((2700.0, 2200.0), 60.0), velocity_mps=(8.0, 0.0))
+    seen = empty_world(noise_m=0.01 * RANGE)
+    for scan in flight(sensor(world_of(moves), range_noise_m=0.01 * RANGE), 60.0, START, speed=3.0):
+        seen.update(scan)
+        assert seen.moving == ()
+    edges = seen.edges_since(-1)
+    assert len(edges) > 5
+    # What is left of its way is no older than half a minute or so.
+    assert edges[:, 0].min() > 2700.0 - 60.0 + 8.0 * (60.0 - 35.0)
+
+
+def test_free_space_beyond_the_range_of_the_scan_stays() -> None:
+    free = FreeSpace(BOUNDS, CLEARANCE, RANGE)
+    eye = sensor(world_of())
+    for scan in flight(eye, 80.0, (3000.0, 500.0)):
+        free.update(scan)
+    here = eye.scan(3000.0, 1000.0, 0.0, 90.0)
+    behind = np.array([(3000.0, 1000.0 + away) for away in (300.0, 800.0, 1400.0, 1700.0, 2500.0)])
+    assert free.contains(behind).all()
+    assert not free.take_back(here, np.array([(5900.0, 5900.0)]))
+    assert free.contains(behind).all()
+    assert free.take_back(here, np.array([(3000.0, 1200.0)]))
+    assert free.contains(behind).tolist() == [False, False, False, True, True]
+    assert free.contains(np.array([(3000.0, 1100.0), (3300.0, 1300.0), (3000.0, 700.0)])).all()
