@@ -104,6 +104,7 @@ class _Unread(RangeScan):
 
     def __post_init__(self) -> None:
         if self.ranges_m is not _NOT_READ:
+            object.__setattr__(self, "follow", None)
             super().__post_init__()
             return
         object.__delattr__(self, "ranges_m")
@@ -155,6 +156,7 @@ class RangeSensor:
         self._rays.setflags(write=False)
         self._surely_in_range_m = config.range_m * (1.0 - 1e-9)
         self._nothing = np.full(config.rays, math.inf)
+        self._nothing.setflags(write=False)
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
         )
@@ -167,8 +169,11 @@ class RangeSensor:
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
         faces = self._near(east_m, north_m, time_s).faces(time_s)
         follow = partial(self._true_ranges, faces, east_m, north_m, sin, cos)
+        face_m = self._nearest(faces, east_m, north_m)
         # What is drawn at random is drawn now, scan by scan.
-        ranges = self._degraded(follow()) if self._flawed else _NOT_READ
+        ranges = (
+            self._degraded(follow()) if self._flawed else _NOT_READ if face_m < math.inf else self._nothing
+        )
         return _Unread(
             time_s=time_s,
             available_s=time_s + self._config.latency_s,
@@ -180,7 +185,7 @@ class RangeSensor:
             fan=self._rays,
             ranges_m=ranges,
             max_range_m=self._config.range_m,
-            face_m=self._nearest(faces, east_m, north_m),
+            face_m=face_m,
             follow=follow,
         )
 
