@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +57,12 @@ class Blocks:
         )
 
     def near_lines(
-        self, origin: Point, ux: FloatArray, uy: FloatArray, within_m: float
+        self,
+        origin: Point,
+        ux: FloatArray,
+        uy: FloatArray,
+        within_m: float,
+        to_m: FloatArray | float = math.inf,
     ) -> tuple[IntArray, IntArray]:
         """Which points may lie near straight lines that begin at one place.
 
@@ -65,6 +71,7 @@ class Blocks:
             ux: (k,) east of the unit vectors along them.
             uy: (k,) north.
             within_m: how near.
+            to_m: points that a line comes near to only after so much of it do not count; one for all or (k,).
 
         Returns:
             Lines and points, (n,) each: all pairs that are as near, and some that are not.
@@ -75,7 +82,10 @@ class Blocks:
         aside -= ux[:, None] * dy
         ahead = ux[:, None] * dx
         ahead += uy[:, None] * dy
-        line, square = ((np.abs(aside, out=aside) < near) & (ahead > -near)).nonzero()
+        wanted = (np.abs(aside, out=aside) < near) & (ahead > -near)
+        if np.min(to_m, initial=math.inf) < math.inf:
+            wanted &= ahead < np.reshape(to_m, (-1, 1)) + near
+        line, square = wanted.nonzero()
         counts = self.counts[square]
         begins = np.cumsum(counts) - counts
         place = np.repeat(self.first[square] - begins, counts) + np.arange(int(counts.sum()))

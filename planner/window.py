@@ -130,7 +130,7 @@ class Window:
             ux, uy, touch, sides = self._tangents(dx, dy, obstacle)
             if not len(ux):
                 continue
-            clear, met = self._clear_along(origin, ux, uy)
+            clear, met = self._clear_past(origin, ux, uy, touch)
             rows = np.column_stack((ux, uy, touch, clear)).tolist()
             for (*row, clear_to), side, met_by in zip(rows, sides, met.tolist(), strict=True):
                 if clear_to >= row[2]:
@@ -194,9 +194,22 @@ class Window:
         angle = np.array(angles)
         return np.cos(angle), np.sin(angle), np.array(touches), sides
 
-    def _clear_along(self, origin: Point, ux: FloatArray, uy: FloatArray) -> tuple[FloatArray, IntArray]:
+    def _clear_past(
+        self, origin: Point, ux: FloatArray, uy: FloatArray, touch_m: FloatArray
+    ) -> tuple[FloatArray, IntArray]:
+        """The same as `_clear_along`: most tangents are hidden before they touch, and need no longer look."""
+        clear, met = self._clear_along(origin, ux, uy, touch_m)
+        clear[clear >= touch_m] = math.inf
+        seen = np.isinf(clear).nonzero()[0]
+        if len(seen):
+            clear[seen], met[seen] = self._clear_along(origin, ux[seen], uy[seen])
+        return clear, met
+
+    def _clear_along(
+        self, origin: Point, ux: FloatArray, uy: FloatArray, to_m: FloatArray | float = math.inf
+    ) -> tuple[FloatArray, IntArray]:
         """How far (k,) directions lead before they come too near to a point, and to which; infinite: never."""
-        which, point = self._blocks.near_lines(origin, ux, uy, self._most_kept_m)
+        which, point = self._blocks.near_lines(origin, ux, uy, self._most_kept_m, to_m)
         points, keep = self.points_m[point], self.keep_m[point]
         dx, dy = points[:, 0] - origin[0], points[:, 1] - origin[1]
         ux_of, uy_of = ux[which], uy[which]
@@ -207,9 +220,14 @@ class Window:
         which, point = which[met_by], point[met_by]
         entry = ahead[met_by] - np.sqrt(room[met_by])
         clear, met = np.full(len(ux), math.inf), np.zeros(len(ux), dtype=np.intp)
-        order = np.lexsort((entry, which))
-        directions, first = np.unique(which, return_index=True)
-        clear[directions], met[directions] = entry[order[first]], point[order[first]]
+        if len(which):
+            # Pairs come direction by direction.
+            first = np.concatenate(([0], (which[1:] != which[:-1]).nonzero()[0] + 1))
+            nearest = np.minimum.reduceat(entry, first)
+            counts = np.diff(np.append(first, len(which)))
+            of_all = (entry == np.repeat(nearest, counts)).nonzero()[0]
+            clear[which[first]] = nearest
+            met[which[of_all[::-1]]] = point[of_all[::-1]]
         return np.maximum(clear, 0.0), met
 
     def free_sectors(self, origin: Point) -> FloatArray:
