@@ -10,7 +10,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -77,6 +77,10 @@ class RangeScan:
         turned: ComplexArray = self.fan.take(rays) * self.ranges_m.take(rays)
         turned *= cmath.rect(1.0, -self.heading_rad)
         return turned
+
+    def kept(self) -> RangeScan:
+        """The same as a plain value: its rays are followed now, and nothing leads from it to the world."""
+        return RangeScan(**{each.name: getattr(self, each.name) for each in fields(RangeScan) if each.init})
 
     @property
     def directions(self) -> FloatArray:
