@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -165,3 +167,17 @@ def test_ignored_rays_and_forgotten_places_leave_nothing() -> None:
     left = edges(seen)
     assert 0 < len(left) < len(points)
     assert np.hypot(*(left - (2400.0, 2500.0)).T).min() > 50.0
+
+
+def test_rays_that_met_what_moves_say_nothing_of_what_stands() -> None:
+    """Something passes before the wall for a minute."""
+    world, seen = world_of(WALL), empty_map()
+    scans = [*flight(sensor(world, range_noise_m=NOISE), 20.0, (2600.0, 1900.0), speed=2.0)]
+    for scan in scans:
+        seen.update(scan)
+    before = edges(seen)
+    blank = replace(scans[-1].kept(), ranges_m=np.full(len(scans[-1].ranges_m), np.inf))
+    for _ in range(120):
+        seen.update(blank, ignored=np.ones(len(blank.ranges_m), dtype=np.bool_))
+    assert len(before) > 50
+    np.testing.assert_array_equal(edges(seen), before)
