@@ -184,8 +184,7 @@ class MovingObstacles:
                 self._before.popleft()
             if len(self._before) >= 2 and scan.nearest_m < math.inf:
                 self._look(scan, moving)
-            if len(scan.ranges_m):  # read: a scan that is kept keeps nothing of the world
-                self._before.append(scan)
+            self._before.append(scan.kept())
         return moving
 
     def _look(self, scan: RangeScan, moving: BoolArray | None) -> None:

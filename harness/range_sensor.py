@@ -10,7 +10,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -78,6 +78,10 @@ class RangeScan:
         turned *= cmath.rect(1.0, -self.heading_rad)
         return turned
 
+    def kept(self) -> RangeScan:
+        """The same as a plain value: its rays are followed now, and nothing leads from it to the world."""
+        return RangeScan(**{each.name: getattr(self, each.name) for each in fields(RangeScan) if each.init})
+
     @property
     def directions(self) -> FloatArray:
         """(n, 2) unit vectors (east, north) of the rays."""
@@ -95,16 +99,15 @@ class _Unread(RangeScan):
 
     Attributes:
         face_m: distance to the nearest face in range, ahead or not; +inf if there is none.
-        follow: gives the ranges; None once it has.
+        follow: gives the ranges.
     """
 
     ranges_m: FloatArray = field(default_factory=lambda: _NOT_READ)
     face_m: float
-    follow: Callable[[], FloatArray] | None
+    follow: Callable[[], FloatArray]
 
     def __post_init__(self) -> None:
         if self.ranges_m is not _NOT_READ:
-            object.__setattr__(self, "follow", None)
             super().__post_init__()
             return
         object.__delattr__(self, "ranges_m")
@@ -114,12 +117,9 @@ class _Unread(RangeScan):
         """The ranges, when they are first read."""
         if name != "ranges_m":
             raise AttributeError(name)
-        assert self.follow is not None
         ranges = self.follow()
         ranges.setflags(write=False)
         object.__setattr__(self, "ranges_m", ranges)
-        # Who keeps a scan keeps nothing of the world.
-        object.__setattr__(self, "follow", None)
         return ranges
 
 

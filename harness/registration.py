@@ -67,7 +67,7 @@ class Laid(NamedTuple):
 
 
 def ends_of(scan: RangeScan, first_ray: int, last_ray: int, apart_m: float) -> Ends:
-    """Whether what some neighbouring rays returned ends with them: beyond, rays go on further by `apart_m`."""
+    """Whether what neighbouring rays returned ends with them: those beyond go on, and end `apart_m` away or more."""
     return _is_end(scan, first_ray, -1, apart_m), _is_end(scan, last_ray, 1, apart_m)
 
 
@@ -82,7 +82,7 @@ def register(
         places: (n,) where they did.
         scan: the scan.
         gate_m: returns further from the outline are not its.
-        apart_m: beyond an end, rays go on further by this.
+        apart_m: beyond an end, rays go on, and end so far away or further.
 
     Returns:
         How; None where too few of the returns are near.
@@ -148,9 +148,12 @@ def _tangents(points: ComplexArray) -> tuple[ComplexArray, NDArray[np.bool_]]:
 
 
 def _is_end(scan: RangeScan, ray: int, side: int, apart_m: float) -> bool:
-    beyond = ray + side * np.arange(1, BEYOND + 1)
+    steps = np.arange(1, BEYOND + 1)
+    beyond = ray + side * steps
     rays = len(scan.ranges_m)
     if not all_round(scan) and not ((beyond >= 0) & (beyond < rays)).all():
         return False
     own = float(scan.ranges_m[ray])
-    return own < FARTHEST * scan.max_range_m and bool((scan.ranges_m[beyond % rays] > own + apart_m).all())
+    further = scan.ranges_m[beyond % rays] - own
+    away = np.hypot(further, own * scan.spacing_rad * steps)
+    return own < FARTHEST * scan.max_range_m and bool(((further > 0.0) & (away > apart_m)).all())

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from aircraft.interface import AircraftState
 from harness import rerun_blueprint as look
 from harness.record import AcceptedPlan, FloatArray, Track
 from harness.rerun_file import RecordingFile
+from harness.rerun_moving import Tracked, log_tracked_style
 from harness.rerun_plans import log_plan_style, send_plans
 from harness.rerun_scene import lines_2d, log_moving, log_obstacle, log_scene, log_summary, quaternions
 from harness.rerun_sensed import News, Sensed, returns_m
@@ -35,6 +36,7 @@ from harness.rerun_states import (
 
 if TYPE_CHECKING:
     from harness.range_sensor import RangeScan
+    from planner.interface import MovingEdges
 
 SCAN_SHARE = 0.004
 """A scan is drawn after every flight of this share of the area, and before every plan."""
@@ -55,12 +57,19 @@ class RerunLog:
         path: the file; its folder must exist.
         scene: what is known before the flight.
         recording_id: identity of the recording; the same run gives the same one.
+        moving: tells what the map takes to move.
 
     Raises:
         OSError: the file cannot be written.
     """
 
-    def __init__(self, path: Path, scene: look.Scene, recording_id: str) -> None:
+    def __init__(
+        self,
+        path: Path,
+        scene: look.Scene,
+        recording_id: str,
+        moving: Callable[[], Sequence[MovingEdges]] = tuple,
+    ) -> None:
         if not path.parent.is_dir():
             raise FileNotFoundError(f"no folder {path.parent} for the recording")
         self._scene = scene
@@ -83,15 +92,18 @@ class RerunLog:
         self._last_point: FloatArray = np.zeros((0, 3))
         self._whole: list[FloatArray] = []
         self._shown_until_s = -math.inf
+        self._known_to_move, self._tracked = moving, Tracked()
         self._moving = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
         log_scene(self._rec, scene)
         log_plan_style(self._rec)
+        log_tracked_style(self._rec)
         self._log_style()
         self.flush()
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Takes a scan; keeps it when one is due to be drawn."""
         self._scan = scan
+        self._tracked.take(scan.time_s, self._known_to_move())
         if scan.time_s - self._scan_drawn_s >= self._scan_period_s:
             self._draw(scan)
 
@@ -192,6 +204,7 @@ class RerunLog:
         """Sends scans, plans and events since the last time."""
         scans, plans = self._scans, self._plans
         self._scans, self._plans = [], []
+        self._tracked.send(self._rec)
         send_plans(self._rec, plans, self._scene.altitude_m, self._chord_error_m)
         if scans:
             points = [returns_m(scan) for scan in scans]

@@ -11,6 +11,9 @@ from harness import rerun_blueprint as look
 from harness.record import AcceptedPlan, FloatArray, polyline
 from harness.rerun_scene import circle, fan
 
+MET = "met"
+"""Below PLAN: edges of what moves, where the planner expects to meet them."""
+
 STYLES = (
     # Entity below PLAN, colour, width in points of the screen, order of drawing.
     ("window", look.WINDOW, 1.5, 22),
@@ -30,6 +33,11 @@ def log_plan_style(rec: rr.RecordingStream) -> None:
     rec.log(
         f"{look.PLAN}/waypoints",
         rr.Points2D.from_fields(colors=[look.CHOSEN], radii=rr.Radius.ui_points(3.5), draw_order=41),
+        static=True,
+    )
+    rec.log(
+        f"{look.PLAN}/{MET}",
+        rr.Points2D.from_fields(colors=[look.MET], radii=rr.Radius.ui_points(1.0), draw_order=24),
         static=True,
     )
     rec.log(
@@ -90,6 +98,12 @@ def send_plans(
         rr.Arrows2D.columns(origins=guides[:, 0], vectors=guides[:, 1] - guides[:, 0]).partition(
             [1 if p else 0 for p in pictures]
         ),
+    )
+    met = [p.met_m if p else np.zeros((0, 2)) for p in pictures]
+    rec.send_columns(
+        f"{look.PLAN}/{MET}",
+        times,
+        rr.Points2D.columns(positions=np.concatenate(met)).partition([len(each) for each in met]),
     )
     level = [np.column_stack((path, np.full(len(path), altitude_m))) for path in paths]
     rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=level))

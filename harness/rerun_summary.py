@@ -22,6 +22,7 @@ LEGEND = """\
 | red dots | what the last scan returned |
 | white | sensed so far; dark grey: the true outline |
 | brown | obstacles that move or come and go |
+| orange | what the map takes to move, with where it will be in 30 s; violet dots: where the plan expects to meet it |
 
 Axes of the aircraft: red ahead, green left, blue up. It is drawn larger than it is; obstacles have no top.
 """

@@ -243,7 +243,7 @@ def _recording(scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pil
         tuple(loop.world.obstacles),
         text,
     )
-    return RerunLog(folder.recording_path, scene, recording_id=title)
+    return RerunLog(folder.recording_path, scene, title, moving=lambda: loop.seen.moving)
 
 
 def _stream(seed: int, number: int) -> np.random.SeedSequence:

@@ -190,15 +190,17 @@ class PlanPicture:
         window_m: radius of the planning window (the paper's r1).
         sectors: (k, 4) free sectors at the aircraft: unit vectors of the right and the left edge.
         candidates: polylines (m, 2) that were compared, the chosen one first.
+        met_m: (j, 2) edges of what moves, where they are expected to be met.
     """
 
     guide_m: FloatArray
     window_m: float
     sectors: FloatArray
     candidates: tuple[FloatArray, ...] = ()
+    met_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
-        for name in ("guide_m", "sectors"):
+        for name in ("guide_m", "sectors", "met_m"):
             object.__setattr__(self, name, _frozen(getattr(self, name)))
         object.__setattr__(self, "candidates", tuple(_frozen(each) for each in self.candidates))
 

@@ -228,7 +228,14 @@ class RollingWindow:
             sentence(request.position_m, goal, course.nodes),
             waypoints_m=np.array([start.position, *course.nodes]),
             path=certified.path,
-            picture=picture(start.position, goal, course.nodes, tracks, self._local.window(start, keep)),
+            picture=picture(
+                start.position,
+                goal,
+                course.nodes,
+                tracks,
+                self._local.window(start, keep),
+                self._memory.points_m[self._memory.known :],
+            ),
         )
         self._proposed = Effect(plan, certified.path, course, certified.leaves_m)
         return plan

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from planner.curves import Point
-from planner.interface import PlanPicture
+from planner.interface import FloatArray, PlanPicture
 from planner.multi_step_search import Track
 from planner.window import Window, guide_vector
 
@@ -35,12 +35,18 @@ def no_way_through(gaps: str) -> str:
 
 
 def picture(
-    position: Point, goal: Point, nodes: Sequence[Point], tracks: Iterable[Track], window: Window
+    position: Point,
+    goal: Point,
+    nodes: Sequence[Point],
+    tracks: Iterable[Track],
+    window: Window,
+    met_m: FloatArray,
 ) -> PlanPicture:
-    """Guide vector, planning window with its free sectors, and what was compared, the chosen course first."""
+    """Guide vector, planning window with its free sectors, what was compared (the chosen course first), what is met."""
     return PlanPicture(
         guide_m=np.array([position, goal]),
         window_m=window.radius_m,
         sectors=window.free_sectors(position),
         candidates=(np.array([position, *nodes]), *(np.array(track.nodes) for track in tracks)),
+        met_m=met_m,
     )

@@ -9,6 +9,8 @@ import pytest
 
 from harness.record import Flight, Outcome
 from harness.scenario import Scenario
+from harness.sensed_world import NOISY
+from tests.closed_loop.moving_worlds import TURNED_DEG, moving, popping_up
 
 SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]
@@ -65,3 +67,68 @@ def test_noise_is_that_of_the_seed(small_world: SmallWorld, flown_by_point_mass:
     first, again, other = (flight.track.east_m.tolist() for flight in flights)
     assert first == again
     assert first != other
+
+
+def assert_reached(flight: Flight, clearance_m: float) -> None:
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    assert flight.track.clearance_m.min() >= clearance_m
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}], ids=["noise", "all"])
+def test_with_noise_of_a_hundredth_of_the_range_edges_are_weighed(
+    flaws: dict[str, float], seed: int, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    noisy = small_world(*WORLD, sensor={"range_noise_m": 15.0, **flaws}, planner={"clearance_m": 60.0})
+    assert noisy.sensor.range_noise_m > NOISY * noisy.planner.clearance_m
+    flight = flown_by_point_mass(noisy.model_copy(update={"seed": seed}))
+    # Edges may be thought of two standard deviations too far back.
+    assert_reached(flight, 60.0 - 2.0 * 15.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", TURNED_DEG)
+def test_what_moves_is_kept_clear_of(
+    kind: str, seed: int, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    assert_reached(flown_by_point_mass(small_world(WORLD[0], moving(seed, kind))), 0.9 * 40.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_appears_ahead_is_kept_clear_of(
+    seed: int, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    assert_reached(flown_by_point_mass(small_world(WORLD[0], popping_up(seed))), 0.9 * 40.0)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    ("sensor", "planner"),
+    [
+        ({}, {}),
+        (
+            {"range_noise_m": 3.0, "dropout": 0.1, "false_return": 0.01, "latency_s": 0.5},
+            {"compute_latency_s": 0.5},
+        ),
+    ],
+    ids=["exact", "flawed"],
+)
+def test_among_all_of_them_at_once_the_goal_is_reached(
+    sensor: dict[str, float],
+    planner: dict[str, float],
+    seed: int,
+    small_world: SmallWorld,
+    flown_by_point_mass: FlyPointMass,
+) -> None:
+    """Searches take several scans, and meanwhile three obstacles move and one appears."""
+    obstacles = (*WORLD, *(moving(seed, kind) for kind in TURNED_DEG), popping_up(seed))
+    scenario = small_world(*obstacles, sensor=sensor, planner=planner)
+    assert_reached(flown_by_point_mass(scenario.model_copy(update={"seed": seed})), 0.5 * 40.0)
+
+
+def test_a_flight_among_what_moves_is_the_same_again(
+    small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    world = small_world(*WORLD, moving(3, "crossing"), popping_up(3), sensor={"dropout": 0.1})
+    first, again = (flown_by_point_mass(world).track for _ in range(2))
+    assert first.east_m.tolist() == again.east_m.tolist()

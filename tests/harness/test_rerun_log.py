@@ -35,7 +35,7 @@ from harness.rerun_viewer import (
     served,
 )
 from harness.trackability import FlightLimits
-from planner.interface import Mission, Plan, PlanPicture, PlanStatus
+from planner.interface import Mission, MovingEdges, Plan, PlanPicture, PlanStatus
 from planner.interface import Path as PlannedPath
 
 MISSION = Mission(
@@ -62,6 +62,7 @@ PICTURE = PlanPicture(
     window_m=700.0,
     sectors=np.array([[1.0, 0.0, 0.0, 1.0]]),
     candidates=(np.array([[0.0, 0.0], [0.0, 700.0]]), np.array([[0.0, 0.0], [200.0, 600.0]])),
+    met_m=np.array([[100.0, 300.0], [110.0, 300.0]]),
 )
 STATE = AircraftState(0.0, 0.0, 0.0, 300.0, 0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 25.0, 1.0)
 
@@ -307,6 +308,37 @@ def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) ->
     ):
         assert seconds(entities, f"/plan/{entity}") == [0.0, 50.0]
         assert column(entities, f"/plan/{entity}", part)[1] == [], "cleared where the planner shows nothing"
+
+
+def test_where_moving_obstacles_are_expected_to_be_met_is_shown(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    assert seconds(entities, "/plan/met") == [0.0, 50.0]
+    assert column(entities, "/plan/met", "positions") == [[[100.0, 300.0], [110.0, 300.0]], []]
+
+
+def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(
+    tmp_path: Path, make_track: Callable[..., Track]
+) -> None:
+    """Known from 5 to 20 s, at 2 Hz."""
+    known: list[MovingEdges] = []
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a", moving=lambda: known)
+    for tick in range(60):
+        time_s = 0.5 * tick
+        outline = np.array([(10.0 * time_s, 0.0), (10.0 * time_s + 20.0, 0.0), (10.0 * time_s + 40.0, 30.0)])
+        known[:] = [MovingEdges(time_s, outline, (10.0, -1.0))] if 5.0 <= time_s <= 20.0 else []
+        log.on_scan(scan(time_s), STATE)
+    log.on_block(make_track(301, plan_index=-1))
+    log.close()
+    entities = read(tmp_path / "a.rrd")
+    times = seconds(entities, "/plan/tracked")
+    np.testing.assert_array_equal(times, [*np.arange(5.0, 20.5), 20.5])
+    np.testing.assert_array_equal(
+        column(entities, "/plan/tracked", "strips")[3], [[(80.0, 0.0), (100.0, 0.0), (120.0, 30.0)]]
+    )
+    np.testing.assert_array_equal(column(entities, "/plan/tracked/velocity", "origins")[3], [(100.0, 10.0)])
+    np.testing.assert_array_equal(column(entities, "/plan/tracked/velocity", "vectors")[3], [(300.0, -30.0)])
+    for entity, part in (("tracked", "strips"), ("tracked/velocity", "vectors")):
+        assert column(entities, f"/plan/{entity}", part)[-1] == [], "cleared when it is lost"
 
 
 def test_events_and_summary(recording: tuple[Path, Flight]) -> None:

@@ -22,6 +22,7 @@ from planner.curves import (
     end_of,
     fillet,
     full_turn,
+    moved,
     on_loiter,
     onward,
     place_on,
@@ -378,3 +379,19 @@ def test_turns_onto_are_one_to_each_side_the_shorter_first(
     assert len({math.copysign(1.0, way[0][4]) for way in ways if way[0][4]}) == sum(
         bool(way[0][4]) for way in ways
     )
+
+
+@given(start=POSES, to=POSES, pieces=PIECES)
+def test_moved_segments_are_the_same_curve_from_another_pose(
+    start: Pose, to: Pose, pieces: list[tuple[float, float]]
+) -> None:
+    segments = joined(start, pieces)
+    elsewhere = moved(segments, to)
+    np.testing.assert_allclose(elsewhere[0][:4], to, atol=1e-9)
+    np.testing.assert_array_equal(np.array(elsewhere)[:, 4:], np.array(segments)[:, 4:])
+    for before, after in itertools.pairwise(elsewhere):
+        np.testing.assert_allclose(along(before, before[5]), after[:4], atol=1e-6)
+    # Turned as a whole: distances from the first place stay.
+    away, there = (np.hypot(*(np.array(rows)[:, :2] - rows[0][:2]).T) for rows in (segments, elsewhere))
+    np.testing.assert_allclose(there, away, atol=1e-6)
+    np.testing.assert_allclose(moved(elsewhere, start), segments, atol=1e-5)
