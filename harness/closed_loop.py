@@ -207,7 +207,7 @@ class _Plans:
         compute_ms = 1e3 * (time.perf_counter() - begun)
         if plan.status is not PlanStatus.KEPT:
             self.compute_ms.append(compute_ms)
-        if plan.status is PlanStatus.UNREACHABLE:
+        if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
             return Outcome.UNREACHABLE, plan.reason
         if plan.status is PlanStatus.NO_PATH:
             for observer in self._observers:

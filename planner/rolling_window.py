@@ -260,6 +260,9 @@ class RollingWindow:
         waits = thinking is not None and not thinking.done and not self._pressed(effect, here)
         if self._watch.broken and effect is not None and not waits:
             return self._turn_away(request, effect, here)
+        away = None if effect is not None else self._turn_away(request, None, here)
+        if away is not None and away.status is PlanStatus.FOUND:
+            return away  # what is closed is told from a safe turn
         no_room = self._effort > 0 and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
@@ -268,7 +271,8 @@ class RollingWindow:
             gap = 2.0 * self._local.least_keeps_m
             return Plan(PlanStatus.UNREACHABLE, no_way_through(f"no gap in it is wider than {gap:.0f} m"))
         if effect is None:
-            return self._turn_away(request, None, here)
+            assert away is not None
+            return away
         turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
         if stuck is not None and turned > math.tau * self._mission.turn_radius_m:
             # The whole turn has shown nothing more: what lies ahead there cannot be entered.

@@ -135,6 +135,29 @@ def test_unreachable(fly: Fly, answering: Install, small_world: SmallWorld) -> N
     assert metrics["min_clearance_m"] is None
 
 
+def test_a_start_that_is_enclosed_in_plain_view_is_told_from_a_safe_turn(
+    small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    ring = [
+        {
+            "circle": {
+                "center_m": [300.0 + 900.0 * math.cos(a), 1200.0 + 900.0 * math.sin(a)],
+                "radius_m": 200.0,
+            }
+        }
+        for a in np.linspace(0.0, math.tau, 24, endpoint=False).tolist()
+    ]
+    scenario = small_world(
+        *ring, mission={"start_m": [300.0, 1200.0]}, area={"bounds_m": [-1500, -1500, 6000, 6000]}
+    )
+    flight = flown_by_point_mass(scenario)
+    assert flight.outcome.value == "unreachable", flight.reason
+    assert flight.plans[-1].plan.path is not None
+    assert flight.plans[-1].plan.path.loiter
+    assert (np.diff(flight.track.time_s) > 0.0).all()
+    assert len(flight.track.time_s) >= 2
+
+
 def test_lost_control(fly: Fly, small_world: SmallWorld, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "jsbsim_aircraft", lambda _, start, air: Failing(start, air))
     status, metrics = fly(small_world())

@@ -80,6 +80,7 @@ def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
         assert off.min() < 1e-6
 
 
+@settings(deadline=None)
 @given(seed=SEEDS)
 def test_obstacles_at_rest_stay_where_they_are(seed: int) -> None:
     each = obstacle(seed, 0.0, 0.0)
@@ -100,6 +101,7 @@ def test_faster_ones_are_met_after_a_bounded_time(seed: int, pace: float, course
     assert (told >= away / (SPEED * (1.0 + FASTEST)) - 1e-9).all()
 
 
+@settings(deadline=None)
 @given(seed=SEEDS, pace=PACES, course=COURSES, age_s=st.floats(0.0, 30.0))
 def test_what_was_seen_a_while_ago_has_moved_on_since(
     seed: int, pace: float, course: float, age_s: float
