@@ -1,0 +1,171 @@
+"""Hard conditions, each alone and all together, in public worlds: 30 % wind, moderate turbulence, the real aircraft.
+
+Besides the sensor's flaws: obstacles that appear ahead, and obstacles that come to the straight line to the goal
+when the aircraft does. `python -m tests.closed_loop.test_hard_conditions` flies whole families and prints
+README's table.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.closed_loop import fly
+from harness.record import Flight, Outcome
+from harness.run import make_loop
+from harness.scenario import Scenario, scenario_of
+
+WORLDS = Path(__file__).parents[3] / "shared" / "worlds"
+FAMILIES = ("circles_mid", "paper_like", "faster_forest", "barn")
+SPEED_MPS, TURN_M = 25.0, 230.0
+WIND_MPS = 0.3 * SPEED_MPS
+WIND = {"wind": {"speed_mps": WIND_MPS, "from_deg": 270.0}}
+TURBULENCE = {"turbulence": {"model": "tustin", "intensity": "moderate"}}
+FLAWS: dict[str, dict[str, Any]] = {
+    "noise, 1 % of range": {"sensor": {"range_noise_m": 0.01}},
+    "10 % lost returns": {"sensor": {"dropout": 0.1}},
+    "1 % false returns": {"sensor": {"false_return": 0.01}},
+    "scans 2 s late": {"sensor": {"latency_s": 2.0}},
+    "plans 2 s late": {"planner": {"compute_latency_s": 2.0}},
+    "field of view 180 deg": {"sensor": {"field_of_view_deg": 180.0}},
+}
+ALL_FLAWS: dict[str, dict[str, Any]] = {
+    "sensor": {key: value for flaw in FLAWS.values() for key, value in flaw.get("sensor", {}).items()},
+    "planner": {"compute_latency_s": 1.0},
+}
+CONDITIONS: dict[str, dict[str, Any]] = {
+    **FLAWS,
+    "6 obstacles appear": {"appear": 6},
+    "6 obstacles move": {"move": 6},
+    "all flaws together": ALL_FLAWS,
+    "all of it together": {**ALL_FLAWS, "appear": 3, "move": 3},
+}
+
+
+def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1) -> Scenario:
+    """The scenario of a world under a condition; what appears and what moves is drawn from the world's name."""
+    range_m, clearance = float(world["sensor_range_m"]), float(world["clearance_m"])
+    sensor = {"range_m": range_m} | condition.get("sensor", {})
+    if "range_noise_m" in sensor:
+        sensor["range_noise_m"] *= range_m
+    rng = np.random.default_rng([seed, *world["name"].encode()])
+    start, goal = complex(*world["start_m"]), complex(*world["goal_m"])
+    obstacles = [{"circle": {"center_m": each[:2], "radius_m": each[2]}} for each in world["circles_m"]]
+    obstacles += [{"polygon": {"vertices_m": each}} for each in world["polygons_m"]]
+    for _ in range(condition.get("appear", 0)):
+        obstacles += _appearing(rng, start, goal, clearance, range_m)
+    for _ in range(condition.get("move", 0)):
+        obstacles += _moving(rng, start, goal, clearance, range_m)
+    way_m = max(world["optimum_m"] or 0.0, abs(goal - start), 10_000.0)
+    return scenario_of(
+        {
+            "schema": "wayproof/scenario/1",
+            "name": world["name"],
+            "seed": seed,
+            "area": {"bounds_m": world["bounds_m"]},
+            "obstacles": obstacles,
+            "mission": {
+                **{key: world[key] for key in ("start_m", "course_deg", "goal_m", "goal_radius_m")},
+                "altitude_m": 300.0,
+                "time_limit_s": float(round(20.0 * way_m / SPEED_MPS)),
+            },
+            "aircraft": {"model": "aerosonde", "airspeed_mps": SPEED_MPS},
+            "sensor": sensor,
+            "planner": {"clearance_m": clearance} | condition.get("planner", {}),
+            "environment": WIND | TURBULENCE,
+        }
+    )
+
+
+def _appearing(
+    rng: np.random.Generator, start: complex, goal: complex, clearance: float, range_m: float
+) -> list[dict[str, Any]]:
+    """A circle about the straight line that appears with room to turn away, and goes again later."""
+    along, distance = (goal - start) / abs(goal - start), abs(goal - start)
+    share = rng.uniform(0.15, 0.85)
+    radius = rng.uniform(0.3, 1.0) * min(0.15 * range_m, 600.0) + 0.3 * clearance
+    place = start + along * (share * distance + 1j * rng.normal() * radius)
+    lead = rng.uniform(
+        4.0 * TURN_M + clearance + radius, max(0.8 * range_m, 6.0 * TURN_M + clearance + radius)
+    )
+    pace = _pace_mps(along)
+    begin = max(0.0, (share * distance - lead) / pace)
+    end = begin + rng.uniform(0.3, 1.0) * 4.0 * lead / pace
+    if min(abs(place - start), abs(place - goal)) < radius + 2.0 * clearance + 3.0 * TURN_M:
+        return []
+    return [{**_circle(place, radius), "active_s": [round(begin, 1), round(end, 1)]}]
+
+
+def _moving(
+    rng: np.random.Generator, start: complex, goal: complex, clearance: float, range_m: float
+) -> list[dict[str, Any]]:
+    """A circle of a tenth to four tenths of the aircraft's speed that is on the straight line when that is."""
+    along, distance = (goal - start) / abs(goal - start), abs(goal - start)
+    share = rng.uniform(0.25, 0.85)
+    radius = rng.uniform(0.3, 1.0) * min(0.1 * range_m, 400.0) + 0.2 * clearance
+    course = rng.uniform(0.0, math.tau)
+    velocity = rng.uniform(0.1, 0.4) * SPEED_MPS * complex(math.cos(course), math.sin(course))
+    meets = start + along * (share * distance + 1j * rng.normal() * radius)
+    place = meets - velocity * (share * distance / _pace_mps(along))
+    if abs(place - start) < radius + 0.3 * range_m + 4.0 * TURN_M:
+        return []
+    return [{**_circle(place, radius), "velocity_mps": [round(velocity.real, 3), round(velocity.imag, 3)]}]
+
+
+def _pace_mps(along: complex) -> float:
+    """Speed over the ground along a course, in a wind that blows to the east."""
+    ahead, across = WIND_MPS * along.real, WIND_MPS * along.imag
+    return math.sqrt(SPEED_MPS**2 - across**2) + ahead
+
+
+def _circle(place: complex, radius: float) -> dict[str, Any]:
+    return {
+        "circle": {"center_m": [round(place.real, 2), round(place.imag, 2)], "radius_m": round(radius, 2)}
+    }
+
+
+def flown(path: Path, condition: str) -> tuple[Flight, Scenario]:
+    scenario = hard(json.loads(path.read_text()), CONDITIONS[condition])
+    return fly(make_loop(scenario)), scenario
+
+
+def worlds(family: str, most: int) -> list[Path]:
+    """Worlds of a family that have a way to the goal, evenly taken."""
+    every = sorted((WORLDS / family).glob("*.json"))
+    reach = [path for path in every if json.loads(path.read_text())["expect"] == "reach"]
+    return reach[:: max(1, len(reach) // most)][:most]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not WORLDS.is_dir(), reason="the shared worlds are not beside this checkout")
+@pytest.mark.parametrize("condition", CONDITIONS)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_is_reached_without_a_collision(family: str, condition: str) -> None:
+    for path in worlds(family, 2):
+        flight, _ = flown(path, condition)
+        assert flight.outcome is Outcome.REACHED, f"{path.name}: {flight.reason}"
+
+
+def _row(condition: str, most: int) -> str:
+    cells = [condition]
+    for family in FAMILIES:
+        flights = [flown(path, condition) for path in worlds(family, most)]
+        reached = sum(flight.outcome is Outcome.REACHED for flight, _ in flights)
+        hit = sum(flight.outcome is Outcome.COLLISION for flight, _ in flights)
+        least = min(
+            float(flight.track.clearance_m.min()) / (scenario.planner.clearance_m or math.nan)
+            for flight, scenario in flights
+        )
+        cells.append(f"{reached}/{len(flights)}, {hit}, {least:.2f}")
+    return "| " + " | ".join(cells) + " |"
+
+
+if __name__ == "__main__":
+    for name in CONDITIONS:
+        print(_row(name, int(sys.argv[1]) if len(sys.argv) > 1 else 10_000), flush=True)
