@@ -3,61 +3,43 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from harness.free_space import FreeSpace
 from harness.obstacle_map import ObstacleMap
-from harness.range_sensor import RangeScan, RangeSensor
-from harness.scenario_sections import Sensor
+from harness.range_sensor import RangeScan
 from harness.world import Circle, Obstacle, Polygon, World
+from tests.harness.looking import (
+    BOUNDS,
+    CLEARANCE,
+    MIDDLE,
+    RANGE,
+    SEEDS,
+    WALL,
+    FloatArray,
+    distance_to,
+    on_circle,
+    random_world,
+    scans,
+    sensor,
+    world_of,
+)
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
-BOUNDS = (0.0, 0.0, 10_000.0, 10_000.0)
-CLEARANCE, RANGE = 200.0, 3000.0
 SPACING = CLEARANCE / 4.0
-FREE_CELL = CLEARANCE / 2.0
-MIDDLE = (5000.0, 5000.0)
-SEEDS = st.integers(0, 2**32 - 1)
 Edit = Callable[[int, FloatArray], None]
 
 
 def empty_map(doubtful: bool = True) -> ObstacleMap:
     return ObstacleMap(BOUNDS, CLEARANCE, RANGE, doubtful=doubtful)
-
-
-def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
-    return RangeSensor(world, Sensor(**{"range_m": RANGE} | keys), np.random.SeedSequence(seed))
-
-
-def world_of(*shapes: Circle | Polygon) -> World:
-    return World([Obstacle(shape) for shape in shapes], BOUNDS)
-
-
-def on_circle(count: int, radius_m: float = 300.0) -> list[tuple[float, float]]:
-    return [
-        (
-            MIDDLE[0] + radius_m * math.cos(math.tau * i / count),
-            MIDDLE[1] + radius_m * math.sin(math.tau * i / count),
-        )
-        for i in range(count)
-    ]
-
-
-def scans(
-    eye: RangeSensor, places: Iterable[tuple[float, float]], start_s: float = 0.0, heading_rad: float = 0.0
-) -> list[RangeScan]:
-    return [eye.scan(*place, heading_rad, start_s + 0.5 * i) for i, place in enumerate(places)]
 
 
 def fed(*sequences: list[RangeScan], doubtful: bool = True) -> ObstacleMap:
@@ -82,32 +64,6 @@ def cells(points: FloatArray) -> set[tuple[int, int]]:
     """Cells of the grid on which points are kept, at most one a cell."""
     origin = BOUNDS[0] - 2.0 * CLEARANCE - SPACING
     return {(int(x), int(y)) for x, y in np.floor((points - origin) / SPACING).tolist()}
-
-
-def distance_to(world: World, points: FloatArray) -> FloatArray:
-    distance: FloatArray = world.clearance(points, np.zeros(len(points)))
-    return distance
-
-
-WALL = Polygon(((4000.0, 6000.0), (6000.0, 6000.0), (6000.0, 6400.0), (4000.0, 6400.0)))
-
-
-def random_world(seed: int) -> World:
-    """Obstacles wider than what rays may miss, none about the middle."""
-    rng = np.random.default_rng(seed)
-    shapes: list[Circle | Polygon] = []
-    for _ in range(int(rng.integers(1, 7))):
-        away, turn, size = rng.uniform(1300.0, 3500.0), rng.uniform(0.0, math.tau), rng.uniform(200.0, 600.0)
-        x, y = MIDDLE[0] + away * math.cos(turn), MIDDLE[1] + away * math.sin(turn)
-        if rng.random() < 0.5:
-            shapes.append(Circle((x, y), float(size)))
-            continue
-        tilt = rng.uniform(0.0, math.tau)
-        corners = tilt + math.tau * np.arange(4) / 4
-        shapes.append(
-            Polygon(tuple((x + float(size) * math.cos(a), y + float(size) * math.sin(a)) for a in corners))
-        )
-    return world_of(*shapes)
 
 
 MOST_IN_A_CELL = 1 + 4 * 4
