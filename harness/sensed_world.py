@@ -61,14 +61,15 @@ class SensedWorld:
         noise_m: float = 0.0,
         false_returns: bool = False,
     ) -> None:
-        self._noisy = noise_m > NOISY * clearance_m
+        noisy = noise_m > NOISY * clearance_m
+        self._doubtful = noisy or false_returns
         self._clearance = clearance_m
         self._edges: Edges = (
             ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
-            if self._noisy
+            if noisy
             else ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
         )
-        self._moving = None if self._noisy else MovingObstacles(clearance_m, noise_m)
+        self._moving = None if noisy else MovingObstacles(clearance_m, noise_m)
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
         self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
@@ -95,7 +96,7 @@ class SensedWorld:
 
     @property
     def surprised_s(self) -> float:
-        """When something was last seen to stand in space that had been seen to be free; -inf: never."""
+        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
         return self._surprised_s
 
     def edges_since(self, revision: int) -> FloatArray:
@@ -119,7 +120,7 @@ class SensedWorld:
         if self._moving and len(trail_m := self._moving.trail_m):
             self._edges.forget(trail_m, self._clearance)
         for edges in (*fresh, *(each.points_m for each in self.moving)):
-            # Where returns are weighed, what stands somewhere shows late: any new edge may be a surprise.
-            if self._free.take_back(scan, edges) or (self._noisy and len(edges)):
+            # Where ranges are noisy or false, what stands somewhere shows late, or does not stand there at all.
+            if self._free.take_back(scan, edges) or (self._doubtful and len(edges)):
                 self._surprised_s = scan.available_s
         self._free.update(scan)

@@ -81,7 +81,7 @@ class SeenWorld(Protocol):
 
     @property
     def surprised_s(self) -> float:
-        """When something was last seen to stand in space that had been seen to be free; -inf: never."""
+        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
         ...
 
     def edges_since(self, revision: int) -> FloatArray:

@@ -105,6 +105,7 @@ class RollingWindow:
         self._effect: Effect | None = None
         self._searched_at_m = 0.0  # station and number of edge points at the last search
         self._searched_with = 0
+        self._moving_s = -math.inf  # when something was last known to move
         self._effort = 0  # grows with every search that was in vain
         self._refused_at_m = 0.0
         self._watch = Watch(
@@ -117,6 +118,8 @@ class RollingWindow:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
         fresh = self._memory.take_in(request.seen, encounters(request, self._mission))
         self._local.trail.add(request.position_m)
+        if request.seen.moving:
+            self._moving_s = request.time_s
         effect = self._in_effect(request)
         if effect is None:
             self._proof_for_turns.closed(request.position_m)
@@ -267,7 +270,8 @@ class RollingWindow:
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
         stuck = None if thinking is None else thinking.stuck
-        if stuck is None and self._proof.closed(request.position_m):
+        still = request.time_s - self._moving_s > EVADING_S  # what moves proves nothing
+        if stuck is None and still and self._proof.closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
             return Plan(PlanStatus.UNREACHABLE, no_way_through(f"no gap in it is wider than {gap:.0f} m"))
         if effect is None:
@@ -279,7 +283,7 @@ class RollingWindow:
             self._refused_at_m = request.station_m
             self._memory.refuse(self._unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
-            if no_room:
+            if no_room and still:
                 gap = 2.0 * self._turns_keep_m
                 return Plan(
                     PlanStatus.UNREACHABLE,
