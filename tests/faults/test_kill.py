@@ -18,29 +18,11 @@ import rerun as rr
 
 from harness.record import RunFolderError, digest
 from harness.run_folder import load_run
-from tests.faults.command import FOREST, run, start
+from tests.faults.command import CAMPAIGN_FILES, FOREST, run, start
 
 KILLS = [3, pytest.param(50, marks=pytest.mark.slow)]
 ORPHANS_LIVE_S = 5.0
 """How long processes of a killed command may live on."""
-
-CAMPAIGN = """\
-schema: wayproof/campaign/1
-name: short
-seed: 5
-scenarios: [short.yaml]
-grid: {environment.wind.speed_mps: [0, 3, 6]}
-recordings: all
-"""
-SHORT = """\
-schema: wayproof/scenario/1
-name: short
-area: {bounds_m: [0, 0, 2000, 2000]}
-obstacles: [{circle: {center_m: [1000, 1000], radius_m: 100}}]
-mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 60}
-sensor: {range_m: 900, rays: 360}
-planner: {clearance_m: 40}
-"""
 
 
 @dataclass(frozen=True)
@@ -113,7 +95,7 @@ COMMANDS = {
         SWEEP,
         (*SWEEP, "--resume"),
         0,
-        {"campaign.yaml": CAMPAIGN, "short.yaml": SHORT},
+        CAMPAIGN_FILES,
         lambda folder: results_claim(folder / "out"),
         lambda folder: results(folder / "out"),
     ),
