@@ -58,7 +58,7 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
             loaded = fdm.load_model(files.name)
         except (OSError, ValueError, jsbsim.BaseError) as error:
             reason = " ".join(str(error).split())
-            raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from None
+            raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
     if not loaded:
         raise AircraftError(f"{files.name}: JSBSim refuses the model")
     fdm.disable_output()

@@ -16,6 +16,9 @@ from harness.scenario_sections import MAX_COORDINATE_M
 MAX_OBSTACLES: Final = 100_000
 """A generator that is asked for more is refused."""
 
+MAX_CORNERS: Final = 500_000
+"""The same for all polygons together; a scenario file with as many can still be read."""
+
 ObstacleKeys = dict[str, Any]
 """One obstacle as a scenario file has it."""
 

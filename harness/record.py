@@ -58,9 +58,11 @@ class RunFolderError(ValueError):
 class WriteError(OSError):
     """What was flown could not be written; the message is one sentence that says what became of it."""
 
-    def __init__(self, what: str, folder: object, error: OSError) -> None:
+    @classmethod
+    def of(cls, what: str, folder: object, error: OSError) -> WriteError:
+        """The error about something that was being written to a folder when another error came."""
         reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())
-        super().__init__(f"cannot write {what} in {folder} ({reason}); it is marked incomplete")
+        return cls(f"cannot write {what} in {folder} ({reason}); it is marked incomplete")
 
 
 class Outcome(Enum):

@@ -207,7 +207,7 @@ def fly_to_folder(
                 log.close(figures)
             folder.finish(flight.plans, figures)
     except OSError as error:
-        raise WriteError("the run", out, error) from error
+        raise WriteError.of("the run", out, error) from error
     return figures
 
 

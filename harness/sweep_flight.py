@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import errno
 import re
 import traceback
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from harness.record import RunFolderError
 from harness.results import ERROR, metric_cells, time_cells
 from harness.scenario import Scenario
+
+FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+"""What a disk that takes no more says, a temporary file's too: that is no fault of the run."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ def fly_job(job: Job) -> Answer:
     """Flies a job. What goes wrong in the flight is an answer too.
 
     Raises:
-        OSError: the run folder cannot be written.
+        OSError: the run folder cannot be written, or the disk is full.
         RunFolderError: the same.
     """
     try:
@@ -60,6 +64,8 @@ def fly_job(job: Job) -> Answer:
     except (OSError, RunFolderError):
         raise
     except Exception as error:
+        if isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL:
+            raise error.__cause__ from error
         return failed(job.run, f"{type(error).__name__}: {error}", traceback.format_exc())
     return Answer(job.run, cells, time_cells(metrics))
 

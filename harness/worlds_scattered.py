@@ -8,7 +8,10 @@ and the goal in the north-east one, `room_m` from both edges.
 
 from __future__ import annotations
 
+import itertools
 import math
+from bisect import insort
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Final
 
@@ -17,6 +20,7 @@ from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
 from harness.generated_world import (
+    MAX_CORNERS,
     MAX_OBSTACLES,
     GeneratedWorld,
     Length,
@@ -30,6 +34,12 @@ from harness.scenario_sections import MAX_COORDINATE_M, Section, key
 TRIES: Final = 100
 AT_ONCE: Final = 10
 """So many places are tried at a time."""
+
+FULL: Final = 5000
+"""After so many without a place the area is full, and nothing more is tried."""
+
+MOST_COLUMNS: Final = 1000
+TRAP_CORNERS: Final = 8
 
 FloatArray = NDArray[np.float64]
 Place = tuple[float, float]
@@ -64,14 +74,24 @@ class _Scattered(Section):
             raise ValueError(
                 f"is {list(self.size_m)} m with room_m {self.room_m:g}; each side must be at least 4 x room_m"
             )
-        if self.number > MAX_OBSTACLES:
-            raise ValueError(f"asks for {self.number} obstacles; must be at most {MAX_OBSTACLES}")
+        each, corners = self.at_most
+        if self.number * each > MAX_OBSTACLES:
+            raise ValueError(f"asks for {self.number * each} obstacles; must be at most {MAX_OBSTACLES}")
+        if self.number * corners > MAX_CORNERS:
+            raise ValueError(
+                f"asks for {self.number} obstacles of {corners} corners; must be at most {MAX_CORNERS} corners"
+            )
         return self
 
     @property
     def number(self) -> int:
         """How many are asked for."""
         return round(self.density_1pkm2 * self.size_m[0] * self.size_m[1] / 1e6)
+
+    @property
+    def at_most(self) -> tuple[int, int]:
+        """Obstacles and corners of polygons that one of them can consist of."""
+        return 1, 0
 
     def world(self, obstacles: Iterable[ObstacleKeys]) -> GeneratedWorld:
         """The area with obstacles in it."""
@@ -105,6 +125,11 @@ class Polygons(_Scattered):
             raise ValueError(f"has corners {list(self.corners)}; must be [least, most], at least 3")
         return self
 
+    @property
+    def at_most(self) -> tuple[int, int]:
+        """One polygon."""
+        return 1, self.corners[1]
+
 
 class Forest(_Scattered):
     """Copses: each of some overlapping trunks, round ones."""
@@ -119,6 +144,11 @@ class Forest(_Scattered):
         if self.trunks[0] > self.trunks[1]:
             raise ValueError(f"has trunks {list(self.trunks)}; must be [least, most]")
         return self
+
+    @property
+    def at_most(self) -> tuple[int, int]:
+        """A copse of round trunks."""
+        return self.trunks[1], 0
 
 
 class UTraps(_Scattered):
@@ -141,6 +171,11 @@ class UTraps(_Scattered):
         if self.wall_m * 2 >= self.width_m[0] or self.wall_m >= self.depth_m[0]:
             raise ValueError("has walls that fill the trap; wall_m must be below depth_m and half of width_m")
         return self
+
+    @property
+    def at_most(self) -> tuple[int, int]:
+        """One trap."""
+        return 1, TRAP_CORNERS
 
 
 def circles(config: Circles, rng: np.random.Generator) -> GeneratedWorld:
@@ -187,27 +222,59 @@ def u_traps(config: UTraps, rng: np.random.Generator) -> GeneratedWorld:
 
 def _placed(config: _Scattered, radii: FloatArray, rng: np.random.Generator) -> list[Place | None]:
     """A middle for each disc of these radii, None for one without a place."""
+    largest = float(radii.max(initial=0.0))
+    taken = _Taken(max(2 * largest + config.gap_m, max(config.size_m) / MOST_COLUMNS))
     ends = config.world(())
-    middles, reach = np.array([ends.start_m, ends.goal_m]), np.full(2, config.room_m)
     found: list[Place | None] = []
+    in_vain = 0
     for radius in radii.tolist():
-        kept = reach.copy()
-        kept[2:] += config.gap_m
-        place = next(_free(config, middles, kept + radius, rng), None)
-        found.append(None if place is None else (float(place[0]), float(place[1])))
-        if place is not None:
-            middles, reach = np.vstack((middles, place)), np.append(reach, radius)
+        free = (
+            place
+            for place in _tries(config, rng)
+            if all(_apart(place, end, config.room_m + radius) for end in (ends.start_m, ends.goal_m))
+            and taken.leaves(place, radius)
+        )
+        place = next(free, None) if in_vain < FULL else None
+        found.append(place)
+        if place is None:
+            in_vain += 1
+        else:
+            taken.add(place, radius + config.gap_m)
     return found
 
 
-def _free(
-    config: _Scattered, middles: FloatArray, kept_m: FloatArray, rng: np.random.Generator
-) -> Iterator[FloatArray]:
-    """Those of `TRIES` places that keep a distance from each middle."""
+def _tries(config: _Scattered, rng: np.random.Generator) -> Iterator[Place]:
     for _ in range(TRIES // AT_ONCE):
-        tries = rng.random((AT_ONCE, 2)) * config.size_m
-        east, north = (np.subtract.outer(tries[:, axis], middles[:, axis]) for axis in (0, 1))
-        yield from tries[(east * east + north * north >= kept_m * kept_m).all(axis=1)]
+        yield from map(tuple, (rng.random((AT_ONCE, 2)) * config.size_m).tolist())
+
+
+class _Taken:
+    """Discs, in square cells so large that those which can matter to another lie in its cell or the next."""
+
+    def __init__(self, cell_m: float) -> None:
+        self._cell_m = cell_m
+        self._cells: defaultdict[tuple[int, int], list[tuple[Place, float]]] = defaultdict(list)
+
+    def add(self, place: Place, kept_m: float) -> None:
+        # The large ones first: they are the most likely to be in the way.
+        insort(self._cells[self._cell(place)], (place, kept_m), key=lambda disc: -disc[1])
+
+    def leaves(self, place: Place, radius_m: float) -> bool:
+        """Whether a disc keeps from every other one what that asks for."""
+        column, row = self._cell(place)
+        return all(
+            _apart(place, other, kept_m + radius_m)
+            for near in itertools.product((column - 1, column, column + 1), (row - 1, row, row + 1))
+            for other, kept_m in self._cells.get(near, ())
+        )
+
+    def _cell(self, place: Place) -> tuple[int, int]:
+        return int(place[0] // self._cell_m), int(place[1] // self._cell_m)
+
+
+def _apart(place: Place, other: Place, distance_m: float) -> bool:
+    east, north = place[0] - other[0], place[1] - other[1]
+    return east * east + north * north >= distance_m * distance_m
 
 
 def _circle(place: Place, radius_m: float) -> ObstacleKeys:

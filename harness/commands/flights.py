@@ -154,7 +154,7 @@ def compare(
     except (RunFolderError, AircraftError) as error:
         raise bad_input(error) from error
     except OSError as error:
-        raise WriteError("the comparison", out, error) from error
+        raise WriteError.of("the comparison", out, error) from error
     except KeyboardInterrupt:
         typer.echo(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
         raise

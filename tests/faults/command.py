@@ -14,6 +14,26 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 FOREST = ROOT / "scenarios" / "aerosonde_forest.yaml"
 TIMEOUT_S = 120.0
+CAMPAIGN_FILES = {
+    "campaign.yaml": """\
+schema: wayproof/campaign/1
+name: short
+seed: 5
+scenarios: [short.yaml]
+grid: {environment.wind.speed_mps: [0, 3, 6]}
+recordings: all
+""",
+    "short.yaml": """\
+schema: wayproof/scenario/1
+name: short
+area: {bounds_m: [0, 0, 2000, 2000]}
+obstacles: [{circle: {center_m: [1000, 1000], radius_m: 100}}]
+mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 60}
+sensor: {range_m: 900, rays: 360}
+planner: {clearance_m: 40}
+""",
+}
+"""A campaign of three short runs."""
 
 
 def start(folder: Path, *arguments: str, file_bytes: int | None = None, **keys: Any) -> subprocess.Popen[str]:

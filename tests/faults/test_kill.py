@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import json
+import os
 import random
 import shutil
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
+import pyarrow.parquet as pq
 import pytest
 import rerun as rr
 
 from harness.record import RunFolderError, digest
 from harness.run_folder import load_run
-from tests.faults.command import FOREST, run, start
+from tests.faults.command import CAMPAIGN_FILES, FOREST, run, start
 
 KILLS = [3, pytest.param(50, marks=pytest.mark.slow)]
+ORPHANS_LIVE_S = 5.0
+"""How long processes of a killed command may live on."""
 
 
 @dataclass(frozen=True)
@@ -25,70 +32,134 @@ class Command:
     Attributes:
         begin: its arguments.
         again: those that finish what a killed one began.
-        runs: the run folders that it writes, below its own folder.
+        status: with which it ends.
+        files: what must be there before, text by name.
+        claims: whether what is in a folder says that it is complete.
+        kept: what has to be the same in every complete folder; reads all of it.
     """
 
     begin: tuple[str, ...]
     again: tuple[str, ...]
-    runs: tuple[str, ...]
+    status: int
+    files: dict[str, str]
+    claims: Callable[[Path], bool]
+    kept: Callable[[Path], object]
 
 
-FLY = ("fly", str(FOREST), "--set", "mission.time_limit_s=60", "--out", "run", "--quiet")
-COMMANDS = {"fly": Command(FLY, FLY, ("run",))}
-"""`sweep`, for one, is another entry: begun, and begun again with `--resume`."""
+def run_digest(folder: Path) -> str:
+    """Of a whole run: every file can be read, and the track is what its digest says."""
+    read = load_run(folder)
+    assert digest(read.track) == read.metrics["digest"]
+    chunks = rr.chunk.RrdReader(folder / "flight.rrd").stream().to_chunks()
+    assert any(chunk.entity_path == "/__properties/metrics" for chunk in chunks)
+    return str(read.metrics["digest"])
 
 
-def digests(folder: Path, command: Command) -> list[str]:
-    """Of whole runs: every file can be read, and the track is what its digest says."""
-    found = []
-    for name in command.runs:
-        read = load_run(folder / name)
-        assert digest(read.track) == read.metrics["digest"]
-        chunks = rr.chunk.RrdReader(folder / name / "flight.rrd").stream().to_chunks()
-        assert any(chunk.entity_path == "/__properties/metrics" for chunk in chunks)
-        assert not list((folder / name).glob("*.partial"))
-        found.append(read.metrics["digest"])
-    return found
-
-
-def is_marked_incomplete(folder: Path) -> bool:
-    """Whether a run folder cannot be taken for a complete one; no folder at all is that too."""
+def run_claims(folder: Path) -> bool:
+    """Whether a run folder can be taken for a complete one; no folder at all cannot."""
     try:
         load_run(folder)
     except RunFolderError as error:
-        return "incomplete" in str(error) or "not a run folder" in str(error)
-    return False
+        return not ("incomplete" in str(error) or "not a run folder" in str(error))
+    return True
+
+
+def results(folder: Path) -> bytes:
+    """The results of a whole campaign, every run of which has a whole folder that agrees with its row."""
+    rows = pq.read_table(folder / "results.parquet").to_pylist()
+    assert [run_digest(folder / "runs" / str(row["run"])) for row in rows] == [row["digest"] for row in rows]
+    return (folder / "results.parquet").read_bytes()
+
+
+def results_claim(folder: Path) -> bool:
+    """Whether results can be taken for all of them; what rows and lines there are must be whole runs."""
+    journal = folder / "journal.jsonl"
+    lines = journal.read_bytes().split(b"\n")[:-1] if journal.exists() else []
+    flown = {line["run"]: line["row"]["digest"] for line in map(json.loads, lines)}
+    for number, flown_digest in flown.items():
+        assert run_digest(folder / "runs" / str(number)) == flown_digest
+    if not (folder / "results.parquet").exists():
+        return False
+    table = pq.read_table(folder / "results.parquet")
+    assert {row["run"]: row["digest"] for row in table.to_pylist()}.items() <= flown.items()
+    return bool(table.num_rows == 3)
+
+
+FLY = ("fly", str(FOREST), "--set", "mission.time_limit_s=60", "--out", "run", "--quiet")
+SWEEP = ("sweep", "campaign.yaml", "--out", "out", "--workers", "2", "--quiet")
+COMMANDS = {
+    "fly": Command(
+        FLY, FLY, 1, {}, lambda folder: run_claims(folder / "run"), lambda folder: run_digest(folder / "run")
+    ),
+    "sweep": Command(
+        SWEEP,
+        (*SWEEP, "--resume"),
+        0,
+        CAMPAIGN_FILES,
+        lambda folder: results_claim(folder / "out"),
+        lambda folder: results(folder / "out"),
+    ),
+}
+
+
+def made(folder: Path, command: Command) -> Path:
+    """A folder in which a command can be given."""
+    folder.mkdir()
+    for name, text in command.files.items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def names(folder: Path) -> set[str]:
+    """Of all files in a folder and below."""
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def alive(group: int) -> list[int]:
+    """Processes of a process group."""
+    found = []
+    for process in psutil.process_iter():
+        try:
+            if os.getpgid(process.pid) == group and process.status() != psutil.STATUS_ZOMBIE:
+                found.append(process.pid)
+        except (ProcessLookupError, psutil.NoSuchProcess):
+            continue  # ended meanwhile
+    return found
 
 
 @pytest.mark.parametrize("kills", KILLS)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_killed_at_any_moment(name: str, kills: int, tmp_path: Path) -> None:
     command = COMMANDS[name]
-    folder = tmp_path / "unbroken"
-    folder.mkdir()
+    folder = made(tmp_path / "unbroken", command)
     begun = time.monotonic()
     status, _, err = run(folder, *command.begin)
     lasts_s = time.monotonic() - begun
-    assert (status, err) == (1, "")
-    unbroken = digests(folder, command)
+    assert (status, err) == (command.status, "")
+    assert command.claims(folder)
+    unbroken, files = command.kept(folder), names(folder)
     moments = random.Random(7)
     killed = whole = 0
     for number in range(kills):
-        folder = tmp_path / "killed"
-        folder.mkdir()
-        process = start(folder, *command.begin)
+        folder = made(tmp_path / "killed", command)
+        process = start(folder, *command.begin, start_new_session=True)
         # A quarter of them in the last tenth, where everything is written at once.
         share = moments.uniform(0.85, 1.02) if number % 4 == 0 else moments.uniform(0.0, 1.0)
         time.sleep(share * lasts_s)
         process.kill()
         killed += process.wait() == -9
+        until = time.monotonic() + ORPHANS_LIVE_S
+        while left := alive(process.pid):
+            assert time.monotonic() < until, left
+            time.sleep(0.02)
         process.communicate()
-        complete = [not is_marked_incomplete(folder / each) for each in command.runs]
-        if all(complete):
+        if command.claims(folder):
             whole += 1
-            assert digests(folder, command) == unbroken
-        assert run(folder, *command.again)[0] == 1
-        assert digests(folder, command) == unbroken
+            assert command.kept(folder) == unbroken
+        status, _, err = run(folder, *command.again)
+        assert (status, err) == (command.status, "")
+        assert command.kept(folder) == unbroken
+        assert names(folder) == files
         shutil.rmtree(folder)
     assert killed >= kills // 2
     assert whole < kills

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from itertools import combinations
 from typing import Any
 
@@ -106,6 +107,36 @@ def test_density_is_the_number_a_square_kilometre_where_there_is_room() -> None:
     assert len(made.obstacles) == 50
     crowded = world("circles", 1, size_m=(2000, 2000), density_1pkm2=100.0, radius_m=(90, 100), gap_m=300)
     assert 5 < len(crowded.obstacles) < 40
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"size_m": (50_000, 50_000), "density_1pkm2": 10.0, "radius_m": (5, 10), "gap_m": 0},
+        {"density_1pkm2": 4000.0},
+        {"density_1pkm2": 4000.0, "radius_m": (1, 1000), "gap_m": 0},
+    ],
+    ids=["many", "no place", "small ones between large ones"],
+)
+def test_what_is_asked_for_takes_no_longer_than_it_takes_to_place(keys: dict[str, Any]) -> None:
+    begun = time.process_time()
+    made = world("circles", 1, **keys)
+    assert time.process_time() - begun < 8.0
+    assert 10 < len(made.obstacles) <= 25_000
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "sentence"),
+    [
+        ("circles", {"density_1pkm2": 4001}, "asks for 100025 obstacles; must be at most 100000"),
+        ("forest", {"density_1pkm2": 50, "trunks": (1, 100)}, "asks for 125000 obstacles"),
+        ("polygons", {"density_1pkm2": 60, "corners": (3, 1000)}, "asks for 1500 obstacles of 1000 corners"),
+        ("u_traps", {"density_1pkm2": 3000}, "asks for 75000 obstacles of 8 corners; must be at most 500000"),
+    ],
+)
+def test_more_than_a_world_can_hold_is_refused(name: str, keys: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        WorldSpec.model_validate({name: keys})
 
 
 def reachable(made: GeneratedWorld, step_m: float) -> bool:

@@ -1,0 +1,113 @@
+"""A campaign on a disk that is full or takes nothing, two at once, a scenario changed: a line, nothing lost."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from harness.run_folder import load_run
+from tests.faults.command import CAMPAIGN_FILES, run, start, wait_until
+
+SWEEP = ("sweep", "campaign.yaml", "--out", "out", "--workers", "1", "--quiet")
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    for name, text in CAMPAIGN_FILES.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """The results of a sweep without a break."""
+    place = tmp_path_factory.mktemp("unbroken")
+    for name, text in CAMPAIGN_FILES.items():
+        (place / name).write_text(text)
+    assert run(place, *SWEEP) == (0, "", "")
+    return results(place)
+
+
+def results(place: Path) -> bytes:
+    return (place / "out" / "results.parquet").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("size", "status", "said"),
+    [
+        (100, 2, "wayproof: cannot write the campaign out: File too large\n"),
+        (4_000, 1, "--resume goes on\n"),
+        (100_000, 1, "--resume goes on\n"),
+    ],
+    ids=["index", "journal and track", "recording"],
+)
+def test_a_full_disk(size: int, status: int, said: str, place: Path, unbroken: bytes) -> None:
+    """No file may grow beyond some bytes, neither the command's nor those of its processes."""
+    ended, out, err = run(place, *SWEEP, file_bytes=size)
+    assert (ended, out) == (status, "")
+    assert err.endswith(said)
+    assert len(err.splitlines()) == 1
+    assert "File too large" in err
+    if (place / "out" / "results.parquet").exists():
+        assert pq.read_table(place / "out" / "results.parquet").num_rows < 3
+    assert run(place, *SWEEP, "--resume") == (0, "", "")
+    assert results(place) == unbroken
+
+
+def test_a_disk_that_is_full_for_the_summary_alone(place: Path, unbroken: bytes) -> None:
+    assert run(place, *SWEEP) == (0, "", "")
+    (place / "out" / "summary.html").unlink()
+    status, out, err = run(place, *SWEEP, "--resume", file_bytes=25_000)
+    assert (status, out) == (2, "")
+    assert err == "wayproof: cannot write the summary in out: File too large\n"
+    assert not (place / "out" / "summary.html").exists()
+    assert results(place) == unbroken
+
+
+@pytest.mark.parametrize("folder", ["/proc/campaign", "/sys/campaign"])
+def test_a_file_system_that_takes_nothing(folder: str, place: Path) -> None:
+    status, out, err = run(place, *SWEEP[:3], folder, *SWEEP[4:])
+    assert (status, out) == (2, "")
+    assert err.startswith(f"wayproof: cannot write the campaign {folder}: ")
+    assert len(err.splitlines()) == 1
+
+
+def test_two_sweeps_into_one_folder(place: Path, unbroken: bytes) -> None:
+    first = start(place, *SWEEP)
+    wait_until((place / "out" / "campaign.json").exists, first)
+    for resume in ((), ("--resume",)):
+        status, out, err = run(place, *SWEEP, *resume)
+        assert (status, out) == (2, "")
+        assert err == (
+            "wayproof: out is being flown into by another process: wait for it or choose another folder\n"
+        )
+    assert first.communicate(timeout=60) == ("", "")
+    assert first.returncode == 0
+    assert results(place) == unbroken
+
+
+def test_a_scenario_changed_and_deleted_in_mid_campaign(place: Path, unbroken: bytes) -> None:
+    scenario = place / "short.yaml"
+    process = start(place, *SWEEP)
+    wait_until((place / "out" / "campaign.json").exists, process)
+    scenario.write_text(CAMPAIGN_FILES["short.yaml"].replace("rays: 360", "rays: 720"))
+    wait_until((place / "out" / "runs" / "1").exists, process)
+    process.kill()
+    process.communicate(timeout=60)
+    journal = (place / "out" / "journal.jsonl").read_bytes()
+    status, _, err = run(place, *SWEEP, "--resume")
+    assert status == 2
+    assert "scenarios[0].keys.sensor.rays was 360, is 720" in err
+    scenario.unlink()
+    assert run(place, *SWEEP, "--resume")[0] == 2
+    assert (place / "out" / "journal.jsonl").read_bytes() == journal, "nothing lost"
+    assert (
+        load_run(place / "out" / "runs" / "0").metrics["digest"]
+        == json.loads(journal.splitlines()[0])["row"]["digest"]
+    )
+    scenario.write_text(CAMPAIGN_FILES["short.yaml"])
+    assert run(place, *SWEEP, "--resume") == (0, "", "")
+    assert results(place) == unbroken
