@@ -39,6 +39,9 @@ from harness.world_generators import generated
 SEED, WORLD, DRAW, DESIGN = range(4)
 """Random streams of a case; DESIGN is one of a combination."""
 
+MAX_DESIGNED: Final = 10_000_000
+"""Values that a design may have in all, which are kept: 80 MB."""
+
 DEFAULT_PLANNER: Final = "rolling_window"
 DEFAULT_AIRCRAFT: Final = "aerosonde"
 
@@ -108,6 +111,15 @@ class CampaignRuns:
         self._last_world: tuple[int, list[_Change]] = (-1, [])
         if self._number > MAX_RUNS:
             raise InputError(f"{file.source}: has {self._number} runs; must be at most {MAX_RUNS}")
+        designed = 0 if campaign.sampler == "independent" else self.cases * len(campaign.random)
+        if designed > MAX_DESIGNED:
+            raise InputError(
+                self._line(
+                    ("draws",),
+                    f"is {campaign.draws}, so that {campaign.sampler} spreads {designed} values at once; must be at "
+                    f"most {MAX_DESIGNED} (or take sampler: independent)",
+                )
+            )
 
     def __len__(self) -> int:
         return self._number

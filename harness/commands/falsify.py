@@ -68,7 +68,7 @@ def falsify(
     """
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
-    ranges = [_range(text) for text in vary]
+    ranges = [range_of(text) for text in vary]
     overrides = [("planner.kind", planner), ("aircraft.model", aircraft), ("seed", seed)]
     given = [(name, str(value)) for name, value in overrides if value is not None]
     fixed = [*given, *map(setting, settings or ())]
@@ -136,8 +136,12 @@ def _flown(scenario: Scenario) -> dict[str, Any]:
     return metrics(fly(make_loop(scenario)), flight_limits(scenario))
 
 
-def _range(text: str) -> tuple[str, float, float]:
-    """KEY.PATH=LO:HI as its three parts."""
+def range_of(text: str) -> tuple[str, float, float]:
+    """KEY.PATH=LO:HI as its three parts.
+
+    Raises:
+        typer.BadParameter: it is something else, or a range that no search is made over.
+    """
     key, equals, ends = text.partition("=")
     low, colon, high = ends.partition(":")
     try:

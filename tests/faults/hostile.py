@@ -74,6 +74,66 @@ YAML_SNIPPETS: Final = (
     *("[" + "0, " * 3000 + "0]", "{circle: {center_m: [0, 0], radius_m: 1}}", "aerosonde", "rolling_window"),
     *("bug2", "tustin", "step", "[10, 5]", "[0, 1e7]", "[-1e6, -1e6, 1e6, 1e6]", "é", "\u2028", "日本"),
 )
+CAMPAIGN_SNIPPETS: Final = (
+    *NUMBERS,
+    *(
+        "{density_1pkm2: 4000}",
+        "{size_m: [1e6, 1e6], density_1pkm2: 0.1}",
+        "{cells: [300, 160]}",
+        "{turns: 50}",
+    ),
+    *("{uniform: [0, 1]}", "{uniform: [1, 0]}", "{uniform: [-1e12, 1e12]}", "{uniform: [0, .nan]}"),
+    *("{uniform: [0]}", "{uniform: [0, 1], choice: [1]}", "{choice: []}", "{choice: [[], {}, null, true]}"),
+    *("{normal: {mean: 0, sigma: 0}}", "{normal: {mean: 0, sigma: 1e-12, least: 1}}"),
+    *(
+        "{normal: {mean: 1e12, sigma: 5e-324, most: 1e12}}",
+        "{normal: {mean: 0, sigma: 1, least: 9, most: 8}}",
+    ),
+    *("[null, 0, a, [1], {a: 1}]", "[" + "0, " * 1500 + "1]", "[0, 0]", "{x: [1, 2]}", "{seed: [1]}"),
+    *("{obstacles: [[]]}", "{'obstacles[0].circle.radius_m': [1, 2]}", "{area.bounds_m: [[0, 0, 1, 1]]}"),
+    *(
+        "{circles: {density_1pkm2: 1e6}}",
+        "{circles: {density_1pkm2: 4000}}",
+        "[{circles: {}}, {circles: {}}]",
+    ),
+    *("{circles: {density_1pkm2: 4000, gap_m: 0, radius_m: [0.1, 1000]}}", "{circles: {size_m: [1, 1e6]}}"),
+    *(
+        "{circles: {size_m: [1e6, 1e6], density_1pkm2: 0.1, radius_m: [1e-300, 1]}}",
+        "{circles: {room_m: 1e6}}",
+    ),
+    *("{forest: {density_1pkm2: 50, trunks: [999, 1000]}}", "{forest: {trunks: [0, 1001]}}"),
+    *("{polygons: {density_1pkm2: 60, corners: [1000, 1000]}}", "{polygons: {corners: [2, 1]}}"),
+    *(
+        "{u_traps: {density_1pkm2: 1e5, gap_m: 0}}",
+        "{u_traps: {wall_m: 1e6}}",
+        "{u_traps: {width_m: [1e6, 1e6]}}",
+    ),
+    *(
+        "{town: {blocks: [300, 300]}}",
+        "{town: {blocks: [300, 300], block_m: 1e6}}",
+        "{town: {share: [1e-300, 1]}}",
+    ),
+    *("{maze: {cells: [300, 160]}}", "{maze: {cells: [300, 300]}}", "{maze: {cells: [1, 1]}}"),
+    *("{maze: {wall_m: 1e6, corridor_m: 1e-9}}", "{spiral: {turns: 50}}", "{spiral: {corridor_m: 1e-300}}"),
+    *(
+        "latin_hypercube",
+        "sobol",
+        "independent",
+        "1000000",
+        "failures",
+        "[aerosonde_forest, aerosonde_forest]",
+    ),
+    *(
+        "[/]",
+        "[/dev]",
+        "[.]",
+        "[s.yaml]",
+        "[/dev/zero]",
+        "[no_such.yaml]",
+        "['a\\0b']",
+        "[" + "x/" * 3000 + "]",
+    ),
+)
 KEYS: Final = (
     *(
         "x",
@@ -277,7 +337,7 @@ def _flow(value: Any) -> str:
         return "{" + ", ".join(f"{_flow(key)}: {_flow(each)}" for key, each in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_flow, value)) + "]"
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def as_json(value: Any) -> str:

@@ -5,8 +5,9 @@ A reader of another kind of file is one entry of `READERS`. The larger numbers o
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,17 +15,25 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from typer import BadParameter
 
 from harness import strict_yaml
+from harness.campaign import CampaignFile, load_campaign
+from harness.campaign_runs import CampaignRuns
+from harness.commands.falsify import range_of
+from harness.falsify_keys import vary_of
 from harness.given_path import fly_by
 from harness.input_file import InputError
 from harness.path_flight import scenario_for
 from harness.paths_io import read_path
-from harness.scenario import dump_scenario, load_scenario, parse_scenario
+from harness.scenario import Scenario, dump_scenario, load_scenario, parse_scenario
+from harness.world_generators import GENERATORS, WorldSpec
 from tests.faults.hostile import (
+    CAMPAIGN_SNIPPETS,
     CELLS,
     JSON_SNIPPETS,
     KEYS,
+    NUMBERS,
     YAML_SNIPPETS,
     Raw,
     as_json,
@@ -33,6 +42,9 @@ from tests.faults.hostile import (
     spoilt,
     spoilt_bytes,
 )
+
+CAMPAIGN_RUNS = 3
+"""So many runs of a campaign are made, and its last one."""
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 LONGEST_S = 10.0
@@ -50,11 +62,20 @@ def plain(value: Any) -> Any:
 
 
 EVERYTHING = plain(strict_yaml.read(SCENARIOS / "one_of_everything.yaml").plain())
+CAMPAIGN = plain(strict_yaml.read(SCENARIOS / "campaigns" / "everything.yaml").plain())
 LEAST = {
     "schema": "wayproof/scenario/1",
     "name": "least",
     "area": {"bounds_m": [0, 0, 8000, 6000]},
     "mission": {"start_m": [500, 3000], "goal_m": [7500, 3000]},
+}
+SHORT_CAMPAIGN = {
+    "schema": "wayproof/campaign/1",
+    "name": "short",
+    "seed": 1,
+    "worlds": [{"circles": {"size_m": [3000, 3000]}}],
+    "grid": {"sensor.range_m": [1000, 1500]},
+    "random": {"environment.wind.speed_mps": {"uniform": [0, 5]}},
 }
 LINE = [[8.0, 47.0], [8.01, 47.0], [8.02, 47.01]]
 GEOJSON = {
@@ -93,6 +114,16 @@ def read_scenario(path: Path) -> None:
     """Loads a scenario; one that is taken is the same when it is written out and read again."""
     taken = load_scenario(path)
     assert parse_scenario(dump_scenario(taken)) == taken
+
+
+def read_campaign(path: Path) -> None:
+    """Loads a campaign and makes some of its runs; one that is taken can be flown from its results alone."""
+    taken = CampaignRuns(load_campaign(path))
+    again = CampaignRuns(CampaignFile.from_plain(json.loads(json.dumps(taken.file.plain())), str(path)))
+    assert (len(taken), taken.varied) == (len(again), again.varied)
+    for number in sorted({*range(min(CAMPAIGN_RUNS, len(taken))), len(taken) - 1}):
+        assert taken.run(number) == again.run(number)
+        assert parse_scenario(dump_scenario(taken.scenario(number))) == again.scenario(number)
 
 
 def read_given_path(path: Path) -> None:
@@ -140,6 +171,8 @@ def _cell(cell: Any) -> str:
 READERS = {
     "scenario": Reader("s.yaml", read_scenario, EVERYTHING, as_yaml, YAML_SNIPPETS),
     "short scenario": Reader("s.yaml", read_scenario, LEAST, as_yaml, YAML_SNIPPETS),
+    "campaign": Reader("c.yaml", read_campaign, CAMPAIGN, as_yaml, CAMPAIGN_SNIPPETS),
+    "short campaign": Reader("c.yaml", read_campaign, SHORT_CAMPAIGN, as_yaml, CAMPAIGN_SNIPPETS),
     "geojson": Reader("p.geojson", read_given_path, GEOJSON, as_json, JSON_SNIPPETS),
     "plan": Reader("p.plan", read_given_path, PLAN, as_json, JSON_SNIPPETS),
     "csv": Reader("p.csv", read_given_path, CSV, rows(","), CELLS),
@@ -247,3 +280,66 @@ def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
         taken_or_refused(path, lambda: dump_scenario(load_scenario(path, pairs)))
 
     fuzzed(cases, st.lists(st.tuples(name, value), min_size=1, max_size=2), holds)
+
+
+ENDS = (*NUMBERS, ".nan", "nan", "inf", "-inf", "", " 1", "a", "0:1", "1e-320", "\0", "\u0663", "12:30")
+VARIED = (
+    "environment.wind.speed_mps",
+    "sensor.latency_s",
+    "sensor.rays",
+    "sensor.range_m",
+    "planner.clearance_m",
+)
+
+
+@pytest.mark.parametrize("cases", [25, pytest.param(1500, marks=pytest.mark.slow)])
+def test_ranges_to_vary(cases: int, tmp_path: Path) -> None:
+    path = tmp_path / "s.yaml"
+    path.write_text(as_yaml(LEAST))
+    known = st.sampled_from((*VARIED, *filter(None, map(_dotted, places(EVERYTHING)))))
+    key = st.one_of(st.sampled_from(VARIED), known, st.sampled_from(KEYS), st.text(max_size=8))
+    end = st.one_of(st.sampled_from(ENDS), st.floats().map(str), st.integers(-10, 2000).map(str))
+    ranged = st.builds("{}={}:{}".format, key, end, end)
+
+    def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
+        return load_scenario(path, replaced)
+
+    def vary(texts: list[str]) -> None:
+        try:
+            ranges = [range_of(text) for text in texts]
+        except BadParameter as error:
+            raise InputError(f"command line: {error}") from error
+        for each in vary_of(load, ranges):
+            assert (each.value(0.0), each.value(1.0)) == (each.mild, each.hard)
+
+    def holds(texts: list[str]) -> None:
+        taken_or_refused(path, lambda: vary(texts))
+
+    fuzzed(
+        cases, st.lists(st.one_of(ranged, ranged, ranged, st.text(max_size=8)), min_size=1, max_size=3), holds
+    )
+
+
+SIZES = st.sampled_from((0, 1, 2, 3, 0.1, 0.5, 10, 60, 300, 1000, 4000, 1e5, 1e6, 1e-9, 1e-300)) | st.floats(
+    0, 5000
+)
+
+
+def _keys_of(name: str) -> st.SearchStrategy[dict[str, Any]]:
+    """Some keys of a generator, each with a number or two of the right kind and any size."""
+    fields = type(getattr(WorldSpec.model_validate({name: {}}), name)).model_fields
+    pair = st.lists(SIZES, min_size=2, max_size=2).map(sorted)
+    each = {key: pair if isinstance(field.default, tuple) else SIZES for key, field in fields.items()}
+    return st.fixed_dictionaries({}, optional=each)
+
+
+@pytest.mark.parametrize("cases", [10, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", GENERATORS)
+def test_worlds_of_any_size(name: str, cases: int, tmp_path: Path) -> None:
+    path = tmp_path / "c.yaml"
+
+    def holds(keys: dict[str, Any]) -> None:
+        path.write_text(as_yaml({**SHORT_CAMPAIGN, "grid": {}, "random": {}, "worlds": [{name: keys}]}))
+        taken_or_refused(path, lambda: CampaignRuns(load_campaign(path)).scenario(0))
+
+    fuzzed(cases, _keys_of(name), holds)

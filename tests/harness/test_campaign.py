@@ -299,6 +299,15 @@ def test_a_fault_of_the_scenario_itself_names_its_own_line_and_the_run(place: Pa
         runs_of(place).check()
 
 
+def test_a_design_of_too_many_values_is_refused_before_it_is_made(place: Path) -> None:
+    names = "".join(f"  random_{number}: {{uniform: [0, 1]}}\n" for number in range(11))
+    text = "worlds: [{circles: {}}]\nsampler: sobol\ndraws: 1000000\nrandom:\n" + names
+    with pytest.raises(
+        InputError, match=r"campaign.yaml:6: draws: .* 11000000 values at once; must be at most"
+    ):
+        runs_of(place, f"schema: wayproof/campaign/1\nname: small\nseed: 5\n{text}")
+
+
 def test_a_campaign_with_neither_scenarios_nor_worlds_is_refused(place: Path) -> None:
     with pytest.raises(InputError, match="has neither scenarios nor worlds"):
         runs_of(place, "schema: wayproof/campaign/1\nname: small\nseed: 5\n")
