@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 
 from harness.falsify_search import STEPS, Point
 from harness.scenario import Scenario
-from harness.strict_yaml import InputError
+from harness.strict_yaml import InputError, loc_of
 
 MOST_KEYS: Final = 6
 
@@ -60,6 +60,10 @@ def vary_of(load: Load, given: Sequence[tuple[str, float, float]]) -> tuple[Vary
             f"command line: --vary is given {len(given)} times; at most {MOST_KEYS} keys are varied"
         )
     for number, (key, mild, hard) in enumerate(given):
+        try:
+            loc_of(key)
+        except ValueError as error:
+            raise InputError(f"command line: --vary: {error}") from error
         if key in [other for other, _, _ in given[:number]]:
             raise InputError(f"command line: --vary {key}: is given twice; give one range")
         if mild == hard:

@@ -149,7 +149,7 @@ def range_of(text: str) -> tuple[str, float, float]:
     except ValueError:
         mild = hard = math.nan
     if not (key.strip() and equals and colon and math.isfinite(mild) and math.isfinite(hard)):
-        raise typer.BadParameter(f"{text!r} is not KEY.PATH=LO:HI with two numbers", param_hint="--vary")
+        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=LO:HI with two numbers", param_hint="--vary")
     if key.strip() == "seed":
         raise typer.BadParameter("a seed is no condition; --seeds flies several", param_hint="--vary")
     return key.strip(), mild, hard

@@ -97,7 +97,7 @@ def setting(text: str) -> tuple[str, str]:
     """KEY.PATH=VALUE as its two parts."""
     name, equals, value = text.partition("=")
     if not equals:
-        raise typer.BadParameter(f"{text!r} is not KEY.PATH=VALUE", param_hint="--set")
+        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
     return name.strip(), value
 
 

@@ -77,9 +77,9 @@ YAML_SNIPPETS: Final = (
 CAMPAIGN_SNIPPETS: Final = (
     *NUMBERS,
     *(
-        "{density_1pkm2: 4000}",
-        "{size_m: [1e6, 1e6], density_1pkm2: 0.1}",
-        "{cells: [300, 160]}",
+        "{density_1pkm2: 400}",
+        "{size_m: [1e6, 1e6], density_1pkm2: 0.001}",
+        "{cells: [60, 50]}",
         "{turns: 50}",
     ),
     *("{uniform: [0, 1]}", "{uniform: [1, 0]}", "{uniform: [-1e12, 1e12]}", "{uniform: [0, .nan]}"),
@@ -93,12 +93,12 @@ CAMPAIGN_SNIPPETS: Final = (
     *("{obstacles: [[]]}", "{'obstacles[0].circle.radius_m': [1, 2]}", "{area.bounds_m: [[0, 0, 1, 1]]}"),
     *(
         "{circles: {density_1pkm2: 1e6}}",
-        "{circles: {density_1pkm2: 4000}}",
+        "{circles: {density_1pkm2: 400}}",
         "[{circles: {}}, {circles: {}}]",
     ),
-    *("{circles: {density_1pkm2: 4000, gap_m: 0, radius_m: [0.1, 1000]}}", "{circles: {size_m: [1, 1e6]}}"),
+    *("{circles: {density_1pkm2: 40, gap_m: 0, radius_m: [0.1, 1000]}}", "{circles: {size_m: [1, 1e6]}}"),
     *(
-        "{circles: {size_m: [1e6, 1e6], density_1pkm2: 0.1, radius_m: [1e-300, 1]}}",
+        "{circles: {size_m: [1e6, 1e6], density_1pkm2: 0.001, radius_m: [1e-300, 1]}}",
         "{circles: {room_m: 1e6}}",
     ),
     *("{forest: {density_1pkm2: 50, trunks: [999, 1000]}}", "{forest: {trunks: [0, 1001]}}"),
@@ -109,11 +109,11 @@ CAMPAIGN_SNIPPETS: Final = (
         "{u_traps: {width_m: [1e6, 1e6]}}",
     ),
     *(
-        "{town: {blocks: [300, 300]}}",
-        "{town: {blocks: [300, 300], block_m: 1e6}}",
+        "{town: {blocks: [60, 50]}}",
+        "{town: {blocks: [60, 50], block_m: 1e6}}",
         "{town: {share: [1e-300, 1]}}",
     ),
-    *("{maze: {cells: [300, 160]}}", "{maze: {cells: [300, 300]}}", "{maze: {cells: [1, 1]}}"),
+    *("{maze: {cells: [60, 50]}}", "{maze: {cells: [300, 300]}}", "{maze: {cells: [1, 1]}}"),
     *("{maze: {wall_m: 1e6, corridor_m: 1e-9}}", "{spiral: {turns: 50}}", "{spiral: {corridor_m: 1e-300}}"),
     *(
         "latin_hypercube",

@@ -43,9 +43,6 @@ from tests.faults.hostile import (
     spoilt_bytes,
 )
 
-CAMPAIGN_RUNS = 3
-"""So many runs of a campaign are made, and its last one."""
-
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 LONGEST_S = 10.0
 """For one small file, on a machine that others use too."""
@@ -117,11 +114,11 @@ def read_scenario(path: Path) -> None:
 
 
 def read_campaign(path: Path) -> None:
-    """Loads a campaign and makes some of its runs; one that is taken can be flown from its results alone."""
+    """Loads a campaign and makes its first run and its last; one that is taken can be flown from its results alone."""
     taken = CampaignRuns(load_campaign(path))
     again = CampaignRuns(CampaignFile.from_plain(json.loads(json.dumps(taken.file.plain())), str(path)))
     assert (len(taken), taken.varied) == (len(again), again.varied)
-    for number in sorted({*range(min(CAMPAIGN_RUNS, len(taken))), len(taken) - 1}):
+    for number in sorted({0, len(taken) - 1}):
         assert taken.run(number) == again.run(number)
         assert parse_scenario(dump_scenario(taken.scenario(number))) == again.scenario(number)
 
