@@ -132,10 +132,11 @@ class MovingObstacles:
     Args:
         clearance_m: wanted distance from obstacles; runs of returns break where they are further apart.
         noise_m: standard deviation of ranges.
+        false_returns: the sensor is known to return ranges where nothing is.
     """
 
-    def __init__(self, clearance_m: float, noise_m: float) -> None:
-        self._noise = noise_m
+    def __init__(self, clearance_m: float, noise_m: float, false_returns: bool = True) -> None:
+        self._noise, self._false_returns = noise_m, false_returns
         self._apart = clearance_m + 6.0 * noise_m
         self._sure = 4.0 * noise_m + 0.02 * clearance_m
         self._compared_s = COMPARED_S + self._sure / SLOW_MPS
@@ -202,7 +203,8 @@ class MovingObstacles:
 
     def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
         """Rays that returned something, but for false returns, and where."""
-        hits = supported(scan, self._apart).nonzero()[0]
+        returned = supported(scan, self._apart) if self._false_returns else scan.ranges_m < math.inf
+        hits = returned.nonzero()[0]
         return hits, scan.from_sensor_m(hits) + complex(scan.east_m, scan.north_m)
 
     def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:

@@ -69,7 +69,7 @@ class SensedWorld:
             if noisy
             else ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
         )
-        self._moving = None if noisy else MovingObstacles(clearance_m, noise_m)
+        self._moving = None if noisy else MovingObstacles(clearance_m, noise_m, false_returns)
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
         self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
