@@ -29,7 +29,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     console = Console()
     width = min(WIDTH, console.width)
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
-    console.print(f"\n{escape(summary.name)}: {summary.total.runs} runs" + (f": {ended}" if ended else ""))
+    console.print(f"{escape(summary.name)}: {summary.total.runs} runs" + (f": {ended}" if ended else ""))
     if not summary.total.runs:
         return
     shown = summary.tables if all_tables else summary.tables[:1]

@@ -180,7 +180,7 @@ def dask_workers(address: str) -> Iterator[Workers]:
         from distributed import Client
     except ImportError as error:
         raise InputError("wayproof: --scheduler needs Dask; pip install 'wayproof[cluster]'") from error
-    for logger in ("distributed", "distributed.client"):
+    for logger in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
         client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)

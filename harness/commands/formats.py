@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -38,7 +39,7 @@ def _found(file: str) -> str:
     from harness.campaign import is_campaign
     from harness.shipped import campaign_path, shipped_campaigns
 
-    if file in shipped_campaigns() or (Path(file).is_file() and is_campaign(Path(file))):
+    if file in shipped_campaigns() or (os.path.isfile(file) and is_campaign(Path(file))):
         from harness.commands.sweep import checked
 
         runs = checked(campaign_path(file))

@@ -76,6 +76,7 @@ def sweep(
         print_json({"results": str(folder / "results.parquet"), "runs": len(runs), "outcomes": told})
     elif not quiet:
         print_summary(summary)
+        typer.echo(f"results: {folder / 'results.parquet'}")
         typer.echo(f"summary: {page}")
     return FAILED if "error" in told else 0
 
