@@ -394,7 +394,7 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
         assert workers.free() == 1
         time.sleep(0.5)
         assert workers.start(job).result(timeout=60).row == first.row
-    assert multiprocessing.active_children() == []
+    wait_for(lambda: multiprocessing.active_children() == [])
 
 
 @pytest.mark.parametrize(("which", "kept"), [("all", {0, 1}), ("failures", {1}), ("none", set())])
