@@ -23,6 +23,9 @@ ComplexArray = NDArray[np.complex128]
 
 CONFIRMED = 2
 """An edge is believed from this score on; a hit adds one, a look through takes one."""
+SUPPORT = 0.5
+"""Where returns may be false, one is believed only if a ray beside it met something as far, but for this share of
+the clearance: a false return beside a wall seldom lies so near to its range."""
 CERTAIN = 6
 """Scores do not rise above this."""
 BETWEEN = np.arange(1, 8) / 8.0
@@ -129,7 +132,7 @@ class ObstacleMap:
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
         self._unconfirmed = False
-        taken = supported(scan, self._join) if self._doubtful else scan.ranges_m < math.inf
+        taken = supported(scan, SUPPORT * self._clearance) if self._doubtful else scan.ranges_m < math.inf
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
         if not len(hits):
             return

@@ -62,7 +62,6 @@ class SensedWorld:
         false_returns: bool = False,
     ) -> None:
         noisy = noise_m > NOISY * clearance_m
-        self._doubtful = false_returns and not noisy
         self._clearance = clearance_m
         self._edges: Edges = (
             ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
@@ -120,7 +119,6 @@ class SensedWorld:
         if self._moving and len(trail_m := self._moving.trail_m):
             self._edges.forget(trail_m, self._clearance)
         for edges in (*fresh, *(each.points_m for each in self.moving)):
-            # Where returns may be false, what seems to stand somewhere may not: the next looks will tell.
-            if self._free.take_back(scan, edges) or (self._doubtful and len(edges)):
+            if self._free.take_back(scan, edges):
                 self._surprised_s = scan.available_s
         self._free.update(scan)
