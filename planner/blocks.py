@@ -6,10 +6,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.curves import Point
 from planner.interface import FloatArray
 from planner.memory import IntArray
+
+ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +24,7 @@ class Blocks:
         first: (c,) where each square begins in `members`.
         counts: (c,) how many points it has.
         beside: (p, 2) squares that touch each other, diagonally too; each pair once.
-        center_m: (c, 2) middle of the box about the points of each square.
+        center_m: (c,) middle of the box about the points of each square, east + i north.
         reach_m: (c,) half the diagonal of that box.
     """
 
@@ -29,7 +32,7 @@ class Blocks:
     first: IntArray
     counts: IntArray
     beside: IntArray
-    center_m: FloatArray
+    center_m: ComplexArray
     reach_m: FloatArray
 
     @staticmethod
@@ -52,15 +55,14 @@ class Blocks:
             first,
             counts,
             np.column_stack((one, place[one, which])),
-            0.5 * (low + high),
+            0.5 * (low[:, 0] + high[:, 0]) + 0.5j * (low[:, 1] + high[:, 1]),
             0.5 * np.hypot(*(high - low).T),
         )
 
     def near_lines(
         self,
         origin: Point,
-        ux: FloatArray,
-        uy: FloatArray,
+        towards: ComplexArray,
         within_m: float,
         to_m: FloatArray | float = math.inf,
     ) -> tuple[IntArray, IntArray]:
@@ -68,21 +70,18 @@ class Blocks:
 
         Args:
             origin: where they begin.
-            ux: (k,) east of the unit vectors along them.
-            uy: (k,) north.
+            towards: (k,) unit vectors along them, east + i north.
             within_m: how near.
             to_m: points that a line comes near to only after so much of it do not count; one for all or (k,).
 
         Returns:
             Lines and points, (n,) each: all pairs that are as near, and some that are not.
         """
-        dx, dy = self.center_m[:, 0] - origin[0], self.center_m[:, 1] - origin[1]
+        away = self.center_m - complex(*origin)
         near = self.reach_m + within_m
-        aside = uy[:, None] * dx
-        aside -= ux[:, None] * dy
-        ahead = ux[:, None] * dx
-        ahead += uy[:, None] * dy
-        wanted = (np.abs(aside, out=aside) < near) & (ahead > -near)
+        seen = np.multiply.outer(towards.conj(), away)
+        ahead = seen.real
+        wanted = (np.abs(seen.imag) < near) & (ahead > -near)
         if np.min(to_m, initial=math.inf) < math.inf:
             wanted &= ahead < np.reshape(to_m, (-1, 1)) + near
         line, square = wanted.nonzero()

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.blocks import Blocks
+from planner.blocks import Blocks, ComplexArray
 from planner.curves import Point
 from planner.interface import FloatArray
 from planner.memory import IntArray
@@ -30,6 +30,12 @@ MOST_HIDING = 12
 
 BLOCK_CELLS = 4
 """Side of the blocks in which points near a line are looked for, in cells."""
+
+AT_ONCE = 12_000
+"""So many pairs of a direction and a point are looked at in one go; of more only those near each other."""
+
+SIDES = np.array((1.0, -1.0))
+"""M and N."""
 
 
 def guide_vector(position: Point, goal: Point) -> tuple[float, float, float]:
@@ -103,6 +109,15 @@ class Window:
         return float(self.keep_m.max())
 
     @cached_property
+    def _places(self) -> ComplexArray:
+        """(m,) the points as east + i north: one number each."""
+        return self.points_m[:, 0] + 1j * self.points_m[:, 1]
+
+    @cached_property
+    def _square(self) -> FloatArray:
+        return self.keep_m * self.keep_m
+
+    @cached_property
     def _blocks(self) -> Blocks:
         return Blocks.of(self.points_m, BLOCK_CELLS * self.cell_m)
 
@@ -124,102 +139,112 @@ class Window:
         edges: list[SectorEdge] = []
         pending = list(dict.fromkeys(beside))
         looked_at = set(pending)
-        dx, dy = self.points_m[:, 0] - origin[0], self.points_m[:, 1] - origin[1]
+        away = self._places - complex(*origin)
         while pending:
             obstacle = pending.pop()
-            ux, uy, touch, sides = self._tangents(dx, dy, obstacle)
-            if not len(ux):
+            towards, touch, sides = self._tangents(away, obstacle)
+            if not len(towards):
                 continue
-            clear, met = self._clear_past(origin, ux, uy, touch)
-            rows = np.column_stack((ux, uy, touch, clear)).tolist()
-            for (*row, clear_to), side, met_by in zip(rows, sides, met.tolist(), strict=True):
-                if clear_to >= row[2]:
-                    edges.append(SectorEdge(row[0], row[1], row[2], clear_to, obstacle, side))
-                if clear_to < row[2] + self.keep_m[met_by]:
-                    # Hidden, or closed right behind: the way goes round what hides it.
-                    other = int(self.labels[met_by])
-                    if other not in looked_at and len(looked_at) < MOST_HIDING:
-                        looked_at.add(other)
-                        pending.append(other)
+            clear, met = self._clear_past(origin, away, towards, touch)
+            hidden = clear < touch + self.keep_m[met]
+            for u, touch_m, clear_m, side in zip(
+                towards.tolist(), touch.tolist(), clear.tolist(), sides, strict=True
+            ):
+                if clear_m >= touch_m:
+                    edges.append(SectorEdge(u.real, u.imag, touch_m, clear_m, obstacle, side))
+            # Hidden, or closed right behind: the way goes round what hides it.
+            for other in self.labels[met[hidden]].tolist():
+                if other not in looked_at and len(looked_at) < MOST_HIDING:
+                    looked_at.add(other)
+                    pending.append(other)
         return edges
 
     def hugged_m(self, origin: Point, edge: SectorEdge, outer_m: float) -> float:
         """How far along an edge an outer distance from the obstacle that it touches is reached again."""
-        _, point = self._blocks.near_lines(origin, np.array([edge.ux]), np.array([edge.uy]), outer_m)
-        points = self.points_m[point[self.labels[point] == edge.obstacle]]
-        dx, dy = points[:, 0] - origin[0], points[:, 1] - origin[1]
-        ahead = dx * edge.ux + dy * edge.uy
-        beside = dx * edge.uy - dy * edge.ux
-        reach = outer_m * outer_m - beside * beside
-        near = (reach > 0.0) & (ahead > -outer_m)
-        ahead, reach = ahead[near], np.sqrt(reach[near])
+        members = self._obstacle(edge.obstacle).members
+        seen = (self._places[members] - complex(*origin)) * complex(edge.ux, -edge.uy)
+        reach = outer_m * outer_m - seen.imag * seen.imag
+        near = ((reach > 0.0) & (seen.real > -outer_m)).nonzero()[0]
+        ahead, reach = seen.real[near], np.sqrt(reach[near])
         order = np.argsort(ahead - reach)
         begin, end = (ahead - reach)[order], np.maximum.accumulate((ahead + reach)[order])
         gap = np.flatnonzero((begin[1:] > end[:-1]) & (end[:-1] > edge.touch_m))
         return float(end[gap[0]] if len(gap) else end[-1])
 
-    def _tangents(
-        self, dx: FloatArray, dy: FloatArray, label: int
-    ) -> tuple[FloatArray, FloatArray, FloatArray, list[float]]:
-        """Unit vectors tangent to the ends of an obstacle's fan, where they touch it, and which ends they are."""
+    def _tangents(self, away: ComplexArray, label: int) -> tuple[ComplexArray, FloatArray, FloatArray]:
+        """Directions tangent to the ends of an obstacle's fan, where they touch it, and which ends they are."""
         cells = self._obstacle(label)
-        x, y = dx[cells.members], dy[cells.members]
-        square = x * x + y * y
-        keep = cells.keep_m
-        half = np.arcsin(np.minimum(keep / np.sqrt(np.maximum(square, 1e-12)), 1.0))
-        middle = np.arctan2(y, x)
-        angles, touches, sides = [], [], []
-        for side in (1.0, -1.0):  # M, N
-            # Angles towards the side, relative to the first point of their cell: none is cut at pi.
-            edge = side * middle + half
-            reference = edge[cells.first]
-            relative = edge - np.repeat(reference, cells.counts)
-            relative -= math.tau * np.rint(relative / math.tau)
-            furthest = np.maximum.reduceat(relative, cells.first)
-            outmost = reference + furthest
-            # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
-            beyond = outmost[cells.other] - outmost[cells.one]
-            beyond -= math.tau * np.rint(beyond / math.tau)
-            ends = np.ones(len(outmost), dtype=np.bool_)
-            ends[cells.one[beyond > 0.0]] = False
-            ends[cells.other[beyond < 0.0]] = False
-            for cell in ends.nonzero()[0].tolist():
-                first = cells.first[cell]
-                place = first + int(relative[first : first + cells.counts[cell]].argmax())
-                touch2 = square[place] - keep[place] ** 2
-                if touch2 > 0.0:
-                    angles.append(side * (edge[place] + EDGE_OFF_RAD))
-                    touches.append(math.sqrt(touch2))
-                    sides.append(side)
-        angle = np.array(angles)
-        return np.cos(angle), np.sin(angle), np.array(touches), sides
+        seen = away[cells.members]
+        distance = np.maximum(np.abs(seen), 1e-6)
+        half = np.arcsin(np.minimum(cells.keep_m / distance, 1.0))
+        # Angles towards M and N, relative to the first point of their cell: none is cut at pi.
+        edge = np.multiply.outer(SIDES, np.angle(seen)) + half
+        reference = edge[:, cells.first]
+        relative = edge - np.repeat(reference, cells.counts, axis=1)
+        relative -= math.tau * np.rint(relative / math.tau)
+        outmost = reference + np.maximum.reduceat(relative, cells.first, axis=1)
+        # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
+        beyond = outmost[:, cells.other] - outmost[:, cells.one]
+        beyond -= math.tau * np.rint(beyond / math.tau)
+        ends = np.ones(outmost.shape, dtype=np.bool_)
+        for inner, cell in ((beyond > 0.0, cells.one), (beyond < 0.0, cells.other)):
+            row, pair = inner.nonzero()
+            ends[row, cell[pair]] = False
+        row, cell = ends.nonzero()
+        place = np.array(
+            [
+                first + int(relative[i, first : first + count].argmax())
+                for i, first, count in zip(
+                    row.tolist(), cells.first[cell].tolist(), cells.counts[cell].tolist(), strict=True
+                )
+            ],
+            dtype=np.intp,
+        )
+        touch2 = distance[place] ** 2 - cells.keep_m[place] ** 2
+        outside = touch2 > 0.0
+        row, place = row[outside], place[outside]
+        side = SIDES[row]
+        angle = side * (edge[row, place] + EDGE_OFF_RAD)
+        return np.cos(angle) + 1j * np.sin(angle), np.sqrt(touch2[outside]), side
 
     def _clear_past(
-        self, origin: Point, ux: FloatArray, uy: FloatArray, touch_m: FloatArray
+        self, origin: Point, away: ComplexArray, towards: ComplexArray, touch_m: FloatArray
     ) -> tuple[FloatArray, IntArray]:
-        """The same as `_clear_along`: most tangents are hidden before they touch, and need no longer look."""
-        clear, met = self._clear_along(origin, ux, uy, touch_m)
+        """How far (k,) directions lead before they come too near to a point, and to which; infinite: never."""
+        if len(away) * len(towards) <= AT_ONCE:
+            return self._clear_of_all(away, towards)
+        # Most tangents are hidden before they touch, and need not be looked along any further.
+        clear, met = self._clear_along(origin, away, towards, touch_m)
         clear[clear >= touch_m] = math.inf
         seen = np.isinf(clear).nonzero()[0]
         if len(seen):
-            clear[seen], met[seen] = self._clear_along(origin, ux[seen], uy[seen])
+            clear[seen], met[seen] = self._clear_along(origin, away, towards[seen])
         return clear, met
 
+    def _clear_of_all(self, away: ComplexArray, towards: ComplexArray) -> tuple[FloatArray, IntArray]:
+        """`_clear_past` of a few directions and points."""
+        seen = np.multiply.outer(towards.conj(), away)
+        ahead, beside = seen.real, seen.imag
+        room = self._square - beside * beside
+        entry = np.where((room > 0.0) & (ahead > 0.0), ahead - np.sqrt(np.maximum(room, 0.0)), math.inf)
+        met = entry.argmin(axis=1)
+        return np.maximum(entry[np.arange(len(met)), met], 0.0), met
+
     def _clear_along(
-        self, origin: Point, ux: FloatArray, uy: FloatArray, to_m: FloatArray | float = math.inf
+        self,
+        origin: Point,
+        away: ComplexArray,
+        towards: ComplexArray,
+        to_m: FloatArray | float = math.inf,
     ) -> tuple[FloatArray, IntArray]:
-        """How far (k,) directions lead before they come too near to a point, and to which; infinite: never."""
-        which, point = self._blocks.near_lines(origin, ux, uy, self._most_kept_m, to_m)
-        points, keep = self.points_m[point], self.keep_m[point]
-        dx, dy = points[:, 0] - origin[0], points[:, 1] - origin[1]
-        ux_of, uy_of = ux[which], uy[which]
-        beside = uy_of * dx - ux_of * dy
-        ahead = ux_of * dx + uy_of * dy
-        room = keep * keep - beside * beside
-        met_by = ((room > 0.0) & (ahead > 0.0)).nonzero()[0]
+        """`_clear_past` of many: only the points near each direction are looked at, and only so far along it."""
+        which, point = self._blocks.near_lines(origin, towards, self._most_kept_m, to_m)
+        seen = away[point] * towards.conj()[which]
+        room = self._square[point] - seen.imag * seen.imag
+        met_by = ((room > 0.0) & (seen.real > 0.0)).nonzero()[0]
         which, point = which[met_by], point[met_by]
-        entry = ahead[met_by] - np.sqrt(room[met_by])
-        clear, met = np.full(len(ux), math.inf), np.zeros(len(ux), dtype=np.intp)
+        entry = seen.real[met_by] - np.sqrt(room[met_by])
+        clear, met = np.full(len(towards), math.inf), np.zeros(len(towards), dtype=np.intp)
         if len(which):
             # Pairs come direction by direction.
             first = np.concatenate(([0], (which[1:] != which[:-1]).nonzero()[0] + 1))

@@ -22,7 +22,7 @@ def test_no_point_near_a_line_is_missed(seed: int, count: int, side: float, with
     origin = tuple(rng.uniform(-3000.0, 3000.0, 2).tolist())
     angles = rng.uniform(-math.pi, math.pi, 5)
     ux, uy = np.cos(angles), np.sin(angles)
-    lines, found = Blocks.of(points, side).near_lines(origin, ux, uy, within)
+    lines, found = Blocks.of(points, side).near_lines(origin, ux + 1j * uy, within)
     pairs = list(zip(lines.tolist(), found.tolist(), strict=True))
     assert len(set(pairs)) == len(pairs)
     dx, dy = points[:, 0] - origin[0], points[:, 1] - origin[1]
@@ -58,6 +58,6 @@ def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count
 
 def test_far_from_all_lines_nothing_is_found() -> None:
     blocks = Blocks.of(np.array([(0.0, 5000.0), (-4000.0, 0.0)]), 300.0)
-    lines, found = blocks.near_lines((0.0, 0.0), np.array([1.0]), np.array([0.0]), 200.0)
+    lines, found = blocks.near_lines((0.0, 0.0), np.array([1.0 + 0.0j]), 200.0)
     assert len(lines) == len(found) == 0
     assert blocks.reach_m.tolist() == pytest.approx([0.0, 0.0])

@@ -207,7 +207,8 @@ def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_o
             memory.refuse((float(step), 0.0))
             refused += 1
         moving = [
-            ring(rng.uniform(-900.0, 900.0), 0.0, int(rng.integers(1, 30))) for _ in range(rng.integers(0, 4))
+            ring(rng.uniform(-900.0, 900.0) + 2000.0 * step, 0.0, int(rng.integers(1, 30)))
+            for _ in range(rng.integers(0, 4))
         ]
         memory.take_in(seen, moving)
         np.testing.assert_array_equal(given_points, before)
