@@ -18,10 +18,6 @@ from planner.local_planning import LocalPlanning, Start
 from planner.multi_step_search import Track
 from planner.route_optimisation import Route
 
-POINTS_A_STEP = 6000
-"""A step among so many edge points is twice the work of one among a few."""
-
-
 class Deliberation:
     """One search for ways to the goal, those that are wanted most first.
 
@@ -48,24 +44,21 @@ class Deliberation:
         self.stuck: Course | None = None
         self.tracks: list[Track] = []
 
-    def courses(self, start: Start, flown: Course | None, work: int) -> Iterator[Course]:
+    def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
         """Ways found with one more portion of work.
 
         Args:
             start: where a plan would begin now.
             flown: what is flown now.
-            work: how much may be done, in steps of the multi-step search among a few edge points.
+            work: how much may be done, as the tally of the local planning has it.
         """
-        step = 1.0 + self.known / POINTS_A_STEP
-        left = float(work)
+        enough = self._local.tally.done + work
         self._start, self._flown = start, flown
         for thought in self._thoughts:
             if thought is not None:
                 yield thought
-            else:
-                left -= step
-                if left <= 0.0:
-                    return
+            elif self._local.tally.done >= enough:
+                return
         self.done = True
 
     def _now(self) -> tuple[Start, Course | None]:

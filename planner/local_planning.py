@@ -16,7 +16,7 @@ from planner.multi_step_search import Track, search
 from planner.pose_search import search_poses
 from planner.route_optimisation import Route, Terrain, optimise
 from planner.trail import Trail
-from planner.window import Window
+from planner.window import Tally, Window
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
@@ -30,9 +30,8 @@ MOST_TRACKS = 300
 WIDER = 4
 """Where n tracks at every one of N steps find no way, this many times as many are tried."""
 
-
-OPTIMISING = 3
-"""Optimising a route is as much work as so many steps of the search."""
+OPTIMISING, OPTIMISING_AMONG = 20, 0.3
+"""Work of optimising a route, in questions about the window, and more of it for each point."""
 
 SWITCH = 0.03
 """The other way round is taken only where it saves this share of the distance left."""
@@ -103,6 +102,7 @@ class LocalPlanning:
         self._mission, self._memory = mission, memory
         self._window_m, self._margin_m = window_m, margin_m
         self._steps, self._candidates = steps, candidates
+        self.tally = Tally()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
         self.limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
@@ -180,8 +180,7 @@ class LocalPlanning:
             route = self._fit(start, attempt, track.nodes, points)
             if route is not None:
                 fitted.append((route.path.length_m + reluctance_m, route))
-            for _ in range(OPTIMISING):
-                yield
+            yield
         fitted.sort(key=lambda each: each[0])
         start, _ = now()
         if start is begun:
@@ -201,6 +200,7 @@ class LocalPlanning:
         self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
     ) -> Route | None:
         """The curve along a track, from where a plan would begin now."""
+        self.tally.add(OPTIMISING, OPTIMISING_AMONG, len(points))
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
         return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
@@ -222,7 +222,7 @@ class LocalPlanning:
     def window(self, start: Start, keep_m: FloatArray) -> Window:
         """The planning window about the start of a plan, with what is to be kept from each of the (m,) points."""
         points, labels = self._memory.points_m, self._memory.labels.copy()
-        return Window(start.pose[:2], self._window_m, points, labels, self._memory.cell_m, keep_m)
+        return Window(start.pose[:2], self._window_m, points, labels, self._memory.cell_m, keep_m, self.tally)
 
     def terrain(self, keep_m: float) -> Terrain:
         """Where a curve may lie that keeps one distance from all edge points."""

@@ -18,7 +18,7 @@ import numpy as np
 from planner.clearance import all_entered, first_entry
 from planner.curves import Point
 from planner.step_model import distance_left_m
-from planner.window import SectorEdge, Window, guide_vector
+from planner.window import PLACE, SectorEdge, Window, guide_vector
 
 SHORT_OF = 0.005
 """A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
@@ -100,6 +100,7 @@ def search(
         if len(visited) > most_tracks:
             return
         yield None
+        window.tally.add(1, PLACE, len(window.points_m))
         _, hit = first_entry(here, goal, window.points_m, window.keep_m)
         count += 1
         if hit < 0:

@@ -52,13 +52,13 @@ BROKEN_SHARE = 0.99
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-PORTION = 40
-"""Steps of the search at one time, while a plan is in effect that ends in a safe turn."""
+PORTION = 4000.0
+"""Work of the search at one time, while a plan is in effect that ends in a safe turn (`planner.window.Tally`)."""
 
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
 
-PRESSED = 5
+PRESSED = 3
 """Without such a plan so many portions are taken at once."""
 
 UNHURRIED = 0.0625
