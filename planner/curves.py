@@ -279,6 +279,7 @@ def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
     """Segments as a whole brought to where they begin at another pose."""
     x, y, tx, ty = segments[0][:4]
     turn = complex(to.tangent_east, to.tangent_north) * complex(tx, -ty)
+    turn /= abs(turn)  # else what is moved again and again shrinks or grows: the error doubles each time
     out: list[Segment] = []
     for east, north, tangent_east, tangent_north, curvature, length in segments:
         place = complex(to.east_m, to.north_m) + turn * complex(east - x, north - y)

@@ -18,6 +18,7 @@ from planner.local_planning import LocalPlanning, Start
 from planner.multi_step_search import Track
 from planner.route_optimisation import Route
 
+
 class Deliberation:
     """One search for ways to the goal, those that are wanted most first.
 

@@ -17,6 +17,10 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
+NOT_UNIT = 1e-6
+"""A tangent is no unit vector where its length is off by more."""
+
+
 def _frozen(array: FloatArray) -> FloatArray:
     copy = np.array(array, dtype=np.float64)
     copy.setflags(write=False)
@@ -215,6 +219,9 @@ class Plan:
         waypoints_m: (k, 2) fixed-altitude waypoints; empty unless FOUND.
         path: the curve through them; None unless FOUND.
         picture: how it came about, where the planner can tell.
+
+    Raises:
+        ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
     """
 
     status: PlanStatus
@@ -225,6 +232,14 @@ class Plan:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))
+        if self.path is not None:
+            lengths = np.hypot(self.path.segments[:, 2], self.path.segments[:, 3])
+            wrong = np.flatnonzero(~(np.abs(lengths - 1.0) < NOT_UNIT))
+            if len(wrong):
+                raise ValueError(
+                    f"segment {wrong[0]} of a plan's path begins with a tangent of length "
+                    f"{lengths[wrong[0]]:.9g}; tangents are unit vectors"
+                )
 
 
 class Planner(Protocol):

@@ -127,6 +127,20 @@ def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWor
     assert metrics["flight_time_s"] == 5.0
 
 
+def test_planner_whose_tangents_are_no_unit_vectors(
+    fly: Fly, answering: Install, small_world: SmallWorld
+) -> None:
+    def shrinks(mission: Mission, request: PlanRequest) -> Plan:
+        east, north = request.direction
+        rows = np.array([(*request.position_m, 0.9 * east, 0.9 * north, 0.0, 20_000.0)])
+        return Plan(PlanStatus.FOUND, "goes straight on", rows[:, :2], Path(rows))
+
+    answering(shrinks)
+    status, metrics = fly(small_world(planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (1, "planner_failed")
+    assert "segment 0 of a plan's path begins with a tangent of length 0.9" in metrics["reason"]
+
+
 def test_unreachable(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
     answering(gives_up)
     status, metrics = fly(small_world(planner={"kind": "stand_in"}))
