@@ -175,6 +175,12 @@ class ObstacleMap:
                 # A wall that turns away from the sensor ends there, too, though both of its sides are in sight.
                 turn = (step[1:] * step[:-1].conj()).imag > CORNER * gap[1:] * gap[:-1]
                 ends = np.concatenate((ends, (turn & joined[1:] & joined[:-1]).nonzero()[0] + 1))
+            # So does what stands before something that it is joined to.
+            jumps = (joined & (gap > self._cell)).nonzero()[0]
+            behind = scan.ranges_m.take(hits[jumps], mode="wrap") > scan.ranges_m.take(
+                hits[jumps + 1], mode="wrap"
+            )
+            ends = np.concatenate((ends, jumps + behind))
             ranges = scan.ranges_m.take(hits[ends], mode="wrap")
             known = self._score.take(keys.take(ends, mode="wrap")) >= CONFIRMED
             for reach, finer in DETAIL:

@@ -115,26 +115,33 @@ class Proof:
 
     Args:
         mission: goal and bounds.
-        memory: the edge points; those refused prove nothing.
+        memory: the edge points.
         keeps_m: what a way has to keep from every point, but for those that are nearer than this to the goal or to
-            where the aircraft is at first: they prove nothing either.
+            where the aircraft is at first: they prove nothing.
+        with_refused: count what was refused: asks whether it leaves no way but through that. Else it proves
+            nothing either.
     """
 
-    def __init__(self, mission: Mission, memory: ObstacleMemory, keeps_m: float) -> None:
+    def __init__(
+        self, mission: Mission, memory: ObstacleMemory, keeps_m: float, with_refused: bool = False
+    ) -> None:
         self._mission, self._memory, self._keeps_m = mission, memory, keeps_m
+        self._with_refused = with_refused
+        self._learnt = memory.learnt
         self._barrier: Barrier | None = None
         self._taken = 0
         self._ends: tuple[Point, Point] | None = None
 
     def closed(self, position: Point) -> bool:
         """Takes in some more of the points and says whether they close all ways from the first position given."""
-        genuine = self._memory.genuine_m
-        if self._barrier is None or self._taken > len(genuine):
+        memory = self._memory
+        points = memory.points_m[: memory.known] if self._with_refused else memory.genuine_m
+        if self._barrier is None or self._learnt != memory.learnt:
             # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
             begin, goal = self._ends or (position, self._mission.goal_m)
             self._barrier = Barrier(begin, goal, self._mission.bounds_m, self._keeps_m)
-            self._taken, self._ends = 0, (begin, goal)
-        more = genuine[self._taken :][:PROVED_AT_ONCE]
+            self._taken, self._ends, self._learnt = 0, (begin, goal), memory.learnt
+        more = points[self._taken :][:PROVED_AT_ONCE]
         self._taken += len(more)
         for east, north in self._ends or ():
             more = more[np.hypot(more[:, 0] - east, more[:, 1] - north) >= self._keeps_m]

@@ -33,9 +33,13 @@ class ObstacleMemory:
     def __init__(self, clearance_m: float) -> None:
         self.cell_m = clearance_m / math.sqrt(2.0)
         self._outlines: Sequence[FloatArray] = ()
+        self._refused: list[tuple[float, float]] = []
+        self.learnt = 0
+        """How often all was learnt anew."""
         self._forget()
 
     def _forget(self) -> None:
+        self.learnt += 1
         self._points = np.zeros((256, 2))
         self._labels = np.zeros(256, dtype=np.intp)
         self._genuine = np.zeros(256, dtype=np.bool_)
@@ -67,11 +71,13 @@ class ObstacleMemory:
 
     def refuse(self, place: tuple[float, float]) -> None:
         """Remembers a place as if there were an edge: it is not to be gone to again."""
+        self._refused.append(place)
         self._add(np.array([place]), genuine=False)
 
     def forgive(self) -> None:
         """Forgets what was refused: at the next call of `take_in` all that was seen is learnt anew."""
-        if not self._genuine[: self._count].all():
+        if self._refused:
+            self._refused = []
             self._forget()
 
     def take_in(self, seen: SeenWorld, met: Sequence[FloatArray] | None = None) -> FloatArray:
@@ -122,7 +128,10 @@ class ObstacleMemory:
         fresh = seen.edges_since(self._revision)
         self._revision = seen.revision
         if len(fresh):
+            anew = not self._count
             self._add(fresh, genuine=True)
+            if anew and self._refused:
+                self._add(np.array(self._refused), genuine=False)
         return fresh
 
     def _add(self, fresh: FloatArray, genuine: bool) -> None:

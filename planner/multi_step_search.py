@@ -29,6 +29,9 @@ BACK_RAD, AWAY_RAD = 2.1, 0.8
 APART = 0.06
 """Track points nearer to each other than this share of the distance kept from obstacles are one."""
 
+APART_WIDE = 0.5
+"""In a wide search: than this share of the shortest step about a corner, which is to lead on."""
+
 
 @dataclass(frozen=True)
 class Track:
@@ -83,6 +86,10 @@ def search(
     start = window.center_m
     _, _, straight = guide_vector(start, goal)
     queue = [(straight, 0, 0, Track((start,), 0.0, straight))]
+    apart_m = APART * outer_m
+    if wide:
+        kept_m = float(window.keep_m.max(initial=0.0))
+        apart_m = max(apart_m, APART_WIDE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m))
     kept_at = [0] * (steps + 1)
     visited: set[tuple[int, int]] = set()
     count = 0
@@ -92,7 +99,7 @@ def search(
             yield track
             continue
         here = track.nodes[-1]
-        place = (round(here[0] / (APART * outer_m)), round(here[1] / (APART * outer_m)))
+        place = (round(here[0] / apart_m), round(here[1] / apart_m))
         if place in visited or kept_at[depth] == keep_best:
             continue
         visited.add(place)

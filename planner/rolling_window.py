@@ -11,7 +11,8 @@ is a way, the course is a shortest one through what is known. Each course is flo
 contradicts it. Edge points lie on a finite grid, so that this can happen only finitely often, and a course that
 nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
 searches (`dead_ends`, `ObstacleMemory.refuse`): each covers a disc of the clearance, so that these are finitely
-many as well. A search in vain is repeated with twice the effort. Where no way is left at the clearance, a closed
+many as well; they are tried again only where no other way is left. A search in vain is repeated with twice the
+effort. Where no way is left at the clearance, a closed
 chain of edges proves it; where none is left but those given up, one with room to turn everywhere must remain,
 or such a chain proves that there is none for this aircraft (`barrier`). Assumed: a world that stands still, a
 sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along which a disc
@@ -98,6 +99,7 @@ class RollingWindow:
         self._proof = Proof(mission, self._memory, self._local.least_keeps_m)
         self._turns_keep_m = mission.clearance_m + mission.turn_radius_m
         self._proof_for_turns = Proof(mission, self._memory, self._turns_keep_m)
+        self._given_up = Proof(mission, self._memory, self._local.least_keeps_m, with_refused=True)
         self._thinking: Deliberation | None = None
         self._dead_ends = DeadEnds(2.0 * mission.clearance_m)
         self._turning: Effect | None = None  # the last plan that was flown into its turn
@@ -267,6 +269,7 @@ class RollingWindow:
         if away is not None and away.status is PlanStatus.FOUND:
             return away  # what is closed is told from a safe turn
         no_room = self._effort > 0 and self._proof_for_turns.closed(request.position_m)
+        only_given_up = self._given_up.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
         stuck = None if thinking is None else thinking.stuck
@@ -289,8 +292,8 @@ class RollingWindow:
                     PlanStatus.UNREACHABLE,
                     no_way_through(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on"),
                 )
-            # No way is left but those given up, or one that takes more looking for.
-            self._memory.forgive()
+            if only_given_up or self._effort == MOST_EFFORT:
+                self._memory.forgive()
             self._effort = min(self._effort + 1, MOST_EFFORT)
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
 

@@ -404,3 +404,14 @@ def test_a_corner_is_kept_in_detail_though_both_of_its_sides_are_in_sight(off_m:
     away = np.hypot(*(edges(seen) - corner).T)
     # Near by rays are 3 m apart, and the points that were kept from afar up to 50.
     assert away.min() < 5.0
+
+
+def test_the_flank_of_a_pillar_is_known_in_detail_though_the_gap_behind_it_is_closed() -> None:
+    pillars = [Circle((5000.0 + 90.0 * i, 5000.0 + 90.0 * j), 45.0) for i, j in ((0, 0), (0, 1), (1, 0))]
+    seen = ObstacleMap(BOUNDS, 50.0, RANGE, doubtful=False)
+    past = [(4903.7 - 1.62 * i, 5000.0 + 12.4 * i) for i in range(-90, 4)]
+    for scan in scans(sensor(world_of(*pillars)), past):
+        seen.update(scan)
+    track = np.array(past)
+    known = min(np.hypot(*(track - edge).T).min() for edge in edges(seen))
+    assert known == pytest.approx(distance_to(world_of(*pillars), track).min(), abs=0.5)

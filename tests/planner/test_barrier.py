@@ -219,3 +219,19 @@ def test_what_was_refused_proves_nothing(wall: MakePoints, known: Known) -> None
         proof._memory.refuse((place[0], place[1]))
     assert not proof.closed(START)
     assert proved(known(points), CLEARANCE)
+
+
+def test_a_proof_with_what_was_refused_holds_until_that_is_forgiven(wall: MakePoints, known: Known) -> None:
+    points = wall((500.0, 0.0), (500.0, 1000.0), 50.0)
+    gap = np.abs(points[:, 1] - 600.0) > 30.0
+    seen = known(points[gap])
+    proof, _ = proof_of(seen, CLEARANCE)
+    memory = proof._memory
+    given_up = Proof(proof._mission, memory, CLEARANCE, with_refused=True)
+    assert not given_up.closed(START)
+    memory.refuse((500.0, 600.0))
+    assert given_up.closed(START)
+    assert not proof.closed(START)
+    memory.forgive()
+    memory.take_in(seen)
+    assert not given_up.closed(START)

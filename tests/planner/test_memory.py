@@ -235,3 +235,20 @@ def test_what_moves_outlasts_what_is_taken_back_and_what_is_forgiven() -> None:
     memory.take_in(seen, [ring(0.0, 0.0)])
     assert memory.known == 7
     np.testing.assert_array_equal(memory.points_m[7:], ring(0.0, 0.0))
+
+
+def test_what_was_refused_outlasts_what_is_taken_back_until_it_is_forgiven() -> None:
+    seen, memory = Batches(), ObstacleMemory(CLEARANCE)
+    seen.add(scattered(1, 30, 500.0))
+    memory.take_in(seen)
+    memory.refuse((900.0, 900.0))
+    learnt, left = memory.learnt, scattered(1, 7, 500.0)
+    seen.take_back(left)
+    memory.take_in(seen)
+    assert memory.learnt == learnt + 1
+    np.testing.assert_array_equal(memory.points_m, [*left, (900.0, 900.0)])
+    np.testing.assert_array_equal(memory.genuine_m, left)
+    memory.forgive()
+    memory.take_in(seen)
+    assert memory.learnt == learnt + 2
+    np.testing.assert_array_equal(memory.points_m, left)
