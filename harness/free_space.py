@@ -83,12 +83,9 @@ class FreeSpace:
         Returns:
             Whether any of it does: an edge point with free cells all about it.
         """
-        around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
-        places = (edges_m[:, None] + around).reshape(-1, 2)
-        free = self.contains(places).reshape(-1, len(around))
-        if not free.all(axis=1).any():
+        if not self.surrounds(edges_m).any():
             return False
-        edges_m = edges_m[free[:, 0]]
+        edges_m = edges_m[self.contains(edges_m)]
         _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
         seen = self._seen[x_low:x_high, y_low:y_high]
         column, row = seen.nonzero()
@@ -124,6 +121,13 @@ class FreeSpace:
         x_low, x_high = max(x_first, 0), min(x_first + size, self._nx)
         y_low, y_high = max(y_first, 0), min(y_first + size, self._ny)
         return x_first, y_first, x_low, x_high, y_low, y_high
+
+    def surrounds(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) points lies in a free cell, with free ones to all four sides."""
+        around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
+        places = (points_m[:, None] + around).reshape(-1, 2)
+        surrounded: BoolArray = np.all(self.contains(places).reshape(-1, len(around)), axis=1)
+        return surrounded
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""

@@ -13,13 +13,22 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from harness.range_sensor import RangeScan, all_round, clockwise_from, supported
-from harness.registration import FEWEST, ComplexArray, IntArray, Outline, ends_of, register
+from harness.registration import (
+    FEWEST,
+    STIFF,
+    STIFF_IN_NOISE,
+    ComplexArray,
+    IntArray,
+    Outline,
+    ends_of,
+    register,
+)
 from planner.interface import BoolArray, FloatArray, MovingEdges
 
 COMPARED_S = 12.0
@@ -39,6 +48,8 @@ DECIDED_S = 5.0
 """Whether something moves is decided after so long at the soonest, and when it is sure."""
 SURE = 4.0
 """In standard errors of the velocity."""
+VAGUE_MPS = 1.5
+"""With a velocity that errs more than this it is not told where a thing will be."""
 UNDECIDED_S = 30.0
 """What cannot be told to move for so long is taken to stand still."""
 LOST_S = 2.0
@@ -47,6 +58,10 @@ COASTS_S = 15.0
 """What is known to move is believed to move on for so long."""
 NEW_OUTLINE_S = 12.0
 """Outlines are compared with one no older than this."""
+GROWN = 1.3
+"""What comes out from behind something is compared with a new outline whenever it has grown by so much."""
+NO_STEP = 0.25
+"""Share of the clearance: returns of neighbouring rays that lie nearer to each other are of one thing."""
 HISTORY_S = 40.0
 """Velocity is that of so long a time."""
 FEWEST_SHIFTS = 4
@@ -102,7 +117,7 @@ class _Track:
     def decide(self, sure_m: float) -> None:
         """Decides whether it moves: surely, and further than returns err."""
         moved_m = abs(self.shifts[-1][1] - self.shifts[0][1])
-        sure = abs(self.velocity) >= LEAST_MPS + SURE * self.error_mps
+        sure = self.error_mps < VAGUE_MPS and abs(self.velocity) >= LEAST_MPS + SURE * self.error_mps
         self.moves = self.moves or (sure and moved_m > sure_m)
 
     def surely_stands(self) -> bool:
@@ -117,6 +132,8 @@ class _Track:
         velocity = complex((times * shifts).sum() / spread)
         off = shifts - shifts.mean() - velocity * times
         self.error_mps = math.sqrt(float((np.abs(off) ** 2).sum()) / (len(off) - 2) / spread)
+        if self.error_mps > VAGUE_MPS:
+            velocity = 0j
         # The outline stays where it has been found.
         last_s, last = self.shifts[-1]
         base = last - velocity * (last_s - self.outline_s)
@@ -133,13 +150,22 @@ class MovingObstacles:
         clearance_m: wanted distance from obstacles; runs of returns break where they are further apart.
         noise_m: standard deviation of ranges.
         false_returns: the sensor is known to return ranges where nothing is.
+        is_free: tells which of (k, 2) places were surely seen to be free. With it, what comes there is told from all
+            that was ever seen, in every scan, and is found at once, standing until it is known to move.
     """
 
-    def __init__(self, clearance_m: float, noise_m: float, false_returns: bool = True) -> None:
-        self._noise, self._false_returns = noise_m, false_returns
+    def __init__(
+        self,
+        clearance_m: float,
+        noise_m: float,
+        false_returns: bool = True,
+        is_free: Callable[[FloatArray], BoolArray] | None = None,
+    ) -> None:
+        self._noise, self._false_returns, self._is_free = noise_m, false_returns, is_free
+        self._clearance = clearance_m
         self._apart = clearance_m + 6.0 * noise_m
         self._sure = 4.0 * noise_m + 0.02 * clearance_m
-        self._compared_s = COMPARED_S + self._sure / SLOW_MPS
+        self._compared_s = 0.0 if is_free else COMPARED_S + self._sure / SLOW_MPS
         self._gate = max(0.5 * clearance_m, 3.0 * noise_m)
         self._before: deque[RangeScan] = deque()
         self._looked_s = -math.inf
@@ -149,15 +175,15 @@ class MovingObstacles:
 
     @property
     def found(self) -> tuple[MovingEdges, ...]:
-        """What is known to move, as it was at the time of the last scan."""
+        """What is known to move, or has just appeared, as it was at the time of the last scan."""
         return tuple(
             MovingEdges(
                 self._time_s,
                 _pairs(track.at(self._time_s).points),
-                (track.velocity.real, track.velocity.imag),
+                (track.velocity.real, track.velocity.imag) if track.moves else (0.0, 0.0),
             )
             for track in self._tracks
-            if track.moves
+            if track.moves or self._is_free
         )
 
     @property
@@ -179,7 +205,10 @@ class MovingObstacles:
         self._time_s = scan.time_s
         self._new = []
         moving = self._follow(scan) if self._tracks else None
-        if scan.time_s - self._looked_s >= LOOK_EVERY_S:
+        if self._is_free:
+            if scan.nearest_m < math.inf:
+                self._look_at_free(scan, moving, self._is_free)
+        elif scan.time_s - self._looked_s >= LOOK_EVERY_S:
             self._looked_s = scan.time_s
             while len(self._before) > 2 and self._before[1].time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()
@@ -201,6 +230,22 @@ class MovingObstacles:
             if _in_a_row(appeared[run]) >= FEWEST and not self._is_followed(places[run], scan.time_s):
                 self._tracks.append(_Track(self._outline(scan, hits[run], places[run]), scan.time_s))
 
+    def _look_at_free(
+        self, scan: RangeScan, moving: BoolArray | None, is_free: Callable[[FloatArray], BoolArray]
+    ) -> None:
+        """Begins to follow what has come to places that were seen to be free."""
+        hits, places = self._returns(scan)
+        appeared = is_free(_pairs(places))
+        if moving is not None:
+            appeared &= ~moving[hits]
+        hits, places = hits[appeared], places[appeared]
+        if len(hits) < FEWEST:
+            return
+        closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
+        for run in _runs(hits, places, self._apart, closed):
+            if len(run) >= FEWEST and not self._is_followed(places[run], scan.time_s):
+                self._tracks.append(_Track(self._outline(scan, hits[run], places[run]), scan.time_s))
+
     def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
         """Rays that returned something, but for false returns, and where."""
         returned = supported(scan, self._apart) if self._false_returns else scan.ranges_m < math.inf
@@ -209,6 +254,11 @@ class MovingObstacles:
 
     def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:
         """The outline that neighbouring returns show: where they lie closer than they err, means of several."""
+        if self._is_free:
+            return Outline(
+                _bow(places, NO_STEP * self._clearance),
+                ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
+            )
         away = np.abs(places - complex(scan.east_m, scan.north_m)).mean()
         several = math.ceil(2.0 * self._noise / max(scan.spacing_rad * float(away), 1e-9))
         points = places
@@ -250,16 +300,48 @@ class MovingObstacles:
         """Finds an outline in a scan; which of the places belong to it."""
         unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
         gate = self._gate + unknown_mps * (scan.time_s - track.seen_s)
-        laid = register(track.at(scan.time_s), hits, places, scan, gate, self._apart)
+        stiff = STIFF_IN_NOISE if self._is_free else STIFF
+        laid = register(track.at(scan.time_s), hits, places, scan, gate, self._apart, stiff)
         if laid is None:
             return np.zeros(0, dtype=np.intp)
         track.note(scan.time_s, laid.shift)
         mine = laid.members
         if len(mine) >= FEWEST:
             track.seen_s = scan.time_s
-            if scan.time_s - track.outline_s > NEW_OUTLINE_S:
-                track.renew(self._outline(scan, hits[mine], places[mine]), scan.time_s)
+            whole = self._grown(mine, hits, places) if self._is_free else mine
+            more = _extent(places[whole]) > GROWN * _extent(track.outline.points)
+            if scan.time_s - track.outline_s > NEW_OUTLINE_S or (self._is_free and more):
+                track.renew(self._outline(scan, hits[whole], places[whole]), scan.time_s)
         return mine
+
+    def _grown(self, mine: IntArray, hits: IntArray, places: ComplexArray) -> IntArray:
+        """Returns that belong to an outline, and those that go on from its ends without a step."""
+        near = (np.diff(hits) <= MISSING + 1) & (np.abs(np.diff(places)) < NO_STEP * self._clearance)
+        first, last = int(mine[0]), int(mine[-1])
+        if first > last:
+            return mine  # it lies behind, where the fan begins and ends
+        while first > 0 and near[first - 1]:
+            first -= 1
+        while last < len(hits) - 1 and near[last]:
+            last += 1
+        return np.arange(first, last + 1)
+
+
+def _extent(points: ComplexArray) -> float:
+    """How far the ends of an outline lie apart."""
+    return float(abs(points[-1] - points[0]))
+
+
+def _bow(places: ComplexArray, apart_m: float) -> ComplexArray:
+    """The parabola that suits (k,) places best, from end to end: points no further apart than some distance."""
+    chord = places[-1] - places[0]
+    chord /= max(abs(chord), 1e-9)
+    turned = (places - places[0]) * chord.conjugate()
+    start, end = float(turned.real.min()), float(turned.real.max())
+    along = np.linspace(start, end, max(math.ceil((end - start) / apart_m), FEWEST + 1) + 1)
+    across = np.polyval(np.polyfit(turned.real, turned.imag, 2), along)
+    bow: ComplexArray = places[0] + chord * (along + 1j * across)
+    return bow
 
 
 def _looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:

@@ -30,8 +30,8 @@ BESIDE = 0.2
 """So much of the gate a return may lie beyond the points of the outline, along it."""
 ENDS = 0.01
 """Each end has this share of the weight of all that lies between."""
-STIFF = 1e-4
-"""So much holds the shift at the prediction."""
+STIFF, STIFF_IN_NOISE = 1e-4, 0.05
+"""So much holds the shift at the prediction; the more returns err, the less a bend in an outline tells."""
 BEYOND = 5
 """So many rays beyond an end are looked at: that all of them are lost by chance is hardly possible."""
 FARTHEST = 0.95
@@ -72,7 +72,13 @@ def ends_of(scan: RangeScan, first_ray: int, last_ray: int, apart_m: float) -> E
 
 
 def register(
-    outline: Outline, hits: IntArray, places: ComplexArray, scan: RangeScan, gate_m: float, apart_m: float
+    outline: Outline,
+    hits: IntArray,
+    places: ComplexArray,
+    scan: RangeScan,
+    gate_m: float,
+    apart_m: float,
+    stiff: float = STIFF,
 ) -> Laid | None:
     """Lays an outline upon the returns of a scan.
 
@@ -83,9 +89,10 @@ def register(
         scan: the scan.
         gate_m: returns further from the outline are not its.
         apart_m: beyond an end, rays go on, and end so far away or further.
+        stiff: share of the weight of all returns that holds the outline where it is expected.
 
     Returns:
-        How; None where too few of the returns are near.
+        How; None where too few of the returns are near, or it would be laid further away than the gate.
     """
     near = _about(outline.points, places, gate_m)
     if min(len(near), len(outline.points)) < FEWEST:
@@ -113,16 +120,18 @@ def register(
         ]
         # An end that is far off is another one: faces come into view and go out of it.
         ends = [end for end in ends if abs(end) < reach + BESIDE * gate_m]
-        shift += _least_squares(1j * along[nearest[inner]], off.imag[inner], ends, shift)
+        shift += _least_squares(1j * along[nearest[inner]], off.imag[inner], ends, shift, stiff)
+    if abs(shift) > gate_m:
+        return None
     return Laid(shift, np.asarray(members, dtype=np.intp))
 
 
 def _least_squares(
-    normals: ComplexArray, across: NDArray[np.float64], ends: list[complex], shift: complex
+    normals: ComplexArray, across: NDArray[np.float64], ends: list[complex], shift: complex, stiff: float
 ) -> complex:
     """The further shift that suits best: points to their lines, ends to ends, and not far from none at all."""
     a, b, c = (normals.real**2).sum(), (normals.real * normals.imag).sum(), (normals.imag**2).sum()
-    hold, pull = STIFF * (a + c), ENDS * (a + c)
+    hold, pull = stiff * (a + c), ENDS * (a + c)
     right = complex((normals * across).sum()) + pull * sum(ends) - hold * shift
     a, c = a + hold + pull * len(ends), c + hold + pull * len(ends)
     return complex(c * right.real - b * right.imag, a * right.imag - b * right.real) / float(a * c - b * b)

@@ -12,6 +12,7 @@ from harness.moving_obstacles import MovingObstacles
 from harness.obstacle_map import ObstacleMap
 from harness.range_sensor import RangeScan
 from harness.reflection_map import ReflectionMap
+from harness.smoothed_scan import ERR, smoothed
 from planner.interface import BoolArray, FloatArray, MovingEdges
 
 NOISY = 0.1
@@ -68,8 +69,13 @@ class SensedWorld:
             if noisy
             else ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
         )
-        self._moving = None if noisy else MovingObstacles(clearance_m, noise_m, false_returns)
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
+        self._noisy = noisy
+        self._moving = (
+            MovingObstacles(clearance_m, ERR * noise_m, is_free=self._free.surrounds)
+            if noisy
+            else MovingObstacles(clearance_m, noise_m, false_returns)
+        )
         self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
 
@@ -91,7 +97,7 @@ class SensedWorld:
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
         """What is known to move; its edges are not among the others."""
-        return self._moving.found if self._moving else ()
+        return self._moving.found
 
     @property
     def surprised_s(self) -> float:
@@ -112,11 +118,11 @@ class SensedWorld:
 
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
-        ignored = self._moving.update(scan) if self._moving else None
+        ignored = self._moving.update(smoothed(scan, self._clearance) if self._noisy else scan)
         before = self.revision
         self._edges.update(scan, ignored)
         fresh = [self.edges_since(before)] if self.revision != before else []
-        if self._moving and len(trail_m := self._moving.trail_m):
+        if len(trail_m := self._moving.trail_m):
             self._edges.forget(trail_m, self._clearance)
         for edges in (*fresh, *(each.points_m for each in self.moving)):
             if self._free.take_back(scan, edges):

@@ -127,23 +127,36 @@ class Proof:
     ) -> None:
         self._mission, self._memory, self._keeps_m = mission, memory, keeps_m
         self._with_refused = with_refused
-        self._learnt = memory.learnt
+        self._ends: tuple[Point, Point] | None = None
+        self._begin()
+
+    def _begin(self) -> None:
         self._barrier: Barrier | None = None
         self._taken = 0
-        self._ends: tuple[Point, Point] | None = None
+        self._begun_at = self._gone = self._memory.gone
 
     def closed(self, position: Point) -> bool:
         """Takes in some more of the points and says whether they close all ways from the first position given."""
-        memory = self._memory
-        points = memory.points_m[: memory.known] if self._with_refused else memory.genuine_m
-        if self._barrier is None or self._learnt != memory.learnt:
-            # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
-            begin, goal = self._ends or (position, self._mission.goal_m)
-            self._barrier = Barrier(begin, goal, self._mission.bounds_m, self._keeps_m)
-            self._taken, self._ends, self._learnt = 0, (begin, goal), memory.learnt
-        more = points[self._taken :][:PROVED_AT_ONCE]
+        # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
+        self._ends = self._ends or (position, self._mission.goal_m)
+        if self._taken_in(self._ends, PROVED_AT_ONCE) and self._begun_at != self._memory.gone:
+            # Some of what closes it may have been let go of since: what is left has to close it as well.
+            self._begin()
+            return self._taken_in(self._ends, self._memory.known)
+        return self._barrier is not None and self._barrier.closed
+
+    def _taken_in(self, ends: tuple[Point, Point], most: int) -> bool:
+        """Whether the ways are closed with so many more points."""
+        memory, keeps_m = self._memory, self._keeps_m
+        if self._barrier is None:
+            self._barrier = Barrier(*ends, self._mission.bounds_m, keeps_m)
+        self._taken = max(self._taken - (memory.gone - self._gone), 0)
+        self._gone = memory.gone
+        more = memory.genuine_m[self._taken :][:most]
         self._taken += len(more)
-        for east, north in self._ends or ():
-            more = more[np.hypot(more[:, 0] - east, more[:, 1] - north) >= self._keeps_m]
+        if self._with_refused:
+            more = np.concatenate((memory.refused_m, more))
+        for east, north in ends:
+            more = more[np.hypot(more[:, 0] - east, more[:, 1] - north) >= keeps_m]
         self._barrier.add(more)
         return self._barrier.closed

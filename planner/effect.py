@@ -61,14 +61,20 @@ class Watch:
         self.broken = False
         """Its certified part does so, or its turn."""
 
-    def begin(self, effect: Effect, points_m: FloatArray) -> None:
-        """A new plan is in effect: it may be cut by what came in while it was looked for, of (m, 2) still edges."""
-        self.cut_m = self.cut_at(effect.course, points_m)
+    def begin(self, effect: Effect, points_m: FloatArray, gone: int = 0) -> None:
+        """A new plan is in effect: it may be cut by what came in while it was looked for (see `cut_at`)."""
+        self.cut_m = self.cut_at(effect.course, points_m, gone)
         self.broken = self.cut_m < effect.leaves_m
 
-    def cut_at(self, course: Course, points_m: FloatArray) -> float:
-        """Station at which a course comes too near to one of (m, 2) still edges that it was not found with."""
-        return first_breach(course.path, points_m[course.known :], self._keep)
+    def cut_at(self, course: Course, points_m: FloatArray, gone: int = 0) -> float:
+        """Station at which a course comes too near to one of (m, 2) still edges that it was not found with.
+
+        Args:
+            course: the course.
+            points_m: (m, 2) all that are remembered, in the order in which they came in.
+            gone: so many at most of those that it was found with have been let go of since.
+        """
+        return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._keep)
 
     def look(self, effect: Effect, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
         """Takes in new edges, (k, 2): compares them at once where one is near, else those of a few scans together.

@@ -32,14 +32,13 @@ class ObstacleMemory:
 
     def __init__(self, clearance_m: float) -> None:
         self.cell_m = clearance_m / math.sqrt(2.0)
+        self.gone = 0
+        """How many points have been let go of so far: the others have moved up in their order by no more."""
         self._outlines: Sequence[FloatArray] = ()
-        self._refused: list[tuple[float, float]] = []
-        self.learnt = 0
-        """How often all was learnt anew."""
+        self._revision = -1
         self._forget()
 
     def _forget(self) -> None:
-        self.learnt += 1
         self._points = np.zeros((256, 2))
         self._labels = np.zeros(256, dtype=np.intp)
         self._genuine = np.zeros(256, dtype=np.bool_)
@@ -47,11 +46,10 @@ class ObstacleMemory:
         self._with_moving: tuple[FloatArray, IntArray] | None = None
         self._of_cell: dict[tuple[int, int], int] = {}
         self._next = 0
-        self._revision = -1
 
     @property
     def known(self) -> int:
-        """How many of the points stand still: the first ones. They stay in their order until all is learnt anew."""
+        """How many of the points stand still: the first ones, in the order in which they came in."""
         return self._count
 
     @property
@@ -69,21 +67,22 @@ class ObstacleMemory:
         """(k, 2) those points that were seen to stand still, not refused."""
         return self._points[: self._count][self._genuine[: self._count]]
 
+    @property
+    def refused_m(self) -> FloatArray:
+        """(k, 2) those points that were refused."""
+        return self._points[: self._count][~self._genuine[: self._count]]
+
     def refuse(self, place: tuple[float, float]) -> None:
         """Remembers a place as if there were an edge: it is not to be gone to again."""
-        self._refused.append(place)
         self._add(np.array([place]), genuine=False)
 
     def forgive(self) -> None:
-        """Forgets what was refused: at the next call of `take_in` all that was seen is learnt anew."""
-        if self._refused:
-            self._refused = []
-            self._forget()
+        """Forgets what was refused."""
+        if not self._genuine[: self._count].all():
+            self._keep_only(self.genuine_m, NOTHING)
 
     def take_in(self, seen: SeenWorld, met: Sequence[FloatArray] | None = None) -> FloatArray:
-        """Remembers what has come in since the last call, and returns it: (k, 2).
-
-        Where something was taken back, all is learnt anew.
+        """Remembers what has come in since the last call, and returns it: (k, 2). Lets go of what was taken back.
 
         Args:
             seen: what has been seen so far.
@@ -121,18 +120,24 @@ class ObstacleMemory:
         return self._with_moving
 
     def _take_in(self, seen: SeenWorld) -> FloatArray:
-        if seen.taken_back_at > self._revision >= 0:
-            self._forget()
         if seen.revision == self._revision:
             return NOTHING
         fresh = seen.edges_since(self._revision)
+        if seen.taken_back_at > self._revision >= 0:
+            known = seen.edges_since(-1)
+            self._keep_only(known[: len(known) - len(fresh)], self.refused_m)
         self._revision = seen.revision
         if len(fresh):
-            anew = not self._count
             self._add(fresh, genuine=True)
-            if anew and self._refused:
-                self._add(np.array(self._refused), genuine=False)
         return fresh
+
+    def _keep_only(self, genuine_m: FloatArray, refused_m: FloatArray) -> None:
+        """Gathers what is left into obstacles anew; what was refused comes first, so that nothing else moves up."""
+        self.gone += self._count - len(genuine_m) - len(refused_m)
+        self._forget()
+        for points, genuine in ((refused_m, False), (genuine_m, True)):
+            if len(points):
+                self._add(points, genuine)
 
     def _add(self, fresh: FloatArray, genuine: bool) -> None:
         total = self._count + len(fresh)

@@ -10,13 +10,13 @@ Why it converges. The search goes through all that is remembered, unseen space t
 is a way, the course is a shortest one through what is known. Each course is flown until something seen
 contradicts it. Edge points lie on a finite grid, so that this can happen only finitely often, and a course that
 nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
-searches (`dead_ends`, `ObstacleMemory.refuse`): each covers a disc of the clearance, so that these are finitely
-many as well; they are tried again only where no other way is left. A search in vain is repeated with twice the
-effort. Where no way is left at the clearance, a closed
-chain of edges proves it; where none is left but those given up, one with room to turn everywhere must remain,
-or such a chain proves that there is none for this aircraft (`barrier`). Assumed: a world that stands still, a
-sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along which a disc
-of the turn radius can be moved at the clearance.
+searches (`dead_ends`, `ObstacleMemory.refuse`), with what lies beside it: each covers a disc of the clearance or
+more, so that these are finitely many as well; they are tried again only where no other way is left. A search in
+vain is repeated with twice the effort. Where no way is left at the clearance, a closed chain of edges proves it;
+where none is left but those given up, one with room to turn everywhere must remain, or such a chain proves that
+there is none for this aircraft (`barrier`). Assumed: a world that stands still, a sensor that sees every gap
+narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn radius can be
+moved at the clearance.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import numpy as np
 from planner.barrier import Proof
 from planner.certificate import CertificateBroken, Certified, Certifier
 from planner.course import Course
-from planner.curves import Point, Pose, Segment, along, moved, on_loiter, onward, place_on
+from planner.curves import Pose, Segment, along, moved, on_loiter, onward, place_on
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
@@ -107,6 +107,7 @@ class RollingWindow:
         self._effect: Effect | None = None
         self._searched_at_m = 0.0  # station and number of edge points at the last search
         self._searched_with = 0
+        self._gone = 0  # how many points had been let go of when the last search began
         self._moving_s = -math.inf  # when something was last known to move
         self._effort = 0  # grows with every search that was in vain
         self._refused_at_m = 0.0
@@ -164,7 +165,7 @@ class RollingWindow:
         """The plan in effect."""
         if self._proposed is not None and request.flown is self._proposed.plan:
             self._effect, self._proposed = self._proposed, None
-            self._watch.begin(self._effect, self._standing_m())
+            self._watch.begin(self._effect, self._standing_m(), self._memory.gone - self._gone)
             self._searched_at_m = self._refused_at_m = 0.0
         return self._effect
 
@@ -180,7 +181,8 @@ class RollingWindow:
             self._thinking = None
         else:
             thinking = self._thinking
-            if thinking is None or thinking.known > known:
+            if thinking is None:
+                self._gone = self._memory.gone
                 thinking = self._thinking = Deliberation(
                     self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
                 )
@@ -213,7 +215,7 @@ class RollingWindow:
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        cut_m = self._watch.cut_at(course, self._standing_m())
+        cut_m = self._watch.cut_at(course, self._standing_m(), self._memory.gone - self._gone)
         return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
 
     def _standing_m(self) -> FloatArray:
@@ -280,11 +282,12 @@ class RollingWindow:
         if effect is None:
             assert away is not None
             return away
-        turned = request.station_m - max(effect.leaves_m, self._refused_at_m)
-        if stuck is not None and turned > math.tau * self._mission.turn_radius_m:
+        since_m = request.station_m - max(effect.leaves_m, self._refused_at_m)
+        turned = since_m > math.tau * self._mission.turn_radius_m
+        if stuck is not None and turned:
             # The whole turn has shown nothing more: what lies ahead there cannot be entered.
             self._refused_at_m = request.station_m
-            self._memory.refuse(self._unseen(stuck, request.seen))
+            self._give_up(stuck, request.seen)
         if stuck is None and thinking is not None:
             if no_room and still:
                 gap = 2.0 * self._turns_keep_m
@@ -292,7 +295,10 @@ class RollingWindow:
                     PlanStatus.UNREACHABLE,
                     no_way_through(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on"),
                 )
-            if only_given_up or self._effort == MOST_EFFORT:
+            # No way is left but those given up, or one that takes more looking for. Or none that can be flown
+            # from here: elsewhere on the turn there may be one.
+            if (only_given_up or self._effort == MOST_EFFORT) and (turned or not thinking.tracks):
+                self._refused_at_m = request.station_m
                 self._memory.forgive()
             self._effort = min(self._effort + 1, MOST_EFFORT)
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
@@ -302,15 +308,22 @@ class RollingWindow:
         if effect is self._turning or not effect.course.to_goal:
             return
         self._turning = effect
-        place = self._unseen(effect.course, seen)
-        if self._dead_ends.turned_before(place):
-            self._memory.refuse(place)
+        if self._dead_ends.turned_before(self._unseen(effect.course, seen)[:2]):
+            self._give_up(effect.course, seen)
 
-    def _unseen(self, course: Course, seen: SeenWorld) -> Point:
+    def _unseen(self, course: Course, seen: SeenWorld) -> Pose:
         """The first place of a course that has not been seen to be free."""
         certifier = Certifier(self._local.limits, self._mission.sensor_range_m, seen.spacing_m)
-        east, north, _, _ = place_on(course.path, certifier.seen_free_to_m(course.path, seen))[0]
-        return east, north
+        return place_on(course.path, certifier.seen_free_to_m(course.path, seen))[0]
+
+    def _give_up(self, course: Course, seen: SeenWorld) -> None:
+        """Gives up the first unseen place of a course, and what lies to its sides: a turn takes so much room."""
+        east, north, along_east, along_north = self._unseen(course, seen)
+        clearance_m = self._mission.clearance_m
+        beside = int(self._mission.turn_radius_m / clearance_m)
+        for i in range(-beside, beside + 1):
+            aside_m = i * clearance_m
+            self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))
 
     def _turn_away(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """A turn that only keeps away from what is known, for want of one that is seen to be free."""

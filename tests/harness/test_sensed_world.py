@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -159,16 +160,63 @@ def test_what_moves_takes_free_space_back_and_gives_it_again() -> None:
     assert seen.surprised_s > 40.0
 
 
-def test_with_much_noise_nothing_is_followed() -> None:
-    moves = Obstacle(Circle((2700.0, 2200.0), 60.0), velocity_mps=(8.0, 0.0))
-    seen = empty_world(noise_m=0.01 * RANGE)
-    for scan in flight(sensor(world_of(moves), range_noise_m=0.01 * RANGE), 60.0, START, speed=3.0):
+NOISE = 0.01 * RANGE
+FLAWS: dict[str, Any] = {"range_noise_m": NOISE, "dropout": 0.1, "false_return": 0.01}
+
+
+@pytest.mark.parametrize("fov_deg", [360.0, 180.0])
+@pytest.mark.parametrize(
+    ("start", "velocity"), [((2600.0, 2300.0), (8.0, -2.0)), ((3000.0, 2900.0), (0.0, -9.0))]
+)
+def test_with_much_noise_what_moves_is_followed(
+    start: tuple[float, float], velocity: tuple[float, float], fov_deg: float
+) -> None:
+    moves = Obstacle(Circle(start, 60.0), velocity_mps=velocity)
+    still = block(2000.0, 2800.0, 2600.0, 2900.0)
+    # Far from others before the flight begins.
+    world, seen = world_of(moves, still), empty_world(noise_m=NOISE, false_returns=True)
+    mover = World(world.obstacles[:1], BOUNDS)
+    known_s: list[float] = []
+    for scan in flight(sensor(world, field_of_view_deg=fov_deg, **FLAWS), 45.0, START, speed=5.0):
         seen.update(scan)
-        assert seen.moving == ()
-    edges = seen.edges_since(-1)
-    assert len(edges) > 5
-    # What is left of its way is no older than half a minute or so.
-    assert edges[:, 0].min() > 2700.0 - 60.0 + 8.0 * (60.0 - 35.0)
+        for each in seen.moving:
+            assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 1.5 * NOISE
+            if each.velocity_mps != (0.0, 0.0):
+                known_s.append(scan.time_s)
+                assert math.dist(each.velocity_mps, velocity) < (4.0 if scan.time_s < 30.0 else 2.0)
+    assert known_s[0] < 25.0
+    assert known_s[-1] > 40.0
+
+
+def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_free() -> None:
+    pops = Obstacle(Circle((3050.0, 2200.0), 60.0), active_s=(20.0, 500.0))
+    seen, told_s = empty_world(noise_m=NOISE, false_returns=True), []
+    for scan in flight(sensor(world_of(pops), **FLAWS), 40.0, START, speed=10.0):
+        seen.update(scan)
+        told_s += [scan.time_s] if seen.moving else []
+        assert all(each.velocity_mps == (0.0, 0.0) for each in seen.moving)
+    assert 20.0 <= told_s[0] <= 21.0
+    assert seen.surprised_s >= 20.0
+    assert not seen.seen_free(np.array([(3050.0, 2150.0), (3055.0, 2200.0)])).any()
+    # By then the map has it.
+    assert np.abs(off(world_of(pops.shape), seen.edges_since(-1))).min() < 0.5 * NOISE
+
+
+@settings(deadline=None, max_examples=12)
+@given(seed=st.integers(0, 2**32 - 1), fov_deg=st.sampled_from([360.0, 180.0]))
+def test_with_much_noise_nothing_is_taken_to_move_that_stands(seed: int, fov_deg: float) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = [
+        Circle((east, rng.uniform(1700.0, 3500.0)), rng.uniform(20.0, 120.0))
+        for east in (2400.0, 2700.0, 3300.0, 3500.0, 3700.0)
+    ]
+    eye = sensor(world_of(*shapes), seed % 1000, field_of_view_deg=fov_deg, **FLAWS)
+    seen, told = empty_world(noise_m=NOISE, false_returns=True), 0
+    for scan in flight(eye, 60.0, START, turn_rad_s=rng.uniform(-0.05, 0.05)):
+        seen.update(scan)
+        told += len(seen.moving) > 0
+        assert all(each.velocity_mps == (0.0, 0.0) for each in seen.moving)
+    assert told <= 12, "for a moment at most"
 
 
 def test_free_space_beyond_the_range_of_the_scan_stays() -> None:

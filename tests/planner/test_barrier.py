@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner.barrier import PROVED_AT_ONCE, THIN, Barrier, Proof
 from planner.curves import Point
-from planner.interface import FloatArray, Mission, SeenWorld
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, SeenWorld
 from planner.memory import ObstacleMemory
 
 MakePoints = Callable[..., FloatArray]
@@ -235,3 +235,41 @@ def test_a_proof_with_what_was_refused_holds_until_that_is_forgiven(wall: MakePo
     memory.forgive()
     memory.take_in(seen)
     assert not given_up.closed(START)
+
+
+class TakingBack:
+    """A wall of which only some is left at the second look; what is new then closes the gap or does not."""
+
+    spacing_m, revision, taken_back_at = 50.0, 1, 0
+    moving: tuple[MovingEdges, ...] = ()
+    surprised_s = -math.inf
+
+    def __init__(self, first: FloatArray, left: FloatArray, new: FloatArray) -> None:
+        self._first, self._left, self._new = first, left, new
+
+    def second_look(self) -> None:
+        self.revision = self.taken_back_at = 2
+
+    def edges_since(self, revision: int) -> FloatArray:
+        if self.revision == 1:
+            return self._first if revision < 1 else self._first[:0]
+        return np.concatenate((self._left, self._new)) if revision < 1 else self._new
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.ones(len(points_m), dtype=np.bool_)
+
+
+@pytest.mark.parametrize("closes", [False, True])
+def test_what_was_let_go_of_proves_nothing_any_more(closes: bool, wall: MakePoints) -> None:
+    whole = wall((500.0, 0.0), (500.0, 1000.0), 20.0)
+    south, north = (whole[:, 1] < 400.0), (whole[:, 1] > 600.0)
+    between = whole[~south & ~north]
+    # At first the gap is filled but the south is missing; then the filling goes and the south comes.
+    seen = TakingBack(whole[~south], whole[north], whole[south] if not closes else whole[~north])
+    proof, _ = proof_of(seen, CLEARANCE)
+    assert not proof.closed(START)
+    seen.second_look()
+    proof._memory.take_in(seen)
+    assert proof._memory.gone == len(between)
+    assert proof.closed(START) is closes
+    assert proof.closed(START) is closes

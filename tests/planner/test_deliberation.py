@@ -9,15 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-import planner.deliberation
-import planner.local_planning
 from planner.course import Course
 from planner.curves import Pose
 from planner.deliberation import Deliberation
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
-from planner.multi_step_search import search
 
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], SeenWorld]
@@ -44,11 +41,17 @@ def trap(wall: MakePoints, known: Known) -> SeenWorld:
     return known(np.concatenate([*sides, wall((8000.0, -5000.0), (8000.0, 1500.0), 50.0)]))
 
 
-def deliberation(seen: SeenWorld, closed: Callable[[], bool] = lambda: False) -> Deliberation:
+def planning(
+    seen: SeenWorld, closed: Callable[[], bool] = lambda: False
+) -> tuple[LocalPlanning, Deliberation]:
     memory = ObstacleMemory(MISSION.clearance_m)
     memory.take_in(seen)
     local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
-    return Deliberation(local, len(memory.points_m), 0, closed)
+    return local, Deliberation(local, len(memory.points_m), 0, closed)
+
+
+def deliberation(seen: SeenWorld, closed: Callable[[], bool] = lambda: False) -> Deliberation:
+    return planning(seen, closed)[1]
 
 
 def all_courses(thinking: Deliberation, work: int, start: Callable[[], Start]) -> tuple[list[Course], int]:
@@ -70,24 +73,16 @@ def test_in_portions_and_at_once_the_same_is_found(trap: SeenWorld) -> None:
     assert at_once[0].nodes[-1] == MISSION.goal_m
 
 
-def test_a_portion_is_no_larger_than_asked_for(trap: SeenWorld, monkeypatch: pytest.MonkeyPatch) -> None:
-    steps = 0
-
-    def counted(*args: object, **keys: object) -> object:
-        nonlocal steps
-        for found in search(*args, **keys):  # type: ignore[arg-type]
-            steps += found is None
-            yield found
-
-    monkeypatch.setattr(planner.local_planning, "search", counted)
-    thinking = deliberation(trap)
-    for portion in range(1, 20):
-        before = steps
-        list(thinking.courses(START, None, 7))
-        assert steps - before <= 7, portion
-        if thinking.done:
-            break
-    assert steps > 7
+def test_a_portion_is_hardly_larger_than_asked_for(trap: SeenWorld) -> None:
+    """It ends with the step that makes it full, or with the route that is optimised."""
+    local, thinking = planning(trap)
+    portions = 0
+    while not thinking.done:
+        before = local.tally.done
+        list(thinking.courses(START, None, 1000.0))
+        assert local.tally.done - before < 2 * 1000.0
+        portions += 1
+    assert portions > 7
 
 
 def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: SeenWorld) -> None:
@@ -155,13 +150,12 @@ def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(w
     assert course.path.length_m < 12_500.0
 
 
-def test_among_many_edge_points_a_portion_is_fewer_steps(
-    trap: SeenWorld, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    _, few = all_courses(deliberation(trap), 20, lambda: START)
-    monkeypatch.setattr(planner.deliberation, "POINTS_A_STEP", 50)
-    _, many = all_courses(deliberation(trap), 20, lambda: START)
-    assert many > 2 * few
+def test_among_many_edge_points_a_portion_leads_less_far(wall: MakePoints, known: Known) -> None:
+    portions = {}
+    for spacing_m in (50.0, 2.5):
+        seen = known(wall((6000.0, -5000.0), (6000.0, 5500.0), spacing_m))
+        _, portions[spacing_m] = all_courses(deliberation(seen), 1000, lambda: START)
+    assert portions[2.5] > 2 * portions[50.0]
 
 
 @pytest.mark.parametrize("flown_before", [False, True])

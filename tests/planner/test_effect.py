@@ -32,6 +32,15 @@ def test_a_plan_is_cut_by_what_came_in_while_it_was_looked_for(known: int, cut: 
         assert 1200.0 <= watch.cut_m <= 1500.0
 
 
+def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
+    watch = Watch(keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0)
+    course = effect(4).course  # one of the four is gone; the last of the edges is new
+    assert watch.cut_at(course, EDGES) == math.inf
+    assert 1200.0 <= watch.cut_at(course, EDGES, gone=2) <= 1500.0
+    watch.begin(effect(4), EDGES, gone=9)
+    assert watch.broken
+
+
 def test_a_cut_beyond_the_turn_does_not_break_the_plan() -> None:
     watch = Watch(keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0)
     watch.begin(effect(1), EDGES[:2])
