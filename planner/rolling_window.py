@@ -60,7 +60,7 @@ MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
 
 PRESSED = 3
-"""Without such a plan so many portions are taken at once."""
+"""Without such a plan, or with little left of it before its turn, so many portions are taken at once."""
 
 UNHURRIED = 0.0625
 """The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step."""
@@ -186,7 +186,8 @@ class RollingWindow:
                 thinking = self._thinking = Deliberation(
                     self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
                 )
-            work = PRESSED * PORTION if self._pressed(effect, here) else PORTION
+            short = self._pressed(effect, here) or (effect is not None and effect.leaves_m - here < self._urgent_m)
+            work = PRESSED * PORTION if short else PORTION
             for course in thinking.courses(start, ahead, work):
                 if serves and course.path.length_m > worth_m:
                     thinking.done = True
