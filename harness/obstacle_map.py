@@ -165,8 +165,11 @@ class ObstacleMap:
             if len(wide):
                 between = (places.take(wide) + np.multiply.outer(BETWEEN, step.take(wide))).ravel()
                 column, row = self._column_and_row(between)
-                counted = np.concatenate((counted, column * self._ny + row))
-                found = np.concatenate((found, between))
+                cells = column * self._ny + row
+                # Where one was looked through, it is not put again: what ends there is seen to end there.
+                open_ = (self._slot.take(cells) >= 0) & (self._score.take(cells) < self._first_score)
+                counted = np.concatenate((counted, cells[~open_]))
+                found = np.concatenate((found, between[~open_]))
         again: list[tuple[NDArray[np.int64], ComplexArray]] = []
         if near:
             ends = (~joined).nonzero()[0]

@@ -29,7 +29,7 @@ BACK_RAD, AWAY_RAD = 2.1, 0.8
 APART = 0.06
 """Track points nearer to each other than this share of the distance kept from obstacles are one."""
 
-APART_WIDE = 0.5
+APART_WIDE = 0.25
 """In a wide search: than this share of the shortest step about a corner, which is to lead on."""
 
 
