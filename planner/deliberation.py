@@ -69,6 +69,7 @@ class Deliberation:
     def _think(self) -> Generator[Course | None, None, None]:
         """Ways as they are found; None after each step of work."""
         found = False
+        waiting: list[Course] = []
         closed_m = math.inf
         for i, attempt in enumerate(self._local.attempts()):
             if attempt.distance_m + attempt.margin_m >= closed_m:
@@ -79,13 +80,24 @@ class Deliberation:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:
                 found = True
-                yield self._course(route, known, shortest=i == 0)
+                waiting.append(self._course(route, known, shortest=i == 0))
+                if i == 0 and self._switches(route):
+                    continue  # a narrower way may lead on
+            yield from sorted(waiting, key=lambda each: each.path.length_m)
+            waiting = []
+        yield from waiting
         if not found:
             route = self._local.tight_route(self._now()[0])
             if route is None and self.tracks:
                 route = self._local.beginning(self._now()[0], self.tracks[0])
             if route is not None:
                 yield self._course(route, self._local.known, shortest=False)
+
+    def _switches(self, route: Route) -> bool:
+        """Whether a way leaves obstacles on the other side than what is flown."""
+        start, flown = self._now()
+        nodes = (start.pose[:2], *route.nodes)
+        return flown is not None and not flown.same_side(nodes, self._local.points_m)
 
     def _course(self, route: Route, known: int, shortest: bool) -> Course:
         path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))

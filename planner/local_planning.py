@@ -135,6 +135,11 @@ class LocalPlanning:
         """How many edge points are remembered that stand still."""
         return self._memory.known
 
+    @property
+    def points_m(self) -> FloatArray:
+        """(m, 2) the edge points that are remembered."""
+        return self._memory.points_m
+
     def route(
         self,
         attempt: Attempt,

@@ -62,8 +62,9 @@ MOST_EFFORT = 4
 PRESSED = 3
 """Without such a plan, or with little left of it before its turn, so many portions are taken at once."""
 
-UNHURRIED = 0.0625
-"""The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step."""
+UNHURRIED, CUT = 0.0625, 0.02
+"""The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step. Where the
+course is cut, after a share that is smaller: what lies ahead may be a dead end."""
 
 HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
@@ -159,6 +160,8 @@ class RollingWindow:
         whole = effect.leaves_m >= effect.course.path.length_m - self._mission.goal_radius_m
         if serves and (whole or effect.leaves_m - here > PROLONG * self._mission.sensor_range_m):
             return False
+        if watch.cut_m < math.inf:
+            return since >= max(self._lead_m, CUT * wrong)
         return since >= max(self._lead_m if near else self._rolling_step_m, UNHURRIED * wrong)
 
     def _in_effect(self, request: PlanRequest) -> Effect | None:

@@ -12,7 +12,7 @@ import pytest
 from planner.course import Course
 from planner.curves import Pose
 from planner.deliberation import Deliberation
-from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, SeenWorld
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 
@@ -171,3 +171,21 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
     thinking = Deliberation(local, len(memory.points_m), 0, lambda: False)
     course = next(iter(thinking.courses(START, None, 10**6)))
     assert (course.nodes[0][1] > 0.0) is flown_before
+
+
+def test_no_other_way_round_is_taken_while_a_narrower_one_leads_on(wall: MakePoints, known: Known) -> None:
+    memory = ObstacleMemory(MISSION.clearance_m)
+    # Too narrow for all of the margin.
+    gap = [wall((6000.0, side * 3000.0), (6000.0, side * 207.0), 50.0) for side in (-1.0, 1.0)]
+    memory.take_in(known(np.concatenate(gap)))
+    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    straight = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 12_000.0)]))
+    through = Course(straight, (MISSION.goal_m,), memory.known, shortest=True)
+
+    def found(flown: Course | None) -> list[Course]:
+        return list(Deliberation(local, memory.known, 0, lambda: False).courses(START, flown, 10**6))
+
+    assert found(None)[0].path.length_m > 13_000.0
+    first, second, *_ = found(through)
+    assert first.path.length_m < 12_100.0
+    assert second.nodes == found(None)[0].nodes
