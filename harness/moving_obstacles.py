@@ -150,6 +150,8 @@ class MovingObstacles:
     @property
     def found(self) -> tuple[MovingEdges, ...]:
         """What is known to move, as it was at the time of the last scan."""
+        if not self._tracks:
+            return ()
         return tuple(
             MovingEdges(
                 self._time_s,
@@ -191,6 +193,10 @@ class MovingObstacles:
     def _look(self, scan: RangeScan, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before."""
         hits, places = self._returns(scan)
+        # Of as many in a row as it takes one is among these.
+        sample = places[::FEWEST]
+        if not len(sample) or not _looked_through(self._before[0], sample, self._sure).any():
+            return
         appeared = np.ones(len(hits), dtype=np.bool_) if moving is None else ~moving[hits]
         for before in (self._before[0], self._before[1]):
             appeared[appeared] = _looked_through(before, places[appeared], self._sure)

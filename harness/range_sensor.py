@@ -83,6 +83,11 @@ class RangeScan:
         return RangeScan(**{each.name: getattr(self, each.name) for each in fields(RangeScan) if each.init})
 
     @property
+    def followed(self) -> bool:
+        """Whether its rays have been followed: ranges that nobody has read yet cost more than others."""
+        return "ranges_m" in self.__dict__
+
+    @property
     def directions(self) -> FloatArray:
         """(n, 2) unit vectors (east, north) of the rays."""
         turned: ComplexArray = self.fan * cmath.rect(1.0, -self.heading_rad)

@@ -113,12 +113,18 @@ class SensedWorld:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         ignored = self._moving.update(scan) if self._moving else None
-        before = self.revision
+        before = self._edges.revision
         self._edges.update(scan, ignored)
-        fresh = [self.edges_since(before)] if self.revision != before else []
-        if self._moving and len(trail_m := self._moving.trail_m):
-            self._edges.forget(trail_m, self._clearance)
-        for edges in (*fresh, *(each.points_m for each in self.moving)):
-            if self._free.take_back(scan, edges):
-                self._surprised_s = scan.available_s
+        if self._edges.revision != before:
+            self._take_back(scan, self.edges_since(before))
+        if self._moving:
+            if len(trail_m := self._moving.trail_m):
+                self._edges.forget(trail_m, self._clearance)
+            for each in self._moving.found:
+                self._take_back(scan, each.points_m)
         self._free.update(scan)
+
+    def _take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
+        """What was seen to be free is not, where edges stand in it."""
+        if self._free.take_back(scan, edges_m):
+            self._surprised_s = scan.available_s
