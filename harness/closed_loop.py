@@ -242,7 +242,8 @@ class _Judge:
         self._loop, self._fault = loop, loop.model.fault
         self._next_look_s = 0.0
         self._appears_s = -math.inf
-        self._measured = (0.0, 0.0, 0.0, 0.0)  # clearance at the last look at the obstacles: where, when, how much
+        # At the last look at the obstacles: where, when, and how much clearance.
+        self._measured = (0.0, 0.0, 0.0, 0.0)
 
     def to_go_m(self, state: AircraftState) -> float:
         """Straight distance to the goal."""
