@@ -84,12 +84,14 @@ class FreeSpace:
         Returns:
             Whether any of it does: an edge point with free cells all about it.
         """
-        around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
+        edges_m = edges_m[self.contains(edges_m)]
+        if not len(edges_m):
+            return False
+        around = self._cell * np.array(((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
         places = (edges_m[:, None] + around).reshape(-1, 2)
         free = self.contains(places).reshape(-1, len(around))
         if not free.all(axis=1).any():
             return False
-        edges_m = edges_m[free[:, 0]]
         _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
         seen = self._seen[x_low:x_high, y_low:y_high]
         column, row = seen.nonzero()

@@ -28,6 +28,8 @@ SLOW_MPS = 5.0
 """and as much longer as something so slow takes to leave the noise."""
 NOWHERE = np.zeros((0, 2))
 LOOK_EVERY_S = 3.0
+LOOK_EVERY = 0.6
+"""What has come in is looked for that often, or as often as the fastest moves on by this share of the clearance."""
 MISSING = 3
 """A run of returns goes on where no more of them in a row are lost."""
 ABREAST = 2
@@ -127,7 +129,7 @@ class _Track:
 class MovingObstacles:
     """Finds and follows what moves.
 
-    In a still world this costs a look at one scan every `LOOK_EVERY_S`; ranges of others are not read.
+    In a still world this costs a look at one scan every few seconds; ranges of others are not read.
 
     Args:
         clearance_m: wanted distance from obstacles; runs of returns break where they are further apart.
@@ -142,6 +144,7 @@ class MovingObstacles:
         self._compared_s = COMPARED_S + self._sure / SLOW_MPS
         self._gate = max(0.5 * clearance_m, 3.0 * noise_m)
         self._before: deque[RangeScan] = deque()
+        self._look_every_s = max(LOOK_EVERY_S, LOOK_EVERY * clearance_m / MOST_MPS)
         self._looked_s = -math.inf
         self._tracks: list[_Track] = []
         self._new: list[_Track] = []
@@ -181,7 +184,7 @@ class MovingObstacles:
         self._time_s = scan.time_s
         self._new = []
         moving = self._follow(scan) if self._tracks else None
-        if scan.time_s - self._looked_s >= LOOK_EVERY_S:
+        if scan.time_s - self._looked_s >= self._look_every_s:
             self._looked_s = scan.time_s
             while len(self._before) > 2 and self._before[1].time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -149,7 +150,7 @@ class Path:
         rows.setflags(write=False)
         object.__setattr__(self, "segments", rows)
 
-    @property
+    @cached_property
     def length_m(self) -> float:
         """Length, one turn of a closing loiter circle included."""
         return float(self.segments[:, 5].sum())
