@@ -108,7 +108,9 @@ class ObstacleMap:
             sensor = complex(scan.east_m, scan.north_m)
             moved = abs(sensor - self._taken_at)
             same = min(SAME_PLACE * nearest, self._same_view)
-            same *= ASTIR if ignored is not None or not self._all_stands else FOLLOWED if scan.followed else 1.0
+            same *= (
+                ASTIR if ignored is not None or not self._all_stands else FOLLOWED if scan.followed else 1.0
+            )
             # What is nearer than the way flown explains has only just appeared.
             if not moved < same or nearest < self._taken_nearest - 1.001 * moved or self._unconfirmed:
                 self._taken_at, self._taken_nearest = sensor, nearest

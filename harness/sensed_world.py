@@ -70,6 +70,7 @@ class SensedWorld:
         )
         self._moving = None if noisy else MovingObstacles(clearance_m, noise_m, false_returns)
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
+        self._found: tuple[MovingEdges, ...] = ()
         self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
 
@@ -91,7 +92,7 @@ class SensedWorld:
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
         """What is known to move; its edges are not among the others."""
-        return self._moving.found if self._moving else ()
+        return self._found
 
     @property
     def surprised_s(self) -> float:
@@ -120,7 +121,8 @@ class SensedWorld:
         if self._moving:
             if len(trail_m := self._moving.trail_m):
                 self._edges.forget(trail_m, self._clearance)
-            for each in self._moving.found:
+            self._found = self._moving.found
+            for each in self._found:
                 self._take_back(scan, each.points_m)
         self._free.update(scan)
 

@@ -155,6 +155,18 @@ class Path:
         """Length, one turn of a closing loiter circle included."""
         return float(self.segments[:, 5].sum())
 
+    @cached_property
+    def middles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Three (n,): east and north of the middle of each segment, and half its length: it reaches no further."""
+        rows = self.segments
+        half = 0.5 * rows[:, 5]
+        bend = 0.5 * rows[:, 4] * half
+        chord = half * np.sinc(bend / np.pi)
+        cos, sin = np.cos(bend), np.sin(bend)
+        east = rows[:, 0] + chord * (rows[:, 2] * cos - rows[:, 3] * sin)
+        north = rows[:, 1] + chord * (rows[:, 3] * cos + rows[:, 2] * sin)
+        return east, north, half
+
     @property
     def max_curvature_1pm(self) -> float:
         """Largest absolute curvature."""
