@@ -119,7 +119,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
             if plans.index >= 0:
-                roll_command, cross_track, station = follower.update(state)[:3]
+                roll_command, cross_track, station, _, _ = follower.update(state)
             model.command(Command(roll_command, loop.altitude_m, mission.speed_mps))
             log.add(state, roll_command, cross_track, station, plans.index)
             if progress is not None and state.time_s >= next_report:
