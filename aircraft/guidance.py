@@ -148,17 +148,18 @@ class PathFollower:
         """
         if not self._rows:
             raise RuntimeError("follow() a route before update()")
-        cross, tangent_east, tangent_north = self._project(state.east_m, state.north_m)
+        _, here_east, here_north, _, velocity_east, velocity_north, _, heading, _, _, airspeed, _, _ = state
+        cross, tangent_east, tangent_north = self._project(here_east, here_north)
         index = self._index
         station = self._starts[index] + self._along
-        velocity_east, velocity_north = state.velocity_east_mps, state.velocity_north_mps
-        speed = max(math.hypot(velocity_east, velocity_north), 1.0)
+        speed = math.sqrt(velocity_east * velocity_east + velocity_north * velocity_north)
+        if speed < 1.0:
+            speed = 1.0
         along_mps = velocity_east * tangent_east + velocity_north * tangent_north
         cross_mps = velocity_east * tangent_north - velocity_north * tangent_east
 
         bank_limit = self._bank_limit
-        heading_east, heading_north = math.sin(state.heading_rad), math.cos(state.heading_rad)
-        airspeed = state.airspeed_mps
+        heading_east, heading_north = math.sin(heading), math.cos(heading)
         ahead_mps = velocity_east * heading_east + velocity_north * heading_north
         # The wind, the ground velocity less the air velocity, is not weaker than the airspeed.
         if speed * speed >= 2.0 * airspeed * ahead_mps:
@@ -178,8 +179,10 @@ class PathFollower:
             wanted = -bank_limit if cross_mps > 0.0 else bank_limit
         else:
             pull = _within(INTERCEPT_SINE * speed, cross * self._pull_per_s)
+            least = 0.3 * speed
             # Lift acts across the course, the correction across the path.
-            across = -self._two_zeta_omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
+            across = -self._two_zeta_omega * (cross_mps + pull) * speed
+            across /= along_mps if along_mps > least else least
             # The curvature where the aircraft will be when it has rolled, averaged over the way that takes.
             blend = speed * self._blend_s
             low = station + speed * self._lead_s - 0.5 * blend
@@ -188,7 +191,8 @@ class PathFollower:
             else:
                 curvature = (self._turn_at(low + blend) - self._turn_at(low)) / blend
             acceleration = across - curvature * (speed * speed)
-            wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
+            cosine = ahead_mps / speed
+            wanted = math.atan(acceleration / (GRAVITY_MPS2 * (cosine if cosine > 0.2 else 0.2)))
         allowed = _within(bank_limit, wanted)
         step = _within(self._roll_step, allowed - self._roll)
         self._roll += step
@@ -213,7 +217,7 @@ class PathFollower:
                 along = begun + to_east * tangent_east + to_north * tangent_north
                 cross = to_east * tangent_north - to_north * tangent_east
             if along <= length or self._index == self._last:
-                self._along = max(along, 0.0)
+                self._along = along if along > 0.0 else 0.0
                 return cross, tangent_east, tangent_north
             self._index += 1
             self._along = 0.0

@@ -108,7 +108,7 @@ class JsbsimModel:
         latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor, throttle = (
             self._read
         )
-        place, convergence = self._place(latitude(), longitude())
+        place, convergence = self._patch.project(latitude(), longitude()) or self._next_patch()
         self._convergence_rad = convergence
         velocity = complex(east(), north()) * cmath.rect(FOOT_M, convergence)
         return AircraftState(
@@ -127,14 +127,12 @@ class JsbsimModel:
             throttle(),
         )
 
-    def _place(self, latitude_rad: float, longitude_rad: float) -> tuple[complex, float]:
-        """East + i north (m) and meridian convergence."""
-        near = self._patch.project(latitude_rad, longitude_rad)
-        if near is None:
-            self._patch = self._plane.patch(latitude_rad, longitude_rad)
-            east_m, north_m, convergence = self._plane.project(latitude_rad, longitude_rad)
-            return complex(east_m, north_m), convergence
-        return near
+    def _next_patch(self) -> tuple[complex, float]:
+        """Goes on to a new patch about where the aircraft is: east + i north (m) and meridian convergence there."""
+        latitude_rad, longitude_rad = self._read[0](), self._read[1]()
+        self._patch = self._plane.patch(latitude_rad, longitude_rad)
+        east_m, north_m, convergence = self._plane.project(latitude_rad, longitude_rad)
+        return complex(east_m, north_m), convergence
 
     def command(self, command: Command) -> None:
         """Sets what the inner loops hold.

@@ -119,7 +119,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
             if plans.index >= 0:
-                roll_command, cross_track, station = follower.update(state)[:3]
+                roll_command, cross_track, station, _, _ = follower.update(state)
             model.command(Command(roll_command, loop.altitude_m, mission.speed_mps))
             log.add(state, roll_command, cross_track, station, plans.index)
             if progress is not None and state.time_s >= next_report:
@@ -242,6 +242,8 @@ class _Judge:
         self._loop, self._fault = loop, loop.model.fault
         self._next_look_s = 0.0
         self._appears_s = -math.inf
+        # At the last look at the obstacles: where, when, and how much clearance.
+        self._measured = (0.0, 0.0, 0.0, 0.0)
 
     def to_go_m(self, state: AircraftState) -> float:
         """Straight distance to the goal."""
@@ -257,7 +259,7 @@ class _Judge:
             return None
         loop, mission = self._loop, self._loop.mission
         world, east, north = loop.world, state.east_m, state.north_m
-        clearance = world.clearance_at(east, north, state.time_s)
+        clearance = self._surely_clear_m(east, north, state.time_s)
         if clearance < 0.0:
             return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
         if not world.inside_bounds(east, north):
@@ -276,3 +278,15 @@ class _Judge:
             self._appears_s = world.next_appearance(state.time_s)
         self._next_look_s = min(state.time_s + wait, self._appears_s, loop.time_limit_s)
         return None
+
+    def _surely_clear_m(self, east: float, north: float, time_s: float) -> float:
+        """The true clearance; or what is surely left of that of the last look, while that is more than half of it."""
+        world = self._loop.world
+        there_east, there_north, then_s, clearance = self._measured
+        lost = math.hypot(east - there_east, north - there_north)
+        lost += world.max_obstacle_speed_mps * (time_s - then_s)
+        if lost < 0.5 * clearance and time_s < self._appears_s:
+            return clearance - lost
+        clearance = world.clearance_at(east, north, time_s)
+        self._measured = (east, north, time_s, clearance)
+        return clearance

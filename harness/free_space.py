@@ -31,14 +31,15 @@ class FreeSpace:
         self._x0, self._y0 = xmin, ymin
         self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
         self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
-        self._clearance, self._every, self._noise = clearance_m, range_m / 40.0, noise_m
+        self._clearance, self._every, self._noise = clearance_m, range_m / 32.0, noise_m
         self._last = (math.inf, math.inf)
         self._reach = 0.0
         self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
 
     def update(self, scan: RangeScan) -> None:
         """Marks what a scan looked through, if the sensor has moved on far enough since the last time."""
-        if math.hypot(scan.east_m - self._last[0], scan.north_m - self._last[1]) < self._every:
+        moved = math.hypot(scan.east_m - self._last[0], scan.north_m - self._last[1])
+        if moved < self._every or (moved < 1.5 * self._every and not scan.followed):
             return
         self._last = (scan.east_m, scan.north_m)
         # Beyond this range the rays are further apart than what must not be missed between them.
@@ -83,9 +84,9 @@ class FreeSpace:
         Returns:
             Whether any of it does: an edge point with free cells all about it.
         """
-        if not self.surrounds(edges_m).any():
-            return False
         edges_m = edges_m[self.contains(edges_m)]
+        if not (len(edges_m) and self.surrounds(edges_m).any()):
+            return False
         _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
         seen = self._seen[x_low:x_high, y_low:y_high]
         column, row = seen.nonzero()

@@ -37,6 +37,8 @@ SLOW_MPS = 5.0
 """and as much longer as something so slow takes to leave the noise."""
 NOWHERE = np.zeros((0, 2))
 LOOK_EVERY_S = 3.0
+LOOK_EVERY = 0.6
+"""What has come in is looked for that often, or as often as the fastest moves on by this share of the clearance."""
 MISSING = 3
 """A run of returns goes on where no more of them in a row are lost."""
 ABREAST = 2
@@ -144,7 +146,7 @@ class _Track:
 class MovingObstacles:
     """Finds and follows what moves.
 
-    In a still world this costs a look at one scan every `LOOK_EVERY_S`; ranges of others are not read.
+    In a still world this costs a look at one scan every few seconds; ranges of others are not read.
 
     Args:
         clearance_m: wanted distance from obstacles; runs of returns break where they are further apart.
@@ -168,6 +170,7 @@ class MovingObstacles:
         self._compared_s = 0.0 if is_free else COMPARED_S + self._sure / SLOW_MPS
         self._gate = max(0.5 * clearance_m, 3.0 * noise_m)
         self._before: deque[RangeScan] = deque()
+        self._look_every_s = max(LOOK_EVERY_S, LOOK_EVERY * clearance_m / MOST_MPS)
         self._looked_s = -math.inf
         self._tracks: list[_Track] = []
         self._new: list[_Track] = []
@@ -176,6 +179,8 @@ class MovingObstacles:
     @property
     def found(self) -> tuple[MovingEdges, ...]:
         """What is known to move, or has just appeared, as it was at the time of the last scan."""
+        if not self._tracks:
+            return ()
         return tuple(
             MovingEdges(
                 self._time_s,
@@ -208,7 +213,7 @@ class MovingObstacles:
         if self._is_free:
             if scan.nearest_m < math.inf:
                 self._look_at_free(scan, moving, self._is_free)
-        elif scan.time_s - self._looked_s >= LOOK_EVERY_S:
+        elif scan.time_s - self._looked_s >= self._look_every_s:
             self._looked_s = scan.time_s
             while len(self._before) > 2 and self._before[1].time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()
@@ -220,6 +225,10 @@ class MovingObstacles:
     def _look(self, scan: RangeScan, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before."""
         hits, places = self._returns(scan)
+        # Of as many in a row as it takes one is among these.
+        sample = places[::FEWEST]
+        if not len(sample) or not _looked_through(self._before[0], sample, self._sure).any():
+            return
         appeared = np.ones(len(hits), dtype=np.bool_) if moving is None else ~moving[hits]
         for before in (self._before[0], self._before[1]):
             appeared[appeared] = _looked_through(before, places[appeared], self._sure)

@@ -34,10 +34,17 @@ DETAIL = ((5.0, 4), (2.0, 16))
 """Outlines are kept in detail up to so many clearances away, in so many cells to one along a side."""
 CORNER = 0.3
 """Sine of the turn from which on a wall has a corner."""
-SAME_PLACE = 1.0 / 16.0
-"""Hits that are seen from where others were seen, but for this share of the least range, tell nothing more."""
+SAME_PLACE = 1.0 / 4.0
+"""Hits that are seen from where others were seen, but for this share of the least range, tell little more,"""
+SAME_VIEW = 1.0 / 64.0
+"""nor further away, but for this share of the sensing range;"""
+FOLLOWED = 0.75
+"""this share of both where somebody has followed the rays already, and"""
+ASTIR = 0.25
+"""this one while something moves, comes or goes."""
 LOOK_THROUGH_EVERY = 6
-"""Every so many scans the points in range are asked whether they were looked through."""
+"""Every so many scans, from the first on, the points in range are asked whether they were looked through; every
+other time only where none was the last time."""
 
 
 class ObstacleMap:
@@ -76,8 +83,10 @@ class ObstacleMap:
         self._revision = 0
         self._taken_back_at = 0
         self._scans = 0
+        self._all_stands = True  # no point was looked through the last time
         self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
-        self._taken_at = complex(math.inf, math.inf)
+        self._same_view = max(SAME_VIEW * range_m, self._cell)
+        self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
         self._near_count = 0
@@ -94,15 +103,22 @@ class ObstacleMap:
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan, but for some of its rays."""
-        self._scans += 1
         nearest = scan.nearest_m
         if nearest < math.inf:
             sensor = complex(scan.east_m, scan.north_m)
-            if self._unconfirmed or not abs(sensor - self._taken_at) < min(SAME_PLACE * nearest, self._cell):
-                self._taken_at = sensor
+            moved = abs(sensor - self._taken_at)
+            same = min(SAME_PLACE * nearest, self._same_view)
+            same *= (
+                ASTIR if ignored is not None or not self._all_stands else FOLLOWED if scan.followed else 1.0
+            )
+            # What is nearer than the way flown explains has only just appeared.
+            if not moved < same or nearest < self._taken_nearest - 1.001 * moved or self._unconfirmed:
+                self._taken_at, self._taken_nearest = sensor, nearest
                 self._take_in(scan, nearest, ignored)
-        if self._scans % LOOK_THROUGH_EVERY == 0 and self._count:
-            self._look_through(scan)
+        turn, between = divmod(self._scans, LOOK_THROUGH_EVERY)
+        if not between and self._count and (turn % 2 == 0 or not self._all_stands):
+            self._all_stands = not self._look_through(scan)
+        self._scans += 1
 
     @property
     def taken_back_at(self) -> int:
@@ -261,8 +277,8 @@ class ObstacleMap:
         self._key = np.resize(self._key, size)
         self._since = np.resize(self._since, size)
 
-    def _look_through(self, scan: RangeScan) -> None:
-        """Takes a point off every known point that three neighbouring rays looked past."""
+    def _look_through(self, scan: RangeScan) -> bool:
+        """Takes a point off every known point that three neighbouring rays looked past; whether any was."""
         sensor = complex(scan.east_m, scan.north_m)
         if not abs(sensor - self._near_at) < self._range / 8.0:
             near = np.abs(self._points[: self._count] - sensor) < 1.125 * self._range
@@ -294,6 +310,7 @@ class ObstacleMap:
             if (self._score[weaker] == CONFIRMED - 1).any():
                 self._revision += 1
                 self._taken_back_at = self._revision
+        return len(weaker) > 0
 
 
 def _pairs(points: ComplexArray) -> FloatArray:

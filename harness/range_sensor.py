@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,12 @@ class RangeScan:
 
     def kept(self) -> RangeScan:
         """The same as a plain value: its rays are followed now, and nothing leads from it to the world."""
-        return RangeScan(**{each.name: getattr(self, each.name) for each in fields(RangeScan) if each.init})
+        return RangeScan(**{name: getattr(self, name) for name in _GIVEN})
+
+    @property
+    def followed(self) -> bool:
+        """Whether its rays have been followed: ranges that nobody has read yet cost more than others."""
+        return "ranges_m" in self.__dict__
 
     @property
     def directions(self) -> FloatArray:
@@ -90,36 +95,33 @@ class RangeScan:
         return turned.view(np.float64).reshape(-1, 2)
 
 
-_NOT_READ: FloatArray = np.zeros(0)
+_GIVEN = tuple(each.name for each in fields(RangeScan) if each.init)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
 class _Unread(RangeScan):
-    """A scan whose rays are followed when somebody first reads their ranges: few scans are news to anybody.
+    """A scan whose rays are followed when somebody first reads their ranges: few scans are news to anybody."""
 
-    Attributes:
-        face_m: distance to the nearest face in range, ahead or not; +inf if there is none.
-        follow: gives the ranges.
-    """
+    @classmethod
+    def of(cls, face_m: float, follow: Callable[[], FloatArray], attributes: dict[str, Any]) -> _Unread:
+        """A scan of which all is known but the ranges.
 
-    ranges_m: FloatArray = field(default_factory=lambda: _NOT_READ)
-    face_m: float
-    follow: Callable[[], FloatArray]
-
-    def __post_init__(self) -> None:
-        if self.ranges_m is not _NOT_READ:
-            super().__post_init__()
-            return
-        object.__delattr__(self, "ranges_m")
-        object.__setattr__(self, "nearest_m", self.face_m)
+        Args:
+            face_m: distance to the nearest face in range, ahead or not; +inf if there is none.
+            follow: gives the ranges.
+            attributes: all others, by name.
+        """
+        scan = cls.__new__(cls)
+        # At once: a frozen dataclass would set them one by one, and that is most of the cost of a scan.
+        scan.__dict__.update(attributes, nearest_m=face_m, _follow=follow)
+        return scan
 
     def __getattr__(self, name: str) -> FloatArray:
         """The ranges, when they are first read."""
         if name != "ranges_m":
             raise AttributeError(name)
-        ranges = self.follow()
+        ranges: FloatArray = self.__dict__["_follow"]()
         ranges.setflags(write=False)
-        object.__setattr__(self, "ranges_m", ranges)
+        self.__dict__[name] = ranges
         return ranges
 
 
@@ -166,28 +168,25 @@ class RangeSensor:
 
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
         """Looks around from a place, at a time."""
-        sin, cos = math.sin(heading_rad), math.cos(heading_rad)
         faces = self._near(east_m, north_m, time_s).faces(time_s)
-        follow = partial(self._true_ranges, faces, east_m, north_m, sin, cos)
+        seen: dict[str, Any] = {
+            "time_s": time_s,
+            "available_s": time_s + self._config.latency_s,
+            "east_m": east_m,
+            "north_m": north_m,
+            "heading_rad": heading_rad,
+            "start_rad": (heading_rad + self._first_rad) % math.tau,
+            "spacing_rad": self._spacing_rad,
+            "fan": self._rays,
+            "max_range_m": self._config.range_m,
+        }
+        follow = partial(self._true_ranges, faces, east_m, north_m, heading_rad)
+        if self._flawed:  # what is drawn at random is drawn now, scan by scan
+            return RangeScan(ranges_m=self._degraded(follow()), **seen)
         face_m = self._nearest(faces, east_m, north_m)
-        # What is drawn at random is drawn now, scan by scan.
-        ranges = (
-            self._degraded(follow()) if self._flawed else _NOT_READ if face_m < math.inf else self._nothing
-        )
-        return _Unread(
-            time_s=time_s,
-            available_s=time_s + self._config.latency_s,
-            east_m=east_m,
-            north_m=north_m,
-            heading_rad=heading_rad,
-            start_rad=(heading_rad + self._first_rad) % math.tau,
-            spacing_rad=self._spacing_rad,
-            fan=self._rays,
-            ranges_m=ranges,
-            max_range_m=self._config.range_m,
-            face_m=face_m,
-            follow=follow,
-        )
+        if face_m == math.inf:
+            seen["ranges_m"] = self._nothing
+        return _Unread.of(face_m, follow, seen)
 
     def _near(self, east: float, north: float, time: float) -> Surroundings:
         """All that is in range, from the neighbour list; this renews the list when it runs out."""
@@ -212,8 +211,9 @@ class RangeSensor:
             nearest = min(nearest, float(np.abs(start + np.clip(share, 0.0, 1.0) * along).min()))
         return nearest if nearest <= self._config.range_m else math.inf
 
-    def _true_ranges(self, faces: Faces, east: float, north: float, sin: float, cos: float) -> FloatArray:
-        """(n,) ranges to the nearest face, +inf beyond the range; sine and cosine of the heading."""
+    def _true_ranges(self, faces: Faces, east: float, north: float, heading_rad: float) -> FloatArray:
+        """(n,) ranges to the nearest face, +inf beyond the range."""
+        sin, cos = math.sin(heading_rad), math.cos(heading_rad)
         ranges = self._nothing.copy()
         for circle in faces.circles:
             self._hit_circle(ranges, circle, complex(east, north), complex(cos, sin))

@@ -171,8 +171,8 @@ class TrackLog:
     ) -> None:
         self._clearance = clearance
         self._sinks = tuple(sinks)
-        self._rows = bytearray()  # no more objects while flying than now
-        self._bytes_a_block = block_rows * ROW.size
+        self._rows = bytearray(block_rows * ROW.size)  # no more objects while flying than now
+        self._filled = 0
         self._blocks: list[Track] = []
 
     def add(
@@ -184,19 +184,22 @@ class TrackLog:
         plan_index: int,
     ) -> None:
         """Adds one row; without a plan, `cross_track_m` and `station_m` are NaN and `plan_index` is -1."""
-        self._rows += ROW.pack(*state, roll_command_rad, cross_track_m, station_m, plan_index)
-        if len(self._rows) == self._bytes_a_block:
+        ROW.pack_into(
+            self._rows, self._filled, *state, roll_command_rad, cross_track_m, station_m, plan_index
+        )
+        self._filled += ROW.size
+        if self._filled == len(self._rows):
             self._cut()
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
-        if self._rows:
+        if self._filled:
             self._cut()
         return Track.joined(self._blocks)
 
     def _cut(self) -> None:
-        rows = np.frombuffer(self._rows).reshape(-1, ROW.size // 8).T
-        self._rows = bytearray()
+        rows = np.frombuffer(self._rows[: self._filled]).reshape(-1, ROW.size // 8).T
+        self._filled = 0
         time, east, north, up, east_mps, north_mps, _, heading, roll, pitch = rows[:10]
         airspeed, load_factor, throttle, roll_command, cross_track, station, plan_index = rows[10:]
         block = Track(

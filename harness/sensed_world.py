@@ -76,6 +76,7 @@ class SensedWorld:
             if noisy
             else MovingObstacles(clearance_m, noise_m, false_returns)
         )
+        self._found: tuple[MovingEdges, ...] = ()
         self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
 
@@ -97,7 +98,7 @@ class SensedWorld:
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
         """What is known to move; its edges are not among the others."""
-        return self._moving.found
+        return self._found
 
     @property
     def surprised_s(self) -> float:
@@ -119,12 +120,18 @@ class SensedWorld:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         ignored = self._moving.update(smoothed(scan, self._clearance) if self._noisy else scan)
-        before = self.revision
+        before = self._edges.revision
         self._edges.update(scan, ignored)
-        fresh = [self.edges_since(before)] if self.revision != before else []
+        if self._edges.revision != before:
+            self._take_back(scan, self.edges_since(before))
         if len(trail_m := self._moving.trail_m):
             self._edges.forget(trail_m, self._clearance)
-        for edges in (*fresh, *(each.points_m for each in self.moving)):
-            if self._free.take_back(scan, edges):
-                self._surprised_s = scan.available_s
+        self._found = self._moving.found
+        for each in self._found:
+            self._take_back(scan, each.points_m)
         self._free.update(scan)
+
+    def _take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
+        """What was seen to be free is not, where edges stand in it."""
+        if self._free.take_back(scan, edges_m):
+            self._surprised_s = scan.available_s

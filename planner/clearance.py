@@ -93,21 +93,18 @@ def first_breach(
     if not len(points_m):
         return math.inf
     rows = path.segments
-    radius = np.broadcast_to(np.asarray(radius_m, dtype=np.float64), (len(points_m),))
-    # No place of a segment is further from its middle than half its length: most points are out of reach.
-    half = 0.5 * rows[:, 5]
-    bend = 0.5 * rows[:, 4] * half
-    chord = half * np.sinc(bend / math.pi)
-    cos, sin = np.cos(bend), np.sin(bend)
-    east = rows[:, 0] + chord * (rows[:, 2] * cos - rows[:, 3] * sin)
-    north = rows[:, 1] + chord * (rows[:, 3] * cos + rows[:, 2] * sin)
+    radius = np.asarray(radius_m, dtype=np.float64)
+    # Most points are out of reach.
+    east, north, half = path.middles
     dx, dy = points_m[:, 0] - east[:, None], points_m[:, 1] - north[:, None]
     which, point = (dx * dx + dy * dy < np.square(half[:, None] + radius)).nonzero()
+    if not len(which):
+        return math.inf
     distance, along = _to_segments(rows[which], points_m[point])
     station = along + _begins(path)[which]
     # Where a segment is nearest at its start, the path only leads away from there on.
     approached = (along > 0.0) | (which == 0)
-    near = (distance < radius[point]) & approached & (station >= from_m)
+    near = (distance < (radius[point] if radius.ndim else radius)) & approached & (station >= from_m)
     return float(station[near].min()) if near.any() else math.inf
 
 

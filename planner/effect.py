@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +32,11 @@ class Effect:
     path: Path
     course: Course
     leaves_m: float
+
+    @cached_property
+    def turn(self) -> Path:
+        """The turn that the path ends with."""
+        return Path(self.path.segments[-1:])
 
     def holds(self, station_m: float) -> bool:
         """Whether an aircraft there is in the turn."""
@@ -95,6 +101,7 @@ class Watch:
         before = self.cut_m
         if not effect.holds(here_m):
             self.cut_m = min(before, first_breach(effect.course.path, edges, self._keep, here_m))
-        turn = Path(effect.path.segments[-1:])
-        self.broken |= self.cut_m < effect.leaves_m or first_breach(turn, edges, self._turn_keeps) < math.inf
+        self.broken |= (
+            self.cut_m < effect.leaves_m or first_breach(effect.turn, edges, self._turn_keeps) < math.inf
+        )
         return self.cut_m < before

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Protocol
+from functools import cached_property
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,10 +154,22 @@ class Path:
         rows.setflags(write=False)
         object.__setattr__(self, "segments", rows)
 
-    @property
+    @cached_property
     def length_m(self) -> float:
         """Length, one turn of a closing loiter circle included."""
         return float(self.segments[:, 5].sum())
+
+    @cached_property
+    def middles(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Three (n,): east and north of the middle of each segment, and half its length: it reaches no further."""
+        rows = self.segments
+        half = 0.5 * rows[:, 5]
+        bend = 0.5 * rows[:, 4] * half
+        chord = half * np.sinc(bend / np.pi)
+        cos, sin = np.cos(bend), np.sin(bend)
+        east = rows[:, 0] + chord * (rows[:, 2] * cos - rows[:, 3] * sin)
+        north = rows[:, 1] + chord * (rows[:, 3] * cos + rows[:, 2] * sin)
+        return east, north, half
 
     @property
     def max_curvature_1pm(self) -> float:
@@ -164,8 +177,7 @@ class Path:
         return float(np.abs(self.segments[:, 4]).max(initial=0.0))
 
 
-@dataclass(frozen=True)
-class PlanRequest:
+class PlanRequest(NamedTuple):
     """One question to a planner.
 
     Attributes:

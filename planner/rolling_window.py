@@ -189,7 +189,9 @@ class RollingWindow:
                 thinking = self._thinking = Deliberation(
                     self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
                 )
-            short = self._pressed(effect, here) or (effect is not None and effect.leaves_m - here < self._urgent_m)
+            short = self._pressed(effect, here) or (
+                effect is not None and effect.leaves_m - here < self._urgent_m
+            )
             work = PRESSED * PORTION if short else PORTION
             for course in thinking.courses(start, ahead, work):
                 if serves and course.path.length_m > worth_m:

@@ -392,7 +392,7 @@ def test_an_outline_is_kept_in_detail_where_the_wall_is_certain_already() -> Non
         return len(edges(seen)) - len(cells(edges(seen)))
 
     assert outline([]) == 0
-    assert outline([(5000.0 + 5.0 * i, 6000.0) for i in range(10)]) > 2
+    assert outline([(5000.0 + 20.0 * i, 6000.0) for i in range(10)]) > 2
 
 
 @pytest.mark.parametrize("off_m", [0.0, 13.0, 29.0, 41.0])

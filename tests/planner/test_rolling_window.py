@@ -258,7 +258,7 @@ def test_off_the_path_a_plan_begins_at_the_aircraft() -> None:
     seen, pilot = Seen(nothing()), planner()
     plan = pilot.plan(first_request(seen))
     seen.show(np.array([(2000.0, 0.0)]))
-    off = replace(request_on(plan, 500.0, seen), position_m=(500.0, 80.0), direction=(0.8, 0.6))
+    off = request_on(plan, 500.0, seen)._replace(position_m=(500.0, 80.0), direction=(0.8, 0.6))
     answer = pilot.plan(off)
     assert answer.path is not None
     np.testing.assert_allclose(pose_at(answer.path, 0.0), (500.0, 80.0, 0.8, 0.6), atol=1e-6)
