@@ -316,8 +316,11 @@ class RollingWindow:
     def _give_up(self, course: Course, seen: SeenWorld) -> None:
         """Gives up the first unseen place of a course, and what lies to its sides: a turn takes so much room."""
         east, north, along_east, along_north = self._unseen(course, seen)
-        clearance_m = self._mission.clearance_m
-        beside = int(self._mission.turn_radius_m / clearance_m)
+        clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
+        beside = int(radius_m / clearance_m)
+        if math.dist((east, north), self._mission.goal_m) < radius_m:
+            # The goal is in view, and no turn: it is to be approached another way.
+            east, north, beside = east - radius_m * along_east, north - radius_m * along_north, 0
         for i in range(-beside, beside + 1):
             aside_m = i * clearance_m
             self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))
