@@ -6,6 +6,10 @@ outline seen first upon the one seen now (`harness.registration`) grows in propo
 at all where it only appeared. Assumed: obstacles that move do so without turning, no faster than `MOST_MPS`. What
 draws straight back from the sensor comes to no place that was looked through: it is left to the map, where it fades.
 
+Where ranges err much (`is_free`), what comes to a place that was ever seen to be free is told at once, as the map
+takes long to. A parabola is laid through its returns before it is followed; it is followed from more of them
+as it comes into view.
+
 Points are complex: east + i north, m.
 """
 

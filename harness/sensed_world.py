@@ -16,7 +16,7 @@ from harness.smoothed_scan import ERR, smoothed
 from planner.interface import BoolArray, FloatArray, MovingEdges
 
 NOISY = 0.1
-"""Ranges that err by more than this share of the clearance are weighed, and too vague to tell what moves."""
+"""Ranges that err by more than this share of the clearance are weighed. What moves is then told by medians."""
 
 
 class Edges(Protocol):

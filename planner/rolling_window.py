@@ -276,8 +276,10 @@ class RollingWindow:
         away = None if effect is not None else self._turn_away(request, None, here)
         if away is not None and away.status is PlanStatus.FOUND:
             return away  # what is closed is told from a safe turn
-        no_room = self._effort > 0 and self._proof_for_turns.closed(request.position_m)
         only_given_up = self._given_up.closed(request.position_m)
+        # Where edges come and go, what was given up may yet be entered.
+        in_vain = MOST_EFFORT if request.seen.taken_back_at > 0 else 1
+        no_room = self._effort >= in_vain and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
         stuck = None if thinking is None else thinking.stuck
@@ -325,8 +327,11 @@ class RollingWindow:
     def _give_up(self, course: Course, seen: SeenWorld) -> None:
         """Gives up the first unseen place of a course, and what lies to its sides: a turn takes so much room."""
         east, north, along_east, along_north = self._unseen(course, seen)
-        clearance_m = self._mission.clearance_m
-        beside = int(self._mission.turn_radius_m / clearance_m)
+        clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
+        beside = int(radius_m / clearance_m)
+        if math.dist((east, north), self._mission.goal_m) < radius_m:
+            # The goal is in view, and no turn: it is to be approached another way.
+            east, north, beside = east - radius_m * along_east, north - radius_m * along_north, 0
         for i in range(-beside, beside + 1):
             aside_m = i * clearance_m
             self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))

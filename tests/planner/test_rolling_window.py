@@ -327,37 +327,3 @@ def test_every_key_is_described() -> None:
         assert len(field.metadata["doc"]) > 20
         assert field.metadata["unit"] in {"m", "1"}
         assert {"minimum", "above"} & field.metadata.keys()
-
-
-class HalfOpen(Seen):
-    """Nothing is known of what lies further east than 3 km."""
-
-    def seen_free(self, points_m: FloatArray) -> BoolArray:
-        return points_m[:, 0] < 3000.0
-
-
-def test_what_cannot_be_entered_is_given_up_with_room_for_a_turn_though_noise_takes_edges_back() -> None:
-    mission = replace(MISSION, turn_radius_m=500.0)
-    seen, pilot = HalfOpen(nothing()), planner(mission)
-    far = np.array([(0.0, 9000.0), (400.0, 9000.0)])
-    seen.show(far)
-    plan = pilot.plan(first_request(seen))
-    assert plan.path is not None
-    refused = nothing()
-    for step in range(300):
-        answer = pilot.plan(request_on(plan, 25.0 * step, seen))
-        assert answer.status is not PlanStatus.FOUND or answer.path is not None
-        known = pilot._memory.points_m[: pilot._memory.known]
-        refused = known[known[:, 1] < 8000.0]
-        if len(refused):
-            break
-    assert len(refused) == 5
-    assert np.ptp(refused[:, 0]) < 400.0
-    gaps = np.hypot(*np.diff(refused, axis=0).T)
-    np.testing.assert_allclose(gaps, mission.clearance_m)
-    assert abs(refused[2, 0] - 3000.0) < 2.0 * SPACING
-    seen.show(far + 50.0)
-    seen.taken_back_at = seen.revision
-    pilot.plan(request_on(plan, 25.0 * step + 25.0, seen))
-    known = pilot._memory.points_m[: pilot._memory.known]
-    assert {*map(tuple, refused.tolist())} <= {*map(tuple, known.tolist())}

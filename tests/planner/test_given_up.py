@@ -1,0 +1,92 @@
+"""Places that could not be entered: what of them is given up, and when there is said to be no way."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanStatus
+from planner.rolling_window import MOST_EFFORT, RollingWindow
+from tests.planner.test_rolling_window import (
+    MISSION,
+    SPACING,
+    Seen,
+    first_request,
+    nothing,
+    planner,
+    request_on,
+)
+
+
+class HalfOpen(Seen):
+    """Nothing is known of what lies further east than some place."""
+
+    to_m = 3000.0
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return points_m[:, 0] < self.to_m
+
+
+FAR = np.array([(0.0, 9000.0), (400.0, 9000.0)])
+
+
+def given_up(pilot: RollingWindow) -> FloatArray:
+    """Places nearer than the edges that were seen far off."""
+    known = pilot._memory.points_m[: pilot._memory.known]
+    return known[known[:, 1] < 8000.0]
+
+
+def circling(mission: Mission, to_m: float) -> tuple[RollingWindow, HalfOpen, Plan, float]:
+    """A flight that turns before what is not known, until some place is given up; how far it flew."""
+    seen, pilot = HalfOpen(nothing()), planner(mission)
+    seen.to_m = to_m
+    seen.show(FAR)
+    plan = pilot.plan(first_request(seen))
+    for step in range(400):
+        pilot.plan(request_on(plan, 25.0 * step, seen))
+        if len(given_up(pilot)):
+            return pilot, seen, plan, 25.0 * step
+    raise AssertionError("nothing was given up")
+
+
+def test_what_cannot_be_entered_is_given_up_with_room_for_a_turn_though_noise_takes_edges_back() -> None:
+    mission = replace(MISSION, turn_radius_m=500.0)
+    pilot, seen, plan, flown_m = circling(mission, 3000.0)
+    refused = given_up(pilot)
+    assert len(refused) == 5
+    assert np.ptp(refused[:, 0]) < 400.0
+    gaps = np.hypot(*np.diff(refused, axis=0).T)
+    np.testing.assert_allclose(gaps, mission.clearance_m)
+    assert abs(refused[2, 0] - 3000.0) < 2.0 * SPACING
+    seen.show(FAR + 50.0)
+    seen.taken_back_at = seen.revision
+    pilot.plan(request_on(plan, flown_m + 25.0, seen))
+    assert {*map(tuple, refused.tolist())} <= {*map(tuple, given_up(pilot).tolist())}
+
+
+def test_a_goal_in_view_without_room_for_a_turn_is_approached_another_way() -> None:
+    mission = replace(MISSION, turn_radius_m=500.0, goal_m=(4000.0, 0.0), goal_radius_m=100.0)
+    pilot, _, _, _ = circling(mission, 4050.0)
+    refused = given_up(pilot)
+    assert len(refused) == 1
+    assert abs(math.dist(refused[0], mission.goal_m) - 500.0) < 2.0 * SPACING
+
+
+@pytest.mark.parametrize(("taken_back_at", "searches"), [(0, 1), (1, MOST_EFFORT)])
+def test_where_edges_come_and_go_no_way_is_told_later(taken_back_at: int, searches: int) -> None:
+    """All is given up, and the edges leave no way that has room to turn."""
+    pilot, seen, plan, flown_m = circling(replace(MISSION, turn_radius_m=500.0), 3000.0)
+    seen.taken_back_at = taken_back_at
+    request, effect = request_on(plan, flown_m, seen), pilot._effect
+    assert effect is not None
+    pilot._proof_for_turns.closed = lambda position: True  # type: ignore[method-assign]
+    in_vain = SimpleNamespace(done=True, stuck=None, tracks=[])
+    told = [
+        pilot._no_way(request, effect, flown_m, in_vain).status  # type: ignore[arg-type]
+        for _ in range(searches + 1 - pilot._effort)
+    ]
+    assert told == [PlanStatus.NO_PATH] * (len(told) - 1) + [PlanStatus.UNREACHABLE]
