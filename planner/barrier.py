@@ -21,7 +21,7 @@ from planner.memory import ObstacleMemory
 OUTSIDE = 0
 """Node of the world outside of the area."""
 
-PROVED_AT_ONCE = 150
+PROVED_AT_ONCE = 100
 """So many edge points at most are taken into a proof in one call."""
 
 THIN = 0.1

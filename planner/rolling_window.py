@@ -276,10 +276,10 @@ class RollingWindow:
         away = None if effect is not None else self._turn_away(request, None, here)
         if away is not None and away.status is PlanStatus.FOUND:
             return away  # what is closed is told from a safe turn
-        only_given_up = self._given_up.closed(request.position_m)
         # Where edges come and go, what was given up may yet be entered.
         in_vain = MOST_EFFORT if request.seen.taken_back_at > 0 else 1
         no_room = self._effort >= in_vain and self._proof_for_turns.closed(request.position_m)
+        only_given_up = len(self._memory.refused_m) > 0 and self._given_up.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
         stuck = None if thinking is None else thinking.stuck
