@@ -276,8 +276,8 @@ class RollingWindow:
         away = None if effect is not None else self._turn_away(request, None, here)
         if away is not None and away.status is PlanStatus.FOUND:
             return away  # what is closed is told from a safe turn
-        # Where edges come and go, what was given up may yet be entered.
-        in_vain = MOST_EFFORT if request.seen.taken_back_at > 0 else 1
+        # Where edges come and go meanwhile, what was given up may yet be entered.
+        in_vain = 1 if self._memory.gone == self._gone else MOST_EFFORT
         no_room = self._effort >= in_vain and self._proof_for_turns.closed(request.position_m)
         only_given_up = len(self._memory.refused_m) > 0 and self._given_up.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:

@@ -76,11 +76,11 @@ def test_a_goal_in_view_without_room_for_a_turn_is_approached_another_way() -> N
     assert abs(math.dist(refused[0], mission.goal_m) - 500.0) < 2.0 * SPACING
 
 
-@pytest.mark.parametrize(("taken_back_at", "searches"), [(0, 1), (1, MOST_EFFORT)])
-def test_where_edges_come_and_go_no_way_is_told_later(taken_back_at: int, searches: int) -> None:
+@pytest.mark.parametrize(("gone", "searches"), [(0, 1), (3, MOST_EFFORT)])
+def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, searches: int) -> None:
     """All is given up, and the edges leave no way that has room to turn."""
     pilot, seen, plan, flown_m = circling(replace(MISSION, turn_radius_m=500.0), 3000.0)
-    seen.taken_back_at = taken_back_at
+    pilot._memory.gone += gone
     request, effect = request_on(plan, flown_m, seen), pilot._effect
     assert effect is not None
     pilot._proof_for_turns.closed = lambda position: True  # type: ignore[method-assign]
