@@ -27,13 +27,11 @@ from harness.registration import (
     FEWEST,
     STIFF,
     STIFF_IN_NOISE,
-    ComplexArray,
-    IntArray,
     Outline,
     ends_of,
     register,
 )
-from planner.interface import BoolArray, FloatArray, MovingEdges
+from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
 COMPARED_S = 12.0
 """Scans are compared with those taken so long before,"""

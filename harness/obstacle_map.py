@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from harness.edge_grid import EdgeGrid
 from harness.range_sensor import RangeScan, all_round, clockwise_from, supported
-from planner.interface import BoolArray, FloatArray
+from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
-ComplexArray = NDArray[np.complex128]
 """Points of the plane as east + i north: one number each."""
 
 CONFIRMED = 2
@@ -318,7 +317,7 @@ def _pairs(points: ComplexArray) -> FloatArray:
     return points.view(np.float64).reshape(-1, 2)
 
 
-def within(known: ComplexArray, points_m: FloatArray, within_m: float) -> NDArray[np.intp]:
+def within(known: ComplexArray, points_m: FloatArray, within_m: float) -> IntArray:
     """(k,) which of (n,) known points, east + i north, lie no further than that from one of (m, 2) points."""
     if not len(points_m):
         return np.zeros(0, dtype=np.intp)
@@ -328,5 +327,5 @@ def within(known: ComplexArray, points_m: FloatArray, within_m: float) -> NDArra
     near = np.zeros(len(slots), dtype=np.bool_)
     for point in points_m[:, 0] + 1j * points_m[:, 1]:
         near |= np.abs(known[slots] - point) <= within_m
-    found: NDArray[np.intp] = slots[near]
+    found: IntArray = slots[near]
     return found

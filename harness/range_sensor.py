@@ -18,13 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.world import Faces, Surroundings, World
+from planner.interface import ComplexArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from harness.scenario_sections import Sensor
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.intp]
-ComplexArray = NDArray[np.complex128]
 
 # The neighbour list reaches this part of the range further, and this far into the future.
 _SKIN = 0.1

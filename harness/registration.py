@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.range_sensor import RangeScan, all_round
+from planner.interface import ComplexArray, IntArray
 
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.intp]
 Ends = tuple[bool, bool]
 
 FEWEST = 3

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.range_sensor import IntArray, RangeScan, all_round
-from planner.interface import FloatArray
+from harness.range_sensor import RangeScan, all_round
+from planner.interface import FloatArray, IntArray
 
 HALVES = (2, 4, 8, 16)
 """So many rays to either side are taken together: the most of these that lie within the width, or the first."""

@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.obstacle import Circle, Obstacle, Polygon
+from planner.interface import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
     from shapely import STRtree
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Circle", "Faces", "Obstacle", "Polygon", "Surroundings", "World"]
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
 
 # A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
 _BLOCK_ROWS = 128

@@ -6,13 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.curves import Point
-from planner.interface import FloatArray
-from planner.memory import IntArray
-
-ComplexArray = NDArray[np.complex128]
+from planner.interface import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True, eq=False)

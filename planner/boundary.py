@@ -17,8 +17,8 @@ import numpy as np
 
 from planner.clearance import first_entry
 from planner.curves import SHORTEST_M, Point, Segment
-from planner.interface import BoolArray, FloatArray, Mission, SeenWorld
-from planner.memory import IntArray, ObstacleMemory
+from planner.interface import BoolArray, FloatArray, IntArray, Mission, SeenWorld
+from planner.memory import ObstacleMemory
 
 ANGLE_OFF_RAD = 1e-7
 """Angles nearer to each other than this are the same: intersections of circles are no better known."""

@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planner.curves import Point, end_of
-from planner.interface import FloatArray, Path
-
-IntArray = NDArray[np.intp]
+from planner.interface import FloatArray, IntArray, Path
 
 
 def _to_lines(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:

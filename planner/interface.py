@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+ComplexArray = NDArray[np.complex128]
 
 
 NOT_UNIT = 1e-6

@@ -6,12 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planner.interface import FloatArray, SeenWorld
-
-IntArray = NDArray[np.intp]
-
+from planner.interface import FloatArray, IntArray, SeenWorld
 
 FIRST_MOVING = -1000
 """Label of the first obstacle that moves; those of the others are below."""

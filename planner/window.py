@@ -17,10 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.blocks import Blocks, ComplexArray
+from planner.blocks import Blocks
 from planner.curves import Point
-from planner.interface import FloatArray
-from planner.memory import IntArray
+from planner.interface import ComplexArray, FloatArray, IntArray
 
 EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
