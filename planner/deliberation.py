@@ -9,14 +9,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from planner.course import Course
-from planner.interface import Path
-from planner.local_planning import LocalPlanning, Start
+from planner.interface import FloatArray, Path
+from planner.local_planning import Attempt, LocalPlanning, Start
 from planner.multi_step_search import Track
 from planner.route_optimisation import Route
+
+
+class _Found(NamedTuple):
+    """A route, where it begins, how far from obstacles it was searched, and among which points."""
+
+    route: Route
+    start: Start
+    attempt: Attempt
+    points_m: FloatArray
+    known: int
+    shortest: bool
 
 
 class Deliberation:
@@ -69,29 +81,39 @@ class Deliberation:
     def _think(self) -> Generator[Course | None, None, None]:
         """Ways as they are found; None after each step of work."""
         found = False
-        waiting: list[Course] = []
+        waiting: list[_Found] = []
         closed_m = math.inf
         for i, attempt in enumerate(self._local.attempts()):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
-            before, known = len(self.tracks), self._local.known
+            before, known, points = len(self.tracks), self._local.known, self._local.points_m
             route = yield from self._local.route(attempt, self._effort, self._now, self.tracks, self._closed)
             if len(self.tracks) == before:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:
                 found = True
-                waiting.append(self._course(route, known, shortest=i == 0))
+                waiting.append(_Found(route, self._now()[0], attempt, points, known, shortest=i == 0))
                 if i == 0 and self._switches(route):
                     continue  # a narrower way may lead on
-            yield from sorted(waiting, key=lambda each: each.path.length_m)
+            yield from self._courses(waiting)
             waiting = []
-        yield from waiting
+        yield from self._courses(waiting)
         if not found:
             route = self._local.tight_route(self._now()[0])
             if route is None and self.tracks:
                 route = self._local.beginning(self._now()[0], self.tracks[0])
             if route is not None:
                 yield self._course(route, self._local.known, shortest=False)
+
+    def _courses(self, found: list[_Found]) -> Iterator[Course]:
+        """Courses along routes, the shorter first, from where a plan would begin now."""
+        for each in sorted(found, key=lambda each: each.route.path.length_m):
+            start, _ = self._now()
+            route: Route | None = each.route
+            if start is not each.start:
+                route = self._local.fitted(start, each.attempt, each.route, each.points_m)
+            if route is not None:
+                yield self._course(route, each.known, each.shortest)
 
     def _switches(self, route: Route) -> bool:
         """Whether a way leaves obstacles on the other side than what is flown."""

@@ -190,9 +190,12 @@ class LocalPlanning:
         start, _ = now()
         if start is begun:
             return fitted[0][1] if fitted else None
-        # The aircraft has flown on meanwhile.
-        routes = (self._fit(start, attempt, (start.pose[:2], *route.nodes), points) for _, route in fitted)
+        routes = (self.fitted(start, attempt, route, points) for _, route in fitted)
         return next((route for route in routes if route is not None), None)
+
+    def fitted(self, start: Start, attempt: Attempt, route: Route, points: FloatArray) -> Route | None:
+        """A route found among (m, 2) points, from where the aircraft has got to; None where it cannot be flown."""
+        return self._fit(start, attempt, (start.pose[:2], *route.nodes), points)
 
     def _reluctance_m(self, track: Track, course: Course | None) -> float:
         """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""

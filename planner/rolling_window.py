@@ -194,6 +194,10 @@ class RollingWindow:
             )
             work = PRESSED * PORTION if short else PORTION
             for course in thinking.courses(start, ahead, work):
+                if tuple(course.path.segments[0, :2]) != tuple(start.prefix[0][:2]):
+                    raise RuntimeError(
+                        f"a course was found that begins elsewhere than at {start.prefix[0][:2]}"
+                    )
                 if serves and course.path.length_m > worth_m:
                     thinking.done = True
                     break

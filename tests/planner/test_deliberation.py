@@ -189,3 +189,20 @@ def test_no_other_way_round_is_taken_while_a_narrower_one_leads_on(wall: MakePoi
     first, second, *_ = found(through)
     assert first.path.length_m < 12_100.0
     assert second.nodes == found(None)[0].nodes
+
+
+def test_a_way_that_waited_for_narrower_ones_begins_where_the_aircraft_has_got_to(
+    wall: MakePoints, known: Known
+) -> None:
+    gap = [wall((6000.0, side * 3000.0), (6000.0, side * 207.0), 50.0) for side in (-1.0, 1.0)]
+    local, thinking = planning(known(np.concatenate(gap)))
+    straight = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 12_000.0)]))
+    through = Course(straight, (MISSION.goal_m,), local.known, shortest=True)
+    flown_m, begun = 0.0, []
+    while not thinking.done:
+        flown_m += 12.5
+        start = Start((flown_m, 0.0), Pose(flown_m, 0.0, 1.0, 0.0))
+        courses = thinking.courses(start, through, 200.0)
+        begun += [(float(course.path.segments[0, 0]), flown_m) for course in courses]
+    assert len(begun) > 1
+    assert [found_m for found_m, _ in begun] == [now_m for _, now_m in begun]
