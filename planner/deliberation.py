@@ -83,7 +83,12 @@ class Deliberation:
         found = False
         waiting: list[_Found] = []
         closed_m = math.inf
-        for i, attempt in enumerate(self._local.attempts()):
+        attempts = self._local.attempts()
+        if self._effort:
+            attempts.sort(
+                key=lambda each: each.distance_m + each.margin_m
+            )  # in vain so far: closed to all at once?
+        for i, attempt in enumerate(attempts):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
             before, known, points = len(self.tracks), self._local.known, self._local.points_m

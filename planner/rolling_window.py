@@ -59,7 +59,7 @@ PORTION = 4000.0
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
 
-PRESSED = 3
+PRESSED = 4
 """Without such a plan, or with little left of it before its turn, so many portions are taken at once."""
 
 UNHURRIED, CUT = 0.0625, 0.02
