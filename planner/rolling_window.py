@@ -53,14 +53,11 @@ BROKEN_SHARE = 0.99
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-PORTION = 4000.0
-"""Work of the search at one time, while a plan is in effect that ends in a safe turn (`planner.window.Tally`)."""
+PORTIONS = (4000.0, 13_000.0)
+"""Work of a search in the first scan and in each further one (`planner.window.Tally`): most are done in the first."""
 
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
-
-PRESSED = 4
-"""Without such a plan, or with little left of it before its turn, so many portions are taken at once."""
 
 UNHURRIED, CUT = 0.0625, 0.02
 """The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step. Where the
@@ -183,16 +180,16 @@ class RollingWindow:
         if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
             self._thinking = None
         else:
-            thinking = self._thinking
+            thinking, begins = self._thinking, self._thinking is None
             if thinking is None:
                 self._gone = self._memory.gone
                 thinking = self._thinking = Deliberation(
                     self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
                 )
-            short = self._pressed(effect, here) or (
-                effect is not None and effect.leaves_m - here < self._urgent_m
+            unhurried = (
+                effect is not None and effect.leaves_m - here > self._urgent_m and not self._watch.broken
             )
-            work = PRESSED * PORTION if short else PORTION
+            work = PORTIONS[0] if begins and unhurried else PORTIONS[1]
             for course in thinking.courses(start, ahead, work):
                 if tuple(course.path.segments[0, :2]) != tuple(start.prefix[0][:2]):
                     raise RuntimeError(
