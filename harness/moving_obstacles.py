@@ -349,6 +349,8 @@ def _bow(places: ComplexArray, apart_m: float) -> ComplexArray:
     chord /= max(abs(chord), 1e-9)
     turned = (places - places[0]) * chord.conjugate()
     start, end = float(turned.real.min()), float(turned.real.max())
+    if end - start < 1e-3 * apart_m:
+        return places  # all at one distance along the chord: no curve lies through them
     along = np.linspace(start, end, max(math.ceil((end - start) / apart_m), FEWEST + 1) + 1)
     across = np.polyval(np.polyfit(turned.real, turned.imag, 2), along)
     bow: ComplexArray = places[0] + chord * (along + 1j * across)
