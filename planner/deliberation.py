@@ -85,9 +85,8 @@ class Deliberation:
         closed_m = math.inf
         attempts = self._local.attempts()
         if self._effort:
-            attempts.sort(
-                key=lambda each: each.distance_m + each.margin_m
-            )  # in vain so far: closed to all at once?
+            # In vain so far: what is closed to the narrowest way is closed to all.
+            attempts.sort(key=lambda each: each.distance_m + each.margin_m)
         for i, attempt in enumerate(attempts):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
