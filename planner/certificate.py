@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -68,12 +69,7 @@ class Certifier:
 
     def __init__(self, limits: Limits, horizon_m: float, spacing_m: float) -> None:
         self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
-        radius = DISC * limits.radius_m
-        count = max(math.ceil(radius / spacing_m), 2)
-        axis = np.linspace(-radius, radius, 2 * count + 1)
-        x, y = (each.ravel() for each in np.meshgrid(axis, axis))
-        inside = x * x + y * y <= radius * radius
-        self._disc = np.column_stack((x[inside], y[inside]))
+        self._disc = _disc(DISC * limits.radius_m, spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: SeenWorld) -> float:
         """Station up to which a path lies in space seen to be free."""
@@ -125,6 +121,16 @@ class Certifier:
             return [full_turn(pose, self._limits.radius_m, side)]
         roll: Segment = (*pose, 0.0, self._limits.roll_m)
         return [roll, full_turn(along(roll, self._limits.roll_m), self._limits.radius_m, side)]
+
+
+@lru_cache(maxsize=8)
+def _disc(radius_m: float, spacing_m: float) -> FloatArray:
+    """(k, 2) places of a disc about the origin, no further apart than the spacing."""
+    count = max(math.ceil(radius_m / spacing_m), 2)
+    axis = np.linspace(-radius_m, radius_m, 2 * count + 1)
+    x, y = (each.ravel() for each in np.meshgrid(axis, axis))
+    inside = x * x + y * y <= radius_m * radius_m
+    return np.column_stack((x[inside], y[inside]))
 
 
 def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:

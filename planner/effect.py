@@ -93,7 +93,9 @@ class Watch:
             self._waiting.append(fresh_m)
             away = np.hypot(fresh_m[:, 0] - position[0], fresh_m[:, 1] - position[1])
             self._nearest_m = min(self._nearest_m, float(away.min()))
-        if not self._waiting or (self._since < WATCHED_TOGETHER and self._nearest_m > self._urgent):
+        elif not self._waiting:
+            return False
+        if self._since < WATCHED_TOGETHER and self._nearest_m > self._urgent:
             return False
         self._since = 0
         edges = np.concatenate(self._waiting)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -32,6 +32,10 @@ WIDER = 4
 
 OPTIMISING, OPTIMISING_AMONG = 20, 0.3
 """Work of optimising a route, in questions about the window, and more of it for each point."""
+
+DOUBTED, MOST_AROUND = 0.1, 8
+"""A way that is longer by this share than the one flown is doubtful: so many of the obstacles nearest to the start are
+looked at as well."""
 
 SWITCH = 0.03
 """The other way round is taken only where it saves this share of the distance left."""
@@ -170,7 +174,13 @@ class LocalPlanning:
         window = self.window(start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room))
         begun = start
         fitted: list[tuple[float, Route]] = []
-        for track in self._found(window, attempt, effort, closed):
+
+        def doubtful() -> bool:
+            _, course = now()
+            least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
+            return course is None or least_m > (1.0 + DOUBTED) * course.path.length_m
+
+        for track in self._found(window, attempt, effort, closed, doubtful):
             if track is None:
                 yield
                 continue
@@ -249,27 +259,45 @@ class LocalPlanning:
         return nearer
 
     def _found(
-        self, window: Window, attempt: Attempt, effort: int, closed: Callable[[], bool]
-    ) -> Iterator[Track | None]:
-        """The n best tracks; where there is none, those of a wider search. None after each step of work."""
-        found = 0
-        for widening in (1, WIDER * 2**effort):
-            tracks = search(
-                window,
-                self._mission.goal_m,
-                self._mission.bounds_m,
-                steps=self._steps * widening,
-                keep_best=self._candidates * widening,
-                outer_m=attempt.distance_m + attempt.margin_m,
-                most_tracks=MOST_TRACKS * widening,
-                wide=widening > 1,
-            )
-            steps_since = 0
-            for track in tracks:
-                yield track
-                found += track is not None
-                steps_since += found > 0
-                if found == self._candidates or steps_since > MOST_TRACKS:
-                    break
-            if found or closed():
-                return
+        self,
+        window: Window,
+        attempt: Attempt,
+        effort: int,
+        closed: Callable[[], bool],
+        doubtful: Callable[[], bool],
+    ) -> Generator[Track | None, None, None]:
+        """The n best tracks; where there is none, those of a wider search. None after each step of work.
+
+        Where they are doubtful the search is repeated: a way out of a pocket may lead past what does not lie
+        towards the goal.
+        """
+        found = yield from self._searched(window, attempt, 1)
+        if found and doubtful():
+            yield from self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
+        elif not found and not closed():
+            around = window.nearest_obstacles(MOST_AROUND)
+            yield from self._searched(window, attempt, WIDER * 2**effort, around)
+
+    def _searched(
+        self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
+    ) -> Generator[Track | None, None, int]:
+        """The n best tracks of one search, and how many they are."""
+        tracks = search(
+            window,
+            self._mission.goal_m,
+            self._mission.bounds_m,
+            steps=self._steps * widening,
+            keep_best=self._candidates * widening,
+            outer_m=attempt.distance_m + attempt.margin_m,
+            most_tracks=MOST_TRACKS * widening,
+            around=around,
+            wide=widening > 1,
+        )
+        found = steps_since = 0
+        for track in tracks:
+            yield track
+            found += track is not None
+            steps_since += found > 0
+            if found == self._candidates or steps_since > MOST_TRACKS:
+                break
+        return found

@@ -93,14 +93,14 @@ class ObstacleMemory:
 
     def _alike(self, outlines: Sequence[FloatArray]) -> bool:
         """Whether what moves is where it was, but for a little."""
-        if len(outlines) != len(self._outlines):
-            return False
+        if not outlines or len(outlines) != len(self._outlines):
+            return len(outlines) == len(self._outlines)
         corners = [
             np.abs(edge(new, axis=0) - edge(old, axis=0)).max()
             for new, old in zip(outlines, self._outlines, strict=True)
             for edge in (np.min, np.max)
         ]
-        return max(corners, default=0.0) < MOVED * self.cell_m
+        return bool(max(corners) < MOVED * self.cell_m)
 
     def _all(self) -> tuple[FloatArray, IntArray]:
         """Points and labels, those of what moves after all others: an obstacle each."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +64,7 @@ def search(
     keep_best: int,
     outer_m: float,
     most_tracks: int,
+    around: Iterable[int] = (),
     wide: bool = False,
 ) -> Iterator[Track | None]:
     """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
@@ -77,6 +78,7 @@ def search(
         outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`,
             so that steps around a round obstacle are long.
         most_tracks: so many are looked at.
+        around: obstacles that the first step may go past, though they do not lie towards the goal.
         wide: also take steps that hardly ever belong to a shortest way.
 
     Yields:
@@ -115,7 +117,7 @@ def search(
             continue
         if depth == steps:
             continue
-        beside = [int(window.labels[hit])]
+        beside = [int(window.labels[hit]), *(around if not depth else ())]
         if wide:
             # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
             entered = all_entered(here, goal, window.points_m, window.keep_m)

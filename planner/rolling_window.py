@@ -59,9 +59,10 @@ PORTIONS = (4000.0, 13_000.0)
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
 
-UNHURRIED, CUT = 0.0625, 0.02
+UNHURRIED, CUT, GRAZED = 0.0625, 0.02, 0.005
 """The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step. Where the
-course is cut, after a share that is smaller: what lies ahead may be a dead end."""
+course is cut, after a share that is smaller, for what lies ahead may be a dead end: not so where the last search made
+the way longer by less than a third share of that distance."""
 
 HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
@@ -107,6 +108,7 @@ class RollingWindow:
         self._searched_with = 0
         self._gone = 0  # how many points had been let go of when the last search began
         self._moving_s = -math.inf  # when something was last known to move
+        self._lengthened_m = math.inf  # by so much the last search made the way longer
         self._effort = 0  # grows with every search that was in vain
         self._refused_at_m = 0.0
         self._watch = Watch(
@@ -158,7 +160,8 @@ class RollingWindow:
         if serves and (whole or effect.leaves_m - here > PROLONG * self._mission.sensor_range_m):
             return False
         if watch.cut_m < math.inf:
-            return since >= max(self._lead_m, CUT * wrong)
+            grazed = self._lengthened_m < GRAZED * wrong
+            return since >= max(self._lead_m, (UNHURRIED if grazed else CUT) * wrong)
         return since >= max(self._lead_m if near else self._rolling_step_m, UNHURRIED * wrong)
 
     def _in_effect(self, request: PlanRequest) -> Effect | None:
@@ -201,6 +204,8 @@ class RollingWindow:
                 certified = self._certify(course, request)
                 if certified is not None and self._leads_on(certified, course):
                     self._thinking, self._searched_with, self._effort = None, thinking.known, 0
+                    before_m = -math.inf if ahead is None else ahead.path.length_m
+                    self._lengthened_m = course.path.length_m - before_m
                     return self._found(request, start, course, certified, thinking.tracks)
                 thinking.stuck = thinking.stuck or course
             if thinking.done:

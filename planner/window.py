@@ -9,6 +9,7 @@ something nearer hides is none.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -147,6 +148,12 @@ class Window:
             self._cells[label] = _Cells(members, cells.first, cells.counts, one, other, self.keep_m[members])
         return self._cells[label]
 
+    def nearest_obstacles(self, most: int) -> list[int]:
+        """The obstacles nearest to the centre, so many at most."""
+        self.tally.add(2, PLACE, len(self.points_m))
+        order = np.argsort(np.abs(self._places - complex(*self.center_m)))
+        return list(itertools.islice(dict.fromkeys(self.labels[order].tolist()), most))
+
     def sector_edges(self, origin: Point, beside: Iterable[int]) -> list[SectorEdge]:
         """The edges M and N of the free sectors beside some obstacles, as seen from a track point.
 
@@ -245,10 +252,8 @@ class Window:
         seen = np.multiply.outer(towards.conj(), away)
         self.tally.add(1, PLACE, seen.size)
         ahead, beside = seen.real, seen.imag
-        room = self._square - beside * beside
-        entry = np.where((room > 0.0) & (ahead > 0.0), ahead - np.sqrt(np.maximum(room, 0.0)), math.inf)
-        met = entry.argmin(axis=1)
-        return np.maximum(entry[np.arange(len(met)), met], 0.0), met
+        which, point = ((beside * beside < self._square) & (ahead > 0.0)).nonzero()
+        return self._nearest(len(towards), which, point, ahead[which, point], beside[which, point])
 
     def _clear_along(
         self,
@@ -261,13 +266,25 @@ class Window:
         which, point = self._blocks.near_lines(origin, towards, self._most_kept_m, to_m)
         self.tally.add(2, PAIR, len(which))
         seen = away[point] * towards.conj()[which]
-        room = self._square[point] - seen.imag * seen.imag
-        met_by = ((room > 0.0) & (seen.real > 0.0)).nonzero()[0]
-        which, point = which[met_by], point[met_by]
-        entry = seen.real[met_by] - np.sqrt(room[met_by])
-        clear, met = np.full(len(towards), math.inf), np.zeros(len(towards), dtype=np.intp)
+        ahead, beside = seen.real, seen.imag
+        met_by = ((beside * beside < self._square[point]) & (ahead > 0.0)).nonzero()[0]
+        return self._nearest(len(towards), which[met_by], point[met_by], ahead[met_by], beside[met_by])
+
+    def _nearest(
+        self, count: int, which: IntArray, point: IntArray, ahead_m: FloatArray, beside_m: FloatArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Where each of so many directions first comes too near to a point, and to which.
+
+        Args:
+            count: number of directions.
+            which: (p,) a direction, in order, of each pair of one and a point that it comes too near to.
+            point: (p,) that point.
+            ahead_m: (p,) how far along the direction it lies.
+            beside_m: (p,) how far beside it.
+        """
+        clear, met = np.full(count, math.inf), np.zeros(count, dtype=np.intp)
         if len(which):
-            # Pairs come direction by direction.
+            entry = ahead_m - np.sqrt(self._square[point] - beside_m * beside_m)
             first = np.concatenate(([0], (which[1:] != which[:-1]).nonzero()[0] + 1))
             nearest = np.minimum.reduceat(entry, first)
             counts = np.diff(np.append(first, len(which)))
