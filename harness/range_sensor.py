@@ -10,7 +10,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -76,9 +76,14 @@ class RangeScan:
         turned *= cmath.rect(1.0, -self.heading_rad)
         return turned
 
+    def ends_m(self, rays: IntArray) -> ComplexArray:
+        """(k,) where some rays ended, east + i north."""
+        return self.from_sensor_m(rays) + complex(self.east_m, self.north_m)
+
     def kept(self) -> RangeScan:
-        """The same as a plain value: its rays are followed now, and nothing leads from it to the world."""
-        return RangeScan(**{name: getattr(self, name) for name in _GIVEN})
+        """The same, its rays followed by now: nothing leads from it to the world any more."""
+        _ = self.ranges_m
+        return self
 
     @property
     def followed(self) -> bool:
@@ -91,9 +96,6 @@ class RangeScan:
         turned: ComplexArray = self.fan * cmath.rect(1.0, -self.heading_rad)
         turned.setflags(write=False)
         return turned.view(np.float64).reshape(-1, 2)
-
-
-_GIVEN = tuple(each.name for each in fields(RangeScan) if each.init)
 
 
 class _Unread(RangeScan):
@@ -117,7 +119,7 @@ class _Unread(RangeScan):
         """The ranges, when they are first read."""
         if name != "ranges_m":
             raise AttributeError(name)
-        ranges: FloatArray = self.__dict__["_follow"]()
+        ranges: FloatArray = self.__dict__.pop("_follow")()
         ranges.setflags(write=False)
         self.__dict__[name] = ranges
         return ranges

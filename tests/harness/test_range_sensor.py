@@ -310,6 +310,14 @@ def test_no_return_is_nearer_than_the_scan_says_before_its_rays_are_followed(see
     assert dataclasses.replace(scan, ranges_m=scan.ranges_m + 5.0).nearest_m == least + 5.0
 
 
+def test_a_scan_that_is_kept_holds_on_to_nothing_of_the_world() -> None:
+    scan = sensor(World([Obstacle(Circle((0.0, 500.0), 100.0))], BOUNDS)).scan(0.0, 0.0, 0.0, 0.0)
+    assert any(callable(each) for each in vars(scan).values())
+    kept = scan.kept()
+    assert kept.followed
+    assert not any(callable(each) for each in vars(kept).values())
+
+
 def test_a_scan_that_is_read_late_shows_the_time_at_which_it_was_taken() -> None:
     moving = Obstacle(Circle((0.0, 500.0), 100.0), velocity_mps=(0.0, 10.0))
     eye = sensor(World([moving], BOUNDS), rays=3)
