@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 # The neighbour list reaches this part of the range further, and this far into the future.
-_SKIN = 0.1
+_SKIN = 0.25
 _HORIZON_S = 30.0
 # Rays tried beyond the bearings of a face, in rays: more than bearings err, even at a tangent (1.5e-8 rad).
 _MARGIN_RAYS = 1e-3
@@ -193,11 +193,14 @@ class RangeSensor:
         skin = _SKIN * self._config.range_m
         listed_east, listed_north, listed_s = self._listed_at
         moved = math.hypot(east - listed_east, north - listed_north)
-        if self._surroundings is None or not (moved <= skin and 0 <= time - listed_s <= _HORIZON_S):
+        listed = self._surroundings
+        if listed is None or not (moved <= skin and listed_s <= time <= listed.until_s):
             reach = self._config.range_m + skin
-            self._surroundings = self._world.surroundings(east, north, reach, time, time + _HORIZON_S)
+            self._surroundings = listed = self._world.surroundings(
+                east, north, reach, time, time + _HORIZON_S
+            )
             self._listed_at = (east, north, time)
-        return self._surroundings
+        return listed
 
     def _nearest(self, faces: Faces, east: float, north: float) -> float:
         """Distance to the nearest face, ahead or not; +inf beyond the range."""

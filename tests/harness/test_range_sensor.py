@@ -276,8 +276,20 @@ def test_far_obstacles_are_not_touched_by_a_scan() -> None:
     for number in range(60):
         source.scan(1.5 * number, 0.0, 0.0, 0.5 * number)
     assert (world.asked, world.faces) == (1, 5)
-    source.scan(110.0, 0.0, 0.0, 20.0)
+    source.scan(260.0, 0.0, 0.0, 30.0)
     assert world.asked == 2
+
+
+@pytest.mark.parametrize(("velocity_mps", "asked"), [((0.0, 0.0), 1), ((0.0, 1.0), 20)])
+def test_only_a_world_that_changes_is_looked_up_again_in_one_place(
+    velocity_mps: tuple[float, float], asked: int
+) -> None:
+    far = Obstacle(Circle((50_000.0, 0.0), 100.0), velocity_mps=velocity_mps)
+    world = CountingWorld([Obstacle(Circle((0.0, 500.0), 100.0)), far], BOUNDS)
+    source = sensor(world)
+    for number in range(20):
+        source.scan(0.0, 0.0, 0.0, 31.0 * number)
+    assert world.asked == asked
 
 
 def test_a_scan_becomes_available_after_the_latency() -> None:
