@@ -27,7 +27,7 @@ __all__ = ["Circle", "Faces", "Obstacle", "Polygon", "Surroundings", "World"]
 
 
 # A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
-_BLOCK_ROWS = 128
+_BLOCK_ROWS = 256
 # What bounds are given to spare, for rounding.
 _ROUNDING_M = 1e-6
 
