@@ -367,9 +367,8 @@ def _looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> Boo
     rays = len(scan.ranges_m)
     bearing = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
     ray = np.rint(bearing / scan.spacing_rad).astype(np.int64)
-    beside = ray[:, None] + np.arange(-ABREAST, ABREAST + 1)
-    least = scan.ranges_m.take(beside, mode="wrap").min(axis=1)
-    through: BoolArray = (least > distance + sure_m) & (distance + sure_m < scan.max_range_m)
+    beyond = np.minimum(scan.least_beside_m(ABREAST).take(ray, mode="wrap"), scan.max_range_m)
+    through: BoolArray = beyond > distance + sure_m
     if not all_round(scan):
         through &= (ray >= ABREAST) & (ray < rays - ABREAST)
     return through

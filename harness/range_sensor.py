@@ -80,6 +80,15 @@ class RangeScan:
         """(k,) where some rays ended, east + i north."""
         return self.from_sensor_m(rays) + complex(self.east_m, self.north_m)
 
+    def least_beside_m(self, aside: int) -> FloatArray:
+        """(n,) the least range of each ray and so many to either side; the ends of the fan are joined."""
+        rays = len(self.ranges_m)
+        ring = self.ranges_m.take(np.arange(-aside, rays + aside), mode="wrap")
+        least = ring[:rays]
+        for first in range(1, 2 * aside + 1):
+            least = np.minimum(least, ring[first : first + rays])
+        return least
+
     def kept(self) -> RangeScan:
         """The same, its rays followed by now: nothing leads from it to the world any more."""
         _ = self.ranges_m
@@ -251,7 +260,7 @@ class RangeSensor:
                 if half_chord2.item(end) < 0.0 or distance.item(end) < 0.0:
                     distance[end] = math.inf
             if farthest > self._surely_in_range_m:
-                distance[distance > self._config.range_m] = math.inf
+                np.putmask(distance, distance > self._config.range_m, math.inf)
             reached = ranges[low:high]
             np.minimum(reached, distance, out=reached)
 
