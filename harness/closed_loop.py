@@ -280,12 +280,12 @@ class _Judge:
         return None
 
     def _surely_clear_m(self, east: float, north: float, time_s: float) -> float:
-        """The true clearance; or what is surely left of that of the last look, while that is more than half of it."""
+        """The true clearance; or what is surely left of that of the last look, while more than a quarter is."""
         world = self._loop.world
         there_east, there_north, then_s, clearance = self._measured
         lost = math.hypot(east - there_east, north - there_north)
         lost += world.max_obstacle_speed_mps * (time_s - then_s)
-        if lost < 0.5 * clearance and time_s < self._appears_s:
+        if lost < 0.75 * clearance and time_s < self._appears_s:
             return clearance - lost
         clearance = world.clearance_at(east, north, time_s)
         self._measured = (east, north, time_s, clearance)

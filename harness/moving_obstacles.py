@@ -226,11 +226,12 @@ class MovingObstacles:
 
     def _look(self, scan: RangeScan, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before."""
-        hits, places = self._returns(scan)
+        hits = self._returned(scan)
         # Of as many in a row as it takes one is among these.
-        sample = places[::FEWEST]
-        if not len(sample) or not _looked_through(self._before[0], sample, self._sure).any():
+        sample = hits[::FEWEST]
+        if not len(sample) or not _looked_through(self._before[0], scan.ends_m(sample), self._sure).any():
             return
+        places = scan.ends_m(hits)
         appeared = np.ones(len(hits), dtype=np.bool_) if moving is None else ~moving[hits]
         for before in (self._before[0], self._before[1]):
             appeared[appeared] = _looked_through(before, places[appeared], self._sure)
@@ -245,7 +246,8 @@ class MovingObstacles:
         self, scan: RangeScan, moving: BoolArray | None, is_free: Callable[[FloatArray], BoolArray]
     ) -> None:
         """Begins to follow what has come to places that were seen to be free."""
-        hits, places = self._returns(scan)
+        hits = self._returned(scan)
+        places = scan.ends_m(hits)
         appeared = is_free(_pairs(places))
         if moving is not None:
             appeared &= ~moving[hits]
@@ -257,11 +259,11 @@ class MovingObstacles:
             if len(run) >= FEWEST and not self._is_followed(places[run], scan.time_s):
                 self._tracks.append(_Track(self._outline(scan, hits[run], places[run]), scan.time_s))
 
-    def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
-        """Rays that returned something, but for false returns, and where."""
+    def _returned(self, scan: RangeScan) -> IntArray:
+        """Rays that returned something, but for false returns."""
         returned = supported(scan, self._apart) if self._false_returns else scan.ranges_m < math.inf
-        hits = returned.nonzero()[0]
-        return hits, scan.from_sensor_m(hits) + complex(scan.east_m, scan.north_m)
+        hits: IntArray = returned.nonzero()[0]
+        return hits
 
     def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:
         """The outline that neighbouring returns show: where they lie closer than they err, means of several."""
@@ -285,7 +287,8 @@ class MovingObstacles:
 
     def _follow(self, scan: RangeScan) -> BoolArray | None:
         """Moves the tracks on; which rays met one that moves."""
-        hits, places = self._returns(scan)
+        hits = self._returned(scan)
+        places = scan.ends_m(hits)
         moving = np.zeros(len(scan.ranges_m), dtype=np.bool_)
         kept: list[_Track] = []
         for track in self._tracks:
@@ -364,9 +367,8 @@ def _looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> Boo
     rays = len(scan.ranges_m)
     bearing = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
     ray = np.rint(bearing / scan.spacing_rad).astype(np.int64)
-    beside = ray[:, None] + np.arange(-ABREAST, ABREAST + 1)
-    least = scan.ranges_m.take(beside, mode="wrap").min(axis=1)
-    through: BoolArray = (least > distance + sure_m) & (distance + sure_m < scan.max_range_m)
+    beyond = np.minimum(scan.least_beside_m(ABREAST).take(ray, mode="wrap"), scan.max_range_m)
+    through: BoolArray = beyond > distance + sure_m
     if not all_round(scan):
         through &= (ray >= ABREAST) & (ray < rays - ABREAST)
     return through

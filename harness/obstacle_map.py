@@ -175,16 +175,17 @@ class ObstacleMap:
         gap = np.abs(step)
         # One ray may be missing between neighbours: a lost return does not open a wall.
         joined = (gap < self._join) & (hits[1:] - hits[:-1] <= 2)
+        apart = joined & (gap > self._cell)
         if len(news):
-            wide = (joined & (gap > self._cell) & (uncertain[1:] | uncertain[:-1])).nonzero()[0]
+            wide = (apart & (uncertain[1:] | uncertain[:-1])).nonzero()[0]
             if len(wide):
                 between = (places.take(wide) + np.multiply.outer(BETWEEN, step.take(wide))).ravel()
                 column, row = self._column_and_row(between)
                 cells = column * self._ny + row
                 # Where one was looked through, it is not put again: what ends there is seen to end there.
-                open_ = (self._slot.take(cells) >= 0) & (self._score.take(cells) < self._first_score)
-                counted = np.concatenate((counted, cells[~open_]))
-                found = np.concatenate((found, between[~open_]))
+                put = (self._slot.take(cells) < 0) | (self._score.take(cells) >= self._first_score)
+                counted = np.concatenate((counted, cells[put]))
+                found = np.concatenate((found, between[put]))
         again: list[tuple[NDArray[np.int64], ComplexArray]] = []
         if near:
             ends = (~joined).nonzero()[0]
@@ -194,7 +195,7 @@ class ObstacleMap:
                 turn = (step[1:] * step[:-1].conj()).imag > CORNER * gap[1:] * gap[:-1]
                 ends = np.concatenate((ends, (turn & joined[1:] & joined[:-1]).nonzero()[0] + 1))
             # So does what stands before something that it is joined to.
-            jumps = (joined & (gap > self._cell)).nonzero()[0]
+            jumps = apart.nonzero()[0]
             behind = scan.ranges_m.take(hits[jumps], mode="wrap") > scan.ranges_m.take(
                 hits[jumps + 1], mode="wrap"
             )
@@ -237,7 +238,8 @@ class ObstacleMap:
         keys, score = keys[uncertain], score[uncertain]
         risen = np.maximum(score + 1, self._first_score)
         self._score[keys] = risen  # duplicates of a cell count once a scan
-        self._unconfirmed |= bool(risen.min() < CONFIRMED)
+        if self._doubtful:
+            self._unconfirmed |= bool(risen.min() < CONFIRMED)
         fresh = (score == 0).nonzero()[0]
         if len(fresh):
             fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
@@ -299,9 +301,8 @@ class ObstacleMap:
         if not all_round(scan):
             aimed &= (ray >= 1) & (ray < rays - 1)
         chosen = aimed.nonzero()[0]
-        ring = np.concatenate((scan.ranges_m[-1:], scan.ranges_m, scan.ranges_m[:2]))
-        beside = np.minimum(np.minimum(ring[:-2], ring[1:-1]), ring[2:])
-        through = beside[ray[chosen]] > distance[chosen] + 1.5 * self._cell
+        beside = scan.least_beside_m(1).take(ray.take(chosen), mode="wrap")
+        through = beside > distance.take(chosen) + 1.5 * self._cell
         weaker = self._key[slots[chosen[through]]]
         weaker = weaker[self._score[weaker] > 0]
         if len(weaker):

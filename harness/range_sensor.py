@@ -10,7 +10,7 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 # The neighbour list reaches this part of the range further, and this far into the future.
-_SKIN = 0.1
+_SKIN = 0.25
 _HORIZON_S = 30.0
 # Rays tried beyond the bearings of a face, in rays: more than bearings err, even at a tangent (1.5e-8 rad).
 _MARGIN_RAYS = 1e-3
@@ -76,9 +76,23 @@ class RangeScan:
         turned *= cmath.rect(1.0, -self.heading_rad)
         return turned
 
+    def ends_m(self, rays: IntArray) -> ComplexArray:
+        """(k,) where some rays ended, east + i north."""
+        return self.from_sensor_m(rays) + complex(self.east_m, self.north_m)
+
+    def least_beside_m(self, aside: int) -> FloatArray:
+        """(n,) the least range of each ray and so many to either side; the ends of the fan are joined."""
+        rays = len(self.ranges_m)
+        ring = self.ranges_m.take(np.arange(-aside, rays + aside), mode="wrap")
+        least = ring[:rays]
+        for first in range(1, 2 * aside + 1):
+            least = np.minimum(least, ring[first : first + rays])
+        return least
+
     def kept(self) -> RangeScan:
-        """The same as a plain value: its rays are followed now, and nothing leads from it to the world."""
-        return RangeScan(**{name: getattr(self, name) for name in _GIVEN})
+        """The same, its rays followed by now: nothing leads from it to the world any more."""
+        _ = self.ranges_m
+        return self
 
     @property
     def followed(self) -> bool:
@@ -91,9 +105,6 @@ class RangeScan:
         turned: ComplexArray = self.fan * cmath.rect(1.0, -self.heading_rad)
         turned.setflags(write=False)
         return turned.view(np.float64).reshape(-1, 2)
-
-
-_GIVEN = tuple(each.name for each in fields(RangeScan) if each.init)
 
 
 class _Unread(RangeScan):
@@ -117,7 +128,7 @@ class _Unread(RangeScan):
         """The ranges, when they are first read."""
         if name != "ranges_m":
             raise AttributeError(name)
-        ranges: FloatArray = self.__dict__["_follow"]()
+        ranges: FloatArray = self.__dict__.pop("_follow")()
         ranges.setflags(write=False)
         self.__dict__[name] = ranges
         return ranges
@@ -191,11 +202,14 @@ class RangeSensor:
         skin = _SKIN * self._config.range_m
         listed_east, listed_north, listed_s = self._listed_at
         moved = math.hypot(east - listed_east, north - listed_north)
-        if self._surroundings is None or not (moved <= skin and 0 <= time - listed_s <= _HORIZON_S):
+        listed = self._surroundings
+        if listed is None or not (moved <= skin and listed_s <= time <= listed.until_s):
             reach = self._config.range_m + skin
-            self._surroundings = self._world.surroundings(east, north, reach, time, time + _HORIZON_S)
+            self._surroundings = listed = self._world.surroundings(
+                east, north, reach, time, time + _HORIZON_S
+            )
             self._listed_at = (east, north, time)
-        return self._surroundings
+        return listed
 
     def _nearest(self, faces: Faces, east: float, north: float) -> float:
         """Distance to the nearest face, ahead or not; +inf beyond the range."""
@@ -246,7 +260,7 @@ class RangeSensor:
                 if half_chord2.item(end) < 0.0 or distance.item(end) < 0.0:
                     distance[end] = math.inf
             if farthest > self._surely_in_range_m:
-                distance[distance > self._config.range_m] = math.inf
+                np.putmask(distance, distance > self._config.range_m, math.inf)
             reached = ranges[low:high]
             np.minimum(reached, distance, out=reached)
 

@@ -217,9 +217,10 @@ def _stretch(accepted: AcceptedPlan, start_m: float, end_m: float, window_m: flo
         out_east * segments[1:, 2] + out_north * segments[1:, 3],
     )
     turned = (np.abs(corner) > CORNER_RAD) & (joint[1:-1] > start_m) & (joint[1:-1] < end_m)
-    at = np.flatnonzero(turned) + 1
-    lengths = np.insert(lengths, at, window_m)
-    curvatures = np.insert(curvatures, at, corner[at - 1] / window_m)
+    if turned.any():
+        at = np.flatnonzero(turned) + 1
+        lengths = np.insert(lengths, at, window_m)
+        curvatures = np.insert(curvatures, at, corner[at - 1] / window_m)
     beyond = max(end_m - max(start_m, float(joint[-1])), 0.0)
     return Profile(
         np.append(lengths, beyond), np.append(curvatures, segments[-1, 4] if accepted.loiter else 0.0)
@@ -253,7 +254,7 @@ def _max_rate(profile: Profile, window_m: float) -> float:
     length, curvature = profile.length_m[used], profile.curvature_1pm[used]
     joint = np.append(0.0, np.cumsum(length))
     edges = np.concatenate((joint, joint - window_m))
-    edges = np.unique(edges[(edges >= 0.0) & (edges <= joint[-1] - window_m)])
+    edges = np.sort(edges[(edges >= 0.0) & (edges <= joint[-1] - window_m)], kind="stable")
     wide = np.diff(edges) > ROUNDING_M
     middle = 0.5 * (edges[:-1] + edges[1:])[wide]
     if not len(middle):

@@ -27,7 +27,7 @@ __all__ = ["Circle", "Faces", "Obstacle", "Polygon", "Surroundings", "World"]
 
 
 # A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
-_BLOCK_ROWS = 128
+_BLOCK_ROWS = 256
 # What bounds are given to spare, for rounding.
 _ROUNDING_M = 1e-6
 
@@ -94,9 +94,16 @@ class Faces:
 
 
 class Surroundings:
-    """Every face that comes near a place during an interval of time; made by `World.surroundings`."""
+    """Every face that comes near a place during an interval of time; made by `World.surroundings`.
 
-    def __init__(self, faces: Faces, circle_motions: _Motions, edge_motions: _Motions) -> None:
+    Attributes:
+        until_s: the end of that interval; +inf in a world where nothing ever moves, comes or goes.
+    """
+
+    def __init__(
+        self, faces: Faces, circle_motions: _Motions, edge_motions: _Motions, until_s: float
+    ) -> None:
+        self.until_s = until_s
         self._faces = faces
         self._circle_motions = circle_motions
         self._edge_motions = edge_motions
@@ -230,6 +237,7 @@ class World:
             Faces(boxes[:, circles][[0, 1, 4]], edges[:, within]),
             motions.take(circles),
             motions.take(owners[within]),
+            stop_s if len(self._changing) else math.inf,
         )
 
     def _listed(self, east: float, north: float, reach: float) -> IntArray:

@@ -276,8 +276,20 @@ def test_far_obstacles_are_not_touched_by_a_scan() -> None:
     for number in range(60):
         source.scan(1.5 * number, 0.0, 0.0, 0.5 * number)
     assert (world.asked, world.faces) == (1, 5)
-    source.scan(110.0, 0.0, 0.0, 20.0)
+    source.scan(260.0, 0.0, 0.0, 30.0)
     assert world.asked == 2
+
+
+@pytest.mark.parametrize(("velocity_mps", "asked"), [((0.0, 0.0), 1), ((0.0, 1.0), 20)])
+def test_only_a_world_that_changes_is_looked_up_again_in_one_place(
+    velocity_mps: tuple[float, float], asked: int
+) -> None:
+    far = Obstacle(Circle((50_000.0, 0.0), 100.0), velocity_mps=velocity_mps)
+    world = CountingWorld([Obstacle(Circle((0.0, 500.0), 100.0)), far], BOUNDS)
+    source = sensor(world)
+    for number in range(20):
+        source.scan(0.0, 0.0, 0.0, 31.0 * number)
+    assert world.asked == asked
 
 
 def test_a_scan_becomes_available_after_the_latency() -> None:
@@ -308,6 +320,14 @@ def test_no_return_is_nearer_than_the_scan_says_before_its_rays_are_followed(see
     if field == 360.0 and least < math.inf:
         assert nearest > 0.95 * least - 1.0
     assert dataclasses.replace(scan, ranges_m=scan.ranges_m + 5.0).nearest_m == least + 5.0
+
+
+def test_a_scan_that_is_kept_holds_on_to_nothing_of_the_world() -> None:
+    scan = sensor(World([Obstacle(Circle((0.0, 500.0), 100.0))], BOUNDS)).scan(0.0, 0.0, 0.0, 0.0)
+    assert any(callable(each) for each in vars(scan).values())
+    kept = scan.kept()
+    assert kept.followed
+    assert not any(callable(each) for each in vars(kept).values())
 
 
 def test_a_scan_that_is_read_late_shows_the_time_at_which_it_was_taken() -> None:
