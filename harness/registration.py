@@ -25,6 +25,10 @@ ROUNDS = 3
 """Registrations in a row, each with the nearest points of the one before."""
 STRAIGHT = 0.9
 """Cosine of the turn between neighbours: places that bend more than that are no good for registration."""
+CLOSER = 0.5
+"""Each round goes by returns so much nearer: what stands beside something that moves is not its."""
+FLAT = 0.99
+"""Mean of the tangents of an outline, each turned by twice its angle: 1 for a straight one."""
 BESIDE = 0.2
 """So much of the gate a return may lie beyond the points of the outline, along it."""
 ENDS = 0.01
@@ -47,6 +51,15 @@ class Outline(NamedTuple):
 
     points: ComplexArray
     ends: Ends
+
+    @property
+    def is_definite(self) -> bool:
+        """Whether it tells of shifts in every direction: it has an end, or is not straight."""
+        if any(self.ends):
+            return True
+        along, straight = _tangents(self.points)
+        turned = along[straight] ** 2
+        return len(turned) > 0 and abs(turned.mean()) < FLAT
 
     def moved(self, by: complex) -> Outline:
         """The outline elsewhere."""
@@ -78,6 +91,7 @@ def register(
     gate_m: float,
     apart_m: float,
     stiff: float = STIFF,
+    near_m: float = 0.0,
 ) -> Laid | None:
     """Lays an outline upon the returns of a scan.
 
@@ -89,6 +103,7 @@ def register(
         gate_m: returns further from the outline are not its.
         apart_m: beyond an end, rays go on, and end so far away or further.
         stiff: share of the weight of all returns that holds the outline where it is expected.
+        near_m: returns no further off may be its in every round: they err so much.
 
     Returns:
         How; None where too few of the returns are near, or it would be laid further away than the gate.
@@ -102,11 +117,12 @@ def register(
     along, straight = _tangents(outline.points)
     reach = 1.5 * float(np.median(np.abs(np.diff(outline.points)))) + 1e-6
     shift = 0j
-    for _ in range(ROUNDS):
+    for i in range(ROUNDS):
+        within_m = max(gate_m * CLOSER**i, near_m)
         apart = places[near, None] - (outline.points + shift)
         nearest = np.abs(apart).argmin(axis=1)
         off = apart[np.arange(len(near)), nearest] * along[nearest].conj()  # along + i across
-        inside = (np.abs(off.imag) < gate_m) & (np.abs(off.real) < reach + BESIDE * gate_m)
+        inside = (np.abs(off.imag) < within_m) & (np.abs(off.real) < reach + BESIDE * gate_m)
         inner = inside & straight[nearest] & (np.abs(off.real) < reach)
         if np.count_nonzero(inner) < FEWEST:
             return None

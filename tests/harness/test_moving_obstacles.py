@@ -152,9 +152,36 @@ def test_what_appears_does_not_move(corners: int, flaws: dict[str, Any]) -> None
     assert not any(all_found for _, all_found in found)
 
 
-def test_what_draws_back_is_left_to_the_map() -> None:
+def told_s(found: Found, velocity: complex) -> float:
+    """When something is first told to move, and moves as told."""
+    time_s, told = next((time_s, all_found) for time_s, all_found in found if all_found)
+    assert min(abs(complex(*each.velocity_mps) - velocity) for each in told) < 0.5
+    return time_s
+
+
+def test_what_draws_back_is_found() -> None:
+    """It comes to no place that was looked through, but leaves those where it was met."""
     world = world_of(Obstacle(Circle((3000.0, 2200.0), 100.0), velocity_mps=(0.0, 8.0)))
-    assert not any(all_found for _, all_found in watched(flight(sensor(world), 40.0, START)))
+    assert told_s(watched(flight(sensor(world), 40.0, START)), 8.0j) < 15.0
+
+
+@pytest.mark.parametrize(
+    ("place", "velocity", "from_east", "within_s"),
+    [
+        ((2800.0, 2380.0), 8.0 + 0.0j, 3100.0, 25.0),
+        ((2900.0, 2380.0), 8.0 + 0.0j, 3100.0, 15.0),
+        ((2900.0, 2380.0), 6.0 - 5.0j, 3000.0, 15.0),
+        ((2900.0, 2380.0), 4.0 + 0.0j, 3100.0, 15.0),
+    ],
+)
+def test_what_comes_out_between_still_ones_is_found_soon(
+    place: tuple[float, float], velocity: complex, from_east: float, within_s: float
+) -> None:
+    """Nearer to them than the clearance: they belong to no outline that is followed."""
+    moves = Obstacle(Circle(place, 80.0), velocity_mps=(velocity.real, velocity.imag))
+    world = world_of(moves, Circle((2880.0, 2280.0), 100.0), Circle((3150.0, 2420.0), 50.0))
+    found = watched(flight(sensor(world), 50.0, (from_east, 1800.0), speed=5.0))
+    assert told_s(found, velocity) < within_s
 
 
 def test_what_leaves_sight_moves_on_for_a_while() -> None:

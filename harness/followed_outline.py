@@ -1,0 +1,99 @@
+"""One outline that is followed from scan to scan: where it is, how fast, and whether it is known to move.
+
+Points are complex: east + i north, m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from harness.registration import Outline
+
+LEAST_MPS = 0.5
+"""What is slower than this stands still."""
+MOST_MPS = 30.0
+SURE = 4.0
+"""In standard errors of the velocity."""
+VAGUE_MPS = 1.5
+"""With a velocity that errs more than this it is not told where a thing will be."""
+HISTORY_S = 40.0
+"""Velocity is that of so long a time."""
+FEWEST_SHIFTS = 4
+"""Velocity is told by so many at least."""
+
+
+@dataclass(eq=False)
+class FollowedOutline:
+    """One run of returns that is followed.
+
+    Attributes:
+        outline: as it was at `outline_s`.
+        begun_s: when it was seen first.
+        base: translation from its first outline to this one.
+        shifts: (time, translation) from the first outline on.
+        velocity: east + i north, m/s.
+        error_mps: standard error of it.
+        seen_s: when it was last seen.
+        moves: it is known to.
+    """
+
+    outline: Outline
+    outline_s: float
+    begun_s: float = field(init=False)
+    base: complex = 0j
+    shifts: deque[tuple[float, complex]] = field(init=False)
+    velocity: complex = 0j
+    error_mps: float = math.inf
+    seen_s: float = field(init=False)
+    moves: bool = False
+
+    def __post_init__(self) -> None:
+        self.begun_s = self.seen_s = self.outline_s
+        self.shifts = deque([(self.outline_s, self.base)])
+
+    def at(self, time_s: float) -> Outline:
+        """The outline where it is at a time."""
+        return self.outline.moved(self.velocity * (time_s - self.outline_s))
+
+    def note(self, time_s: float, further: complex) -> None:
+        """Takes in that the outline was found elsewhere than expected by a shift."""
+        moved = self.base + self.velocity * (time_s - self.outline_s) + further
+        self.shifts.append((time_s, moved))
+        while time_s - self.shifts[0][0] > HISTORY_S:
+            self.shifts.popleft()
+        if len(self.shifts) >= FEWEST_SHIFTS:
+            self._measure()
+
+    def renew(self, outline: Outline, time_s: float) -> None:
+        """Goes on with an outline as it was just found."""
+        self.outline, self.outline_s, self.base = outline, time_s, self.shifts[-1][1]
+
+    def decide(self, sure_m: float) -> None:
+        """Decides whether it moves: surely, and further than returns err."""
+        moved_m = abs(self.shifts[-1][1] - self.shifts[0][1])
+        sure = self.error_mps < VAGUE_MPS and abs(self.velocity) >= LEAST_MPS + SURE * self.error_mps
+        self.moves = self.moves or (sure and moved_m > sure_m and self.outline.is_definite)
+
+    def surely_stands(self) -> bool:
+        """Whether its velocity is surely too little."""
+        return abs(self.velocity) + SURE * self.error_mps < LEAST_MPS
+
+    def _measure(self) -> None:
+        """Velocity: the slope of the shifts over time."""
+        times, shifts = (np.array(each) for each in zip(*self.shifts, strict=True))
+        times = times - times.mean()
+        spread = float((times * times).sum())
+        velocity = complex((times * shifts).sum() / spread)
+        off = shifts - shifts.mean() - velocity * times
+        self.error_mps = math.sqrt(float((np.abs(off) ** 2).sum()) / (len(off) - 2) / spread)
+        if self.error_mps > VAGUE_MPS:
+            velocity = 0j
+        # The outline stays where it has been found.
+        last_s, last = self.shifts[-1]
+        base = last - velocity * (last_s - self.outline_s)
+        self.outline, self.base = self.outline.moved(base - self.base), base
+        self.velocity = velocity * min(1.0, MOST_MPS / max(abs(velocity), MOST_MPS))

@@ -1,0 +1,85 @@
+"""What is other in one scan than in another: what has come to places looked through before, and what has gone.
+
+Places are complex: east + i north, m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.range_sensor import RangeScan, all_round, clockwise_from
+from harness.registration import FEWEST
+from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
+
+MISSING = 3
+"""A run of returns goes on where no more of them in a row are lost."""
+ABREAST = 2
+"""A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
+
+
+def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
+    """(k,) which places were looked through by a scan before: what is there now has come."""
+    # Of as many in a row as it takes one is among these.
+    if not looked_through(before, places[::FEWEST], sure_m).any():
+        return np.zeros(len(places), dtype=np.bool_)
+    return looked_through(before, places, sure_m)
+
+
+def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
+    """(n,) which rays of a scan look through where something was before: what they meet may have drawn back.
+
+    Args:
+        were: (k,) places where a scan before met something.
+        scan: as it is now.
+        sure_m: what lies further behind is surely another place.
+        most_m: nothing has drawn back by more.
+    """
+    gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
+    if looked_through(scan, were[::FEWEST], sure_m).any():
+        left = were[looked_through(scan, were, sure_m)]
+        ray = rays_towards(scan, left)
+        back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
+        ray = ray[back_m < most_m]
+        # From nearer by, places that were met by neighbouring rays lie further apart.
+        gone[(ray[:, None] + np.arange(-1, 2)) % len(gone)] = True
+    return gone
+
+
+def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:
+    """(k,) the rays of a scan nearest to the bearings of places; of a narrow fan also what would be beyond."""
+    offsets = places - complex(scan.east_m, scan.north_m)
+    bearing = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
+    ray = np.rint(bearing / scan.spacing_rad).astype(np.int64)
+    return ray % len(scan.ranges_m) if all_round(scan) else ray
+
+
+def looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
+    """(k,) whether a scan looked through places, surely: with the ray towards each and two to either side."""
+    distance = np.abs(places - complex(scan.east_m, scan.north_m))
+    rays = len(scan.ranges_m)
+    ray = rays_towards(scan, places)
+    beyond = np.minimum(scan.least_beside_m(ABREAST).take(ray, mode="wrap"), scan.max_range_m)
+    through: BoolArray = beyond > distance + sure_m
+    if not all_round(scan):
+        through &= (ray >= ABREAST) & (ray < rays - ABREAST)
+    return through
+
+
+def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: bool) -> list[IntArray]:
+    """Returns of neighbouring rays that lie near to each other, run by run."""
+    breaks = ((np.abs(np.diff(places)) > apart_m[1:]) | (np.diff(hits) > MISSING + 1)).nonzero()[0] + 1
+    runs = np.split(np.arange(len(hits)), breaks)
+    if closed and len(runs) > 1 and abs(places[-1] - places[0]) <= apart_m[0]:
+        runs = [np.concatenate((runs[-1], runs[0])), *runs[1:-1]]
+    return runs
+
+
+def in_a_row(flags: Sequence[bool] | BoolArray) -> int:
+    """The longest row of true ones."""
+    longest = row = 0
+    for flag in flags:
+        row = row + 1 if flag else 0
+        longest = max(longest, row)
+    return longest
