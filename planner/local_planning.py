@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from planner.cost_to_go import CostToGo
 from planner.course import Course
 from planner.curves import Limits, Point, Pose, Segment
 from planner.interface import FloatArray, Mission
@@ -27,8 +28,9 @@ LEAST_MARGIN = 0.4
 MOST_TRACKS = 300
 """So many tracks at most are looked at in one search."""
 
-WIDER = 4
-"""Where n tracks at every one of N steps find no way, this many times as many are tried."""
+WIDER, FURTHER = 4, 60
+"""Where n tracks at every one of N steps find no way, this many times as many are tried, led by the cost to go: so that
+the best come first, and after the first only so many steps more are looked at."""
 
 OPTIMISING, OPTIMISING_AMONG = 20, 0.3
 """Work of optimising a route, in questions about the window, and more of it for each point."""
@@ -254,6 +256,11 @@ class LocalPlanning:
         """The n best tracks; where there is none, those of a wider search. None after each step of work."""
         found = 0
         for widening in (1, WIDER * 2**effort):
+            to_go: CostToGo | None = None
+            if widening > 1:
+                ends = window.center_m, self._mission.goal_m
+                to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.tally)
+                yield from to_go.spread()
             tracks = search(
                 window,
                 self._mission.goal_m,
@@ -263,13 +270,14 @@ class LocalPlanning:
                 outer_m=attempt.distance_m + attempt.margin_m,
                 most_tracks=MOST_TRACKS * widening,
                 wide=widening > 1,
+                to_go=to_go,
             )
             steps_since = 0
             for track in tracks:
                 yield track
                 found += track is not None
                 steps_since += found > 0
-                if found == self._candidates or steps_since > MOST_TRACKS:
+                if found == self._candidates or steps_since > (MOST_TRACKS if to_go is None else FURTHER):
                     break
             if found or closed():
                 return
