@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from planner.cost_to_go import CostToGo
 from planner.course import Course
 from planner.curves import Limits, Point, Pose, Segment
 from planner.interface import FloatArray, Mission
@@ -27,8 +28,9 @@ LEAST_MARGIN = 0.4
 MOST_TRACKS = 300
 """So many tracks at most are looked at in one search."""
 
-WIDER = 4
-"""Where n tracks at every one of N steps find no way, this many times as many are tried."""
+WIDER, FURTHER = 4, 60
+"""Where n tracks at every one of N steps find no way, this many times as many are tried, led by the cost to go: so that
+the best come first, and after the first only so many steps more are looked at."""
 
 OPTIMISING, OPTIMISING_AMONG = 20, 0.3
 """Work of optimising a route, in questions about the window, and more of it for each point."""
@@ -275,11 +277,19 @@ class LocalPlanning:
         if found and doubtful():
             yield from self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
         elif not found and not closed():
+            ends = window.center_m, self._mission.goal_m
+            to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.tally)
+            yield from to_go.spread()
             around = window.nearest_obstacles(MOST_AROUND)
-            yield from self._searched(window, attempt, WIDER * 2**effort, around)
+            yield from self._searched(window, attempt, WIDER * 2**effort, around, to_go)
 
     def _searched(
-        self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
+        self,
+        window: Window,
+        attempt: Attempt,
+        widening: int,
+        around: Sequence[int] = (),
+        to_go: CostToGo | None = None,
     ) -> Generator[Track | None, None, int]:
         """The n best tracks of one search, and how many they are."""
         tracks = search(
@@ -292,12 +302,14 @@ class LocalPlanning:
             most_tracks=MOST_TRACKS * widening,
             around=around,
             wide=widening > 1,
+            to_go=to_go,
         )
+        further = MOST_TRACKS if to_go is None else FURTHER
         found = steps_since = 0
         for track in tracks:
             yield track
             found += track is not None
             steps_since += found > 0
-            if found == self._candidates or steps_since > MOST_TRACKS:
+            if found == self._candidates or steps_since > further:
                 break
         return found

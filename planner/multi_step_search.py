@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.clearance import all_entered, first_entry
+from planner.cost_to_go import CostToGo
 from planner.curves import Point
 from planner.step_model import distance_left_m
 from planner.window import PLACE, SectorEdge, Window, guide_vector
@@ -66,6 +67,7 @@ def search(
     most_tracks: int,
     around: Iterable[int] = (),
     wide: bool = False,
+    to_go: CostToGo | None = None,
 ) -> Iterator[Track | None]:
     """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
 
@@ -80,6 +82,8 @@ def search(
         most_tracks: so many are looked at.
         around: obstacles that the first step may go past, though they do not lie towards the goal.
         wide: also take steps that hardly ever belong to a shortest way.
+        to_go: distances to the goal round what is known, by which the cheapest are told instead, within a few per
+            cent; default: straight on, as equation (4) has it.
 
     Yields:
         Tracks that see the goal from their last track point but one; none where n tracks at every one
@@ -87,7 +91,7 @@ def search(
     """
     start = window.center_m
     _, _, straight = guide_vector(start, goal)
-    queue = [(straight, 0, 0, Track((start,), 0.0, straight))]
+    queue = [(straight if to_go is None else to_go(start), 0, 0, Track((start,), 0.0, straight))]
     apart_m = APART * outer_m
     if wide:
         kept_m = float(window.keep_m.max(initial=0.0))
@@ -100,6 +104,8 @@ def search(
         if not track.left_m:
             yield track
             continue
+        if cost == math.inf:
+            return
         here = track.nodes[-1]
         place = (round(here[0] / apart_m), round(here[1] / apart_m))
         if place in visited or kept_at[depth] == keep_best:
@@ -113,7 +119,9 @@ def search(
         _, hit = first_entry(here, goal, window.points_m, window.keep_m)
         count += 1
         if hit < 0:
-            heapq.heappush(queue, (cost, count, depth, Track((*track.nodes, goal), cost, 0.0)))
+            heapq.heappush(
+                queue, (track.cost_m, count, depth, Track((*track.nodes, goal), track.cost_m, 0.0))
+            )
             continue
         if depth == steps:
             continue
@@ -129,7 +137,8 @@ def search(
             child = _step(window, track, edge, goal, outer_m)
             if child is not None and _inside(child.nodes[-1], bounds_m):
                 count += 1
-                heapq.heappush(queue, (child.cost_m, count, depth + 1, child))
+                cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
+                heapq.heappush(queue, (cost, count, depth + 1, child))
 
 
 def _leads_away(track: Track, edge: SectorEdge) -> bool:

@@ -206,3 +206,28 @@ def test_a_way_that_waited_for_narrower_ones_begins_where_the_aircraft_has_got_t
         begun += [(float(course.path.segments[0, 0]), flown_m) for course in courses]
     assert len(begun) > 1
     assert [found_m for found_m, _ in begun] == [now_m for _, now_m in begun]
+
+
+@pytest.mark.parametrize("gap_m", [0.0, 600.0])
+def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_is_none(
+    gap_m: float, ring: MakePoints, wall: MakePoints, known: Known
+) -> None:
+    """A room with columns, its door behind the aircraft."""
+    west, east, north = -3000.0, 6000.0, 4500.0
+    corners = [(west, 0.5 * gap_m), (west, north), (east, north), (east, -north), (west, -north)]
+    walls = [wall(a, b, 50.0) for a, b in pairwise([*corners, (west, -0.5 * gap_m)])]
+    columns = [(float(x), float(y)) for x in range(-2000, 5500, 1200) for y in range(-3500, 4000, 1200)]
+    rings = [ring(x, y, 200.0, 50.0) for x, y in columns if math.hypot(x, y) > 700.0]
+    local, thinking = planning(known(np.concatenate([*walls, *rings])))
+    courses, _ = all_courses(thinking, 10**9, lambda: START)
+    assert local.tally.done < (400_000.0 if gap_m else 100_000.0)
+    assert (len(thinking.tracks) > 0) == (len(courses) > 0) == (gap_m > 0.0)
+    shortest = (
+        3000.0
+        + math.dist((west, 0.0), (west - 200.0, north))
+        + 9400.0
+        + math.dist((6200.0, 4700.0), (12e3, 0))
+    )
+    for course in courses:
+        assert course.nodes[-1] == MISSION.goal_m
+        assert course.path.length_m < 1.06 * shortest

@@ -13,11 +13,12 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from planner.cost_to_go import CostToGo
 from planner.curves import Point
 from planner.interface import FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track, search
-from planner.window import Window
+from planner.window import Tally, Window
 
 MakePoints = Callable[..., FloatArray]
 SPACING, KEEP, OUTER = 50.0, 212.0, 220.0
@@ -56,10 +57,19 @@ def tracks_in(
     bounds: tuple[float, float, float, float] = BOUNDS,
     goal: Point = GOAL,
     wide: bool = False,
+    to_go: CostToGo | None = None,
 ) -> list[Track]:
     """The first dozen tracks, after a look at what is promised of each."""
     found = search(
-        window, goal, bounds, steps=steps, keep_best=keep_best, outer_m=OUTER, most_tracks=1200, wide=wide
+        window,
+        goal,
+        bounds,
+        steps=steps,
+        keep_best=keep_best,
+        outer_m=OUTER,
+        most_tracks=1200,
+        wide=wide,
+        to_go=to_go,
     )
     tracks = list(islice((track for track in found if track is not None), 12))
     points = shapely.points(window.points_m)
@@ -73,7 +83,8 @@ def tracks_in(
         for x, y in track.nodes:
             assert bounds[0] <= x <= bounds[2]
             assert bounds[1] <= y <= bounds[3]
-    assert [track.cost_m for track in tracks] == sorted(track.cost_m for track in tracks)
+    if to_go is None:
+        assert [track.cost_m for track in tracks] == sorted(track.cost_m for track in tracks)
     return tracks
 
 
@@ -233,8 +244,13 @@ def connected(points: FloatArray, keep_m: float) -> bool:
 
 
 @settings(deadline=None, max_examples=40)
-@given(walls=st.lists(st.booleans(), min_size=2 * CELLS * (CELLS - 1), max_size=2 * CELLS * (CELLS - 1)))
-def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(walls: list[bool], wall: MakePoints) -> None:
+@given(
+    walls=st.lists(st.booleans(), min_size=2 * CELLS * (CELLS - 1), max_size=2 * CELLS * (CELLS - 1)),
+    led=st.booleans(),
+)
+def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(
+    walls: list[bool], led: bool, wall: MakePoints
+) -> None:
     lines: list[tuple[Point, Point]] = []
     for line in range(CELLS - 1):
         for row in range(CELLS):
@@ -242,7 +258,12 @@ def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(walls: list[bool],
             lines += [((at, low), (at, low + CELL)), ((low, at), (low + CELL, at))]
     pieces = [wall(a, b, SPACING) for (a, b), there in zip(lines, walls, strict=True) if there]
     window = window_of(*pieces)
-    tracks = tracks_in(window, steps=64, keep_best=48, bounds=WITHIN, goal=CORNER, wide=True)
+    to_go = None
+    if led and len(window.points_m):
+        to_go = CostToGo(START, CORNER, WITHIN, window.points_m, window.keep_m, Tally())
+        for _ in to_go.spread():
+            pass
+    tracks = tracks_in(window, steps=64, keep_best=48, bounds=WITHIN, goal=CORNER, wide=True, to_go=to_go)
     if connected(window.points_m, 1.1 * KEEP):
         assert tracks
         assert tracks[0].cost_m >= math.dist(START, CORNER) * (1.0 - 1e-9)
