@@ -32,9 +32,6 @@ WIDER, FURTHER = 4, 60
 """Where n tracks at every one of N steps find no way, this many times as many are tried, led by the cost to go: so that
 the best come first, and after the first only so many steps more are looked at."""
 
-OPTIMISING, OPTIMISING_AMONG = 20, 0.3
-"""Work of optimising a route, in questions about the window, and more of it for each point."""
-
 DOUBTED, MOST_AROUND = 0.1, 8
 """A way that is longer by this share than the one flown is doubtful: so many of the obstacles nearest to the start are
 looked at as well."""
@@ -220,7 +217,6 @@ class LocalPlanning:
         self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
     ) -> Route | None:
         """The curve along a track, from where a plan would begin now."""
-        self.tally.add(OPTIMISING, OPTIMISING_AMONG, len(points))
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
         return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
@@ -247,11 +243,12 @@ class LocalPlanning:
     def terrain(self, keep_m: float) -> Terrain:
         """Where a curve may lie that keeps one distance from all edge points."""
         points = self._memory.points_m
-        return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m)
+        return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m, self.tally)
 
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
         keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
-        return Terrain(points, np.minimum(keep, self._room(start, points)), self._mission.bounds_m)
+        room = self._room(start, points)
+        return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.tally)
 
     def _room(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
