@@ -15,7 +15,7 @@ import numpy as np
 
 from planner.course import Course
 from planner.interface import FloatArray, Path
-from planner.local_planning import Attempt, LocalPlanning, Start
+from planner.local_planning import DOUBTED, Attempt, LocalPlanning, Start
 from planner.multi_step_search import Track
 from planner.route_optimisation import Route
 
@@ -97,8 +97,9 @@ class Deliberation:
             if route is not None:
                 found = True
                 waiting.append(_Found(route, self._now()[0], attempt, points, known, shortest=i == 0))
-                if i == 0 and self._switches(route):
-                    continue  # a narrower way may lead on
+            narrower_may_lead_on = i == 0 and route is not None and self._switches(route)
+            if narrower_may_lead_on or self._passed_over(waiting):
+                continue
             yield from self._courses(waiting)
             waiting = []
         yield from self._courses(waiting)
@@ -118,6 +119,11 @@ class Deliberation:
                 route = self._local.fitted(start, each.attempt, each.route, each.points_m)
             if route is not None:
                 yield self._course(route, each.known, each.shortest)
+
+    def _passed_over(self, found: list[_Found]) -> bool:
+        """Whether a much shorter way could not be flown: further from obstacles it may have room for its turns."""
+        least_m = min((each.route.path.length_m for each in found), default=0.0)
+        return least_m > (1.0 + DOUBTED) * min((track.cost_m for track in self.tracks), default=math.inf)
 
     def _switches(self, route: Route) -> bool:
         """Whether a way leaves obstacles on the other side than what is flown."""
