@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -111,17 +111,16 @@ class _Unread(RangeScan):
     """A scan whose rays are followed when somebody first reads their ranges: few scans are news to anybody."""
 
     @classmethod
-    def of(cls, face_m: float, follow: Callable[[], FloatArray], attributes: dict[str, Any]) -> _Unread:
+    def of(cls, face_m: float, attributes: dict[str, Any]) -> _Unread:
         """A scan of which all is known but the ranges.
 
         Args:
             face_m: distance to the nearest face in range, ahead or not; +inf if there is none.
-            follow: gives the ranges.
-            attributes: all others, by name.
+            attributes: all others, by name; and either the ranges or, as `_follow`, what gives them.
         """
         scan = cls.__new__(cls)
         # At once: a frozen dataclass would set them one by one, and that is most of the cost of a scan.
-        scan.__dict__.update(attributes, nearest_m=face_m, _follow=follow)
+        scan.__dict__.update(attributes, nearest_m=face_m)
         return scan
 
     def __getattr__(self, name: str) -> FloatArray:
@@ -193,9 +192,9 @@ class RangeSensor:
         if self._flawed:  # what is drawn at random is drawn now, scan by scan
             return RangeScan(ranges_m=self._degraded(follow()), **seen)
         face_m = self._nearest(faces, east_m, north_m)
-        if face_m == math.inf:
-            seen["ranges_m"] = self._nothing
-        return _Unread.of(face_m, follow, seen)
+        if face_m == math.inf:  # nothing to follow rays to
+            return _Unread.of(face_m, {**seen, "ranges_m": self._nothing})
+        return _Unread.of(face_m, {**seen, "_follow": follow})
 
     def _near(self, east: float, north: float, time: float) -> Surroundings:
         """All that is in range, from the neighbour list; this renews the list when it runs out."""

@@ -22,6 +22,9 @@ CELLS = 5.0
 MOST_CELLS = 250_000
 """A grid of more is made coarser: it then closes less, but nothing that is open."""
 
+LEAST_M = 1.0
+"""Where less is kept, as where start or goal lie at an edge, the grid is made for this."""
+
 EIGHT = (2, 4)
 """Of five levels of the wave these go on to all 8 neighbours of a cell, the others to 4: what is counted is between the
 length of a way and 0.92 of it, so that what looks shortest on the grid seldom is not."""
@@ -56,7 +59,7 @@ class CostToGo:
     ) -> None:
         self._goal, self._points, self._keep, self._tally = goal, points_m, keep_m, tally
         # Beyond all that is known, and a way round it, nothing is nearer to anything.
-        most = float(keep_m.max())
+        most = max(float(keep_m.max()), LEAST_M)
         places = np.vstack((points_m, start, goal))
         low = np.maximum(places.min(axis=0) - 2.0 * most, np.minimum(bounds_m[:2], places.min(axis=0)))
         high = np.minimum(places.max(axis=0) + 2.0 * most, np.maximum(bounds_m[2:], places.max(axis=0)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -179,22 +179,23 @@ class LocalPlanning:
             least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
             return course is None or least_m > (1.0 + DOUBTED) * course.path.length_m
 
-        for track in self._found(window, attempt, effort, closed, doubtful):
-            if track is None:
+        for search_on in self._searches(window, attempt, effort, tracks, doubtful, closed):
+            for track in search_on:
+                if track is None:
+                    yield
+                    continue
+                start, course = now()
+                least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
+                if track.cost_m >= least_m:
+                    break
+                tracks.append(track)
+                reluctance_m = self._reluctance_m(track, course)
+                if track.cost_m + reluctance_m >= least_m:
+                    continue
+                route = self._fit(start, attempt, track.nodes, points)
+                if route is not None:
+                    fitted.append((route.path.length_m + reluctance_m, route))
                 yield
-                continue
-            start, course = now()
-            least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
-            if track.cost_m >= least_m:
-                break
-            tracks.append(track)
-            reluctance_m = self._reluctance_m(track, course)
-            if track.cost_m + reluctance_m >= least_m:
-                continue
-            route = self._fit(start, attempt, track.nodes, points)
-            if route is not None:
-                fitted.append((route.path.length_m + reluctance_m, route))
-            yield
         fitted.sort(key=lambda each: each[0])
         start, _ = now()
         if start is begun:
@@ -257,39 +258,40 @@ class LocalPlanning:
         nearer: FloatArray = np.minimum(*room)
         return nearer
 
-    def _found(
+    def _searches(
         self,
         window: Window,
         attempt: Attempt,
         effort: int,
-        closed: Callable[[], bool],
+        tracks: Sequence[Track],
         doubtful: Callable[[], bool],
-    ) -> Generator[Track | None, None, None]:
-        """The n best tracks; where there is none, those of a wider search. None after each step of work.
+        closed: Callable[[], bool],
+    ) -> Iterator[Iterator[Track | None]]:
+        """Searches for the n best tracks, each where those before have not found enough.
 
-        Where they are doubtful the search is repeated: a way out of a pocket may lead past what does not lie
-        towards the goal.
+        Where what was found is doubtful the obstacles around the start are looked at as well: a way out of a pocket
+        may lead past what does not lie towards the goal. Where nothing was found a wider search follows.
         """
-        found = yield from self._searched(window, attempt, 1)
-        if found and doubtful():
-            yield from self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
-        elif not found and not closed():
+        before = len(tracks)
+        yield self._searched(window, attempt, 1)
+        if len(tracks) > before:
+            if doubtful():
+                yield self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
+        elif not closed():
+            around = window.nearest_obstacles(MOST_AROUND)
+            yield self._searched(window, attempt, WIDER * 2**effort, around)
+
+    def _searched(
+        self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
+    ) -> Iterator[Track | None]:
+        """The n best tracks of one search. None after each step of work."""
+        to_go: CostToGo | None = None
+        if widening > 1:
             ends = window.center_m, self._mission.goal_m
             to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.tally)
             yield from to_go.spread()
-            around = window.nearest_obstacles(MOST_AROUND)
-            yield from self._searched(window, attempt, WIDER * 2**effort, around, to_go)
-
-    def _searched(
-        self,
-        window: Window,
-        attempt: Attempt,
-        widening: int,
-        around: Sequence[int] = (),
-        to_go: CostToGo | None = None,
-    ) -> Generator[Track | None, None, int]:
-        """The n best tracks of one search, and how many they are."""
-        tracks = search(
+        found = steps_since = 0
+        for track in search(
             window,
             self._mission.goal_m,
             self._mission.bounds_m,
@@ -300,13 +302,9 @@ class LocalPlanning:
             around=around,
             wide=widening > 1,
             to_go=to_go,
-        )
-        further = MOST_TRACKS if to_go is None else FURTHER
-        found = steps_since = 0
-        for track in tracks:
+        ):
             yield track
             found += track is not None
             steps_since += found > 0
-            if found == self._candidates or steps_since > further:
-                break
-        return found
+            if found == self._candidates or steps_since > (MOST_TRACKS if to_go is None else FURTHER):
+                return

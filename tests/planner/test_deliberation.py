@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from itertools import pairwise
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,8 +14,11 @@ from planner.course import Course
 from planner.curves import Pose
 from planner.deliberation import Deliberation
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, SeenWorld
-from planner.local_planning import LocalPlanning, Start
+from planner.local_planning import Attempt, LocalPlanning, Now, Start
 from planner.memory import ObstacleMemory
+from planner.multi_step_search import Track
+from planner.route_optimisation import Route
+from planner.window import Tally, Window
 
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], SeenWorld]
@@ -231,3 +235,46 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
     for course in courses:
         assert course.nodes[-1] == MISSION.goal_m
         assert course.path.length_m < 1.06 * shortest
+
+
+@pytest.mark.parametrize(("flown_m", "again"), [(30_000.0, False), (9_000.0, True)])
+def test_a_way_much_longer_than_the_one_flown_is_looked_for_once_more(
+    flown_m: float, again: bool, trap: SeenWorld, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies around the start is looked at as well."""
+    looked_round: list[int] = []
+    nearest = Window.nearest_obstacles
+
+    def counted(window: Window, most: int) -> list[int]:
+        looked_round.append(most)
+        return nearest(window, most)
+
+    monkeypatch.setattr(Window, "nearest_obstacles", counted)
+    flown = Course(Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, flown_m)])), (MISSION.goal_m,), 0, shortest=True)
+    assert list(deliberation(trap).courses(START, flown, 10**9))
+    assert bool(looked_round) == again
+
+
+class TightNearObstacles:
+    """Finds a short way that has room for its turns only further from obstacles, and a long one near them."""
+
+    known, points_m, tally = 0, np.zeros((0, 2)), Tally()
+
+    def attempts(self) -> list[Attempt]:
+        return [Attempt(60.0, 6.0), Attempt(60.0, 2.4), Attempt(110.0, 6.0)]
+
+    def route(
+        self, attempt: Attempt, effort: int, now: Now, tracks: list[Track], closed: Callable[[], bool]
+    ) -> Generator[None, None, Route | None]:
+        tracks.append(Track((START.position, MISSION.goal_m), 6400.0, 0.0))
+        yield
+        if attempt.margin_m < 6.0:
+            return None
+        length = 14_000.0 if attempt.distance_m == 60.0 else 6500.0
+        return Route((MISSION.goal_m,), Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)])))
+
+
+def test_a_long_way_waits_where_a_much_shorter_one_had_no_room_for_its_turns() -> None:
+    thinking = Deliberation(cast(LocalPlanning, TightNearObstacles()), 0, 0, lambda: False)
+    lengths = [course.path.length_m for course in thinking.courses(START, None, math.inf)]
+    assert lengths == [6500.0, 14_000.0]

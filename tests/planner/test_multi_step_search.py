@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from itertools import islice
 
 import numpy as np
@@ -56,6 +56,7 @@ def tracks_in(
     keep_best: int = 6,
     bounds: tuple[float, float, float, float] = BOUNDS,
     goal: Point = GOAL,
+    around: Iterable[int] = (),
     wide: bool = False,
     to_go: CostToGo | None = None,
 ) -> list[Track]:
@@ -68,6 +69,7 @@ def tracks_in(
         keep_best=keep_best,
         outer_m=OUTER,
         most_tracks=1200,
+        around=around,
         wide=wide,
         to_go=to_go,
     )
@@ -269,3 +271,20 @@ def test_in_a_maze_there_are_tracks_just_where_there_is_a_way(
         assert tracks[0].cost_m >= math.dist(START, CORNER) * (1.0 - 1e-9)
     elif not connected(window.points_m, 0.97 * KEEP):
         assert not tracks
+
+
+def test_the_first_step_may_lead_past_what_does_not_lie_towards_the_goal(
+    ring: MakePoints, wall: MakePoints
+) -> None:
+    window = window_of(
+        ring(6000.0, 0.0, 600.0, SPACING), wall((-3000.0, -2000.0), (3000.0, -2000.0), SPACING)
+    )
+    ahead, beside = window.labels[0], window.labels[-1]
+    assert window.nearest_obstacles(1) == [beside]
+    assert window.nearest_obstacles(5) == [beside, ahead]
+
+    def passes_the_end_of_the_wall(tracks: list[Track]) -> bool:
+        return any(math.dist(track.nodes[1], (-3000.0, -2000.0)) < 2.0 * OUTER for track in tracks)
+
+    assert not passes_the_end_of_the_wall(tracks_in(window))
+    assert passes_the_end_of_the_wall(tracks_in(window, around=[beside]))

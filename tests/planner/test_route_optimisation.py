@@ -12,6 +12,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from planner.clearance import first_breach, line_is_clear
 from planner.curves import Limits, Point, Pose, end_of, sample
 from planner.interface import FloatArray, Path
 from planner.route_optimisation import Terrain, optimise, shortcut
@@ -174,6 +175,18 @@ def test_what_lies_further_off_does_not_matter_to_a_short_path(seed: int, count:
     short = Path(np.array([(0.0, 0.0, 0.6, 0.8, 1 / 400.0, reach)]))
     assert near.admits(short) == all_of_it.admits(short)
     assert len(near.points_m) == len(near.keep_m) <= count
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, count=st.integers(1000, 1500), keep_m=st.floats(1.0, 80.0))
+def test_many_points_are_looked_at_as_few_are(seed: int, count: int, keep_m: float) -> None:
+    """Some first, then all: the answer is that of all at once."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1e4, 1e4, (count, 2))
+    many, a, b = terrain(points, keep_m), *(tuple(each) for each in rng.uniform(-5e3, 5e3, (2, 2)).tolist())
+    assert many.admits_line(a, b) == line_is_clear(a, b, points, keep_m)
+    path = Path(np.array([(*a, 0.6, 0.8, 1 / 400.0, rng.uniform(10.0, 2500.0))]))
+    assert many.admits(path) == math.isinf(first_breach(path, points, keep_m))
 
 
 def test_a_turn_round_something_is_flown_on_where_its_track_points_lie_outside(
