@@ -236,6 +236,28 @@ def test_new_points_on_the_plan_bring_a_new_one(ring: MakePoints) -> None:
     )
 
 
+def looks_again_after_m(wall: FloatArray, more: float) -> float:
+    """How far is flown before a course that a wall cuts again, grown to one side, is searched for anew."""
+    seen, pilot = Seen(nothing()), planner()
+    plan = pilot.plan(first_request(seen))
+    seen.show(wall)
+    plan = pilot.plan(request_on(plan, 200.0, seen))
+    assert plan.status is PlanStatus.FOUND
+    assert pilot.plan(request_on(plan, 0.0, seen)).status is PlanStatus.KEPT
+    seen.show(wall[wall[:, 1].argmax()][None] + (0.0, more))
+    for i in range(1, 100):
+        if pilot.plan(request_on(plan, 12.5 * i, seen)).status is not PlanStatus.KEPT:
+            return 12.5 * i
+    raise AssertionError("the course is not searched for anew")
+
+
+def test_a_course_that_is_only_grazed_is_searched_for_anew_less_soon(wall: MakePoints) -> None:
+    """A little more of the end of a wall costs little; a wall that made the way much longer may be a dead end."""
+    short = wall((6000.0, -3000.0), (6000.0, 0.0), SPACING)
+    long = wall((6000.0, -3000.0), (6000.0, 2500.0), SPACING)
+    assert looks_again_after_m(short, 60.0) > 1.5 * looks_again_after_m(long, 60.0)
+
+
 def test_new_points_beside_the_plan_do_not(ring: MakePoints) -> None:
     seen, pilot = Seen(nothing()), planner()
     plan = pilot.plan(first_request(seen))
