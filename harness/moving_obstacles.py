@@ -25,14 +25,7 @@ import numpy as np
 
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline
 from harness.range_sensor import RangeScan, all_round, supported
-from harness.registration import (
-    FEWEST,
-    STIFF,
-    STIFF_IN_NOISE,
-    Outline,
-    ends_of,
-    register,
-)
+from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
 from harness.scan_comparison import MISSING, come, drawn_back, in_a_row, runs_of
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
@@ -271,16 +264,15 @@ class MovingObstacles:
         mine = laid.members
         if len(mine) >= FEWEST:
             track.seen_s = scan.time_s
-            whole = self._grown(mine, hits, places, scan) if self._is_free else mine
+            whole = self._grown(mine, hits, places) if self._is_free else mine
             more = _extent(places[whole]) > GROWN * _extent(track.outline.points)
             if scan.time_s - track.outline_s > NEW_OUTLINE_S or (self._is_free and more):
                 track.renew(self._outline(scan, hits[whole], places[whole]), scan.time_s)
         return mine
 
-    def _grown(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+    def _grown(self, mine: IntArray, hits: IntArray, places: ComplexArray) -> IntArray:
         """Returns that belong to an outline, and those that go on from its ends without a step."""
-        step = NO_STEP * self._clearance if self._is_free else self._step(scan, hits)[1:]
-        near = (np.diff(hits) <= MISSING + 1) & (np.abs(np.diff(places)) < step)
+        near = (np.diff(hits) <= MISSING + 1) & (np.abs(np.diff(places)) < NO_STEP * self._clearance)
         first, last = int(mine[0]), int(mine[-1])
         if first > last:
             return mine  # it lies behind, where the fan begins and ends
