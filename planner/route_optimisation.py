@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
 from planner.clearance import first_breach, inside_bounds, line_is_clear
 from planner.curves import Limits, Point, Pose, fillet
 from planner.interface import FloatArray, Path
-from planner.window import PLACE, Tally
+from planner.window import Tally
 
 MOST_LEFT_OUT = 6
 """So many corners at most, from the first on, are tried to be left out."""
 
-MANY, SOME = 1000, 10
-"""Of so many points every tenth is looked at before all are."""
+MANY, NEAREST = 1000, 200
+"""Of so many points those nearest to the start of a path are looked at first: there turns mostly want room."""
 
 REACH = 0.012
 """Work of looking whether a segment of a path comes near to a point."""
@@ -39,27 +38,31 @@ class Terrain:
     keep_m: FloatArray
     bounds_m: tuple[float, float, float, float]
     tally: Tally = field(default_factory=Tally)
-
-    @cached_property
-    def _looked_at(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Points and distances to be kept: some of many first, for what comes too near to a wall mostly shows there."""
-        every = [(self.points_m, self.keep_m)]
-        return every if len(self.points_m) < MANY else [(self.points_m[::SOME], self.keep_m[::SOME]), *every]
+    _nearest_to: dict[Point, tuple[FloatArray, FloatArray]] = field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def admits(self, path: Path) -> bool:
         """Whether a path keeps its distance and stays inside."""
-        return inside_bounds(path, self.bounds_m) and all(
-            math.isinf(self._first_breach(path, points, keep)) for points, keep in self._looked_at
-        )
+        if not inside_bounds(path, self.bounds_m):
+            return False
+        if len(self.points_m) > MANY:
+            x, y = path.segments[0, :2].tolist()
+            if self._first_breach(path, *self._nearest(x, y)) < math.inf:
+                return False
+        return math.isinf(self._first_breach(path, self.points_m, self.keep_m))
+
+    def _nearest(self, x_m: float, y_m: float) -> tuple[FloatArray, FloatArray]:
+        """The points nearest to a place, and the distances to be kept from them."""
+        if (x_m, y_m) not in self._nearest_to:
+            dx, dy = self.points_m[:, 0] - x_m, self.points_m[:, 1] - y_m
+            chosen = np.argpartition(dx * dx + dy * dy, NEAREST)[:NEAREST]
+            self._nearest_to[x_m, y_m] = self.points_m[chosen], self.keep_m[chosen]
+        return self._nearest_to[x_m, y_m]
 
     def _first_breach(self, path: Path, points: FloatArray, keep: FloatArray) -> float:
         self.tally.add(3, REACH, len(points) * len(path.segments))
         return first_breach(path, points, keep)
-
-    def admits_line(self, a: Point, b: Point) -> bool:
-        """Whether the line from a to b keeps its distance."""
-        self.tally.add(2, PLACE, len(self.points_m))
-        return all(line_is_clear(a, b, points, keep) for points, keep in self._looked_at)
 
     def near(self, x_m: float, y_m: float, reach_m: float) -> Terrain:
         """What can matter to a path of at most `reach_m` from a place."""
@@ -82,7 +85,7 @@ def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
     i = 0
     while i < len(nodes) - 1:
         furthest = range(len(nodes) - 1, i + 1, -1)
-        sees = (k for k in furthest if terrain.admits_line(nodes[i], nodes[k]))
+        sees = (k for k in furthest if line_is_clear(nodes[i], nodes[k], terrain.points_m, terrain.keep_m))
         i = next(sees, i + 1)
         kept.append(nodes[i])
     return kept
