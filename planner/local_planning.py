@@ -17,7 +17,7 @@ from planner.multi_step_search import Track, search
 from planner.pose_search import search_poses
 from planner.route_optimisation import Route, Terrain, optimise
 from planner.trail import Trail
-from planner.window import Tally, Window
+from planner.window import PLACE, Tally, Window
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
@@ -209,8 +209,10 @@ class LocalPlanning:
 
     def _reluctance_m(self, track: Track, course: Course | None) -> float:
         """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
-        if course is not None and course.same_side(track.nodes, self._memory.points_m):
-            return 0.0
+        if course is not None:
+            self.tally.add(4, PLACE, 4 * len(track.nodes) * course.known)
+            if course.same_side(track.nodes, self._memory.points_m):
+                return 0.0
         switching = 0.0 if course is None else SWITCH * track.cost_m
         return switching + RETRACE * self.trail.retraced_m(track.nodes)
 

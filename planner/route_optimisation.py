@@ -11,7 +11,7 @@ import numpy as np
 from planner.clearance import first_breach, inside_bounds, line_is_clear
 from planner.curves import Limits, Point, Pose, fillet
 from planner.interface import FloatArray, Path
-from planner.window import Tally
+from planner.window import PLACE, Tally
 
 MOST_LEFT_OUT = 6
 """So many corners at most, from the first on, are tried to be left out."""
@@ -52,6 +52,11 @@ class Terrain:
                 return False
         return math.isinf(self._first_breach(path, self.points_m, self.keep_m))
 
+    def admits_line(self, a: Point, b: Point) -> bool:
+        """Whether the line from a to b keeps its distance."""
+        self.tally.add(1, PLACE, len(self.points_m))
+        return line_is_clear(a, b, self.points_m, self.keep_m)
+
     def _nearest(self, x_m: float, y_m: float) -> tuple[FloatArray, FloatArray]:
         """The points nearest to a place, and the distances to be kept from them."""
         if (x_m, y_m) not in self._nearest_to:
@@ -85,7 +90,7 @@ def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
     i = 0
     while i < len(nodes) - 1:
         furthest = range(len(nodes) - 1, i + 1, -1)
-        sees = (k for k in furthest if line_is_clear(nodes[i], nodes[k], terrain.points_m, terrain.keep_m))
+        sees = (k for k in furthest if terrain.admits_line(nodes[i], nodes[k]))
         i = next(sees, i + 1)
         kept.append(nodes[i])
     return kept
