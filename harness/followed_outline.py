@@ -16,7 +16,7 @@ from harness.registration import Outline
 LEAST_MPS = 0.5
 """What is slower than this stands still."""
 MOST_MPS = 30.0
-SURE = 4.0
+SURE = 8.0
 """In standard errors of the velocity."""
 VAGUE_MPS = 1.5
 """With a velocity that errs more than this it is not told where a thing will be."""

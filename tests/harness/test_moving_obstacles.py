@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness import range_sensor
@@ -135,14 +135,16 @@ STILL: list[dict[str, Any]] = [
 ]
 
 
-# The same worlds every time: in one of some 700 others something is taken to move for a while.
-@settings(deadline=None, max_examples=100, derandomize=True)
+@settings(deadline=None, max_examples=60)
 @given(
     seed=SEEDS,
     flaws=st.sampled_from(STILL),
     turn=st.sampled_from([0.0, 0.0, 0.05, -0.16]),
     course=st.floats(-0.6, 0.6),
 )
+@example(seed=623, flaws=STILL[0], turn=0.0, course=0.0)
+@example(seed=1215, flaws=STILL[4], turn=0.0, course=-0.24699075901474227)
+@example(seed=11734, flaws=STILL[1], turn=0.05, course=0.0707772080525213)
 def test_nothing_moves_in_a_still_world(seed: int, flaws: dict[str, Any], turn: float, course: float) -> None:
     world, outside = random_still_world(seed), []
     for scan in flight(sensor(world, seed, **flaws), 90.0, (3000.0, 1000.0), course, turn):
