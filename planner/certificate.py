@@ -130,7 +130,9 @@ def _disc(radius_m: float, spacing_m: float) -> FloatArray:
     axis = np.linspace(-radius_m, radius_m, 2 * count + 1)
     x, y = (each.ravel() for each in np.meshgrid(axis, axis))
     inside = x * x + y * y <= radius_m * radius_m
-    return np.column_stack((x[inside], y[inside]))
+    disc = np.column_stack((x[inside], y[inside]))
+    disc.setflags(write=False)
+    return disc
 
 
 def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:
