@@ -10,6 +10,7 @@ from pydantic import ValidationError, create_model
 
 from harness.scenario_sections import PlannerSpec, Section, key
 from harness.validation import KeyFault, first_fault, unknown_key
+from planner.compiled import compile_all
 from planner.registry import PlannerKind, planner_kinds
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
 
 
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
-    """The planner for one flight, from a section that `resolved` returned."""
+    """The planner for one flight, from a section that `resolved` returned; nothing is left to compile in it."""
+    compile_all()
     kind = planner_kinds()[spec.kind]
     return kind.make(kind.config(**spec.own), mission)
 

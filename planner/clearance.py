@@ -6,53 +6,54 @@ import math
 
 import numpy as np
 
-from planner.curves import Point, end_of
+from planner.compiled import COUNT, FLOAT, FLOATS, ROWS, compiled
+from planner.curves import Point
+from planner.fans import entered
 from planner.interface import FloatArray, IntArray, Path
 
 
-def _to_lines(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(k,) distance of points to straight segments, one each, and how far along the nearest place is."""
-    x, y, tx, ty, _, length = rows.T
-    dx, dy = points[:, 0] - x, points[:, 1] - y
-    s = np.minimum(np.maximum(dx * tx + dy * ty, 0.0), length)
-    dx -= s * tx
-    dy -= s * ty
-    return np.sqrt(dx * dx + dy * dy), s
+@compiled(ROWS, COUNT, FLOAT)
+def _place(rows: FloatArray, which: int, along: float) -> tuple[float, float]:
+    """East and north so far along a segment."""
+    x, y, tx, ty = rows[which, 0], rows[which, 1], rows[which, 2], rows[which, 3]
+    half = 0.5 * rows[which, 4] * along
+    chord = along * (math.sin(half) / half if half else 1.0)
+    cos, sin = math.cos(half), math.sin(half)
+    return x + chord * (tx * cos - ty * sin), y + chord * (ty * cos + tx * sin)
 
 
-def _to_arcs(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(k,) distance of points to arcs, one each, and how far along the nearest place is."""
-    x, y, tx, ty, curvature, length = rows.T
-    side, radius = np.sign(curvature), 1.0 / np.abs(curvature)
+@compiled(ROWS, COUNT, FLOAT, FLOAT)
+def _to_segment(rows: FloatArray, which: int, east: float, north: float) -> tuple[float, float]:
+    """Distance of a place to a segment, and how far along it the nearest place is."""
+    tx, ty, curvature, length = rows[which, 2], rows[which, 3], rows[which, 4], rows[which, 5]
+    dx, dy = east - rows[which, 0], north - rows[which, 1]
+    if abs(curvature) <= 1e-12:
+        along = min(max(dx * tx + dy * ty, 0.0), length)
+        return math.hypot(dx - along * tx, dy - along * ty), along
+    side, radius = math.copysign(1.0, curvature), 1.0 / abs(curvature)
     # Radial unit vector at the start, seen from the centre, and the tangent in the sense of travel.
     rx, ry = side * ty, -side * tx
-    dx = points[:, 0] - x + radius * rx
-    dy = points[:, 1] - y + radius * ry
+    dx, dy = dx + radius * rx, dy + radius * ry
     sweep = length / radius
-    turn = np.arctan2(dx * tx + dy * ty, dx * rx + dy * ry) % math.tau
-    # Beyond the end the nearer end counts: the middle of the part not swept parts the two.
-    turn = np.where(turn <= sweep, turn, np.where(turn > 0.5 * (sweep + math.tau), 0.0, sweep))
-    px, py = (
-        radius * (np.cos(turn) * rx + np.sin(turn) * tx),
-        radius * (np.cos(turn) * ry + np.sin(turn) * ty),
-    )
-    return np.hypot(dx - px, dy - py), turn * radius
+    turn = math.atan2(dx * tx + dy * ty, dx * rx + dy * ry) % math.tau
+    if turn > sweep:
+        # Beyond the end the nearer end counts: the middle of the part not swept parts the two.
+        turn = 0.0 if turn > 0.5 * (sweep + math.tau) else sweep
+    cos, sin = radius * math.cos(turn), radius * math.sin(turn)
+    return math.hypot(dx - (cos * rx + sin * tx), dy - (cos * ry + sin * ty)), turn * radius
 
 
-def _to_segments(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(k,) distance of points, (k, 2), to segments, (k, 6), and how far along the nearest place is."""
-    distance, along = np.empty((2, len(rows)))
-    bent = np.abs(rows[:, 4]) > 1e-12
-    for which, measure in ((~bent, _to_lines), (bent, _to_arcs)):
-        if which.any():
-            distance[which], along[which] = measure(rows[which], points[which])
-    return distance, along
-
-
-def _begins(path: Path) -> FloatArray:
-    """(n,) station at which each segment begins."""
-    begins: FloatArray = np.cumsum(path.segments[:, 5]) - path.segments[:, 5]
-    return begins
+@compiled(ROWS, ROWS)
+def _distances(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    nearest, stations = np.full(len(points), np.inf), np.zeros(len(points))
+    begins = 0.0
+    for which in range(len(rows)):
+        for i in range(len(points)):
+            distance, along = _to_segment(rows, which, points[i, 0], points[i, 1])
+            if distance < nearest[i]:
+                nearest[i], stations[i] = distance, begins + along
+        begins += rows[which, 5]
+    return nearest, stations
 
 
 def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -65,12 +66,25 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
     Returns:
         (m,) distances in metres and (m,) stations along the path of the nearest places.
     """
-    n, m = len(path.segments), len(points_m)
-    each = _to_segments(np.repeat(path.segments, m, axis=0), np.tile(points_m, (n, 1)))
-    distance, along = (values.reshape(n, m) for values in each)
-    nearest = distance.argmin(axis=0)
-    column = np.arange(m)
-    return distance[nearest, column], along[nearest, column] + _begins(path)[nearest]
+    return _distances(path.segments, points_m)
+
+
+@compiled(ROWS, ROWS, FLOATS, FLOAT)
+def _first_breach(rows: FloatArray, points: FloatArray, radius: FloatArray, from_m: float) -> float:
+    first, begins = math.inf, 0.0
+    for which in range(len(rows)):
+        half = 0.5 * rows[which, 5]
+        east, north = _place(rows, which, half)
+        for i in range(len(points)):
+            dx, dy, reach = points[i, 0] - east, points[i, 1] - north, half + radius[i]
+            if dx * dx + dy * dy >= reach * reach:
+                continue  # most points are out of reach
+            distance, along = _to_segment(rows, which, points[i, 0], points[i, 1])
+            # Where a segment is nearest at its start, the path only leads away from there on.
+            if distance < radius[i] and (along > 0.0 or not which) and from_m <= begins + along < first:
+                first = begins + along
+        begins += rows[which, 5]
+    return first
 
 
 def first_breach(
@@ -87,61 +101,41 @@ def first_breach(
     Returns:
         The station in metres; infinite where the distance is kept.
     """
-    if not len(points_m):
-        return math.inf
-    rows = path.segments
-    radius = np.asarray(radius_m, dtype=np.float64)
-    # Most points are out of reach.
-    east, north, half = path.middles
-    dx, dy = points_m[:, 0] - east[:, None], points_m[:, 1] - north[:, None]
-    which, point = (dx * dx + dy * dy < np.square(half[:, None] + radius)).nonzero()
-    if not len(which):
-        return math.inf
-    distance, along = _to_segments(rows[which], points_m[point])
-    station = along + _begins(path)[which]
-    # Where a segment is nearest at its start, the path only leads away from there on.
-    approached = (along > 0.0) | (which == 0)
-    near = (distance < (radius[point] if radius.ndim else radius)) & approached & (station >= from_m)
-    return float(station[near].min()) if near.any() else math.inf
+    return _first_breach(path.segments, points_m, _each(radius_m, points_m), from_m)
+
+
+@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+def _inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax: float) -> bool:
+    for which in range(len(rows) + 1):
+        end = which == len(rows)
+        x, y = _place(rows, which - 1, rows[which - 1, 5]) if end else (rows[which, 0], rows[which, 1])
+        if not (xmin <= x <= xmax and ymin <= y <= ymax):
+            return False
+    for which in range(len(rows)):
+        curvature = rows[which, 4]
+        if abs(curvature) <= 1e-12:
+            continue
+        # Between its ends an arc leaves a rectangle only at one of its four outermost points.
+        radius = 1.0 / abs(curvature)
+        center_x = rows[which, 0] - rows[which, 3] / curvature
+        center_y = rows[which, 1] + rows[which, 2] / curvature
+        for sx, sy in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+            x, y = center_x + sx * radius, center_y + sy * radius
+            if xmin <= x <= xmax and ymin <= y <= ymax:
+                continue
+            if _to_segment(rows, which, x, y)[0] < 1e-6 * radius:
+                return False
+    return True
 
 
 def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bool:
     """Whether a path stays inside a rectangle xmin, ymin, xmax, ymax."""
-    xmin, ymin, xmax, ymax = bounds_m
-    rows = path.segments
-    if not _all_within(rows[:, 0], rows[:, 1], bounds_m):
-        return False
-    bent = rows[np.abs(rows[:, 4]) > 1e-12]
-    if len(bent):
-        # An arc leaves a rectangle only at one of its four outermost points, or at its ends.
-        centre_x, centre_y = bent[:, 0] - bent[:, 3] / bent[:, 4], bent[:, 1] + bent[:, 2] / bent[:, 4]
-        radius = 1.0 / np.abs(bent[:, 4])
-        out = (
-            (centre_x - radius < xmin)
-            | (centre_x + radius > xmax)
-            | (centre_y - radius < ymin)
-            | (centre_y + radius > ymax)
-        )
-        for x, y, r, row in zip(centre_x[out], centre_y[out], radius[out], bent[out], strict=True):
-            extremes = np.array([[x - r, y], [x + r, y], [x, y - r], [x, y + r]])
-            distance, _ = _to_arcs(np.tile(row, (4, 1)), extremes)
-            passed = extremes[distance < 1e-6 * r]
-            if not _all_within(passed[:, 0], passed[:, 1], bounds_m):
-                return False
-    end = end_of(path)
-    return bool(xmin <= end.east_m <= xmax and ymin <= end.north_m <= ymax)
-
-
-def _all_within(x: FloatArray, y: FloatArray, bounds_m: tuple[float, float, float, float]) -> bool:
-    xmin, ymin, xmax, ymax = bounds_m
-    return bool(((x >= xmin) & (x <= xmax) & (y >= ymin) & (y <= ymax)).all())
+    return _inside_bounds(path.segments, *bounds_m)
 
 
 def line_is_clear(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> bool:
     """Whether the line from a to b keeps a distance from all points."""
-    if not len(points_m):
-        return True
-    return math.isinf(first_entry(a, b, points_m, radius_m)[0])
+    return not len(all_entered(a, b, points_m, radius_m))
 
 
 def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> tuple[float, int]:
@@ -158,31 +152,18 @@ def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | Floa
     Returns:
         Distance from a (m) and index of the disc; infinite and -1 where the line is clear.
     """
-    entry, entered = _entries(a, b, points_m, radius_m)
-    if not len(entered):
+    entry, which = entered(points_m, _each(radius_m, points_m), *a, *b)
+    if not len(which):
         return math.inf, -1
     first = int(entry.argmin())
-    return max(float(entry[first]), 0.0), int(entered[first])
+    return max(float(entry[first]), 0.0), int(which[first])
 
 
 def all_entered(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> IntArray:
     """Indices of all discs that the line from a to b enters, as `first_entry` has it."""
-    return _entries(a, b, points_m, radius_m)[1]
+    return entered(points_m, _each(radius_m, points_m), *a, *b)[1]
 
 
-def _entries(
-    a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray
-) -> tuple[FloatArray, IntArray]:
-    """Distances from a at which the line to b enters discs, and the indices of these discs."""
-    ux, uy = b[0] - a[0], b[1] - a[1]
-    length = math.hypot(ux, uy)
-    if length < 1e-9 or not len(points_m):
-        return np.zeros(0), np.zeros(0, dtype=np.intp)
-    ux, uy = ux / length, uy / length
-    dx, dy = points_m[:, 0] - a[0], points_m[:, 1] - a[1]
-    ahead = dx * ux + dy * uy
-    beside = dx * uy - dy * ux
-    past = np.maximum(ahead - length, 0.0)
-    room = np.square(radius_m) - beside * beside
-    hit = np.flatnonzero((room > past * past) & (ahead > 0.0))
-    return ahead[hit] - np.sqrt(room[hit]), hit
+def _each(radius_m: float | FloatArray, points_m: FloatArray) -> FloatArray:
+    """(m,) the radius of each of (m, 2) points."""
+    return radius_m if isinstance(radius_m, np.ndarray) else np.full(len(points_m), radius_m)

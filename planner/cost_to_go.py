@@ -12,8 +12,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from planner.compiled import (
+    BOOLS_OUT,
+    COUNT,
+    COUNTS_OUT,
+    FLOAT,
+    FLOATS,
+    FLOATS_OUT,
+    ROWS,
+    compiled,
+)
 from planner.curves import Point
-from planner.interface import FloatArray, IntArray
+from planner.interface import BoolArray, FloatArray, IntArray
 from planner.window import Tally
 
 CELLS = 5.0
@@ -30,10 +40,70 @@ EIGHT = (2, 4)
 length of a way and 0.92 of it, so that what looks shortest on the grid seldom is not."""
 
 AT_ONCE = 20_000
-"""So many pairs of a point and a cell are looked at in one step of work."""
+"""So many pairs of a point and a cell, or cells that the wave comes to, make one step of work."""
 
-PAIR, LEVEL, CELL = 0.015, 8.0, 0.04
-"""Work of a pair of a point and a cell near it, of a level of the wave, and of each cell in it."""
+CLOSED, REACHED = 0.002, 0.012
+"""Work of a pair of a point and a cell near it, and of each cell that the wave comes to."""
+
+
+@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT)
+def _close(
+    open_: BoolArray,
+    points: FloatArray,
+    keep: FloatArray,
+    west: float,
+    south: float,
+    cell: float,
+    columns: int,
+    rows: int,
+) -> None:
+    """Closes the cells that lie as a whole within what is to be kept from one of some points."""
+    for i in range(len(points)):
+        x, y, within = points[i, 0] - west, points[i, 1] - south, keep[i] - math.sqrt(0.5) * cell
+        if within <= 0.0:
+            continue
+        for column in range(max(int((x - within) / cell), 0), min(int((x + within) / cell) + 1, columns - 2)):
+            east = (column + 0.5) * cell - x
+            for row in range(max(int((y - within) / cell), 0), min(int((y + within) / cell) + 1, rows - 2)):
+                north = (row + 0.5) * cell - y
+                if east * east + north * north < within * within:
+                    open_[(column + 1) * rows + row + 1] = False
+
+
+@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT)
+def _spread(
+    levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
+) -> None:
+    """Lets the wave go on, by so many cells and to the end of a level.
+
+    Args:
+        levels: of each cell.
+        open_: whether the wave may go there, and has not.
+        order: cells in the order in which it came there.
+        state: the level; from which one in that order on cells have yet to go on to what touches them at a corner;
+            where the last level begins; where it ends.
+        rows: cells side by side.
+        most: how many.
+    """
+    level, cornered, begin, end = state
+    enough = end + most
+    while cornered < end < enough:
+        level += 1
+        corners = level % 5 in EIGHT
+        # What touches only at a corner is come to later, from all that was new since the last time.
+        front, begin = (cornered if corners else begin), end
+        for i in range(front, begin):
+            for across in (-rows, 0, rows):
+                for up in (-1, 0, 1):
+                    cell = order[i] + across + up
+                    if open_[cell] and (corners or not (across and up)):
+                        open_[cell] = False
+                        levels[cell] = level
+                        order[end] = cell
+                        end += 1
+        if corners:
+            cornered = begin
+    state[:] = (level, cornered, begin, end)
 
 
 class CostToGo:
@@ -82,59 +152,24 @@ class CostToGo:
         grid = np.zeros((self._columns, self._rows), dtype=np.bool_)
         grid[1:-1, 1:-1] = True
         open_ = grid.ravel()
-        for some in self._portions():
-            open_[self._closed_by(some)] = False
+        width = 2 * int(float(self._keep.max(initial=0.0)) / self._cell) + 3
+        some = max(AT_ONCE // width**2, 1)
+        west, south = self._low.tolist()
+        for i in range(0, len(self._points), some):
+            points, keep = self._points[i : i + some], self._keep[i : i + some]
+            _close(open_, points, keep, west, south, self._cell, self._columns, self._rows)
+            self._tally.add(1, CLOSED, len(points) * width**2)
             yield
-        rows = self._rows
-        beside = np.array((rows, -rows, 1, -1))
-        around = np.concatenate((beside, (rows + 1, rows - 1, 1 - rows, -rows - 1)))
-        level, front, fronts = 0, np.array([self._index(self._goal)]), list[IntArray]()
-        open_[front] = False
-        self._levels[front] = 0.0
+        goal = self._index(self._goal)
         order = np.zeros(len(open_), dtype=np.intp)
-        while len(front) or fronts:
-            level += 1
-            if len(front):
-                fronts.append(front)
-            corners = level % 5 in EIGHT
-            # What touches only at a corner is come to later, from all that was new since the last time.
-            old = np.concatenate(fronts) if corners else front
-            found = np.add.outer(old, around if corners else beside).ravel()
-            found = found[open_[found]]
-            order[found] = np.arange(len(found))
-            front = found[order[found] == np.arange(len(found))]
-            open_[front] = False
-            self._levels[front] = level
-            self._tally.add(0, LEVEL, 1)
-            self._tally.add(0, CELL, len(old))
-            if corners:
-                fronts = []
+        order[0], open_[goal], self._levels[goal] = goal, False, 0.0
+        state = np.array((0, 0, 0, 1))
+        while state[1] < state[3]:
+            before = int(state[3])
+            _spread(self._levels, open_, order, state, self._rows, AT_ONCE)
+            self._tally.add(1, REACHED, int(state[3]) - before)
             yield
 
     def _index(self, place: Point) -> int:
         column = int((place[0] - self._low[0]) / self._cell) + 1
         return column * self._rows + int((place[1] - self._low[1]) / self._cell) + 1
-
-    def _portions(self) -> Iterator[slice]:
-        reach = int(float(self._keep.max()) / self._cell) + 1
-        some = max(AT_ONCE // (2 * reach + 1) ** 2, 1)
-        return (slice(i, i + some) for i in range(0, len(self._points), some))
-
-    def _closed_by(self, some: slice) -> IntArray:
-        """Cells that lie as a whole within what is to be kept from one of some points."""
-        points, keep = self._points[some], self._keep[some] - math.sqrt(0.5) * self._cell
-        reach = int(float(self._keep.max()) / self._cell) + 1
-        offsets = np.arange(-reach, reach + 1)
-        self._tally.add(1, PAIR, len(points) * len(offsets) ** 2)
-        at = np.floor((points - self._low) / self._cell).astype(np.intp)
-        column, row = (at[:, axis, None] + offsets for axis in (0, 1))
-        east, north = (
-            (cells + 0.5) * self._cell + self._low[axis] - points[:, axis, None]
-            for axis, cells in enumerate((column, row))
-        )
-        near = east[:, :, None] ** 2 + north[:, None, :] ** 2 < (np.maximum(keep, 0.0) ** 2)[:, None, None]
-        which, i, j = near.nonzero()
-        column, row = column[which, i] + 1, row[which, j] + 1
-        inside = (column > 0) & (column < self._columns) & (row > 0) & (row < self._rows)
-        closed: IntArray = column[inside] * self._rows + row[inside]
-        return closed

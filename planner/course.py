@@ -9,6 +9,7 @@ import numpy as np
 
 from planner.clearance import distances
 from planner.curves import Point, between
+from planner.fans import encircled
 from planner.interface import FloatArray, Path
 
 
@@ -54,15 +55,3 @@ class Course:
         """
         loop = np.array([*nodes, *self.nodes[-2::-1]])
         return not encircled(loop, points_m[: self.known]).any()
-
-
-def encircled(loop_m: FloatArray, points_m: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(m,) whether a closed polyline (k, 2) goes round each of (m, 2) points an odd number of times."""
-    x, y = points_m[:, 0], points_m[:, 1]
-    x0, y0 = loop_m.T[:, :, None]
-    x1, y1 = np.roll(loop_m, -1, axis=0).T[:, :, None]
-    spans = (y0 <= y) != (y1 <= y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossing = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
-    odd: np.ndarray[tuple[int], np.dtype[np.bool_]] = (spans & (x < crossing)).sum(axis=0) % 2 == 1
-    return odd

@@ -16,12 +16,6 @@ from planner.window import PLACE, Tally
 MOST_LEFT_OUT = 6
 """So many corners at most, from the first on, are tried to be left out."""
 
-MANY, NEAREST = 1000, 200
-"""Of so many points those nearest to the start of a path are looked at first: there turns mostly want room."""
-
-REACH = 0.012
-"""Work of looking whether a segment of a path comes near to a point."""
-
 
 @dataclass(frozen=True, eq=False)
 class Terrain:
@@ -38,36 +32,18 @@ class Terrain:
     keep_m: FloatArray
     bounds_m: tuple[float, float, float, float]
     tally: Tally = field(default_factory=Tally)
-    _nearest_to: dict[Point, tuple[FloatArray, FloatArray]] = field(
-        default_factory=dict, init=False, repr=False
-    )
 
     def admits(self, path: Path) -> bool:
         """Whether a path keeps its distance and stays inside."""
         if not inside_bounds(path, self.bounds_m):
             return False
-        if len(self.points_m) > MANY:
-            x, y = path.segments[0, :2].tolist()
-            if self._first_breach(path, *self._nearest(x, y)) < math.inf:
-                return False
-        return math.isinf(self._first_breach(path, self.points_m, self.keep_m))
+        self.tally.add(1, PLACE, len(self.points_m) * len(path.segments))
+        return math.isinf(first_breach(path, self.points_m, self.keep_m))
 
     def admits_line(self, a: Point, b: Point) -> bool:
         """Whether the line from a to b keeps its distance."""
         self.tally.add(1, PLACE, len(self.points_m))
         return line_is_clear(a, b, self.points_m, self.keep_m)
-
-    def _nearest(self, x_m: float, y_m: float) -> tuple[FloatArray, FloatArray]:
-        """The points nearest to a place, and the distances to be kept from them."""
-        if (x_m, y_m) not in self._nearest_to:
-            dx, dy = self.points_m[:, 0] - x_m, self.points_m[:, 1] - y_m
-            chosen = np.argpartition(dx * dx + dy * dy, NEAREST)[:NEAREST]
-            self._nearest_to[x_m, y_m] = self.points_m[chosen], self.keep_m[chosen]
-        return self._nearest_to[x_m, y_m]
-
-    def _first_breach(self, path: Path, points: FloatArray, keep: FloatArray) -> float:
-        self.tally.add(3, REACH, len(points) * len(path.segments))
-        return first_breach(path, points, keep)
 
     def near(self, x_m: float, y_m: float, reach_m: float) -> Terrain:
         """What can matter to a path of at most `reach_m` from a place."""

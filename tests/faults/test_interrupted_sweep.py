@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -78,12 +79,14 @@ def test_a_file_system_that_takes_nothing(folder: str, place: Path) -> None:
 def test_two_sweeps_into_one_folder(place: Path, unbroken: bytes) -> None:
     first = start(place, *SWEEP)
     wait_until((place / "out" / "campaign.json").exists, first)
+    first.send_signal(signal.SIGSTOP)  # else it may end before the others have begun
     for resume in ((), ("--resume",)):
         status, out, err = run(place, *SWEEP, *resume)
         assert (status, out) == (2, "")
         assert err == (
             "wayproof: out is being flown into by another process: wait for it or choose another folder\n"
         )
+    first.send_signal(signal.SIGCONT)
     assert first.communicate(timeout=60) == ("", "")
     assert first.returncode == 0
     assert results(place) == unbroken

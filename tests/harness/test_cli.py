@@ -151,7 +151,7 @@ def test_validating_imports_nothing_of_the_flight(tmp_path: Path) -> None:
 import sys
 from harness.cli import main
 assert main(["validate", "paper_circles"]) == 0
-print(sorted({"jsbsim", "rerun", "pyarrow"} & set(sys.modules)), file=sys.stderr)
+print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=sys.stderr)
 """
     environment = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path / "cache")}
     wayproof("validate", "paper_circles", folder=tmp_path, **environment)  # flies the aircraft, once

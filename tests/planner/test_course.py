@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.course import Course, encircled
+from planner.course import Course
 from planner.curves import Point, end_of, pose_at
+from planner.fans import encircled
 from planner.interface import BoolArray, FloatArray, Path
 
 GOAL = (1000.0, 0.0)

@@ -12,10 +12,9 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.clearance import first_breach
 from planner.curves import Limits, Point, Pose, end_of, sample
 from planner.interface import FloatArray, Path
-from planner.route_optimisation import REACH, Terrain, optimise, shortcut
+from planner.route_optimisation import Terrain, optimise, shortcut
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
@@ -175,26 +174,6 @@ def test_what_lies_further_off_does_not_matter_to_a_short_path(seed: int, count:
     short = Path(np.array([(0.0, 0.0, 0.6, 0.8, 1 / 400.0, reach)]))
     assert near.admits(short) == all_of_it.admits(short)
     assert len(near.points_m) == len(near.keep_m) <= count
-
-
-@settings(deadline=None)
-@given(seed=SEEDS, count=st.integers(1001, 1500), keep_m=st.floats(1.0, 80.0))
-def test_many_points_are_looked_at_as_few_are(seed: int, count: int, keep_m: float) -> None:
-    """Those near the start first, then all: the answer is that of all at once."""
-    rng = np.random.default_rng(seed)
-    points = rng.uniform(-1e4, 1e4, (count, 2))
-    many, (x, y) = terrain(points, keep_m), rng.uniform(-5e3, 5e3, 2).tolist()
-    for length_m in rng.uniform(10.0, 2500.0, 4).tolist():
-        path = Path(np.array([(x, y, 0.6, 0.8, 1 / 400.0, length_m)]))
-        assert many.admits(path) == math.isinf(first_breach(path, points, keep_m))
-
-
-def test_of_many_points_those_far_off_are_not_looked_at_where_the_start_has_no_room() -> None:
-    rng = np.random.default_rng(1)
-    points = np.concatenate((rng.uniform(-1e4, 1e4, (5000, 2)), ((300.0, 0.0),)))
-    many = terrain(points)
-    assert not many.admits(Path(np.array([(*EAST, 0.0, 5000.0)] * 4)))
-    assert many.tally.done < 5000 * REACH
 
 
 def test_a_turn_round_something_is_flown_on_where_its_track_points_lie_outside(

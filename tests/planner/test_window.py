@@ -8,11 +8,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import shapely
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-import planner.window
 from planner.interface import FloatArray
 from planner.window import SectorEdge, Window, guide_vector
 
@@ -155,19 +154,6 @@ def test_every_edge_is_free_and_tangent(seed: int, count: int, ring: MakePoints,
     for label in range(count):
         for edge in window.sector_edges((0.0, 0.0), [label]):
             assert_tangent(edge, window, (0.0, 0.0))
-
-
-@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(seed=SEEDS, count=st.integers(2, 6))
-def test_many_points_are_looked_at_as_few_are(
-    seed: int, count: int, ring: MakePoints, wall: MakePoints, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    window = random_window(seed, count, ring, wall)
-    few = window.sector_edges((0.0, 0.0), range(count))
-    with monkeypatch.context() as patched:
-        patched.setattr(planner.window, "AT_ONCE", 0)
-        many = window.sector_edges((0.0, 0.0), range(count))
-    np.testing.assert_allclose(sorted(few), sorted(many))
 
 
 def test_hidden_edges_are_not_returned_but_those_of_what_hides_them(ring: MakePoints) -> None:

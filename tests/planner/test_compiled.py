@@ -1,0 +1,100 @@
+"""Compiled functions: when, for which arguments, and where there is no place to keep what was compiled."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.compiled import FLOAT, ROWS, Compiled
+from planner.fans import encircled
+
+
+def twice(x: float) -> float:
+    return 2.0 * x
+
+
+def inverse(x: float) -> float:
+    return 1.0 / x
+
+
+def unknown(x: float) -> float:
+    return no_such_name(x)  # type: ignore[name-defined, no-any-return]  # noqa: F821
+
+
+def total(rows: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> float:
+    return rows[0, 0] + rows[1, 1]  # type: ignore[no-any-return]
+
+
+@pytest.fixture(autouse=True)
+def names_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiling puts what is compiled in the place of a function."""
+    for function in (twice, inverse, unknown, total):
+        monkeypatch.setitem(globals(), function.__name__, function)
+
+
+def ran(source: str, folder: Path, **environment: str) -> list[str]:
+    """What a program writes that is run in another folder."""
+    run = subprocess.run(
+        [sys.executable, "-c", source],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.getcwd(), **environment},
+        check=True,
+        cwd=folder,
+    )
+    return run.stdout.split()
+
+
+def test_to_import_planners_compiles_nothing(tmp_path: Path) -> None:
+    source = """
+import sys, planner.registry
+print("numba" in sys.modules)
+from planner.clearance import inside_bounds
+from planner.interface import Path
+print(inside_bounds(Path([(0.0, 0.0, 1.0, 0.0, 0.0, 9.0)]), (0.0, 0.0, 10.0, 10.0)), "numba" in sys.modules)
+"""
+    assert ran(source, tmp_path) == ["False", "True", "True"]
+
+
+def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path: Path) -> None:
+    """From a file that cannot be found again there is nowhere to keep them."""
+    source = """
+from planner.compiled import FLOAT, Compiled
+names = {}
+exec("def twice(x): return 2.0 * x", names)
+made = Compiled(names["twice"], (FLOAT,))
+made.compile()
+print(made(21.0))
+"""
+    assert ran(source, tmp_path, HOME="/nonexistent") == ["42.0"]
+
+
+def test_other_failures_are_told() -> None:
+    with pytest.raises(Exception, match="no_such_name"):
+        Compiled(unknown, (FLOAT,)).compile()
+
+
+def test_division_by_zero_gives_what_it_gives_in_numpy() -> None:
+    made = Compiled(inverse, (FLOAT,))
+    made.compile()
+    assert made(0.0) == np.inf
+
+
+def test_nothing_is_compiled_in_flight() -> None:
+    """Arguments of other types are refused, where compiling anew would take seconds."""
+    loop, points = np.zeros((3, 2)), np.zeros((2, 4))[:, ::2]
+    with pytest.raises(TypeError, match="No matching definition"):
+        encircled(loop, points)
+
+
+def test_what_is_only_read_may_be_read_only() -> None:
+    made = Compiled(total, (ROWS,))
+    made.compile()
+    rows = np.eye(2)
+    rows.setflags(write=False)
+    assert made(rows) == 2.0
