@@ -14,19 +14,120 @@ import math
 
 import numpy as np
 
+from planner.compiled import (
+    BOOL,
+    BOOLS_OUT,
+    COUNT,
+    COUNTS_OUT,
+    FLOAT,
+    FLOATS,
+    ROWS,
+    compiled,
+)
 from planner.curves import Point
-from planner.interface import FloatArray, Mission
+from planner.interface import BoolArray, FloatArray, IntArray, Mission
 from planner.memory import ObstacleMemory
 
 OUTSIDE = 0
 """Node of the world outside of the area."""
 
-PROVED_AT_ONCE = 100
+PROVED_AT_ONCE = 500
 """So many edge points at most are taken into a proof in one call."""
 
 THIN = 0.1
 """Points nearer to one that was taken in than this share of the clearance are left out. Fewer points prove less,
 but nothing that is not so."""
+
+
+SQUARES = 4096
+"""Into so many lists nodes are put, by where they lie."""
+
+
+@compiled(COUNTS_OUT, BOOLS_OUT, COUNT)
+def _root(parent: IntArray, parity: BoolArray, node: int) -> tuple[int, bool]:
+    """The root of a node's tree and the parity of crossings on the way there; shortens the way."""
+    root, odd = node, False
+    while parent[root] != root:
+        odd ^= parity[root]
+        root = parent[root]
+    left = odd
+    while parent[node] != root and node != root:
+        after, crosses = parent[node], parity[node]
+        parent[node], parity[node] = root, left
+        node, left = after, left ^ crosses
+    return root, odd
+
+
+@compiled(FLOAT, FLOAT, FLOAT, FLOAT, ROWS)
+def _crosses(ax: float, ay: float, bx: float, by: float, ends: FloatArray) -> bool:
+    """Whether the line from a to b crosses that from start to goal."""
+    sx, sy, dx, dy = ends[0, 0], ends[0, 1], ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
+    side_a = dx * (ay - sy) - dy * (ax - sx)
+    side_b = dx * (by - sy) - dy * (bx - sx)
+    if (side_a > 0.0) == (side_b > 0.0):
+        return False
+    share = side_a / (side_a - side_b)
+    x, y = ax + share * (bx - ax), ay + share * (by - ay)
+    return bool(0.0 <= (x - sx) * dx + (y - sy) * dy < dx * dx + dy * dy)
+
+
+@compiled(COUNTS_OUT, BOOLS_OUT, COUNT, COUNT, BOOL)
+def _link(parent: IntArray, parity: BoolArray, a: int, b: int, crosses: bool) -> bool:
+    """Links two nodes; whether that closes a chain that parts start and goal."""
+    root_a, parity_a = _root(parent, parity, a)
+    root_b, parity_b = _root(parent, parity, b)
+    odd = parity_a ^ parity_b ^ crosses
+    if root_a == root_b:
+        return odd
+    parent[root_a], parity[root_a] = root_b, odd
+    return False
+
+
+@compiled(ROWS, COUNT, COUNTS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, ROWS, FLOATS, FLOAT)
+def _link_all(
+    places: FloatArray,
+    first: int,
+    parent: IntArray,
+    parity: BoolArray,
+    last: IntArray,
+    before: IntArray,
+    ends: FloatArray,
+    bounds: FloatArray,
+    clearance: float,
+) -> bool:
+    """Links nodes, from the first one on, with all before that are near enough; whether that closes a chain.
+
+    Args:
+        places: of each node but that of the outside, which is the first.
+        first: the first one to be linked.
+        parent: of each node in its tree.
+        parity: whether the chain to it crosses the line from start to goal an odd number of times.
+        last: by where they lie, told by squares: the last node there.
+        before: of each node the one before it there.
+        ends: start and goal.
+        bounds: xmin, ymin, xmax, ymax.
+        clearance: distance that a way keeps.
+    """
+    closed, reach = False, 2.0 * clearance
+    xmin, ymin, xmax, ymax = bounds
+    for node in range(first, len(places)):
+        x, y = places[node]
+        parent[node] = node
+        for border_x, border_y in ((xmin, y), (xmax, y), (x, ymin), (x, ymax)):
+            if math.hypot(border_x - x, border_y - y) < clearance:
+                closed |= _link(parent, parity, node, OUTSIDE, _crosses(x, y, border_x, border_y, ends))
+        column, row = math.floor(x / reach), math.floor(y / reach)
+        for i in range(column - 1, column + 2):
+            for j in range(row - 1, row + 2):
+                other = last[(i * 7919 + j) % len(last)]
+                while other > 0:
+                    other_x, other_y = places[other]
+                    if (other_x - x) ** 2 + (other_y - y) ** 2 < reach * reach:
+                        closed |= _link(parent, parity, node, other, _crosses(x, y, other_x, other_y, ends))
+                    other = before[other]
+        square = (column * 7919 + row) % len(last)
+        before[node], last[square] = last[square], node
+    return closed
 
 
 class Barrier:
@@ -42,72 +143,32 @@ class Barrier:
     def __init__(
         self, start: Point, goal: Point, bounds_m: tuple[float, float, float, float], clearance_m: float
     ) -> None:
-        self._start, self._goal = start, goal
-        self._bounds = bounds_m
+        self._ends, self._bounds = np.array((start, goal)), np.array(bounds_m)
         self._clearance = clearance_m
-        self._parent = [OUTSIDE]
-        self._parity = [False]  # crossings on the way to the parent
-        self._cells: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
         self._thinned: set[tuple[int, int]] = set()
+        self._places = np.zeros((1, 2))
+        self._parent, self._before = np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp)
+        self._parity = np.zeros(1, dtype=np.bool_)
+        self._last = np.zeros(SQUARES, dtype=np.intp)
         self.closed = False
 
     def add(self, points_m: FloatArray) -> None:
         """Takes in edge points, (k, 2)."""
+        known, fresh = len(self._places), []
         places = np.floor(points_m / (THIN * self._clearance)).astype(np.int64).tolist()
-        for (x, y), (column, row) in zip(points_m.tolist(), places, strict=True):
+        for i, (column, row) in enumerate(places):
             if (column, row) not in self._thinned:
                 self._thinned.add((column, row))
-                self._add(x, y)
-
-    def _add(self, x: float, y: float) -> None:
-        node = len(self._parent)
-        self._parent.append(node)
-        self._parity.append(False)
-        xmin, ymin, xmax, ymax = self._bounds
-        for border in ((xmin, y), (xmax, y), (x, ymin), (x, ymax)):
-            if math.dist(border, (x, y)) < self._clearance:
-                self._link(node, OUTSIDE, self._crosses((x, y), border))
-        reach = 2.0 * self._clearance
-        column, row = math.floor(x / reach), math.floor(y / reach)
-        for i in (column - 1, column, column + 1):
-            for j in (row - 1, row, row + 1):
-                for other_x, other_y, other in self._cells.get((i, j), ()):
-                    if (other_x - x) ** 2 + (other_y - y) ** 2 < reach * reach:
-                        self._link(node, other, self._crosses((x, y), (other_x, other_y)))
-        self._cells.setdefault((column, row), []).append((x, y, node))
-
-    def _link(self, a: int, b: int, crosses: bool) -> None:
-        root_a, parity_a = self._root(a)
-        root_b, parity_b = self._root(b)
-        odd = parity_a ^ parity_b ^ crosses
-        if root_a != root_b:
-            self._parent[root_a], self._parity[root_a] = root_b, odd
-        elif odd:
-            self.closed = True
-
-    def _root(self, node: int) -> tuple[int, bool]:
-        """The root of a node's tree and the parity of crossings on the way there; shortens the way."""
-        way = []
-        while self._parent[node] != node:
-            way.append(node)
-            node = self._parent[node]
-        parity = False
-        for each in reversed(way):
-            parity ^= self._parity[each]
-            self._parent[each], self._parity[each] = node, parity
-        return node, parity
-
-    def _crosses(self, a: Point, b: Point) -> bool:
-        """Whether the line from a to b crosses that from start to goal."""
-        (sx, sy), (gx, gy) = self._start, self._goal
-        dx, dy = gx - sx, gy - sy
-        side_a = dx * (a[1] - sy) - dy * (a[0] - sx)
-        side_b = dx * (b[1] - sy) - dy * (b[0] - sx)
-        if (side_a > 0.0) == (side_b > 0.0):
-            return False
-        share = side_a / (side_a - side_b)
-        x, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
-        return 0.0 <= (x - sx) * dx + (y - sy) * dy < dx * dx + dy * dy
+                fresh.append(i)
+        if not fresh:
+            return
+        more = np.zeros(len(fresh), dtype=np.intp)
+        self._places = np.concatenate((self._places, points_m[fresh]))
+        self._parent = np.concatenate((self._parent, more))
+        self._before = np.concatenate((self._before, more))
+        self._parity = np.concatenate((self._parity, more.astype(np.bool_)))
+        nodes = (self._parent, self._parity, self._last, self._before)
+        self.closed |= _link_all(self._places, known, *nodes, self._ends, self._bounds, self._clearance)
 
 
 class Proof:

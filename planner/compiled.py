@@ -8,10 +8,11 @@ time. Fast mathematics is left off: the same numbers give the same results.
 from __future__ import annotations
 
 import functools
+import gc
 from collections.abc import Callable
 from typing import Any, Generic, ParamSpec, TypeVar
 
-FLOAT, COUNT = "float64", "intp"
+FLOAT, COUNT, BOOL = "float64", "intp", "boolean"
 FLOATS = "Array(float64, 1, 'C', readonly=True)"
 ROWS = "Array(float64, 2, 'C', readonly=True)"
 """(n, k): points, or the segments of a path."""
@@ -75,6 +76,11 @@ def compiled(*arguments: str) -> Callable[[Callable[P, R]], Compiled[P, R]]:
 
 def compile_all() -> None:
     """Compiles all functions imported so far that are not yet: some seconds the first time, then some tenths."""
+    if not _waiting:
+        return
     while _waiting:
         _waiting[0].compile()
         del _waiting[0]
+    # The compiler stays for good: to look through it for garbage would hold a flight up for a tenth of a second.
+    gc.collect()
+    gc.freeze()

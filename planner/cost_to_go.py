@@ -129,7 +129,7 @@ class CostToGo:
     ) -> None:
         self._goal, self._points, self._keep, self._tally = goal, points_m, keep_m, tally
         # Beyond all that is known, and a way round it, nothing is nearer to anything.
-        most = max(float(keep_m.max()), LEAST_M)
+        most = max(float(keep_m.max(initial=0.0)), LEAST_M)
         places = np.vstack((points_m, start, goal))
         low = np.maximum(places.min(axis=0) - 2.0 * most, np.minimum(bounds_m[:2], places.min(axis=0)))
         high = np.minimum(places.max(axis=0) + 2.0 * most, np.maximum(bounds_m[2:], places.max(axis=0)))

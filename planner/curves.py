@@ -21,6 +21,10 @@ SHORTEST_M = 1e-6
 """Segments shorter than this are left out of a path."""
 
 
+ON_TURN = 1e-6
+"""A place is on a turn that is no further from it than this share of its radius."""
+
+
 class Pose(NamedTuple):
     """A place (metres, ENU) and the unit vector of the direction of travel."""
 
@@ -286,3 +290,24 @@ def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
         tangent = turn * complex(tangent_east, tangent_north)
         out.append((place.real, place.imag, tangent.real, tangent.imag, curvature, length))
     return out
+
+
+def onward_in_turn(pose: Pose, curvature: float, to: Pose) -> list[Segment] | None:
+    """The arc of a turn from one pose to another on it; None where that is not on it, with its tangent.
+
+    Args:
+        pose: in the turn.
+        curvature: of the turn, 1/m; 0: none.
+        to: the other pose.
+    """
+    if not curvature:
+        return None
+    turned = math.atan2(
+        pose.tangent_east * to.tangent_north - pose.tangent_north * to.tangent_east,
+        pose.tangent_east * to.tangent_east + pose.tangent_north * to.tangent_north,
+    )
+    turn = math.copysign(1.0, curvature) * turned % math.tau
+    arc: Segment = (*pose, curvature, turn / abs(curvature))
+    if math.dist(along(arc, arc[5])[:2], to[:2]) > ON_TURN / abs(curvature):
+        return None
+    return [arc] if SHORTEST_M < arc[5] < math.tau / abs(curvature) - SHORTEST_M else []

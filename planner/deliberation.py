@@ -104,9 +104,9 @@ class Deliberation:
             waiting = []
         yield from self._courses(waiting)
         if not found:
-            route = self._local.tight_route(self._now()[0])
+            route = yield from self._local.tight_route(self._now)
             if route is None and self.tracks:
-                route = self._local.beginning(self._now()[0], self.tracks[0])
+                route = yield from self._local.beginning(self._now, self.tracks[0])
             if route is not None:
                 yield self._course(route, self._local.known, shortest=False)
 

@@ -16,33 +16,56 @@ EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
 
 
-@compiled(FLOAT)
-def _turned_least(angle: float) -> float:
-    """An angle without whole turns, in -pi to pi."""
-    return angle - math.tau * float(np.rint(angle / math.tau))
-
-
-@compiled(ROWS, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, FLOATS, COUNTS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
 def first_met(
-    points: FloatArray, keep: FloatArray, east: float, north: float, ux: float, uy: float
+    points: FloatArray,
+    keep: FloatArray,
+    order: IntArray,
+    first: IntArray,
+    circles: FloatArray,
+    east: float,
+    north: float,
+    ux: float,
+    uy: float,
 ) -> tuple[float, int]:
-    """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does."""
+    """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does.
+
+    Args:
+        points: all edge points.
+        keep: distance to be kept from each.
+        order: the points, as `planner.blocks.blocks` has them,
+        first: where each square begins among them,
+        circles: and the circle about it.
+        east: where the ray begins.
+        north: where the ray begins.
+        ux: along the ray.
+        uy: along the ray.
+    """
     nearest, met = math.inf, 0
-    for i in range(len(points)):
-        dx, dy = points[i, 0] - east, points[i, 1] - north
-        ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
-        room = keep[i] * keep[i] - beside * beside
-        if room > 0.0 and ahead > 0.0:
-            entry = ahead - math.sqrt(room)
-            if entry < nearest:
-                nearest, met = entry, i
+    for block in range(len(circles)):
+        dx, dy, reach = circles[block, 0] - east, circles[block, 1] - north, circles[block, 2]
+        ahead = dx * ux + dy * uy
+        if abs(dx * uy - dy * ux) >= reach or ahead <= -reach or ahead - reach >= nearest:
+            continue
+        for k in range(first[block], first[block + 1]):
+            i = order[k]
+            dx, dy = points[i, 0] - east, points[i, 1] - north
+            ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+            room = keep[i] * keep[i] - beside * beside
+            if room > 0.0 and ahead > 0.0:
+                entry = ahead - math.sqrt(room)
+                if entry < nearest:
+                    nearest, met = entry, i
     return max(nearest, 0.0), met
 
 
-@compiled(ROWS, FLOATS, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT)
+@compiled(ROWS, FLOATS, COUNTS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT)
 def fan_edges(
     points: FloatArray,
     keep: FloatArray,
+    order: IntArray,
+    block: IntArray,
+    circles: FloatArray,
     members: IntArray,
     first: IntArray,
     counts: IntArray,
@@ -56,6 +79,9 @@ def fan_edges(
     Args:
         points: all edge points.
         keep: distance to be kept from each.
+        order: all points by squares, see `first_met`,
+        block: where each square begins,
+        circles: and the circle about it.
         members: indices of the obstacle's points, those of a cell next to each other.
         first: where each cell begins in `members`.
         counts: how many points it has.
@@ -68,46 +94,49 @@ def fan_edges(
         (k, 5) unit vector, distance at which it touches, distance up to which it is free, side (1 for M, -1 for N);
         (k,) index of the point that it comes too near to first.
     """
-    cells = len(first)
-    # Angles towards M and N, relative to the first point of their cell: none is cut at pi.
-    outmost, place = np.empty((2, cells)), np.empty((2, cells), dtype=np.intp)
-    edge = np.empty((2, len(members)))
+    cells, count = len(first), 0
+    left, right = np.empty((len(members), 2)), np.empty((len(members), 2))
     for j, i in enumerate(members):
-        dx, dy = points[i, 0] - east, points[i, 1] - north
-        half = math.asin(min(keep[i] / max(math.sqrt(dx * dx + dy * dy), 1e-6), 1.0))
-        angle = math.atan2(dy, dx)
-        edge[0, j], edge[1, j] = half + angle, half - angle
-    for row in range(2):
-        for cell in range(cells):
-            at, most = first[cell], 0.0
-            for j in range(first[cell] + 1, first[cell] + counts[cell]):
-                beyond = _turned_least(edge[row, j] - edge[row, first[cell]])
-                if beyond > most:
-                    at, most = j, beyond
-            outmost[row, cell], place[row, cell] = edge[row, first[cell]] + most, members[at]
-    # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
-    ends = np.ones((2, cells), dtype=np.bool_)
-    for row in range(2):
-        for pair in range(len(one)):
-            beyond = _turned_least(outmost[row, other[pair]] - outmost[row, one[pair]])
-            if beyond > 0.0:
-                ends[row, one[pair]] = False
-            elif beyond < 0.0:
-                ends[row, other[pair]] = False
+        # The direction towards a point, turned to its tangents; from too near they lead square past it.
+        dx, dy, kept2 = points[i, 0] - east, points[i, 1] - north, keep[i] * keep[i]
+        away2 = max(dx * dx + dy * dy, 1e-12)
+        inside = away2 <= kept2
+        cos = 0.0 if inside else math.sqrt(away2 - kept2) / away2
+        sin = 1.0 / math.sqrt(away2) if inside else keep[i] / away2
+        left[j, 0], left[j, 1] = dx * cos - dy * sin, dy * cos + dx * sin
+        right[j, 0], right[j, 1] = dx * cos + dy * sin, dy * cos - dx * sin
+    outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
     edges, met = np.empty((2 * cells, 5)), np.empty(2 * cells, dtype=np.intp)
-    count = 0
-    for row in range(2):
-        side = -1.0 if row else 1.0
+    for side, u in ((1.0, left), (-1.0, right)):
         for cell in range(cells):
-            i = place[row, cell]
+            begin = outmost[cell] = first[cell]
+            most = 0.0
+            for j in range(begin + 1, begin + counts[cell]):
+                beyond = side * (u[begin, 0] * u[j, 1] - u[begin, 1] * u[j, 0])
+                if beyond > 0.0 and u[begin, 0] * u[j, 0] + u[begin, 1] * u[j, 1] < 0.0:
+                    beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
+                if beyond > most:
+                    outmost[cell], most = j, beyond
+            ends[cell] = True
+        # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
+        for pair in range(len(one)):
+            j, k = outmost[one[pair]], outmost[other[pair]]
+            beyond = side * (u[j, 0] * u[k, 1] - u[j, 1] * u[k, 0])
+            if beyond > 0.0:
+                ends[one[pair]] = False
+            elif beyond < 0.0:
+                ends[other[pair]] = False
+        for cell in range(cells):
+            j = outmost[cell]
+            i = members[j]
             dx, dy = points[i, 0] - east, points[i, 1] - north
             touch2 = dx * dx + dy * dy - keep[i] * keep[i]
-            if not ends[row, cell] or touch2 <= 0.0:
+            if not ends[cell] or touch2 <= 0.0:
                 continue
-            angle = side * (outmost[row, cell] + EDGE_OFF_RAD)
-            ux, uy = math.cos(angle), math.sin(angle)
-            clear, met[count] = first_met(points, keep, east, north, ux, uy)
-            edges[count] = (ux, uy, math.sqrt(touch2), clear, side)
+            off = side * EDGE_OFF_RAD
+            towards, aside = u[j, 0] - off * u[j, 1], u[j, 1] + off * u[j, 0]
+            clear, met[count] = first_met(points, keep, order, block, circles, east, north, towards, aside)
+            edges[count] = (towards, aside, math.sqrt(touch2), clear, side)
             count += 1
     return edges[:count], met[:count]
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from planner.cost_to_go import CostToGo
 from planner.course import Course
-from planner.curves import Limits, Point, Pose, Segment
-from planner.interface import FloatArray, Mission
+from planner.curves import Limits, Point, Pose, Segment, onward_in_turn
+from planner.interface import FloatArray, Mission, Path
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track, search
 from planner.pose_search import search_poses
@@ -224,18 +224,34 @@ class LocalPlanning:
         terrain = self._terrain(start, attempt, points)
         return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
 
-    def tight_route(self, start: Start) -> Route | None:
-        """A way found by search over poses, where none through the free sectors can be flown."""
-        terrain = self._terrain(start, self._tight, self._memory.points_m)
-        return search_poses(start.pose, start.curvature, self._mission.goal_m, self.limits, terrain)
+    def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
+        """A way found by search over poses, where none through the free sectors can be flown.
 
-    def beginning(self, start: Start, track: Track) -> Route | None:
+        While this goes on the aircraft flies the turn that it is in, so that it comes by where the way begins again.
+        """
+        start, _ = now()
+        terrain = self._terrain(start, self._tight, self._memory.points_m)
+        goal, points = self._mission.goal_m, (terrain.points_m, terrain.keep_m)
+        to_go = CostToGo(start.pose[:2], goal, self._mission.bounds_m, *points, self.tally)
+        yield from to_go.spread()
+        route = yield from search_poses(start.pose, start.curvature, goal, self.limits, terrain, to_go)
+        begins, _ = now()
+        if route is None or begins is start:
+            return route
+        on = onward_in_turn(begins.pose, begins.curvature, start.pose)
+        return (
+            None if on is None else Route(route.nodes, Path(np.array([*on, *route.path.segments.tolist()])))
+        )
+
+    def beginning(self, now: Now, track: Track) -> Generator[None, None, Route | None]:
         """As much of a track as can be flown, where all of it cannot: from there the rest may look otherwise."""
-        nodes = (start.pose[:2], *track.nodes[1:])
-        for end in range(len(nodes) - 1, 1, -1):
-            route = self._fit(start, self._tight, nodes[:end], self._memory.points_m)
+        for end in range(len(track.nodes) - 1, 1, -1):
+            start, _ = now()
+            nodes = (start.pose[:2], *track.nodes[1:end])
+            route = self._fit(start, self._tight, nodes, self._memory.points_m)
             if route is not None:
                 return route
+            yield
         return None
 
     def window(self, start: Start, keep_m: FloatArray) -> Window:

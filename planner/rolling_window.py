@@ -54,7 +54,7 @@ BROKEN_SHARE = 0.99
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-PORTIONS = (4000.0, 13_000.0)
+PORTIONS = (4000.0, 8000.0)
 """Work of a search in the first scan and in each further one (`planner.window.Tally`): most are done in the first."""
 
 MOST_EFFORT = 4

@@ -6,8 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from planner.clearance import first_breach, inside_bounds, line_is_clear
 from planner.curves import Limits, Point, Pose, fillet
 from planner.interface import FloatArray, Path
@@ -44,12 +42,6 @@ class Terrain:
         """Whether the line from a to b keeps its distance."""
         self.tally.add(1, PLACE, len(self.points_m))
         return line_is_clear(a, b, self.points_m, self.keep_m)
-
-    def near(self, x_m: float, y_m: float, reach_m: float) -> Terrain:
-        """What can matter to a path of at most `reach_m` from a place."""
-        distance = np.hypot(self.points_m[:, 0] - x_m, self.points_m[:, 1] - y_m)
-        chosen = distance < self.keep_m + reach_m
-        return Terrain(self.points_m[chosen], self.keep_m[chosen], self.bounds_m, self.tally)
 
 
 @dataclass(frozen=True)

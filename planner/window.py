@@ -13,11 +13,12 @@ import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from planner.cells import Cells
+from planner.blocks import Cells, blocks, cells
 from planner.curves import Point
 from planner.fans import fan_edges, hugged
 from planner.interface import FloatArray, IntArray
@@ -25,7 +26,10 @@ from planner.interface import FloatArray, IntArray
 MOST_HIDING = 12
 """So many obstacles at most are looked at for the edges of one."""
 
-CALL, TANGENT, PLACE = 10.0, 0.08, 0.0012
+BLOCK_CELLS = 4
+"""Side of the squares in which points near a line are looked for, in cells."""
+
+CALL, TANGENT, PLACE = 14.0, 0.04, 0.0016
 """Work of a question, and more of it for each point that tangents are laid at and for each that is compared."""
 
 
@@ -89,12 +93,17 @@ class Window:
     tally: Tally = field(default_factory=Tally)
     _cells: dict[int, Cells] = field(default_factory=dict, init=False, repr=False)
 
+    @cached_property
+    def _blocks(self) -> tuple[IntArray, IntArray, FloatArray]:
+        self.tally.add(1, TANGENT, len(self.points_m))
+        return blocks(self.points_m, self.keep_m, BLOCK_CELLS * self.cell_m)
+
     def _obstacle(self, label: int) -> Cells:
-        """The points of an obstacle, gathered once."""
+        """The points of an obstacle, gathered once, as `planner.blocks.cells` has them."""
         if label not in self._cells:
             members = np.flatnonzero(self.labels == label)
             self.tally.add(4, TANGENT, len(members))
-            self._cells[label] = Cells.of(self.points_m, members, self.cell_m)
+            self._cells[label] = cells(self.points_m, members, self.cell_m)
         return self._cells[label]
 
     def nearest_obstacles(self, most: int) -> list[int]:
@@ -114,10 +123,10 @@ class Window:
         looked_at = set(pending)
         while pending:
             obstacle = pending.pop()
-            cells = self._obstacle(obstacle)
-            ends, met = fan_edges(self.points_m, self.keep_m, *cells, *origin)
-            self.tally.add(1, TANGENT, len(cells.members))
-            self.tally.add(0, PLACE, len(met) * len(self.points_m))
+            members = self._obstacle(obstacle)
+            ends, met = fan_edges(self.points_m, self.keep_m, *self._blocks, *members, *origin)
+            self.tally.add(1, TANGENT, len(members[0]))
+            self.tally.add(0, PLACE, len(met) * len(self._blocks[2]))
             for (ux, uy, touch_m, clear_m, side), hiding in zip(ends.tolist(), met.tolist(), strict=True):
                 if clear_m >= touch_m:
                     edges.append(SectorEdge(ux, uy, touch_m, clear_m, obstacle, side))
@@ -131,7 +140,7 @@ class Window:
 
     def hugged_m(self, origin: Point, edge: SectorEdge, outer_m: float) -> float:
         """How far along an edge an outer distance from the obstacle that it touches is reached again."""
-        members = self._obstacle(edge.obstacle).members
+        members = self._obstacle(edge.obstacle)[0]
         self.tally.add(1, PLACE, len(members))
         return hugged(self.points_m, members, *origin, edge.ux, edge.uy, outer_m, edge.touch_m)
 

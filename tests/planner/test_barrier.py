@@ -198,7 +198,7 @@ def proved(seen: SeenWorld, keeps_m: float) -> bool:
 
 
 def test_a_proof_takes_its_time(wall: MakePoints, known: Known) -> None:
-    points = wall((500.0, 0.0), (500.0, 1000.0), 5.0)
+    points = wall((500.0, 0.0), (500.0, 1000.0), 1.5)
     assert len(points) > PROVED_AT_ONCE
     proof, portions = proof_of(known(points), CLEARANCE)
     assert not proof.closed(START)

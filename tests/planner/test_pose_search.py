@@ -12,10 +12,12 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from planner.cost_to_go import CostToGo
 from planner.curves import Limits, Point, Pose, end_of, sample
 from planner.interface import FloatArray, Path
 from planner.pose_search import search_poses
-from planner.route_optimisation import Terrain, optimise
+from planner.route_optimisation import Route, Terrain, optimise
+from planner.window import Tally
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
@@ -29,6 +31,27 @@ def terrain(points: FloatArray, bounds: tuple[float, float, float, float] = WIDE
     return Terrain(points, np.full(len(points), KEEP), bounds)
 
 
+def searched(
+    start: Pose,
+    curvature: float,
+    goal: Point,
+    points: FloatArray,
+    bounds: tuple[float, float, float, float] = WIDE,
+) -> Route | None:
+    """What the search finds, led by the distances to go."""
+    near = (-6000.0, -6000.0, 6000.0, 6000.0) if bounds == WIDE else bounds
+    to_go = CostToGo(start[:2], goal, near, points, np.full(len(points), KEEP), Tally())
+    for _ in to_go.spread():
+        pass
+    search = search_poses(start, curvature, goal, LIMITS, terrain(points, bounds), to_go)
+    while True:
+        try:
+            next(search)
+        except StopIteration as end:
+            found: Route | None = end.value
+            return found
+
+
 def found_way(
     start: Pose,
     goal: Point,
@@ -37,7 +60,7 @@ def found_way(
     bounds: tuple[float, float, float, float] = WIDE,
 ) -> Path | None:
     """The path found, after a look at whether it can be flown."""
-    found = search_poses(start, 0.0, goal, LIMITS, terrain(points, bounds))
+    found = searched(start, 0.0, goal, points, bounds)
     if found is None:
         return None
     nodes, path = found.nodes, found.path
@@ -123,9 +146,7 @@ def test_whatever_is_found_can_be_flown(seed: int, count: int, assert_flyable: A
 @pytest.mark.parametrize("before", [1.0, -1.0])
 def test_a_turn_never_follows_the_opposite_one_at_once(before: float) -> None:
     for goal in ((300.0, 2000.0), (300.0, -2000.0), (-1000.0, 50.0), (-1000.0, -50.0)):
-        found = search_poses(
-            Pose(0.0, 0.0, 1.0, 0.0), before / RADIUS, goal, LIMITS, terrain(np.zeros((0, 2)))
-        )
+        found = searched(Pose(0.0, 0.0, 1.0, 0.0), before / RADIUS, goal, np.zeros((0, 2)))
         assert found is not None
         bends = [before / RADIUS, *found.path.segments[:, 4].tolist()]
         assert all(a * b >= 0.0 for a, b in pairwise(bends))

@@ -165,17 +165,6 @@ def test_walled_in_there_is_nothing_to_optimise(ring: MakePoints) -> None:
     assert not flown([(3000.0, 0.0)], terrain(ring(0.0, 0.0, 600.0, 25.0)))
 
 
-@settings(deadline=None)
-@given(seed=SEEDS, count=st.integers(0, 12), reach=st.floats(10.0, 2000.0))
-def test_what_lies_further_off_does_not_matter_to_a_short_path(seed: int, count: int, reach: float) -> None:
-    points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (count, 2))
-    all_of_it = terrain(points, keep_m=200.0)
-    near = all_of_it.near(0.0, 0.0, reach)
-    short = Path(np.array([(0.0, 0.0, 0.6, 0.8, 1 / 400.0, reach)]))
-    assert near.admits(short) == all_of_it.admits(short)
-    assert len(near.points_m) == len(near.keep_m) <= count
-
-
 def test_a_turn_round_something_is_flown_on_where_its_track_points_lie_outside(
     assert_flyable: AssertFlyable,
 ) -> None:

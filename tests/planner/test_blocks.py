@@ -1,0 +1,67 @@
+"""Squares of the plane hold each point once; what lies near a ray is found among them as among all points."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.blocks import MOST_BLOCKS, blocks, cells
+from planner.fans import first_met
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, count=st.integers(1, 120), side=st.floats(100.0, 2000.0))
+def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count: int, side: float) -> None:
+    points = np.random.default_rng(seed).uniform(-4000.0, 4000.0, (count, 2))
+    some = np.arange(3, 3 + count)
+    members, first, counts, one, other = cells(np.concatenate((np.full((3, 2), 1e6), points)), some, side)
+    assert sorted(members.tolist()) == some.tolist()
+    assert first.tolist() == (np.cumsum(counts) - counts).tolist()
+    in_square = np.repeat(np.floor(points[members[first] - 3] / side), counts, axis=0)
+    np.testing.assert_array_equal(np.floor(points[members - 3] / side), in_square)
+    squares = [tuple(each) for each in np.floor(points[members[first] - 3] / side).astype(int).tolist()]
+    assert len(set(squares)) == len(squares)
+    touching = {
+        frozenset((i, j))
+        for i, (x, y) in enumerate(squares)
+        for j, (u, v) in enumerate(squares[:i])
+        if max(abs(x - u), abs(y - v)) == 1
+    }
+    pairs = [frozenset(pair) for pair in zip(one.tolist(), other.tolist(), strict=True)]
+    assert len(pairs) == len(set(pairs))
+    assert set(pairs) == touching
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, count=st.integers(0, 200), side=st.floats(0.1, 5000.0))
+def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side: float) -> None:
+    rng = np.random.default_rng(seed)
+    points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
+    order, first, circles = blocks(points, keep, side)
+    assert sorted(order.tolist()) == list(range(count))
+    assert (first[0], first[-1], len(first)) == (0, count, len(circles) + 1)
+    which = np.repeat(np.arange(len(circles)), np.diff(first))
+    away = np.hypot(*(points[order] - circles[which, :2]).T)
+    assert (away + keep[order] <= circles[which, 2] + 1e-9).all()
+    assert len(circles) <= 2 * MOST_BLOCKS
+
+
+@settings(deadline=None)
+@given(seed=SEEDS, count=st.integers(0, 200), bearing=st.floats(-math.pi, math.pi))
+def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, bearing: float) -> None:
+    rng = np.random.default_rng(seed)
+    points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
+    ux, uy = math.cos(bearing), math.sin(bearing)
+    distance, met = first_met(points, keep, *blocks(points, keep, 500.0), 100.0, -50.0, ux, uy)
+    away = points - (100.0, -50.0)
+    ahead, beside = away @ (ux, uy), away @ (uy, -ux)
+    hit = (ahead > 0.0) & (np.abs(beside) < keep)
+    entry = np.where(hit, ahead - np.sqrt(np.maximum(keep**2 - beside**2, 0.0)), math.inf)
+    assert distance == pytest.approx(max(entry.min(initial=math.inf), 0.0))
+    assert not hit.any() or entry[met] == pytest.approx(entry.min())
