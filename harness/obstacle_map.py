@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.edge_grid import EdgeGrid
-from harness.range_sensor import RangeScan, all_round, clockwise_from, supported
+from harness.range_sensor import RangeScan, all_round, supported
+from harness.scan_comparison import looked_through
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 """Points of the plane as east + i north: one number each."""
@@ -288,22 +289,17 @@ class ObstacleMap:
         slots = self._near
         if self._near_count < self._count:
             slots = np.concatenate((slots, np.arange(self._near_count, self._count, dtype=np.int32)))
-        offsets = self._points.take(slots) - sensor
-        distance = np.abs(offsets)
-        rays = len(scan.ranges_m)
-        bearing = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
-        position = bearing / scan.spacing_rad
-        ray = np.rint(position).astype(np.int64)
-        # Only a ray that passes close by says anything about the point.
-        aimed = (np.abs(position - ray) * scan.spacing_rad * distance < 0.25 * self._cell) & (
-            distance < scan.max_range_m - 2.0 * self._cell
+        # Only a ray that passes close by says anything about a point.
+        through = looked_through(
+            scan,
+            self._points.take(slots),
+            1.5 * self._cell,
+            abreast=1,
+            aimed_m=0.25 * self._cell,
+            within_m=scan.max_range_m - 2.0 * self._cell,
         )
-        if not all_round(scan):
-            aimed &= (ray >= 1) & (ray < rays - 1)
-        chosen = aimed.nonzero()[0]
-        beside = scan.least_beside_m(1).take(ray.take(chosen), mode="wrap")
-        through = beside > distance.take(chosen) + 1.5 * self._cell
-        weaker = self._key[slots[chosen[through]]]
+        weaker = self._key[slots[through]]
+        weaker = self._key[slots[through]]
         weaker = weaker[self._score[weaker] > 0]
         if len(weaker):
             self._score[weaker] -= 1

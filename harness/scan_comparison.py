@@ -5,26 +5,19 @@ Places are complex: east + i north, m.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from harness.range_sensor import RangeScan, all_round, clockwise_from
-from harness.registration import FEWEST
+from planner.compiled import BOOL, COUNT, FLOAT, FLOATS, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 MISSING = 3
 """A run of returns goes on where no more of them in a row are lost."""
 ABREAST = 2
 """A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
-
-
-def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
-    """(k,) which places were looked through by a scan before: what is there now has come."""
-    # Of as many in a row as it takes one is among these.
-    if not looked_through(before, places[::FEWEST], sure_m).any():
-        return np.zeros(len(places), dtype=np.bool_)
-    return looked_through(before, places, sure_m)
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
@@ -37,8 +30,8 @@ def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float
         most_m: nothing has drawn back by more.
     """
     gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
-    if looked_through(scan, were[::FEWEST], sure_m).any():
-        left = were[looked_through(scan, were, sure_m)]
+    left = were[looked_through(scan, were, sure_m)]
+    if len(left):
         ray = rays_towards(scan, left)
         back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
         ray = ray[back_m < most_m]
@@ -55,15 +48,69 @@ def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:
     return ray % len(scan.ranges_m) if all_round(scan) else ray
 
 
-def looked_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
-    """(k,) whether a scan looked through places, surely: with the ray towards each and two to either side."""
-    distance = np.abs(places - complex(scan.east_m, scan.north_m))
-    rays = len(scan.ranges_m)
-    ray = rays_towards(scan, places)
-    beyond = np.minimum(scan.least_beside_m(ABREAST).take(ray, mode="wrap"), scan.max_range_m)
-    through: BoolArray = beyond > distance + sure_m
-    if not all_round(scan):
-        through &= (ray >= ABREAST) & (ray < rays - ABREAST)
+def looked_through(
+    scan: RangeScan,
+    places: ComplexArray,
+    sure_m: float,
+    abreast: int = ABREAST,
+    aimed_m: float = math.inf,
+    within_m: float = math.inf,
+) -> BoolArray:
+    """(k,) whether a scan looked through places, surely: with the ray towards each and some to either side.
+
+    Args:
+        scan: the scan.
+        places: (k,) places.
+        sure_m: how much further than a place the rays went.
+        abreast: so many rays to either side.
+        aimed_m: how near the ray passes by a place, if it is to say anything about it.
+        within_m: how far away it says anything.
+    """
+    return _through(
+        places,
+        scan.ranges_m,
+        scan.east_m,
+        scan.north_m,
+        scan.start_rad,
+        scan.spacing_rad,
+        all_round(scan),
+        min(within_m, scan.max_range_m - sure_m),
+        sure_m,
+        abreast,
+        aimed_m,
+    )
+
+
+@compiled(PLACES, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT, COUNT, FLOAT)
+def _through(
+    places: ComplexArray,
+    ranges: FloatArray,
+    east: float,
+    north: float,
+    start_rad: float,
+    spacing_rad: float,
+    closed: bool,
+    within_m: float,
+    sure_m: float,
+    abreast: int,
+    aimed_m: float,
+) -> BoolArray:
+    through, rays = np.zeros(len(places), dtype=np.bool_), len(ranges)
+    for i in range(len(places)):
+        dx, dy = places[i].real - east, places[i].imag - north
+        distance = math.hypot(dx, dy)
+        if distance >= within_m:
+            continue
+        towards = ((math.atan2(dx, dy) - start_rad) % math.tau) / spacing_rad
+        ray = round(towards)
+        if abs(towards - ray) * spacing_rad * distance >= aimed_m:
+            continue
+        if not closed and not abreast <= ray < rays - abreast:
+            continue
+        through[i] = True
+        for beside in range(ray - abreast, ray + abreast + 1):
+            if ranges[beside % rays] <= distance + sure_m:
+                through[i] = False
     return through
 
 

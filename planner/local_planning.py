@@ -259,9 +259,9 @@ class LocalPlanning:
         points, labels = self._memory.points_m, self._memory.labels.copy()
         return Window(start.pose[:2], self._window_m, points, labels, self._memory.cell_m, keep_m, self.tally)
 
-    def terrain(self, keep_m: float) -> Terrain:
-        """Where a curve may lie that keeps one distance from all edge points."""
-        points = self._memory.points_m
+    def terrain(self, keep_m: float, refused: bool = True) -> Terrain:
+        """Where a curve may lie that keeps one distance from all edge points; or from all but what was refused."""
+        points = self._memory.points_m if refused else self._memory.sensed_m
         return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m, self.tally)
 
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:

@@ -64,6 +64,11 @@ class ObstacleMemory:
         return self._points[: self._count][self._genuine[: self._count]]
 
     @property
+    def sensed_m(self) -> FloatArray:
+        """(k, 2) those points that were seen, not refused: of what stands still and of what moves."""
+        return np.concatenate((self.genuine_m, self.points_m[self.known :]))
+
+    @property
     def refused_m(self) -> FloatArray:
         """(k, 2) those points that were refused."""
         return self._points[: self._count][~self._genuine[: self._count]]

@@ -54,7 +54,7 @@ BROKEN_SHARE = 0.99
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
-PORTIONS = (4000.0, 8000.0)
+PORTIONS = (4000.0, 12_000.0)
 """Work of a search in the first scan and in each further one (`planner.window.Tally`): most are done in the first."""
 
 MOST_EFFORT = 4
@@ -352,7 +352,8 @@ class RollingWindow:
         else:
             path, last = effect.path, min(self._watch.cut_m, effect.leaves_m)
         for share in HOLD_SHARES:
-            terrain = self._local.terrain(share * self._local.path_keeps_m)
+            # What was only refused stands in nobody's way.
+            terrain = self._local.terrain(share * self._local.path_keeps_m, refused=False)
             if effect is not None and terrain.admits(effect.left(here)):
                 self._watch.broken = False
                 return Plan(

@@ -25,6 +25,7 @@ from planner.curves import (
     moved,
     on_loiter,
     onward,
+    onward_in_turn,
     place_on,
     pose_at,
     poses_at,
@@ -405,3 +406,28 @@ def test_what_is_moved_again_and_again_keeps_its_size(start: Pose, pieces: list[
         # As an aircraft does that begins each plan on the one before.
         segments = moved(segments, Pose(*segments[0][:4]))
     np.testing.assert_allclose(segments, first, atol=1e-6)
+
+
+@given(
+    curvature=st.floats(1e-4, 1e-2).flatmap(lambda bend: st.sampled_from((bend, -bend))),
+    course=st.floats(-math.pi, math.pi),
+    share=st.floats(0.001, 0.999),
+)
+def test_a_turn_comes_by_each_of_its_poses(curvature: float, course: float, share: float) -> None:
+    pose = Pose(300.0, -200.0, math.cos(course), math.sin(course))
+    round_m = math.tau / abs(curvature)
+    to = along((*pose, curvature, round_m), share * round_m)
+    arc = onward_in_turn(pose, curvature, to)
+    assert arc is not None
+    assert len(arc) == 1
+    assert arc[0][:5] == (*pose, curvature)
+    assert arc[0][5] == pytest.approx(share * round_m)
+
+
+def test_only_on_a_turn_there_is_a_way_on_in_it() -> None:
+    pose = Pose(0.0, 0.0, 1.0, 0.0)
+    assert onward_in_turn(pose, 0.0, pose) is None
+    assert onward_in_turn(pose, 0.01, pose) == []
+    beside = Pose(100.0, 101.0, 0.0, 1.0)
+    assert onward_in_turn(pose, 0.01, beside) is None
+    assert onward_in_turn(pose, 0.01, Pose(100.0, 100.0, 0.0, -1.0)) is None

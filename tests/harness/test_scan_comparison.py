@@ -1,0 +1,66 @@
+"""What a scan looked through, against a loop over places and rays."""
+
+from __future__ import annotations
+
+import cmath
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.range_sensor import RangeScan
+from harness.scan_comparison import looked_through
+
+RAYS, RANGE = 60, 1000.0
+AT = complex(300.0, -200.0)
+
+
+def scan_of(ranges: np.ndarray[tuple[int], np.dtype[np.float64]], fan_rad: float) -> RangeScan:
+    """From north on, clockwise."""
+    spacing = fan_rad / (RAYS if fan_rad == math.tau else RAYS - 1)
+    fan = 1j * np.exp(-1j * spacing * np.arange(RAYS))
+    return RangeScan(0.0, 0.0, AT.real, AT.imag, 0.0, 0.0, spacing, fan, ranges, RANGE)
+
+
+@settings(deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    fan_rad=st.sampled_from((math.tau, math.pi)),
+    abreast=st.integers(0, 3),
+    aimed_m=st.sampled_from((math.inf, 10.0)),
+    within_m=st.sampled_from((math.inf, 700.0)),
+)
+def test_a_place_is_looked_through_where_the_rays_about_it_went_beyond(
+    seed: int, fan_rad: float, abreast: int, aimed_m: float, within_m: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    ranges = rng.choice([rng.uniform(50.0, RANGE), math.inf, 600.0], RAYS)
+    scan, sure_m = scan_of(ranges, fan_rad), 20.0
+    places = AT + rng.uniform(1.0, 1100.0, 40) * np.exp(1j * rng.uniform(-math.pi, math.pi, 40))
+    through = looked_through(scan, places, sure_m, abreast, aimed_m, within_m)
+    for place, seen in zip(places.tolist(), through.tolist(), strict=True):
+        away = abs(place - AT)
+        clockwise = (math.pi / 2 - cmath.phase(place - AT)) % math.tau
+        ray = round(clockwise / scan.spacing_rad)
+        about = range(ray - abreast, ray + abreast + 1)
+        if fan_rad < math.tau and not 0 <= about[0] <= about[-1] < RAYS:
+            assert not seen
+            continue
+        beyond = all(min(ranges[each % RAYS], RANGE) > away + sure_m for each in about)
+        aimed = abs(clockwise - ray * scan.spacing_rad) * away < aimed_m
+        assert seen == (beyond and aimed and away < within_m)
+
+
+def test_of_no_places_none_was_looked_through() -> None:
+    none = np.zeros(0, dtype=np.complex128)
+    assert looked_through(scan_of(np.full(RAYS, math.inf), math.tau), none, 1.0).tolist() == []
+
+
+@pytest.mark.parametrize("north", [True, False])
+def test_the_ends_of_a_whole_round_are_joined(north: bool) -> None:
+    ranges = np.full(RAYS, math.inf)
+    ranges[-1 if north else 0] = 100.0
+    place = AT + cmath.rect(500.0, math.pi / 2 + (0.0 if north else 1.0) * math.tau / RAYS)
+    assert not looked_through(scan_of(ranges, math.tau), np.array([place]), 1.0).any()
