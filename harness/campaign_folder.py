@@ -28,7 +28,7 @@ JOURNAL: Final = "journal.jsonl"
 LOCK: Final = "lock"
 RUNS: Final = "runs"
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
-FLOWN_WITH: Final = ("wayproof", "jsbsim", "numpy", "shapely")
+FLOWN_WITH: Final = ("wayproof", "jsbsim", "numba", "numpy", "shapely")
 """What a flight's bits depend on: a campaign is not gone on with another version."""
 
 MAX_TOLD: Final = 3

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.range_sensor import RangeScan, all_round, clockwise_from
+from planner.compiled import FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
 MOST_CELLS = 1_000_000
@@ -132,12 +133,17 @@ class FreeSpace:
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""
-        ix = np.floor((points_m[:, 0] - self._x0) / self._cell).astype(np.int64)
-        iy = np.floor((points_m[:, 1] - self._y0) / self._cell).astype(np.int64)
-        inside = (ix >= 0) & (iy >= 0) & (ix < self._nx) & (iy < self._ny)
-        out = np.zeros(len(points_m), dtype=np.bool_)
-        out[inside] = self._seen[ix[inside], iy[inside]]
-        return out
+        return _contains(self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
+
+
+@compiled(GRID, ROWS, FLOAT, FLOAT, FLOAT)
+def _contains(seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float) -> BoolArray:
+    out = np.zeros(len(points), dtype=np.bool_)
+    for i in range(len(points)):
+        column, row = math.floor((points[i, 0] - x0) / cell), math.floor((points[i, 1] - y0) / cell)
+        if 0 <= column < seen.shape[0] and 0 <= row < seen.shape[1]:
+            out[i] = seen[column, row]
+    return out
 
 
 def _disc(cells: int) -> BoolArray:

@@ -54,7 +54,7 @@ MAX_BYTES, MAX_JSON_BYTES = 64_000_000, 16_000_000
 """Of a scenario and of a JSON file in the folder."""
 
 SCHEMA = "wayproof/run/1"
-DISTRIBUTIONS = ("wayproof", "jsbsim", "numpy", "shapely", "rerun-sdk", "pyarrow")
+DISTRIBUTIONS = ("wayproof", "jsbsim", "numba", "numpy", "shapely", "rerun-sdk", "pyarrow")
 COMPRESSION = "lz4"
 SPLIT = [name for name in TRACK_FIELDS if name != "plan_index"]
 """Columns whose bytes are written first bytes first: half the size and half the time."""

@@ -28,7 +28,7 @@ RECORDED_EACH: Final = 25
 
 CONNECT_S: Final = 10.0
 WAITING_PER_THREAD: Final = 2
-SAME: Final = ("wayproof", "jsbsim", "numpy")
+SAME: Final = ("wayproof", "jsbsim", "numba", "numpy")
 
 
 class WorkerDiedError(Exception):

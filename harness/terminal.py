@@ -34,7 +34,7 @@ def progress_bar(straight_m: float) -> Iterator[Report | None]:
         TextColumn("{task.fields[to_go_m]:8.0f} m to go  {task.description}"),
     )
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", total=straight_m, time_s=0.0, speed_up=0.0, to_go_m=straight_m)
+        task = bar.add_task("starting up", total=straight_m, time_s=0.0, speed_up=0.0, to_go_m=straight_m)
 
         def report(time_s: float, to_go_m: float, state: str) -> None:
             elapsed_s = bar.tasks[0].elapsed or 0.0

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.compiled import FLOATS, ROWS, compiled
 from planner.interface import FloatArray, Path
 
 Point = tuple[float, float]
@@ -63,17 +64,25 @@ def place_on(path: Path, station_m: float) -> tuple[Pose, float]:
 
 def poses_at(path: Path, stations_m: FloatArray) -> FloatArray:
     """(k, 4) poses at (k,) stations along a path, clamped to its ends."""
-    rows = path.segments
-    ends = np.cumsum(rows[:, 5])
-    stations = np.clip(stations_m, 0.0, ends[-1])
-    which = np.minimum(np.searchsorted(ends, stations), len(rows) - 1)
-    x, y, tx, ty, curvature, length = rows[which].T
-    s = stations - (ends[which] - length)
-    half = 0.5 * curvature * s
-    chord = s * np.sinc(half / np.pi)
-    c, sn = np.cos(half), np.sin(half)
-    cx, cy = tx * c - ty * sn, ty * c + tx * sn  # direction of the chord
-    return np.column_stack((x + chord * cx, y + chord * cy, cx * c - cy * sn, cy * c + cx * sn))
+    return _poses_at(path.segments, np.ascontiguousarray(stations_m))
+
+
+@compiled(ROWS, FLOATS)
+def _poses_at(rows: FloatArray, stations: FloatArray) -> FloatArray:
+    poses = np.empty((len(stations), 4))
+    for i in range(len(stations)):
+        which, along = 0, max(stations[i], 0.0)
+        while along > rows[which, 5] and which < len(rows) - 1:
+            along -= rows[which, 5]
+            which += 1
+        along = min(along, rows[which, 5])
+        tx, ty, half = rows[which, 2], rows[which, 3], 0.5 * rows[which, 4] * along
+        chord = along * (math.sin(half) / half if half else 1.0)
+        cos, sin = math.cos(half), math.sin(half)
+        cx, cy = tx * cos - ty * sin, ty * cos + tx * sin  # direction of the chord
+        poses[i, 0], poses[i, 1] = rows[which, 0] + chord * cx, rows[which, 1] + chord * cy
+        poses[i, 2], poses[i, 3] = cx * cos - cy * sin, cy * cos + cx * sin
+    return poses
 
 
 def curvature_at(path: Path, stations_m: FloatArray) -> FloatArray:

@@ -104,13 +104,11 @@ class Deliberation:
             waiting = []
         yield from self._courses(waiting)
         if not found:
-            known = self._local.known
             route = yield from self._local.tight_route(self._now)
             if route is None and self.tracks:
                 route = yield from self._local.beginning(self._now, self.tracks[0])
-                known = self._local.known
             if route is not None:
-                yield self._course(route, known, shortest=False)
+                yield self._course(route, self._local.known, shortest=False)
 
     def _courses(self, found: list[_Found]) -> Iterator[Course]:
         """Courses along routes, the shorter first, from where a plan would begin now."""

@@ -239,9 +239,12 @@ class LocalPlanning:
         if route is None or begins is start:
             return route
         on = onward_in_turn(begins.pose, begins.curvature, start.pose)
-        return (
-            None if on is None else Route(route.nodes, Path(np.array([*on, *route.path.segments.tolist()])))
-        )
+        if on is None:
+            return None
+        path = Path(np.array([*on, *route.path.segments.tolist()]))
+        # What has come in meanwhile may be in its way.
+        terrain = self._terrain(begins, self._tight, self._memory.points_m)
+        return Route(route.nodes, path) if terrain.admits(path) else None
 
     def beginning(self, now: Now, track: Track) -> Generator[None, None, Route | None]:
         """As much of a track as can be flown, where all of it cannot: from there the rest may look otherwise."""

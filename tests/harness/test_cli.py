@@ -23,7 +23,7 @@ from harness.strict_yaml import InputError
 from planner.registry import planner_kinds
 
 ROOT = Path(__file__).parents[2]
-SLOW = {"jsbsim", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "scipy", "yaml"}
+SLOW = {"jsbsim", "numba", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "scipy", "yaml"}
 COMMANDS = (
     "fly",
     "check",

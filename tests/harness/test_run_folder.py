@@ -62,6 +62,7 @@ def test_run_reads_back_as_written(
         "python",
         "wayproof",
         "jsbsim",
+        "numba",
         "numpy",
         "shapely",
         "rerun-sdk",
