@@ -54,9 +54,10 @@ class Compiled(Generic[P, R]):
         signature = f"({', '.join(self._arguments)},)"
         try:
             code: Any = numba.njit(signature, cache=True, error_model="numpy")(self._function)
-        except RuntimeError as error:
-            if "cannot cache" not in str(error):
+        except (OSError, RuntimeError) as error:
+            if isinstance(error, RuntimeError) and "cannot cache" not in str(error):
                 raise
+            # There is no place to keep it, or no room there.
             code = numba.njit(signature, error_model="numpy")(self._function)
         self._code = code
         # Functions of the same file that call it find what is compiled.

@@ -74,6 +74,18 @@ print(made(21.0))
     assert ran(source, tmp_path, HOME="/nonexistent") == ["42.0"]
 
 
+def test_where_the_disk_is_full_functions_are_compiled_all_the_same(tmp_path: Path) -> None:
+    source = """
+import resource
+from planner.compiled import compile_all
+from planner.fans import encircled
+import numpy as np
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+print(encircled(np.zeros((3, 2)), np.ones((1, 2)))[0])
+"""
+    assert ran(source, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")) == ["False"]
+
+
 def test_other_failures_are_told() -> None:
     with pytest.raises(Exception, match="no_such_name"):
         Compiled(unknown, (FLOAT,)).compile()
