@@ -26,7 +26,7 @@ import numpy as np
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
-from harness.scan_comparison import MISSING, drawn_back, in_a_row, looked_through, runs_of
+from harness.scan_comparison import MISSING, come, drawn_back, in_a_row, runs_of
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
 COMPARED_S = 12.0
@@ -146,9 +146,9 @@ class MovingObstacles:
         long_ago, of_late = (self._before[0], self._before[1]), (self._before[-1], self._before[-2])
         # A scan that errs may be wrong about a place; two are not.
         many = 2 if self._flawed else 1
-        changed = _all(looked_through(before, places, self._sure) for before in long_ago[:many])
+        changed = _all(come(before, places, self._sure) for before in long_ago[:many])
         if self._noise == 0.0:  # else too little has changed of late
-            late = _all(looked_through(before, places, self._sure) for before in of_late[:many])
+            late = _all(come(before, places, self._sure) for before in of_late[:many])
             late |= _all(self._drawn_back(before, scan)[hits] for before in of_late[:many])
             # Where rays are far apart an outline ends anywhere.
             changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from harness.range_sensor import RangeScan, all_round, clockwise_from
+from harness.registration import FEWEST
 from planner.compiled import BOOL, COUNT, FLOAT, FLOATS, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
@@ -18,6 +19,13 @@ MISSING = 3
 """A run of returns goes on where no more of them in a row are lost."""
 ABREAST = 2
 """A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
+
+
+def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
+    """(k,) which places were looked through by a scan before: what is there now has come."""
+    through = looked_through(before, places, sure_m)
+    # Of as many in a row as it takes one is among these.
+    return through if through[::FEWEST].any() else np.zeros(len(places), dtype=np.bool_)
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
@@ -30,8 +38,9 @@ def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float
         most_m: nothing has drawn back by more.
     """
     gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
-    left = were[looked_through(scan, were, sure_m)]
-    if len(left):
+    through = looked_through(scan, were, sure_m)
+    if through[::FEWEST].any():
+        left = were[through]
         ray = rays_towards(scan, left)
         back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
         ray = ray[back_m < most_m]

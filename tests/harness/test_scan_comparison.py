@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.range_sensor import RangeScan
-from harness.scan_comparison import looked_through
+from harness.registration import FEWEST
+from harness.scan_comparison import come, drawn_back, looked_through
 
 RAYS, RANGE = 60, 1000.0
 AT = complex(300.0, -200.0)
@@ -64,3 +65,20 @@ def test_the_ends_of_a_whole_round_are_joined(north: bool) -> None:
     ranges[-1 if north else 0] = 100.0
     place = AT + cmath.rect(500.0, math.pi / 2 + (0.0 if north else 1.0) * math.tau / RAYS)
     assert not looked_through(scan_of(ranges, math.tau), np.array([place]), 1.0).any()
+
+
+@pytest.mark.parametrize("several", [1, 2, FEWEST])
+def test_few_places_in_a_row_tell_nothing(several: int) -> None:
+    """One or two places of a still wall may seem to be looked through: nothing has come there, or drawn back."""
+    ranges = np.full(RAYS, 500.0)
+    ranges[21 : 26 + several] = 900.0  # so many, and what lies abreast of them
+    scan = scan_of(ranges, math.tau)
+    bearings = math.pi / 2 - scan.spacing_rad * np.arange(RAYS)
+    were = AT + 500.0 * np.exp(1j * bearings)
+    assert np.count_nonzero(looked_through(scan, were, 20.0)) == several + 1
+    for shift in range(FEWEST):
+        shifted = np.roll(were, shift)
+        sampled = looked_through(scan, shifted, 20.0)[::FEWEST].any()
+        assert come(scan, shifted, 20.0).any() == sampled
+        assert drawn_back(shifted, scan, 20.0, 1000.0).any() == sampled
+    assert several + 1 < FEWEST or sampled
