@@ -21,8 +21,8 @@ SURE = 8.0
 VAGUE_MPS = 1.5
 """With a velocity that errs more than this it is not told where a thing will be."""
 FAR = 10.0
-"""Something of which only a straight face without an end is seen moves when it has come so many times as far as
-another has to."""
+"""Something of which only a straight face is seen moves when it has come so many times as far across it as another
+has to."""
 HISTORY_S = 40.0
 """Velocity is that of so long a time."""
 FEWEST_SHIFTS = 4
@@ -76,11 +76,19 @@ class FollowedOutline:
         self.outline, self.outline_s, self.base = outline, time_s, self.shifts[-1][1]
 
     def decide(self, sure_m: float) -> None:
-        """Decides whether it moves: surely, and further than returns err; by far if it tells of one direction only."""
-        moved_m = abs(self.shifts[-1][1] - self.shifts[0][1])
-        sure = self.error_mps < VAGUE_MPS and abs(self.velocity) >= LEAST_MPS + SURE * self.error_mps
-        further_m = sure_m if self.outline.is_definite else FAR * sure_m
-        self.moves = self.moves or (sure and moved_m > further_m)
+        """Decides whether it moves: surely, and further than returns err.
+
+        Of a straight face without both of its ends other parts come into view along it: there only motion across
+        it tells, and by far.
+        """
+        moved, velocity, further_m = self.shifts[-1][1] - self.shifts[0][1], self.velocity, sure_m
+        if not self.outline.is_definite:
+            face = self.outline.points[-1] - self.outline.points[0]
+            along = face / max(abs(face), 1e-9)
+            moved, velocity = ((each * along.conjugate()).imag * 1j for each in (moved, velocity))
+            further_m = FAR * sure_m
+        sure = self.error_mps < VAGUE_MPS and abs(velocity) >= LEAST_MPS + SURE * self.error_mps
+        self.moves = self.moves or (sure and abs(moved) > further_m)
 
     def surely_stands(self) -> bool:
         """Whether its velocity is surely too little."""

@@ -54,8 +54,8 @@ class Outline(NamedTuple):
 
     @property
     def is_definite(self) -> bool:
-        """Whether it tells of shifts in every direction: it has an end, or is not straight."""
-        if any(self.ends):
+        """Whether it tells of shifts in every direction: it shows both of its ends, or is not straight."""
+        if all(self.ends):
             return True
         along, straight = _tangents(self.points)
         turned = along[straight] ** 2

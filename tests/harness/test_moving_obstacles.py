@@ -145,6 +145,7 @@ STILL: list[dict[str, Any]] = [
 @example(seed=623, flaws=STILL[0], turn=0.0, course=0.0)
 @example(seed=1215, flaws=STILL[4], turn=0.0, course=-0.24699075901474227)
 @example(seed=11734, flaws=STILL[1], turn=0.05, course=0.0707772080525213)
+@example(seed=68076, flaws=STILL[1], turn=-0.16, course=0.006071549687820643)
 def test_nothing_moves_in_a_still_world(seed: int, flaws: dict[str, Any], turn: float, course: float) -> None:
     world, outside = random_still_world(seed), []
     for scan in flight(sensor(world, seed, **flaws), 90.0, (3000.0, 1000.0), course, turn):
