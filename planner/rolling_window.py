@@ -226,10 +226,14 @@ class RollingWindow:
         return effect is None or (self._watch.broken and near_m < self._urgent_m)
 
     def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
-        certifier = Certifier(self._local.limits, self._mission.sensor_range_m, 1.5 * request.seen.spacing_m)
+        certifier = self._certifier(1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
         cut_m = self._watch.cut_at(course, self._standing_m(), self._memory.gone - self._gone)
         return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
+
+    def _certifier(self, spacing_m: float) -> Certifier:
+        mission = self._mission
+        return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)
 
     def _standing_m(self) -> FloatArray:
         """(m, 2) edge points of what stands still: what moves is looked at whenever it has moved on."""
@@ -328,8 +332,8 @@ class RollingWindow:
 
     def _unseen(self, course: Course, seen: SeenWorld) -> Pose:
         """The first place of a course that has not been seen to be free."""
-        certifier = Certifier(self._local.limits, self._mission.sensor_range_m, seen.spacing_m)
-        return place_on(course.path, certifier.seen_free_to_m(course.path, seen))[0]
+        free_to_m = self._certifier(seen.spacing_m).seen_free_to_m(course.path, seen)
+        return place_on(course.path, free_to_m)[0]
 
     def _give_up(self, course: Course, seen: SeenWorld) -> None:
         """Gives up the first unseen place of a course, and what lies to its sides: a turn takes so much room."""

@@ -12,7 +12,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.certificate import DISC, Certified, Certifier, least_sensor_range_m
+from planner.certificate import DISC, Certified, Certifier, disc_radius_m, least_sensor_range_m
 from planner.curves import Limits, along, between, end_of, pose_at, poses_at, sample
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path
 from planner.route_optimisation import Terrain
@@ -21,7 +21,8 @@ AssertFlyable = Callable[[Path, float], None]
 
 RADIUS, ROLL, SPACING, HORIZON, KEEP = 100.0, 15.0, 20.0, 2000.0, 40.0
 LIMITS = Limits(RADIUS, ROLL)
-CERTIFIER = Certifier(LIMITS, HORIZON, SPACING)
+CERTIFIER = Certifier(LIMITS, KEEP, HORIZON, SPACING)
+DISC_M = disc_radius_m(RADIUS, KEEP)
 WIDE = (-1e4, -1e4, 1e4, 1e4)
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1500.0)]))
 PIECES = st.lists(
@@ -94,7 +95,7 @@ def assert_certified(
     assert abs(closing[4]) == pytest.approx(1.0 / RADIUS)
     # Between the places that were asked it may be hidden by half their distance at most.
     assert seen.depth_m(sample(found.path, 2.0)).max() <= SPACING
-    assert seen.depth_m(filled_disc(found.path, DISC * RADIUS - SPACING, 4.0)).max() <= SPACING
+    assert seen.depth_m(filled_disc(found.path, DISC_M - SPACING, 4.0)).max() <= SPACING
     line = shapely.LineString(sample(found.path, 5.0, 0.01))
     assert shapely.distance(line, shapely.points(points)).min(initial=math.inf) >= KEEP - 0.02
     stations = np.linspace(0.0, found.leaves_m, 50)
@@ -104,7 +105,7 @@ def assert_certified(
 def disc_is_free(path: Path, station: float, side: float, seen: FreeDiscs) -> bool:
     x, y, tx, ty = pose_at(path, station)
     probe = Path(np.array([(x, y, tx, ty, side / RADIUS, 1.0)]))
-    return bool(seen.seen_free(filled_disc(probe, DISC * RADIUS, 3.0)).all())
+    return bool(seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all())
 
 
 @settings(deadline=None, max_examples=80)
@@ -147,7 +148,7 @@ def test_it_is_the_last_turn_off_the_path_that_is_free(free_m: float, assert_fly
     found = CERTIFIER.certify(STRAIGHT, seen, terrain())
     assert found is not None
     assert_certified(found, STRAIGHT, seen, np.zeros((0, 2)), assert_flyable)
-    furthest = min(free_m - DISC * RADIUS, STRAIGHT.length_m)
+    furthest = min(free_m - DISC_M, STRAIGHT.length_m)
     # The best on a grid of stations half a radius, or a 32nd of the free part, apart.
     step = max(0.5 * RADIUS, free_m / 32)
     assert furthest - step - SPACING <= found.leaves_m <= furthest + SPACING
@@ -203,12 +204,12 @@ def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll(assert_fl
 
 def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> None:
     fine, roll = 4.0, 60.0
-    certifier = Certifier(Limits(RADIUS, roll), HORIZON, fine)
+    certifier = Certifier(Limits(RADIUS, roll), KEEP, HORIZON, fine)
     path = bent([(1 / 200.0, 300.0)])
     x, y, tx, ty = pose_at(path, path.length_m)
     # Free is the path, and the disc of a right turn that begins at its end without rolling.
     on_it = sample(path, 5.0)
-    disc = (x + RADIUS * ty, y - RADIUS * tx, DISC * RADIUS + fine)
+    disc = (x + RADIUS * ty, y - RADIUS * tx, DISC_M + fine)
     seen = FreeDiscs(np.array([*((east, north, 15.0) for east, north in on_it), disc]))
     found = certifier.certify(path, seen, terrain())
     assert found is None or seen.depth_m(sample(found.path, 2.0)).max() <= fine
@@ -220,6 +221,11 @@ def test_no_further_than_the_horizon() -> None:
     assert found is not None
     assert found.leaves_m == pytest.approx(HORIZON)
     assert math.dist(end_of(found.path)[:2], (HORIZON, 0.0)) < 1e-6
+
+
+@pytest.mark.parametrize(("clearance_m", "radius_m"), [(40.0, 120.0), (6.0, 104.0), (0.0, 104.0)])
+def test_the_disc_is_larger_than_the_turn(clearance_m: float, radius_m: float) -> None:
+    assert disc_radius_m(100.0, clearance_m) == pytest.approx(radius_m)
 
 
 def test_the_least_sensor_range_reaches_over_a_turn_to_the_side() -> None:
