@@ -15,25 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.edge_grid import EdgeGrid
+from harness.hit_counting import CONFIRMED, count_hits, ends, news
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.scan_comparison import looked_through
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 """Points of the plane as east + i north: one number each."""
 
-CONFIRMED = 2
-"""An edge is believed from this score on; a hit adds one, a look through takes one."""
 SUPPORT = 0.5
 """Where returns may be false, one is believed only if a ray beside it met something as far, but for this share of
 the clearance: a false return beside a wall seldom lies so near to its range."""
-CERTAIN = 6
-"""Scores do not rise above this."""
-BETWEEN = np.arange(1, 8) / 8.0
-"""Where points are put between two hits that are joined: no more than a cell apart from each other."""
 DETAIL = ((5.0, 4), (2.0, 16))
 """Outlines are kept in detail up to so many clearances away, in so many cells to one along a side."""
-CORNER = 0.3
-"""Sine of the turn from which on a wall has a corner."""
 SAME_PLACE = 1.0 / 4.0
 """Hits that are seen from where others were seen, but for this share of the least range, tell little more,"""
 SAME_VIEW = 1.0 / 64.0
@@ -155,69 +148,36 @@ class ObstacleMap:
         # Places are points seen from the corner of the grid.
         places = scan.from_sensor_m(hits)
         places += complex(scan.east_m, scan.north_m) - self._origin
-        column, row = self._column_and_row(places)
         if not self._holds(scan):
+            column, row = self._column_and_row(places)
             on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
-            hits, places, column, row = hits[on_grid], places[on_grid], column[on_grid], row[on_grid]
-        keys = column * self._ny + row
-        uncertain = self._score.take(keys) < CERTAIN
-        news = uncertain.nonzero()[0]
-        near = nearest_m < self._near_by and len(hits) > 0
-        if not len(news) and not near:
+            hits, places = hits[on_grid], places[on_grid]
+            if not len(hits):
+                return
+        rays, cell, join, first = len(scan.ranges_m), self._cell, self._join, self._first_score
+        closed = all_round(scan) and bool(hits[0] + rays - hits[-1] <= 2)
+        cells, found = news(hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first)
+        if nearest_m >= self._near_by:
+            self._count_hits(cells, found)
             return
-        counted, found = keys.take(news), places.take(news)
-        rays = len(scan.ranges_m)
-        closed = all_round(scan) and hits[0] + rays - hits[-1] <= 2
-        if closed:
-            hits = np.concatenate((hits, hits[:1] + rays))
-            places = np.concatenate((places, places[:1]))
-            uncertain = np.concatenate((uncertain, uncertain[:1]))
-        step = places[1:] - places[:-1]
-        gap = np.abs(step)
-        # One ray may be missing between neighbours: a lost return does not open a wall.
-        joined = (gap < self._join) & (hits[1:] - hits[:-1] <= 2)
-        apart = joined & (gap > self._cell)
-        if len(news):
-            wide = (apart & (uncertain[1:] | uncertain[:-1])).nonzero()[0]
-            if len(wide):
-                between = (places.take(wide) + np.multiply.outer(BETWEEN, step.take(wide))).ravel()
-                column, row = self._column_and_row(between)
-                cells = column * self._ny + row
-                # Where one was looked through, it is not put again: what ends there is seen to end there.
-                put = (self._slot.take(cells) < 0) | (self._score.take(cells) >= self._first_score)
-                counted = np.concatenate((counted, cells[put]))
-                found = np.concatenate((found, between[put]))
-        again: list[tuple[NDArray[np.int64], ComplexArray]] = []
-        if near:
-            ends = (~joined).nonzero()[0]
-            ends = np.concatenate((ends, ends + 1) if closed else (ends, ends + 1, (0, len(hits) - 1)))
-            if nearest_m < DETAIL[-1][0] * self._clearance:
-                # A wall that turns away from the sensor ends there, too, though both of its sides are in sight.
-                turn = (step[1:] * step[:-1].conj()).imag > CORNER * gap[1:] * gap[:-1]
-                ends = np.concatenate((ends, (turn & joined[1:] & joined[:-1]).nonzero()[0] + 1))
-            # So does what stands before something that it is joined to.
-            jumps = apart.nonzero()[0]
-            behind = scan.ranges_m.take(hits[jumps], mode="wrap") > scan.ranges_m.take(
-                hits[jumps + 1], mode="wrap"
-            )
-            ends = np.concatenate((ends, jumps + behind))
-            ranges = scan.ranges_m.take(hits[ends], mode="wrap")
-            known = self._score.take(keys.take(ends, mode="wrap")) >= CONFIRMED
-            for reach, finer in DETAIL:
-                within = ranges < reach * self._clearance
-                at = places[ends[within]]
-                if len(at):
-                    fine = self._fine_keys(at, finer)
+        corners = nearest_m < DETAIL[-1][0] * self._clearance
+        near = ends(hits, places, scan.ranges_m, cell, closed, join, corners)
+        ranges, places = scan.ranges_m[hits[near]], places[near]
+        column, row = self._column_and_row(places)
+        known = self._score[column * self._ny + row] >= CONFIRMED
+        again: list[tuple[IntArray, ComplexArray]] = []
+        for reach, finer in DETAIL:
+            within = ranges < reach * self._clearance
+            at = places[within]
+            if len(at):
+                fine = self._fine_keys(at, finer)
+                cells, found = np.concatenate((cells, fine)), np.concatenate((found, at))
+                if first < CONFIRMED:
                     # Where the wall is known, this only tells where it ends: once is enough.
                     sure = known[within]
-                    counted = np.concatenate((counted, fine))
-                    found = np.concatenate((found, at))
-                    if self._first_score < CONFIRMED:
-                        again.append((fine[sure], at[sure]))
-        if len(counted):
-            self._count_hits(counted, found)
-        for fine, at in again:
-            self._count_hits(fine, at)
+                    again.append((fine[sure], at[sure]))
+        for each in ((cells, found), *again):
+            self._count_hits(*each)
 
     def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Cells of places seen from the corner of the grid."""
@@ -230,35 +190,22 @@ class ObstacleMap:
         width, height = self._nx * self._cell, self._ny * self._cell
         return reach < x < width - reach and reach < y < height - reach
 
-    def _count_hits(self, keys: NDArray[np.int64], places: ComplexArray) -> None:
-        """Counts hits: a cell gets a point with the first, and is an edge as soon as it is believed."""
-        score = self._score.take(keys)
-        uncertain = (score < CERTAIN).nonzero()[0]
-        if not len(uncertain):
-            return
-        keys, score = keys[uncertain], score[uncertain]
-        risen = np.maximum(score + 1, self._first_score)
-        self._score[keys] = risen  # duplicates of a cell count once a scan
-        if self._doubtful:
-            self._unconfirmed |= bool(risen.min() < CONFIRMED)
-        fresh = (score == 0).nonzero()[0]
-        if len(fresh):
-            fresh = fresh[self._slot[keys[fresh]] < 0]  # others have a point, though no score is left
-        if len(fresh):
-            first: dict[int, int] = {}
-            for key, hit in zip(keys[fresh].tolist(), uncertain[fresh].tolist(), strict=True):
-                first.setdefault(key, hit)
-            self._grow(len(first))
-            new = slice(self._count, self._count + len(first))
-            self._key[new] = list(first)
-            self._slot[self._key[new]] = np.arange(new.start, new.stop)
-            self._points[new] = places[list(first.values())] + self._origin
-            self._since[new] = 0
-            self._count = new.stop
-        raised = keys[(score < CONFIRMED) & (risen >= CONFIRMED)]
-        if len(raised):
-            self._revision += 1
-            self._since[self._slot[raised]] = self._revision
+    def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
+        self._grow(len(cells))
+        self._count, self._revision, unconfirmed = count_hits(
+            cells,
+            places,
+            self._score,
+            self._slot,
+            self._points,
+            self._key,
+            self._since,
+            self._count,
+            self._revision,
+            self._first_score,
+            self._origin,
+        )
+        self._unconfirmed |= unconfirmed
 
     def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
         """Numbers of the cells of a finer grid at some places."""
@@ -298,7 +245,6 @@ class ObstacleMap:
             aimed_m=0.25 * self._cell,
             within_m=scan.max_range_m - 2.0 * self._cell,
         )
-        weaker = self._key[slots[through]]
         weaker = self._key[slots[through]]
         weaker = weaker[self._score[weaker] > 0]
         if len(weaker):

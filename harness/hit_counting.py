@@ -1,0 +1,196 @@
+"""What the hits of a scan count for on the grid of edges. Compiled: see `planner.compiled`.
+
+Places are seen from the corner of the grid, east + i north, m. A cell is told by its column times the rows of the grid,
+plus its row.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.compiled import BOOL, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS, PLACES, compiled
+from planner.interface import ComplexArray, FloatArray, IntArray
+
+CONFIRMED = 2
+"""An edge is believed from this score on; a hit adds one, a look through takes one."""
+CERTAIN = 6
+"""Scores do not rise above this."""
+PARTS = 8
+"""Hits that are joined lie no further apart than so many cells: points put between them, one cell."""
+CORNER = 0.3
+"""Sine of the turn from which on a wall has a corner."""
+
+SCORES, SLOTS = "Array(int8, 1, 'C', readonly=True)", "Array(int32, 1, 'C', readonly=True)"
+SCORES_OUT, SLOTS_OUT, PLACES_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128[::1]", "complex128"
+
+
+@compiled(COUNTS, PLACES, SCORES, SLOTS, FLOAT, COUNT, COUNT, BOOL, FLOAT, COUNT)
+def news(
+    hits: IntArray,
+    places: ComplexArray,
+    score: NDArray[np.int8],
+    slot: NDArray[np.int32],
+    cell_m: float,
+    rows: int,
+    rays: int,
+    closed: bool,
+    join_m: float,
+    first_score: int,
+) -> tuple[IntArray, ComplexArray]:
+    """Cells and places to be counted: hits that are not certain, and what lies between two that are joined.
+
+    Args:
+        hits: (n,) rays that met something,
+        places: (n,) and where.
+        score: of each cell.
+        slot: of each cell; negative where it has no point.
+        cell_m: width of a cell.
+        rows: of the grid.
+        rays: of the scan.
+        closed: the last hit is the neighbour of the first.
+        join_m: hits nearer to each other are joined.
+        first_score: a cell that was hit has at least this score, unless it was looked through.
+    """
+    n, per_m = len(hits), 1.0 / cell_m
+    cells, uncertain = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.bool_)
+    fresh = 0
+    for i in range(n):
+        cells[i] = int(places[i].real * per_m) * rows + int(places[i].imag * per_m)
+        uncertain[i] = score[cells[i]] < CERTAIN
+        fresh += uncertain[i]
+    wide, gaps = np.empty(n, dtype=np.int64), 0
+    for i in range(n if closed else n - 1):
+        j = (i + 1) % n
+        if uncertain[i] or uncertain[j]:
+            missing, gap_m = hits[j] - hits[i], abs(places[j] - places[i])
+            # One ray may be missing between neighbours: a lost return does not open a wall.
+            if (missing if j else missing + rays) <= 2 and cell_m < gap_m < join_m:
+                wide[gaps] = i
+                gaps += 1
+    most = fresh + (PARTS - 1) * gaps
+    counted, found = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.complex128)
+    k = 0
+    for i in range(n):
+        if uncertain[i]:
+            counted[k], found[k] = cells[i], places[i]
+            k += 1
+    for part in range(1, PARTS):
+        for gap in range(gaps):
+            i = wide[gap]
+            place = places[i] + part / PARTS * (places[(i + 1) % n] - places[i])
+            cell = int(place.real * per_m) * rows + int(place.imag * per_m)
+            # Where one was looked through, it is not put again: what ends there is seen to end there.
+            if slot[cell] < 0 or score[cell] >= first_score:
+                counted[k], found[k] = cell, place
+                k += 1
+    return counted[:k], found[:k]
+
+
+@compiled(COUNTS, PLACES, FLOATS, FLOAT, BOOL, FLOAT, BOOL)
+def ends(
+    hits: IntArray,
+    places: ComplexArray,
+    ranges: FloatArray,
+    cell_m: float,
+    closed: bool,
+    join_m: float,
+    corners: bool,
+) -> IntArray:
+    """(k,) which hits lie at an end of an outline, as the sensor sees it; one may be told several times.
+
+    Args:
+        hits: (n,) rays that met something,
+        places: (n,) and where.
+        ranges: of all rays.
+        cell_m: width of a cell.
+        closed: the last hit is the neighbour of the first.
+        join_m: hits nearer to each other are joined.
+        corners: a wall that turns away from the sensor ends there, too, though both of its sides are in sight.
+    """
+    n, rays = len(hits), len(ranges)
+    pairs = n if closed else n - 1
+    step, gap_m = np.empty(pairs, dtype=np.complex128), np.empty(pairs)
+    joined = np.empty(pairs, dtype=np.bool_)
+    found, k = np.empty(4 * n + 2, dtype=np.int64), 0
+    for i in range(pairs):
+        j = (i + 1) % n
+        step[i] = places[j] - places[i]
+        gap_m[i] = abs(step[i])
+        joined[i] = gap_m[i] < join_m and (hits[j] - hits[i] if j else hits[j] + rays - hits[i]) <= 2
+        if not joined[i]:
+            found[k] = i
+            k += 1
+    for end in range(k):
+        found[k + end] = (found[end] + 1) % n
+    k *= 2
+    if not closed:
+        found[k], found[k + 1] = 0, n - 1
+        k += 2
+    if corners:
+        for i in range(pairs - 1):
+            turn = (step[i + 1] * step[i].conjugate()).imag
+            if joined[i] and joined[i + 1] and turn > CORNER * gap_m[i + 1] * gap_m[i]:
+                found[k] = i + 1
+                k += 1
+    for i in range(pairs):
+        # So does what stands before something that it is joined to.
+        if joined[i] and gap_m[i] > cell_m:
+            j = (i + 1) % n
+            found[k] = j if ranges[hits[i]] > ranges[hits[j]] else i
+            k += 1
+    return found[:k]
+
+
+@compiled(
+    COUNTS, PLACES, SCORES_OUT, SLOTS_OUT, PLACES_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT, COUNT, PLACE
+)
+def count_hits(
+    cells: IntArray,
+    places: ComplexArray,
+    score: NDArray[np.int8],
+    slot: NDArray[np.int32],
+    points: ComplexArray,
+    cell_of: IntArray,
+    since: IntArray,
+    known: int,
+    revision: int,
+    first_score: int,
+    corner: complex,
+) -> tuple[int, int, bool]:
+    """Counts hits: a cell gets a point with the first, and is an edge as soon as it is believed.
+
+    Args:
+        cells: (k,) cells that were hit; each counts once,
+        places: (k,) and where; the first in a cell counts.
+        score: of each cell.
+        slot: of each cell; negative where it has no point.
+        points: by slot, east + i north; there is room for k more,
+        cell_of: by slot: its cell,
+        since: and the revision at which it became an edge.
+        known: how many slots are in use.
+        revision: of the map.
+        first_score: what the first hit of a cell raises its score to, at least.
+        corner: of the grid, east + i north.
+
+    Returns:
+        How many slots are in use now; the revision now; whether a cell was hit that has yet to be believed.
+    """
+    before = np.empty(len(cells), dtype=np.int64)
+    for i in range(len(cells)):
+        before[i] = score[cells[i]]
+    unconfirmed, raised = False, 0
+    for i in range(len(cells)):
+        if before[i] >= CERTAIN:
+            continue
+        cell, risen = cells[i], max(before[i] + 1, first_score)
+        score[cell] = risen
+        if slot[cell] < 0:
+            slot[cell], cell_of[known], points[known], since[known] = known, cell, places[i] + corner, 0
+            known += 1
+        if risen < CONFIRMED:
+            unconfirmed = True
+        elif before[i] < CONFIRMED:
+            raised = 1
+            since[slot[cell]] = revision + 1
+    return known, revision + raised, unconfirmed
