@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from harness.range_sensor import RangeScan, all_round, clockwise_from
-from planner.compiled import FLOAT, GRID, ROWS, compiled
+from harness.range_sensor import RangeScan, all_round
+from planner.compiled import BOOL, FLOAT, FLOATS, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
+CELLS, CELLS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]"
+"""Parts of grids."""
 MOST_CELLS = 1_000_000
 NARROWEST_RAD = 1e-3
 """What something hides is told by bearings no finer than this."""
@@ -51,29 +52,19 @@ class FreeSpace:
         x_first, y_first, x_low, x_high, y_low, y_high = self._window(scan, len(self._disc) // 2)
         if x_low >= x_high or y_low >= y_high:
             return
-        seen = self._seen[x_low:x_high, y_low:y_high]
-        disc = self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first]
-        # Most of what is in reach has been seen from the places before.
-        cell = (disc > seen).ravel().nonzero()[0]
-        column = cell // seen.shape[1]
-        row = cell - column * seen.shape[1]
-        # From the sensor to the middle of each cell.
-        x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
-        y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
-        distance = np.sqrt(x * x + y * y)
-        rays = len(scan.ranges_m)
-        ray = np.rint(clockwise_from(scan.start_rad, x, y) * (1.0 / scan.spacing_rad)).astype(np.int64)
-        # A cell is seen through only if all rays that meet it went beyond it, and one to either side.
-        half = 0.75 * self._cell
-        level = np.ceil(half / scan.spacing_rad / np.maximum(distance, half)).astype(np.int64) + 1
-        if not all_round(scan):
-            covered = ((ray >= level) & (ray < rays - level)).nonzero()[0]
-            column, row, distance, ray, level = (
-                each[covered] for each in (column, row, distance, ray, level)
-            )
-        beyond = _least_beside(np.minimum(scan.ranges_m, reach), ray, level) - half - self._noise
-        free = (beyond > distance).nonzero()[0]
-        seen[column.take(free), row.take(free)] = True
+        _look_through(
+            self._seen[x_low:x_high, y_low:y_high],
+            self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first],
+            scan.ranges_m,
+            self._x0 + x_low * self._cell - scan.east_m,
+            self._y0 + y_low * self._cell - scan.north_m,
+            self._cell,
+            scan.start_rad,
+            scan.spacing_rad,
+            all_round(scan),
+            reach,
+            self._noise,
+        )
 
     def take_back(self, scan: RangeScan, edges_m: FloatArray) -> bool:
         """Something stands where space was seen to be free: it, and what it hides, is not known to be free any more.
@@ -136,6 +127,64 @@ class FreeSpace:
         return _contains(self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
 
 
+@compiled(CELLS_OUT, CELLS, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT)
+def _look_through(
+    seen: BoolArray,
+    disc: BoolArray,
+    ranges: FloatArray,
+    x_first: float,
+    y_first: float,
+    cell: float,
+    start_rad: float,
+    spacing_rad: float,
+    closed: bool,
+    reach: float,
+    noise: float,
+) -> None:
+    """Marks the cells of a disc about the sensor that all rays which meet them went beyond, and one to either side.
+
+    So many rays to either side of the one towards its middle, or up to twice as many: 2^k - 1. The ends of the fan
+    are joined.
+
+    Args:
+        seen: cells seen to be free.
+        disc: of these, those to be asked.
+        ranges: of all rays.
+        x_first: corner of the first cell, from the sensor.
+        y_first: corner of the first cell, from the sensor.
+        cell: width of a cell.
+        start_rad: bearing of the first ray.
+        spacing_rad: of the rays.
+        closed: the last ray is the neighbour of the first.
+        reach: ranges count up to this one.
+        noise: so much further than a cell the rays have to go.
+    """
+    rays, half = len(ranges), 0.75 * cell
+    for column in range(seen.shape[0]):
+        x = (column + 0.5) * cell + x_first
+        for row in range(seen.shape[1]):
+            # Most of what is in reach has been seen from the places before.
+            if seen[column, row] or not disc[column, row]:
+                continue
+            y = (row + 0.5) * cell + y_first
+            distance = math.sqrt(x * x + y * y)
+            beyond = distance + half + noise
+            if beyond >= reach:
+                continue
+            ray = round((math.atan2(x, y) - start_rad) % math.tau / spacing_rad)
+            level = math.ceil(half / spacing_rad / max(distance, half)) + 1
+            if not closed and not level <= ray < rays - level:
+                continue
+            free, wide = True, 1
+            while wide <= level:
+                wide *= 2
+            for beside in range(ray - wide + 1, ray + wide):
+                if ranges[beside % rays] <= beyond:
+                    free = False
+                    break
+            seen[column, row] = free
+
+
 @compiled(GRID, ROWS, FLOAT, FLOAT, FLOAT)
 def _contains(seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float) -> BoolArray:
     out = np.zeros(len(points), dtype=np.bool_)
@@ -151,21 +200,3 @@ def _disc(cells: int) -> BoolArray:
     away = np.arange(-cells, cells + 1) ** 2
     disc: BoolArray = away[:, None] + away <= cells * cells
     return disc
-
-
-def _least_beside(ranges: FloatArray, ray: NDArray[np.int64], level: NDArray[np.int64]) -> FloatArray:
-    """The least range of each of some rays and at least those `level` rays to either side.
-
-    The ends of the fan are joined: its last ray is followed by the first. Windows are widened to 2^k - 1 rays
-    to either side.
-    """
-    rays = len(ranges)
-    power = np.minimum(np.frexp(level)[1], rays.bit_length() - 1)
-    ring = np.concatenate((ranges, ranges, ranges))
-    least = [ring[rays : 2 * rays + 1]]
-    for k in range(int(power.max(initial=0))):
-        wide = 2**k
-        ring = np.minimum(np.minimum(ring[: -2 * wide], ring[wide:-wide]), ring[2 * wide :])
-        first = rays + 1 - 2 * wide
-        least.append(ring[first : first + rays + 1])
-    return np.concatenate(least).take(power * (rays + 1) + ray)

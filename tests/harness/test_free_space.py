@@ -146,3 +146,32 @@ def test_what_hides_just_beside_the_field_of_view_is_not_in_free_space(side: flo
     free = seen.contains(points)
     assert free.any()
     assert distance_to(world, points[free]).min() > 0.0
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    seed=SEEDS,
+    field=st.sampled_from([360.0, 120.0]),
+    east=st.floats(BOUNDS[0], BOUNDS[2]),
+    noise=st.sampled_from([0.0, 20.0]),
+)
+def test_a_cell_is_free_where_the_rays_about_it_went_beyond(
+    seed: int, field: float, east: float, noise: float
+) -> None:
+    eye = sensor(random_world(seed), rays=90, field_of_view_deg=field)
+    (scan,) = scans(eye, [(east, MIDDLE[1])])
+    seen = FreeSpace(BOUNDS, CLEARANCE, RANGE, noise)
+    seen.update(scan)
+    rng, rays = np.random.default_rng(seed), len(scan.ranges_m)
+    reach, half = min(RANGE, CLEARANCE / scan.spacing_rad), 0.75 * FREE_CELL
+    columns, rows = (math.ceil((BOUNDS[2 + axis] - BOUNDS[axis]) / FREE_CELL) for axis in (0, 1))
+    for column, row in zip(rng.integers(0, columns, 500), rng.integers(0, rows, 500), strict=True):
+        middle = np.array((BOUNDS[0], BOUNDS[1])) + (np.array((column, row)) + 0.5) * FREE_CELL
+        x, y = middle - (scan.east_m, scan.north_m)
+        away = math.hypot(x, y)
+        ray = round((math.atan2(x, y) - scan.start_rad) % math.tau / scan.spacing_rad)
+        aside = math.ceil(half / scan.spacing_rad / max(away, half)) + 1
+        inside = field == 360.0 or (aside <= ray < rays - aside)
+        about = np.arange(1 - 2 ** aside.bit_length(), 2 ** aside.bit_length())
+        beyond = min(reach, scan.ranges_m[(ray + about) % rays].min())
+        assert seen.contains(middle[None])[0] == (inside and beyond - half - noise > away)
