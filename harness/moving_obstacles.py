@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,6 +60,14 @@ FACES = 1.5
 """What comes into view so many times as near as that is another face of what moves."""
 
 
+class _Looked(NamedTuple):
+    """A scan that was looked at, the rays that returned something, and where."""
+
+    scan: RangeScan
+    hits: IntArray
+    places: ComplexArray
+
+
 class MovingObstacles:
     """Finds and follows what moves.
 
@@ -86,7 +95,7 @@ class MovingObstacles:
         self._sure = 4.0 * noise_m + 0.02 * clearance_m
         self._compared_s = 0.0 if is_free else COMPARED_S + self._sure / SLOW_MPS
         self._gate = max(0.5 * clearance_m, 3.0 * noise_m)
-        self._before: deque[RangeScan] = deque()
+        self._before: deque[_Looked] = deque()
         self._look_every_s = max(LOOK_EVERY_S, LOOK_EVERY * clearance_m / MOST_MPS)
         self._looked_s = -math.inf
         self._tracks: list[FollowedOutline] = []
@@ -132,23 +141,24 @@ class MovingObstacles:
                 self._look_at_free(scan, moving, self._is_free)
         elif scan.time_s - self._looked_s >= self._look_every_s:
             self._looked_s = scan.time_s
-            while len(self._before) > 2 and self._before[1].time_s <= scan.time_s - self._compared_s:
+            while len(self._before) > 2 and self._before[1].scan.time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()
+            now = _Looked(scan.kept(), *self._returns(scan))
             if len(self._before) >= 2 and scan.nearest_m < math.inf:
-                self._look(scan, moving)
-            self._before.append(scan.kept())
+                self._look(now, moving)
+            self._before.append(now)
         return moving
 
-    def _look(self, scan: RangeScan, moving: BoolArray | None) -> None:
+    def _look(self, now: _Looked, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before, or has drawn back."""
-        hits, places = self._returns(scan)
+        scan, hits, places = now
         fresh = np.ones(len(hits), dtype=np.bool_) if moving is None else ~moving[hits]
         long_ago, of_late = (self._before[0], self._before[1]), (self._before[-1], self._before[-2])
         # A scan that errs may be wrong about a place; two are not.
         many = 2 if self._flawed else 1
-        changed = _all(come(before, places, self._sure) for before in long_ago[:many])
+        changed = _all(come(before.scan, places, self._sure) for before in long_ago[:many])
         if self._noise == 0.0:  # else too little has changed of late
-            late = _all(come(before, places, self._sure) for before in of_late[:many])
+            late = _all(come(before.scan, places, self._sure) for before in of_late[:many])
             late |= _all(self._drawn_back(before, scan)[hits] for before in of_late[:many])
             # Where rays are far apart an outline ends anywhere.
             changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)
@@ -171,10 +181,10 @@ class MovingObstacles:
         )
         return np.minimum(step, self._apart)
 
-    def _drawn_back(self, before: RangeScan, scan: RangeScan) -> BoolArray:
+    def _drawn_back(self, before: _Looked, scan: RangeScan) -> BoolArray:
         """(n,) which rays of a scan meet what may have drawn back since another."""
-        most_m = MOST_MPS * (scan.time_s - before.time_s)
-        return drawn_back(self._returns(before)[1], scan, self._sure, most_m)
+        most_m = MOST_MPS * (scan.time_s - before.scan.time_s)
+        return drawn_back(before.places, scan, self._sure, most_m)
 
     def _look_at_free(
         self, scan: RangeScan, moving: BoolArray | None, is_free: Callable[[FloatArray], BoolArray]

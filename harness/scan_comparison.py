@@ -23,9 +23,9 @@ ABREAST = 2
 
 def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     """(k,) which places were looked through by a scan before: what is there now has come."""
-    through = looked_through(before, places, sure_m)
-    # Of as many in a row as it takes one is among these.
-    return through if through[::FEWEST].any() else np.zeros(len(places), dtype=np.bool_)
+    if not _may_be_through(before, places, sure_m):
+        return np.zeros(len(places), dtype=np.bool_)
+    return looked_through(before, places, sure_m)
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
@@ -38,15 +38,19 @@ def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float
         most_m: nothing has drawn back by more.
     """
     gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
-    through = looked_through(scan, were, sure_m)
-    if through[::FEWEST].any():
-        left = were[through]
+    if _may_be_through(scan, were, sure_m):
+        left = were[looked_through(scan, were, sure_m)]
         ray = rays_towards(scan, left)
         back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
         ray = ray[back_m < most_m]
         # From nearer by, places that were met by neighbouring rays lie further apart.
         gone[(ray[:, None] + np.arange(-1, 2)) % len(gone)] = True
     return gone
+
+
+def _may_be_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> bool:
+    """Whether a scan may have looked through as many places in a row as it takes: one is among these."""
+    return bool(looked_through(scan, places[::FEWEST].copy(), sure_m).any())
 
 
 def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:
