@@ -171,18 +171,21 @@ def _look_through(
             beyond = distance + half + noise
             if beyond >= reach:
                 continue
-            ray = round((math.atan2(x, y) - start_rad) % math.tau / spacing_rad)
+            clockwise = math.atan2(x, y) - start_rad
+            while clockwise < 0.0:
+                clockwise += math.tau
+            ray = round(clockwise / spacing_rad)
             level = math.ceil(half / spacing_rad / max(distance, half)) + 1
             if not closed and not level <= ray < rays - level:
                 continue
-            free, wide = True, 1
+            wide = 1
             while wide <= level:
                 wide *= 2
-            for beside in range(ray - wide + 1, ray + wide):
-                if ranges[beside % rays] <= beyond:
-                    free = False
-                    break
-            seen[column, row] = free
+            beside, left = (ray - wide + 1) % rays, 2 * wide - 1
+            while left and ranges[beside] > beyond:
+                beside = beside + 1 if beside + 1 < rays else 0
+                left -= 1
+            seen[column, row] = not left
 
 
 @compiled(GRID, ROWS, FLOAT, FLOAT, FLOAT)

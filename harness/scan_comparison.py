@@ -114,16 +114,20 @@ def _through(
         distance = math.hypot(dx, dy)
         if distance >= within_m:
             continue
-        towards = ((math.atan2(dx, dy) - start_rad) % math.tau) / spacing_rad
+        clockwise = math.atan2(dx, dy) - start_rad
+        while clockwise < 0.0:
+            clockwise += math.tau
+        towards = clockwise / spacing_rad
         ray = round(towards)
         if abs(towards - ray) * spacing_rad * distance >= aimed_m:
             continue
         if not closed and not abreast <= ray < rays - abreast:
             continue
-        through[i] = True
-        for beside in range(ray - abreast, ray + abreast + 1):
-            if ranges[beside % rays] <= distance + sure_m:
-                through[i] = False
+        beside, left = (ray - abreast) % rays, 2 * abreast + 1
+        while left and ranges[beside] > distance + sure_m:
+            beside = beside + 1 if beside + 1 < rays else 0
+            left -= 1
+        through[i] = not left
     return through
 
 
