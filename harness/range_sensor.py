@@ -1,15 +1,13 @@
 """Simulated scanning range sensor: rays against the true world, with its imperfections.
 
-Frame: local ENU plane, x = east, y = north, metres. Bearings are radians clockwise from north. Whether and
-where a ray hits is decided by correctly rounded operations on that ray and that face alone; bearings of faces
-only choose which rays are tried, with a margin. So a face that is not hit cannot change any bit of a scan.
+Frame: local ENU plane, x = east, y = north, metres. Bearings are radians clockwise from north. Rays are followed
+in `harness.ray_casting`: a face that is not hit cannot change any bit of a scan.
 """
 
 from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -17,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.ray_casting import Fan
 from harness.world import Faces, Surroundings, World
 from planner.interface import ComplexArray, FloatArray, IntArray
 
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
 # The neighbour list reaches this part of the range further, and this far into the future.
 _SKIN = 0.25
 _HORIZON_S = 30.0
-# Rays tried beyond the bearings of a face, in rays: more than bearings err, even at a tangent (1.5e-8 rad).
-_MARGIN_RAYS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,18 +152,12 @@ class RangeSensor:
     def __init__(self, world: World, config: Sensor, seed_sequence: np.random.SeedSequence) -> None:
         self._world = world
         self._config = config
-        field_rad = math.radians(config.field_of_view_deg)
-        self._spacing_rad = field_rad / config.rays
-        self._first_rad = 0.5 * self._spacing_rad - field_rad / 2
-        offsets = self._first_rad + self._spacing_rad * np.arange(config.rays)
-        self._turn = math.tau / self._spacing_rad
-        self._fan = np.array((np.sin(offsets), np.cos(offsets)))  # seen from the nose: to its right, ahead
-        self._fan_right, self._fan_ahead = self._fan
-        self._rays: ComplexArray = self._fan_right + 1j * self._fan_ahead
-        self._rays.setflags(write=False)
-        self._surely_in_range_m = config.range_m * (1.0 - 1e-9)
-        self._nothing = np.full(config.rays, math.inf)
-        self._nothing.setflags(write=False)
+        self._fan = Fan(math.radians(config.field_of_view_deg), config.rays, config.range_m)
+        self._always: dict[str, Any] = {
+            "spacing_rad": self._fan.spacing_rad,
+            "fan": self._fan.rays,
+            "max_range_m": config.range_m,
+        }
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)
         )
@@ -177,24 +168,24 @@ class RangeSensor:
     def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
         """Looks around from a place, at a time."""
         faces = self._near(east_m, north_m, time_s).faces(time_s)
-        seen: dict[str, Any] = {
+        seen = {
+            **self._always,
             "time_s": time_s,
             "available_s": time_s + self._config.latency_s,
             "east_m": east_m,
             "north_m": north_m,
             "heading_rad": heading_rad,
-            "start_rad": (heading_rad + self._first_rad) % math.tau,
-            "spacing_rad": self._spacing_rad,
-            "fan": self._rays,
-            "max_range_m": self._config.range_m,
+            "start_rad": (heading_rad + self._fan.first_rad) % math.tau,
         }
-        follow = partial(self._true_ranges, faces, east_m, north_m, heading_rad)
         if self._flawed:  # what is drawn at random is drawn now, scan by scan
-            return RangeScan(ranges_m=self._degraded(follow()), **seen)
+            ranges = self._fan.ranges_m(faces, east_m, north_m, heading_rad)
+            return RangeScan(ranges_m=self._degraded(ranges), **seen)
         face_m = self._nearest(faces, east_m, north_m)
         if face_m == math.inf:  # nothing to follow rays to
-            return _Unread.of(face_m, {**seen, "ranges_m": self._nothing})
-        return _Unread.of(face_m, {**seen, "_follow": follow})
+            seen["ranges_m"] = self._fan.nothing
+        else:
+            seen["_follow"] = partial(self._fan.ranges_m, faces, east_m, north_m, heading_rad)
+        return _Unread.of(face_m, seen)
 
     def _near(self, east: float, north: float, time: float) -> Surroundings:
         """All that is in range, from the neighbour list; this renews the list when it runs out."""
@@ -222,103 +213,6 @@ class RangeSensor:
             nearest = min(nearest, float(np.abs(start + np.clip(share, 0.0, 1.0) * along).min()))
         return nearest if nearest <= self._config.range_m else math.inf
 
-    def _true_ranges(self, faces: Faces, east: float, north: float, heading_rad: float) -> FloatArray:
-        """(n,) ranges to the nearest face, +inf beyond the range."""
-        sin, cos = math.sin(heading_rad), math.cos(heading_rad)
-        ranges = self._nothing.copy()
-        for circle in faces.circles:
-            self._hit_circle(ranges, circle, complex(east, north), complex(cos, sin))
-        if faces.edges_m.shape[1]:
-            away_east, away_north = faces.edges_m[::2] - east, faces.edges_m[1::2] - north
-            self._hit_edges(ranges, cos * away_east - sin * away_north, sin * away_east + cos * away_north)
-        return ranges
-
-    def _hit_circle(
-        self, ranges: FloatArray, circle: tuple[float, float, float], place: complex, heading: complex
-    ) -> None:
-        """Lowers ranges to a circle: centre east and north, radius; from a place, with a nose."""
-        east, north, radius = circle
-        centre = (complex(east, north) - place) * heading  # to the right + i ahead
-        away = abs(centre)
-        if away - radius > self._config.range_m:
-            return
-        half_rad, near_side = (math.asin(radius / away), True) if away > radius else (math.pi, False)
-        right, ahead = centre.real, centre.imag
-        # The power of the sensor's place: the square of its tangent to the circle, negative inside.
-        power = (away - radius) * (away + radius)
-        farthest = math.sqrt(power) if near_side else away + radius
-        for low, high in self._tried(math.atan2(right, ahead) - half_rad, 2.0 * half_rad):
-            along = self._fan_right[low:high] * right
-            along += self._fan_ahead[low:high] * ahead
-            half_chord2 = along * along
-            half_chord2 -= power
-            half_chord = np.sqrt(np.maximum(half_chord2, 0.0))
-            distance = along - half_chord if near_side else along + half_chord
-            # Only the outermost rays may pass by: the margin is far less than a ray.
-            for end in (0, -1):
-                if half_chord2.item(end) < 0.0 or distance.item(end) < 0.0:
-                    distance[end] = math.inf
-            if farthest > self._surely_in_range_m:
-                np.putmask(distance, distance > self._config.range_m, math.inf)
-            reached = ranges[low:high]
-            np.minimum(reached, distance, out=reached)
-
-    def _hit_edges(self, ranges: FloatArray, right: FloatArray, ahead: FloatArray) -> None:
-        """Lowers ranges to edges; (2, e) where they start and end, to the right and ahead.
-
-        A ray hits where the ends lie on different sides of it. Two edges that share a vertex agree about its
-        side, so that no ray slips through between them.
-        """
-        (start_right, end_right), (start_ahead, end_ahead) = right, ahead
-        turn = start_ahead * end_right - start_right * end_ahead
-        dot = start_right * end_right + start_ahead * end_ahead
-        width = np.arctan2(turn, dot)
-        backwards = width < 0.0
-        first = np.arctan2(
-            np.where(backwards, end_right, start_right), np.where(backwards, end_ahead, start_ahead)
-        )
-        tries, faces = [], []
-        for face, (bearing, wide) in enumerate(zip(first.tolist(), np.abs(width).tolist(), strict=True)):
-            for span in self._tried(bearing, wide):
-                tries.append(span)
-                faces.append(face)
-        if not tries:
-            return
-        along_right, along_ahead = end_right - start_right, end_ahead - start_ahead
-        lever = start_right * along_ahead - start_ahead * along_right
-        columns = np.array((start_right, start_ahead, end_right, end_ahead, lever))[:, faces]
-        rays, (start_right, start_ahead, end_right, end_ahead, lever) = self._pairs(tries, columns)
-        ray_right, ray_ahead = rays
-        start_side = ray_right * start_ahead - ray_ahead * start_right
-        end_side = ray_right * end_ahead - ray_ahead * end_right
-        hit = ((start_side >= 0) != (end_side >= 0)).nonzero()[0]
-        distance = np.full(len(lever), math.inf)
-        distance[hit] = lever[hit] / (end_side[hit] - start_side[hit])
-        distance[(distance < 0) | (distance > self._config.range_m)] = math.inf
-        _lower(ranges, tries, distance)
-
-    def _tried(self, first_rad: float, width_rad: float) -> Iterable[tuple[int, int]]:
-        """Spans of rays (first, last + 1) that may meet a face.
-
-        Args:
-            first_rad: bearing from the nose at which the face begins.
-            width_rad: how far it reaches clockwise from there.
-        """
-        rays, first = self._config.rays, (first_rad - self._first_rad) % math.tau / self._spacing_rad
-        last = first + width_rad / self._spacing_rad
-        low, high = math.ceil(first - _MARGIN_RAYS), math.floor(last + _MARGIN_RAYS) + 1
-        if high <= rays:
-            return ((low, high),) if low < high else ()
-        # It may begin in this turn and reach into the next: it is tried as it is, and one turn back.
-        again = min(math.floor(last - self._turn + _MARGIN_RAYS) + 1, rays)
-        return tuple(span for span in ((low, rays), (0, again)) if span[0] < span[1])
-
-    def _pairs(self, tries: Sequence[tuple[int, int]], faces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Rays and faces that may meet: (2, p) directions to the right and ahead, and (k, p) rows of faces."""
-        counts = [high - low for low, high in tries]
-        rays = np.concatenate([self._fan[:, low:high] for low, high in tries], axis=1)
-        return rays, faces.repeat(counts, axis=1)
-
     def _degraded(self, ranges: FloatArray) -> FloatArray:
         """Ranges with the imperfections of the sensor."""
         config, n = self._config, len(ranges)
@@ -331,15 +225,6 @@ class RangeSensor:
             chance, share = self._false_return.random((2, n))
             ranges = np.where(chance < config.false_return, config.range_m * (1.0 - share), ranges)
         return ranges
-
-
-def _lower(ranges: FloatArray, tries: Iterable[tuple[int, int]], distance: FloatArray) -> None:
-    """Lowers ranges to the distances of pairs of rays and faces."""
-    first = 0
-    for low, high in tries:
-        reached = ranges[low:high]
-        np.minimum(reached, distance[first : first + high - low], out=reached)
-        first += high - low
 
 
 def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:

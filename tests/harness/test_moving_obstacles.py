@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from harness import range_sensor
+from harness import ray_casting
 from harness.moving_obstacles import COASTS_S, MovingObstacles, _bow
 from harness.obstacle import Circle, Obstacle, Polygon
 from harness.range_sensor import RangeScan
@@ -268,13 +268,13 @@ def test_where_it_was_is_told_when_it_is_found() -> None:
 
 def test_in_a_still_world_few_scans_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
     read = []
-    follow = range_sensor.RangeSensor._true_ranges
+    follow = ray_casting.Fan.ranges_m
 
-    def counted(self: range_sensor.RangeSensor, *arguments: Any) -> Any:
+    def counted(self: ray_casting.Fan, *arguments: Any) -> Any:
         read.append(arguments)
         return follow(self, *arguments)
 
-    monkeypatch.setattr(range_sensor.RangeSensor, "_true_ranges", counted)
+    monkeypatch.setattr(ray_casting.Fan, "ranges_m", counted)
     watched(flight(sensor(world_of(Circle((3300.0, 2500.0), 150.0))), 60.0, START))
     assert 10 <= len(read) <= 60.0 / 3.0
 
