@@ -152,7 +152,6 @@ class MovingObstacles:
     def _look(self, now: _Looked, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before, or has drawn back."""
         scan, hits, places = now
-        fresh = np.ones(len(hits), dtype=np.bool_) if moving is None else ~moving[hits]
         long_ago, of_late = (self._before[0], self._before[1]), (self._before[-1], self._before[-2])
         # A scan that errs may be wrong about a place; two are not.
         many = 2 if self._flawed else 1
@@ -160,9 +159,11 @@ class MovingObstacles:
         if self._noise == 0.0:  # else too little has changed of late
             late = _all(come(before.scan, places, self._sure) for before in of_late[:many])
             late |= _all(self._drawn_back(before, scan)[hits] for before in of_late[:many])
-            # Where rays are far apart an outline ends anywhere.
-            changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)
-        changed &= fresh
+            if late.any():
+                # Where rays are far apart an outline ends anywhere.
+                changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)
+        if moving is not None:
+            changed &= ~moving[hits]
         if np.count_nonzero(changed) < FEWEST:
             return
         for run in self._runs(scan, hits, places):
