@@ -89,17 +89,17 @@ class ObstacleMemory:
             seen: what has been seen so far.
             met: for each obstacle that moves, (k, 2) where its edge is to be thought of; default: where it is.
         """
-        fresh = self._take_in(seen)
+        fresh = NOTHING if seen.revision == self._revision else self._take_in(seen)
         outlines = [each.points_m for each in seen.moving] if met is None else met
-        if self._alike(outlines):
+        if not (outlines or self._outlines) or self._alike(outlines):
             return fresh
         self._outlines, self._with_moving = tuple(outlines), None
         return np.concatenate((fresh, *outlines))
 
     def _alike(self, outlines: Sequence[FloatArray]) -> bool:
         """Whether what moves is where it was, but for a little."""
-        if not outlines or len(outlines) != len(self._outlines):
-            return len(outlines) == len(self._outlines)
+        if len(outlines) != len(self._outlines):
+            return False
         corners = [
             np.abs(edge(new, axis=0) - edge(old, axis=0)).max()
             for new, old in zip(outlines, self._outlines, strict=True)
@@ -121,8 +121,6 @@ class ObstacleMemory:
         return self._with_moving
 
     def _take_in(self, seen: SeenWorld) -> FloatArray:
-        if seen.revision == self._revision:
-            return NOTHING
         fresh = seen.edges_since(self._revision)
         if seen.taken_back_at > self._revision >= 0:
             known = seen.edges_since(-1)

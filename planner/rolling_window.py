@@ -120,11 +120,14 @@ class RollingWindow:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
-        fresh = self._memory.take_in(request.seen, encounters(request, self._mission))
-        self._local.trail.add(request.position_m)
+        met: list[FloatArray] = []
         if request.seen.moving:
-            self._moving_s = request.time_s
-        effect = self._in_effect(request)
+            self._moving_s, met = request.time_s, encounters(request, self._mission)
+        fresh = self._memory.take_in(request.seen, met)
+        self._local.trail.add(request.position_m)
+        if self._proposed is not None:
+            self._take_effect(request, self._proposed)
+        effect = self._effect
         if effect is None:
             self._proof_for_turns.closed(request.position_m)
             return self._roll(request, None, 0.0)
@@ -165,13 +168,12 @@ class RollingWindow:
             return since >= max(self._lead_m, (UNHURRIED if grazed else CUT) * wrong)
         return since >= max(self._lead_m if near else self._rolling_step_m, UNHURRIED * wrong)
 
-    def _in_effect(self, request: PlanRequest) -> Effect | None:
-        """The plan in effect."""
-        if self._proposed is not None and request.flown is self._proposed.plan:
-            self._effect, self._proposed = self._proposed, None
-            self._watch.begin(self._effect, self._standing_m(), self._memory.gone - self._gone)
+    def _take_effect(self, request: PlanRequest, proposed: Effect) -> None:
+        """Begins to watch what was proposed last, if it is flown now."""
+        if request.flown is proposed.plan:
+            self._effect, self._proposed = proposed, None
+            self._watch.begin(proposed, self._standing_m(), self._memory.gone - self._gone)
             self._searched_at_m = self._refused_at_m = 0.0
-        return self._effect
 
     def _roll(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
