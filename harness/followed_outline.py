@@ -75,20 +75,25 @@ class FollowedOutline:
         """Goes on with an outline as it was just found."""
         self.outline, self.outline_s, self.base = outline, time_s, self.shifts[-1][1]
 
-    def decide(self, sure_m: float) -> None:
-        """Decides whether it moves: surely, and further than returns err.
+    @property
+    def moved(self) -> complex:
+        """How far it was found from where it was first, of what is remembered of it."""
+        return self.shifts[-1][1] - self.shifts[0][1]
+
+    def seems_to_move(self, sure_m: float) -> bool:
+        """Whether it was found to move: surely, and further than returns err.
 
         Of a straight face without both of its ends other parts come into view along it: there only motion across
         it tells, and by far.
         """
-        moved, velocity, further_m = self.shifts[-1][1] - self.shifts[0][1], self.velocity, sure_m
+        moved, velocity, further_m = self.moved, self.velocity, sure_m
         if not self.outline.is_definite:
             face = self.outline.points[-1] - self.outline.points[0]
             along = face / max(abs(face), 1e-9)
             moved, velocity = ((each * along.conjugate()).imag * 1j for each in (moved, velocity))
             further_m = FAR * sure_m
         sure = self.error_mps < VAGUE_MPS and abs(velocity) >= LEAST_MPS + SURE * self.error_mps
-        self.moves = self.moves or (sure and abs(moved) > further_m)
+        return sure and abs(moved) > further_m
 
     def surely_stands(self) -> bool:
         """Whether its velocity is surely too little."""

@@ -27,7 +27,7 @@ import numpy as np
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
-from harness.scan_comparison import MISSING, come, drawn_back, in_a_row, runs_of
+from harness.scan_comparison import MISSING, come, drawn_back, in_a_row, looked_through, runs_of
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
 COMPARED_S = 12.0
@@ -246,7 +246,9 @@ class MovingObstacles:
                 continue
             age_s, known = scan.time_s - track.begun_s, track.moves
             if age_s >= DECIDED_S:
-                track.decide(self._sure)
+                track.moves = track.moves or (
+                    track.seems_to_move(self._sure) and self._has_come_or_gone(track, places[mine], scan)
+                )
                 if track.surely_stands() or (age_s > UNDECIDED_S and not track.moves):
                     continue
             kept.append(track)
@@ -258,6 +260,18 @@ class MovingObstacles:
                 self._new += [] if known else [track]
         self._tracks = kept
         return moving if moving.any() else None
+
+    def _has_come_or_gone(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
+        """Whether it is seen where nothing was, or nothing where it was.
+
+        Where a corner is rounded, another face comes into view little by little, as if the first one moved.
+        """
+        if self._is_free:
+            return True
+        first = track.at(scan.time_s).points - track.moved
+        come_or_gone = [looked_through(scan, first, self._sure)]
+        come_or_gone += [come(before.scan, places, self._sure) for before in self._before]
+        return any(np.count_nonzero(each) >= FEWEST for each in come_or_gone)
 
     def _found_again(
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
