@@ -2,10 +2,11 @@
 
 Two edge points nearer to each other than twice the clearance let nothing through between them: no point of the
 line that joins them is as far as the clearance from both. Nor is there a way between an edge point and the border of
-the area that is nearer to it than the clearance. A closed chain of such lines, where the border closes chains
-outside of the area, that crosses the straight line from start to goal an odd number of times parts the two (Jordan
-curve theorem, modulo 2). Chains are kept as a forest with the parity of their crossings, so that the first link
-that closes an odd one is noticed: union-find with parity.
+the area that is nearer to it than the clearance; what has to keep a distance from the border, too, like the middle of
+a turn, finds none where both together are more than what lies between. A closed chain of such lines, where the border
+closes chains outside of the area, that crosses the straight line from start to goal an odd number of times parts the
+two (Jordan curve theorem, modulo 2). Chains are kept as a forest with the parity of their crossings, so that the first
+link that closes an odd one is noticed: union-find with parity.
 """
 
 from __future__ import annotations
@@ -83,7 +84,7 @@ def _link(parent: IntArray, parity: BoolArray, a: int, b: int, crosses: bool) ->
     return False
 
 
-@compiled(ROWS, COUNT, COUNTS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, ROWS, FLOATS, FLOAT)
+@compiled(ROWS, COUNT, COUNTS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, ROWS, FLOATS, FLOAT, FLOAT)
 def _link_all(
     places: FloatArray,
     first: int,
@@ -94,6 +95,7 @@ def _link_all(
     ends: FloatArray,
     bounds: FloatArray,
     clearance: float,
+    border: float,
 ) -> bool:
     """Links nodes, from the first one on, with all before that are near enough; whether that closes a chain.
 
@@ -106,7 +108,8 @@ def _link_all(
         before: of each node the one before it there.
         ends: start and goal.
         bounds: xmin, ymin, xmax, ymax.
-        clearance: distance that a way keeps.
+        clearance: distance that a way keeps,
+        border: and from the border, but for what of that is nearer to start or goal.
     """
     closed, reach = False, 2.0 * clearance
     xmin, ymin, xmax, ymax = bounds
@@ -114,7 +117,11 @@ def _link_all(
         x, y = places[node]
         parent[node] = node
         for border_x, border_y in ((xmin, y), (xmax, y), (x, ymin), (x, ymax)):
-            if math.hypot(border_x - x, border_y - y) < clearance:
+            if math.hypot(border_x - x, border_y - y) >= clearance + border:
+                continue
+            from_start = math.hypot(border_x - ends[0, 0], border_y - ends[0, 1])
+            from_goal = math.hypot(border_x - ends[1, 0], border_y - ends[1, 1])
+            if min(from_start, from_goal) >= border:
                 closed |= _link(parent, parity, node, OUTSIDE, _crosses(x, y, border_x, border_y, ends))
         column, row = math.floor(x / reach), math.floor(y / reach)
         for i in range(column - 1, column + 2):
@@ -137,14 +144,20 @@ class Barrier:
         start: a place that keeps the clearance from all points.
         goal: another.
         bounds_m: xmin, ymin, xmax, ymax of the area, which is never left.
-        clearance_m: distance that a way keeps from every point.
+        clearance_m: distance that a way keeps from every point,
+        border_m: and from the border, but for those places of it that are nearer to start or goal.
     """
 
     def __init__(
-        self, start: Point, goal: Point, bounds_m: tuple[float, float, float, float], clearance_m: float
+        self,
+        start: Point,
+        goal: Point,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        border_m: float = 0.0,
     ) -> None:
         self._ends, self._bounds = np.array((start, goal)), np.array(bounds_m)
-        self._clearance = clearance_m
+        self._clearance, self._border = clearance_m, border_m
         self._thinned: set[tuple[int, int]] = set()
         self._places = np.zeros((1, 2))
         self._parent, self._before = np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp)
@@ -168,7 +181,8 @@ class Barrier:
         self._before = np.concatenate((self._before, more))
         self._parity = np.concatenate((self._parity, more.astype(np.bool_)))
         nodes = (self._parent, self._parity, self._last, self._before)
-        self.closed |= _link_all(self._places, known, *nodes, self._ends, self._bounds, self._clearance)
+        keeps = (self._clearance, self._border)
+        self.closed |= _link_all(self._places, known, *nodes, self._ends, self._bounds, *keeps)
 
 
 class Proof:
@@ -179,14 +193,21 @@ class Proof:
         memory: the edge points.
         keeps_m: what a way has to keep from every point, but for those that are nearer than this to the goal or to
             where the aircraft is at first: they prove nothing.
+        border_m: what it has to keep from the border of the area.
         with_refused: count what was refused: asks whether it leaves no way but through that. Else it proves
             nothing either.
     """
 
     def __init__(
-        self, mission: Mission, memory: ObstacleMemory, keeps_m: float, with_refused: bool = False
+        self,
+        mission: Mission,
+        memory: ObstacleMemory,
+        keeps_m: float,
+        border_m: float = 0.0,
+        with_refused: bool = False,
     ) -> None:
-        self._mission, self._memory, self._keeps_m = mission, memory, keeps_m
+        self._mission, self._memory = mission, memory
+        self._keeps_m, self._border_m = keeps_m, border_m
         self._with_refused = with_refused
         self._ends: tuple[Point, Point] | None = None
         self._begin()
@@ -210,7 +231,7 @@ class Proof:
         """Whether the ways are closed with so many more points."""
         memory, keeps_m = self._memory, self._keeps_m
         if self._barrier is None:
-            self._barrier = Barrier(*ends, self._mission.bounds_m, keeps_m)
+            self._barrier = Barrier(*ends, self._mission.bounds_m, keeps_m, self._border_m)
         self._taken = max(self._taken - (memory.gone - self._gone), 0)
         self._gone = memory.gone
         more = memory.genuine_m[self._taken :][:most]

@@ -17,7 +17,7 @@ at once. Where no way is left at the clearance, a closed chain of edges proves i
 where none is left but those given up, one with room to turn everywhere must remain, or such a chain proves that
 there is none for this aircraft (`barrier`). Assumed: a world that stands still, a sensor that sees every gap
 narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn radius can be
-moved at the clearance.
+moved at the clearance, within the area.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class RollingWindow:
         self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps
         self._proof = Proof(mission, self._memory, self._local.least_keeps_m)
         self._turns_keep_m = mission.clearance_m + mission.turn_radius_m
-        self._proof_for_turns = Proof(mission, self._memory, self._turns_keep_m)
+        self._proof_for_turns = Proof(mission, self._memory, self._turns_keep_m, mission.turn_radius_m)
         self._given_up = Proof(mission, self._memory, self._local.least_keeps_m, with_refused=True)
         self._thinking: Deliberation | None = None
         self._dead_ends = DeadEnds(2.0 * mission.clearance_m)

@@ -113,6 +113,29 @@ def test_a_wall_closes_the_area_where_it_reaches_from_border_to_border(
     assert barrier_of(points, start=start, goal=goal).closed is closed
 
 
+@pytest.mark.parametrize("begin", [0.0, 41.0, 89.0, 91.0])
+def test_what_keeps_from_the_border_as_well_needs_a_wider_gap_there(begin: float) -> None:
+    wall = np.column_stack((np.full(60, 500.0), np.linspace(begin, 1000.0, 60)))
+    for border_m in (0.0, 50.0):
+        barrier = Barrier(START, GOAL, BOUNDS, CLEARANCE, border_m)
+        barrier.add(wall)
+        # The middle of a turn keeps off the border by its radius and off the wall by the clearance more.
+        within = shapely.box(*BOUNDS).buffer(-border_m)
+        free = within.difference(shapely.buffer(shapely.LineString(wall), CLEARANCE))
+        parts = shapely.get_parts(free)
+        joined = any(all(part.contains(shapely.Point(end)) for end in (START, GOAL)) for part in parts)
+        assert barrier.closed is not joined
+
+
+def test_a_border_beside_an_end_counts_for_nothing() -> None:
+    goal = (480.0, 30.0)
+    wall = np.column_stack((np.full(60, 500.0), np.linspace(85.0, 1000.0, 60)))
+    for end, closed in (((800.0, 30.0), True), (goal, False)):
+        barrier = Barrier((200.0, 480.0), end, BOUNDS, CLEARANCE, 50.0)
+        barrier.add(wall)
+        assert barrier.closed is closed
+
+
 def test_a_wall_beside_both_parts_nothing() -> None:
     along = np.linspace(0.0, 1000.0, 60)
     points = np.column_stack((along, np.full(60, 700.0)))
