@@ -39,6 +39,7 @@ class Deliberation:
         known: number of edge points, of what stands still, that it begins with.
         effort: how often the work of a wide search is doubled.
         closed: asked before more work than usual: whether it is proved that there is no way.
+        roomy: ways with room to turn everywhere come first, however long.
 
     Attributes:
         known: number of edge points, of what stands still, that it began with.
@@ -47,8 +48,10 @@ class Deliberation:
         tracks: candidates looked at so far.
     """
 
-    def __init__(self, local: LocalPlanning, known: int, effort: int, closed: Callable[[], bool]) -> None:
-        self._local, self._effort, self._closed = local, effort, closed
+    def __init__(
+        self, local: LocalPlanning, known: int, effort: int, closed: Callable[[], bool], roomy: bool = False
+    ) -> None:
+        self._local, self._effort, self._closed, self._roomy = local, effort, closed, roomy
         self._start: Start | None = None
         self._flown: Course | None = None
         self._thoughts = self._think()
@@ -84,9 +87,9 @@ class Deliberation:
         waiting: list[_Found] = []
         closed_m = math.inf
         attempts = self._local.attempts()
-        if self._effort:
+        if self._effort or self._roomy:
             # In vain so far: what is closed to the narrowest way is closed to all.
-            attempts.sort(key=lambda each: each.distance_m + each.margin_m)
+            attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._roomy)
         for i, attempt in enumerate(attempts):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one

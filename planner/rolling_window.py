@@ -6,18 +6,18 @@ turn radius (`route_optimisation`); the shortest of the n is the course (`local_
 part is put into effect which ends in a turn seen to be free (`certificate`), and flown until the window rolls
 on. A search that takes long is spread over several scans (`deliberation`).
 
-Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there
-is a way, the course is a shortest one through what is known. Each course is flown until something seen
-contradicts it. Edge points lie on a finite grid, so that this can happen only finitely often, and a course that
-nothing contradicts ends at the goal. A place that the aircraft turned before twice is left out of further
-searches (`dead_ends`, `ObstacleMemory.refuse`), with what lies beside it: each covers a disc of the clearance or
-more, so that these are finitely many as well; they are tried again only where no other way is left. A search in
-vain is repeated with twice the effort; where nothing is left open at all, the distances to go (`cost_to_go`) tell it
-at once. Where no way is left at the clearance, a closed chain of edges proves it;
-where none is left but those given up, one with room to turn everywhere must remain, or such a chain proves that
-there is none for this aircraft (`barrier`). Assumed: a world that stands still, a sensor that sees every gap
-narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn radius can be
-moved at the clearance, within the area.
+Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
+way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.
+Edge points lie on a finite grid, so that this can happen only finitely often, and a course that nothing
+contradicts ends at the goal. A place that the aircraft turned before twice is left out of further searches
+(`dead_ends`, `ObstacleMemory.refuse`), with what lies beside it: each covers a disc of the clearance or more, so
+that these are finitely many as well; they are tried again only where no other way is left, and then those with
+room to turn first, for they can be entered. A search in vain is repeated with twice the effort; where nothing is
+left open at all, the distances to go (`cost_to_go`) tell it at once. Where no way is left at the clearance, a
+closed chain of edges proves it; where none is left but those given up, one with room to turn everywhere must
+remain, or such a chain proves that there is none for this aircraft (`barrier`). Assumed: a world that stands
+still, a sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along
+which a disc of the turn radius can be moved at the clearance, within the area.
 """
 
 from __future__ import annotations
@@ -111,6 +111,7 @@ class RollingWindow:
         self._moving_s = -math.inf  # when something was last known to move
         self._lengthened_m = math.inf  # by so much the last search made the way longer
         self._effort = 0  # grows with every search that was in vain
+        self._forgiven = False  # what was given up is, or was, tried again
         self._refused_at_m = 0.0
         self._watch = Watch(
             keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
@@ -190,7 +191,11 @@ class RollingWindow:
             if thinking is None:
                 self._gone = self._memory.gone
                 thinking = self._thinking = Deliberation(
-                    self._local, known, self._effort, lambda: self._proof.closed(request.position_m)
+                    self._local,
+                    known,
+                    self._effort,
+                    lambda: self._proof.closed(request.position_m),
+                    roomy=self._forgiven,
                 )
             unhurried = (
                 effect is not None and effect.leaves_m - here > self._urgent_m and not self._watch.broken
@@ -291,8 +296,9 @@ class RollingWindow:
             return away  # what is closed is told from a safe turn
         # Where edges come and go meanwhile, what was given up may yet be entered.
         in_vain = 1 if self._memory.gone == self._gone else MOST_EFFORT
-        no_room = self._effort >= in_vain and self._proof_for_turns.closed(request.position_m)
         only_given_up = len(self._memory.refused_m) > 0 and self._given_up.closed(request.position_m)
+        tried = self._effort >= in_vain or (only_given_up and self._forgiven)
+        no_room = tried and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
         stuck = None if thinking is None else thinking.stuck
@@ -321,6 +327,7 @@ class RollingWindow:
             if (only_given_up or self._effort == MOST_EFFORT) and (turned or not thinking.tracks):
                 self._refused_at_m = request.station_m
                 self._memory.forgive()
+                self._forgiven = True
             self._effort = min(self._effort + 1, MOST_EFFORT)
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
 
