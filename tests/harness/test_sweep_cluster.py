@@ -104,8 +104,12 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
     out = tmp_path / "out"
     flying = start(tmp_path, "--scheduler", cluster.address)
     wait_for(lambda: journal_lines(out) >= 2)
+    for worker in cluster.workers:
+        worker.send_signal(signal.SIGSTOP)  # else all may be flown before it is interrupted
     flying.send_signal(signal.SIGINT)
     told, said = flying.communicate(timeout=60)
+    for worker in cluster.workers:
+        worker.send_signal(signal.SIGCONT)
     assert (flying.returncode, told) == (130, "")
     assert said == "wayproof: interrupted; what is done is in out, --resume goes on\n"
 
