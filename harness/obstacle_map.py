@@ -20,8 +20,6 @@ from harness.range_sensor import RangeScan, all_round, supported
 from harness.scan_comparison import looked_through
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
-"""Points of the plane as east + i north: one number each."""
-
 SUPPORT = 0.5
 """Where returns may be false, one is believed only if a ray beside it met something as far, but for this share of
 the clearance: a false return beside a wall seldom lies so near to its range."""
