@@ -39,7 +39,7 @@ class Deliberation:
         known: number of edge points, of what stands still, that it begins with.
         effort: how often the work of a wide search is doubled.
         closed: asked before more work than usual: whether it is proved that there is no way.
-        roomy: ways with room to turn everywhere come first, however long.
+        roomy: the widest ways are looked for first, however long.
 
     Attributes:
         known: number of edge points, of what stands still, that it began with.

@@ -11,13 +11,13 @@ way, the course is a shortest one through what is known. Each course is flown un
 Edge points lie on a finite grid, so that this can happen only finitely often, and a course that nothing
 contradicts ends at the goal. A place that the aircraft turned before twice is left out of further searches
 (`dead_ends`, `ObstacleMemory.refuse`), with what lies beside it: each covers a disc of the clearance or more, so
-that these are finitely many as well; they are tried again only where no other way is left, and then those with
-room to turn first, for they can be entered. A search in vain is repeated with twice the effort; where nothing is
-left open at all, the distances to go (`cost_to_go`) tell it at once. Where no way is left at the clearance, a
-closed chain of edges proves it; where none is left but those given up, one with room to turn everywhere must
-remain, or such a chain proves that there is none for this aircraft (`barrier`). Assumed: a world that stands
-still, a sensor that sees every gap narrower than twice the clearance as one wall, and a way to the goal along
-which a disc of the turn radius can be moved at the clearance, within the area.
+that these are finitely many as well; they are tried again only where no other way is left, and then the widest are
+looked for first. A search in vain is repeated with twice the effort; where nothing is left open at all, the
+distances to go (`cost_to_go`) tell it at once. Where no way is left at the clearance, a closed chain of edges
+proves it; where none is left but those given up, one with room to turn everywhere must remain, or such a chain
+proves that there is none for this aircraft (`barrier`). Assumed: a world that stands still, a sensor that sees
+every gap narrower than twice the clearance as one wall, and a way to the goal along which a disc of the turn
+radius can be moved at the clearance, within the area.
 """
 
 from __future__ import annotations

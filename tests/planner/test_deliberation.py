@@ -274,6 +274,27 @@ class TightNearObstacles:
         return Route((MISSION.goal_m,), Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)])))
 
 
+@pytest.mark.parametrize("roomy", [False, True])
+def test_the_widest_ways_are_looked_for_first_where_that_is_asked_for(roomy: bool) -> None:
+    asked: list[Attempt] = []
+
+    class InVain(TightNearObstacles):
+        def route(self, attempt: Attempt, *_: object) -> Generator[None, None, Route | None]:
+            asked.append(attempt)
+            yield
+            return None
+
+        def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
+            yield
+            return None
+
+    local = InVain()
+    thinking = Deliberation(cast(LocalPlanning, local), 0, 0, lambda: False, roomy=roomy)
+    assert not list(thinking.courses(START, None, math.inf))
+    widest = max(local.attempts(), key=lambda each: each.distance_m)
+    assert (asked[0] == widest) is roomy
+
+
 def test_a_long_way_waits_where_a_much_shorter_one_had_no_room_for_its_turns() -> None:
     thinking = Deliberation(cast(LocalPlanning, TightNearObstacles()), 0, 0, lambda: False)
     lengths = [course.path.length_m for course in thinking.courses(START, None, math.inf)]
