@@ -23,9 +23,8 @@ ABREAST = 2
 
 def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     """(k,) which places were looked through by a scan before: what is there now has come."""
-    if not _may_be_through(before, places, sure_m):
-        return np.zeros(len(places), dtype=np.bool_)
-    return looked_through(before, places, sure_m)
+    some = looked_through(before, places, sure_m, every=FEWEST)
+    return looked_through(before, places, sure_m) if some.any() else some
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
@@ -38,19 +37,14 @@ def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float
         most_m: nothing has drawn back by more.
     """
     gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
-    if _may_be_through(scan, were, sure_m):
-        left = were[looked_through(scan, were, sure_m)]
+    left = were[come(scan, were, sure_m)]
+    if len(left):
         ray = rays_towards(scan, left)
         back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
         ray = ray[back_m < most_m]
         # From nearer by, places that were met by neighbouring rays lie further apart.
         gone[(ray[:, None] + np.arange(-1, 2)) % len(gone)] = True
     return gone
-
-
-def _may_be_through(scan: RangeScan, places: ComplexArray, sure_m: float) -> bool:
-    """Whether a scan may have looked through as many places in a row as it takes: one is among these."""
-    return bool(looked_through(scan, places[::FEWEST].copy(), sure_m).any())
 
 
 def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:
@@ -68,6 +62,7 @@ def looked_through(
     abreast: int = ABREAST,
     aimed_m: float = math.inf,
     within_m: float = math.inf,
+    every: int = 1,
 ) -> BoolArray:
     """(k,) whether a scan looked through places, surely: with the ray towards each and some to either side.
 
@@ -78,6 +73,7 @@ def looked_through(
         abreast: so many rays to either side.
         aimed_m: how near the ray passes by a place, if it is to say anything about it.
         within_m: how far away it says anything.
+        every: only so many places on is one asked: one is among as many in a row.
     """
     return _through(
         places,
@@ -91,10 +87,11 @@ def looked_through(
         sure_m,
         abreast,
         aimed_m,
+        every,
     )
 
 
-@compiled(PLACES, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT, COUNT, FLOAT)
+@compiled(PLACES, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
 def _through(
     places: ComplexArray,
     ranges: FloatArray,
@@ -107,9 +104,10 @@ def _through(
     sure_m: float,
     abreast: int,
     aimed_m: float,
+    every: int,
 ) -> BoolArray:
     through, rays = np.zeros(len(places), dtype=np.bool_), len(ranges)
-    for i in range(len(places)):
+    for i in range(0, len(places), every):
         dx, dy = places[i].real - east, places[i].imag - north
         distance = math.hypot(dx, dy)
         if distance >= within_m:
