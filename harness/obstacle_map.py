@@ -122,7 +122,9 @@ class ObstacleMap:
             return np.zeros((0, 2))
         slots = (self._since[: self._count] > revision).nonzero()[0]
         slots = slots[self._score[self._key[slots]] >= CONFIRMED]
-        return _pairs(self._points[slots[np.argsort(self._since[slots], kind="stable")]])
+        if revision < self._revision - 1:  # else all came in at once
+            slots = slots[np.argsort(self._since[slots], kind="stable")]
+        return _pairs(self._points[slots])
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Forgets all that is no further from some points, (k, 2)."""
@@ -161,8 +163,6 @@ class ObstacleMap:
         corners = nearest_m < DETAIL[-1][0] * self._clearance
         near = ends(hits, places, scan.ranges_m, cell, closed, join, corners)
         ranges, places = scan.ranges_m[hits[near]], places[near]
-        column, row = self._column_and_row(places)
-        known = self._score[column * self._ny + row] >= CONFIRMED
         again: list[tuple[IntArray, ComplexArray]] = []
         for reach, finer in DETAIL:
             within = ranges < reach * self._clearance
@@ -172,7 +172,8 @@ class ObstacleMap:
                 cells, found = np.concatenate((cells, fine)), np.concatenate((found, at))
                 if first < CONFIRMED:
                     # Where the wall is known, this only tells where it ends: once is enough.
-                    sure = known[within]
+                    column, row = self._column_and_row(at)
+                    sure = self._score[column * self._ny + row] >= CONFIRMED
                     again.append((fine[sure], at[sure]))
         for each in ((cells, found), *again):
             self._count_hits(*each)
