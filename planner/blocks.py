@@ -16,12 +16,17 @@ MOST_BLOCKS = 4096
 """Where the squares would be more, over all of the ground, they are made larger."""
 
 
-Cells = tuple[IntArray, IntArray, IntArray, IntArray, IntArray]
-"""What `cells` returns."""
+Cells = tuple[IntArray, IntArray, IntArray, IntArray]
+"""(c,) where each square begins among gathered points; (c,) how many it has; (p,) twice: squares that touch each other,
+diagonally too, each pair once."""
+
+Blocks = tuple[FloatArray, IntArray, FloatArray]
+"""(3, m) east and north of points by squares and the distance to be kept from each; (b + 1,) where each square begins
+among them, and the end; (3, b) centre and radius of a circle about each that holds what is to be kept from them. m."""
 
 
 @compiled(ROWS, COUNTS, FLOAT)
-def cells(points: FloatArray, some: IntArray, side: float) -> Cells:
+def cells(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray, Cells]:
     """Some points by squares: what lies in one of them is looked at as one piece of wall.
 
     Args:
@@ -30,8 +35,7 @@ def cells(points: FloatArray, some: IntArray, side: float) -> Cells:
         side: of the squares, m.
 
     Returns:
-        (m,) the indices, those of a square next to each other; (c,) where each square begins among them; (c,) how many
-        points it has; (p,) twice: squares that touch each other, diagonally too, each pair once.
+        (m,) the indices, those of a square next to each other; where the squares begin, and which touch.
     """
     column, row = np.empty(len(some), dtype=np.int64), np.empty(len(some), dtype=np.int64)
     for j, i in enumerate(some):
@@ -61,12 +65,22 @@ def cells(points: FloatArray, some: IntArray, side: float) -> Cells:
             if k < count and squares[k] == squares[j] + step:
                 one[pairs], other[pairs] = j, k
                 pairs += 1
-    return some[order], first[:count].copy(), counts[:count].copy(), one[:pairs].copy(), other[:pairs].copy()
+    squares_of = first[:count].copy(), counts[:count].copy(), one[:pairs].copy(), other[:pairs].copy()
+    return some[order], squares_of
+
+
+@compiled(ROWS, FLOATS, COUNTS)
+def places(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray:
+    """(3, k) east and north of k of (n, 2) points, and the distance to be kept from each, one row after the other."""
+    rows = np.empty((3, len(some)))
+    for j, i in enumerate(some):
+        rows[0, j], rows[1, j], rows[2, j] = points[i, 0], points[i, 1], keep[i]
+    return rows
 
 
 @compiled(ROWS, FLOATS, FLOAT)
-def blocks(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, IntArray, FloatArray]:
-    """All points by squares, with a circle about each that holds what is to be kept from its points.
+def blocks(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, Blocks]:
+    """All points by squares.
 
     Args:
         points: (m, 2) points, m.
@@ -74,11 +88,10 @@ def blocks(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray,
         side: of the squares, m.
 
     Returns:
-        (m,) indices, those of a square next to each other; (b + 1,) where each square begins among them, and the end;
-        (b, 3) centre and radius of the circles, m.
+        (m,) indices, those of a square next to each other; the points in this order.
     """
     if not len(points):
-        return np.empty(0, dtype=np.intp), np.zeros(1, dtype=np.intp), np.empty((0, 3))
+        return np.empty(0, dtype=np.intp), (np.empty((3, 0)), np.zeros(1, dtype=np.intp), np.empty((3, 0)))
     west, south = points[:, 0].min(), points[:, 1].min()
     east, north = points[:, 0].max() - west, points[:, 1].max() - south
     side = max(side, (east + north) / MOST_BLOCKS, math.sqrt(east * north / MOST_BLOCKS))
@@ -93,7 +106,7 @@ def blocks(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray,
     for i in range(len(points)):
         order[at[key[i]]] = i
         at[key[i]] += 1
-    first, circles = np.empty(len(begins), dtype=np.intp), np.empty((len(begins), 3))
+    first, circles = np.empty(len(begins), dtype=np.intp), np.empty((3, len(begins)))
     count = 0
     for square in range(len(begins) - 1):
         within = order[begins[square] : begins[square + 1]]
@@ -105,12 +118,9 @@ def blocks(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray,
             x, y = points[i]
             xmin, xmax, ymin, ymax = min(xmin, x), max(xmax, x), min(ymin, y), max(ymax, y)
             kept = max(kept, keep[i])
-        circles[count] = (
-            0.5 * (xmin + xmax),
-            0.5 * (ymin + ymax),
-            kept + 0.5 * math.hypot(xmax - xmin, ymax - ymin),
-        )
+        circles[0, count], circles[1, count] = 0.5 * (xmin + xmax), 0.5 * (ymin + ymax)
+        circles[2, count] = kept + 0.5 * math.hypot(xmax - xmin, ymax - ymin)
         first[count] = begins[square]
         count += 1
     first[count] = len(points)
-    return order, first[: count + 1].copy(), circles[:count].copy()
+    return order, (places(points, keep, order), first[: count + 1].copy(), circles[:, :count].copy())

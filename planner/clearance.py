@@ -9,7 +9,10 @@ import numpy as np
 from planner.compiled import COUNT, FLOAT, FLOATS, ROWS, compiled
 from planner.curves import Point
 from planner.fans import entered
-from planner.interface import FloatArray, IntArray, Path
+from planner.interface import FloatArray, Path
+
+EVERYWHERE = np.array([[0.0], [0.0], [math.inf]])
+"""A circle that holds all: (3, 1), as `planner.blocks.blocks` has them."""
 
 
 @compiled(ROWS, COUNT, FLOAT)
@@ -133,35 +136,34 @@ def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bo
     return _inside_bounds(path.segments, *bounds_m)
 
 
-def line_is_clear(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> bool:
-    """Whether the line from a to b keeps a distance from all points."""
-    return not len(all_entered(a, b, points_m, radius_m))
+def discs(points_m: FloatArray, radius_m: float | FloatArray) -> FloatArray:
+    """(3, m) east, north and radius of discs about (m, 2) points, of one radius or of one for each."""
+    return np.array((*points_m.T, _each(radius_m, points_m)))
 
 
-def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> tuple[float, int]:
-    """Where the line from a to b first enters one of the discs about some points.
+def line_is_clear(a: Point, b: Point, about: FloatArray) -> bool:
+    """Whether the line from a to b enters none of (3, m) discs."""
+    return first_entry(a, b, about)[1] < 0
+
+
+def first_entry(a: Point, b: Point, about: FloatArray) -> tuple[float, int]:
+    """Where the line from a to b first enters one of some discs.
 
     A disc that holds `a` counts only when the line leads deeper into it.
 
     Args:
         a: start.
         b: end.
-        points_m: (m, 2) centres.
-        radius_m: radius, one for all or one for each disc.
+        about: (3, m) discs, see `discs`.
 
     Returns:
         Distance from a (m) and index of the disc; infinite and -1 where the line is clear.
     """
-    entry, which = entered(points_m, _each(radius_m, points_m), *a, *b)
+    entry, which = entered(about, np.array([0, len(about[0])]), EVERYWHERE, *a, *b)
     if not len(which):
         return math.inf, -1
     first = int(entry.argmin())
     return max(float(entry[first]), 0.0), int(which[first])
-
-
-def all_entered(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> IntArray:
-    """Indices of all discs that the line from a to b enters, as `first_entry` has it."""
-    return entered(points_m, _each(radius_m, points_m), *a, *b)[1]
 
 
 def _each(radius_m: float | FloatArray, points_m: FloatArray) -> FloatArray:

@@ -1,6 +1,7 @@
 """What obstacles look like from a track point: where their fans end, and how far lines lead past their edge points.
 
-Points are (m, 2), metres, ENU; `keep` is the distance to be kept from each of them. Compiled: see `planner.compiled`.
+Metres, ENU. Points are (3, m): east, north and the distance to be kept from each, which gives the processor one row
+after the other. Compiled: see `planner.compiled`.
 """
 
 from __future__ import annotations
@@ -9,18 +10,16 @@ import math
 
 import numpy as np
 
-from planner.compiled import COUNTS, FLOAT, FLOATS, ROWS, compiled
+from planner.compiled import COUNTS, FLOAT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
 EDGE_OFF_RAD = 1e-7
 """Edges are turned this much into the free sector, clear of rounding errors."""
 
 
-@compiled(ROWS, FLOATS, COUNTS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
 def first_met(
-    points: FloatArray,
-    keep: FloatArray,
-    order: IntArray,
+    places: FloatArray,
     first: IntArray,
     circles: FloatArray,
     east: float,
@@ -31,9 +30,7 @@ def first_met(
     """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does.
 
     Args:
-        points: all edge points.
-        keep: distance to be kept from each.
-        order: the points, as `planner.blocks.blocks` has them,
+        places: all edge points by squares, as `planner.blocks.blocks` has them,
         first: where each square begins among them,
         circles: and the circle about it.
         east: where the ray begins.
@@ -42,31 +39,28 @@ def first_met(
         uy: along the ray.
     """
     nearest, met = math.inf, 0
-    for block in range(len(circles)):
-        dx, dy, reach = circles[block, 0] - east, circles[block, 1] - north, circles[block, 2]
+    for block in range(len(first) - 1):
+        dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
         ahead = dx * ux + dy * uy
         if abs(dx * uy - dy * ux) >= reach or ahead <= -reach or ahead - reach >= nearest:
             continue
         for k in range(first[block], first[block + 1]):
-            i = order[k]
-            dx, dy = points[i, 0] - east, points[i, 1] - north
+            dx, dy = places[0, k] - east, places[1, k] - north
             ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
-            room = keep[i] * keep[i] - beside * beside
+            room = places[2, k] * places[2, k] - beside * beside
             if room > 0.0 and ahead > 0.0:
                 entry = ahead - math.sqrt(room)
                 if entry < nearest:
-                    nearest, met = entry, i
+                    nearest, met = entry, k
     return max(nearest, 0.0), met
 
 
-@compiled(ROWS, FLOATS, COUNTS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT)
+@compiled(ROWS, COUNTS, ROWS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT)
 def fan_edges(
-    points: FloatArray,
-    keep: FloatArray,
-    order: IntArray,
+    places: FloatArray,
     block: IntArray,
     circles: FloatArray,
-    members: IntArray,
+    own: FloatArray,
     first: IntArray,
     counts: IntArray,
     one: IntArray,
@@ -77,13 +71,12 @@ def fan_edges(
     """The tangents to the ends of an obstacle's fan, and how far each is free.
 
     Args:
-        points: all edge points.
-        keep: distance to be kept from each.
-        order: all points by squares, see `first_met`,
-        block: where each square begins,
+        places: all edge points by squares, as `planner.blocks.blocks` has them,
+        block: where each square begins among them,
         circles: and the circle about it.
-        members: indices of the obstacle's points, those of a cell next to each other.
-        first: where each cell begins in `members`.
+        own: (3, m) east, north and the distance to be kept of the obstacle's points, those of a cell next to each
+            other.
+        first: where each cell begins in `own`.
         counts: how many points it has.
         one: a cell,
         other: and one that touches it; each pair once.
@@ -92,71 +85,63 @@ def fan_edges(
 
     Returns:
         (k, 5) unit vector, distance at which it touches, distance up to which it is free, side (1 for M, -1 for N);
-        (k,) index of the point that it comes too near to first.
+        (k,) index in `places` of the point that it comes too near to first.
     """
     cells, count = len(first), 0
-    left, right = np.empty((len(members), 2)), np.empty((len(members), 2))
-    for j, i in enumerate(members):
+    tangents = np.empty((4, len(own[0])))
+    for j in range(len(own[0])):
         # The direction towards a point, turned to its tangents; from too near they lead square past it.
-        dx, dy, kept2 = points[i, 0] - east, points[i, 1] - north, keep[i] * keep[i]
+        dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
         away2 = max(dx * dx + dy * dy, 1e-12)
-        inside = away2 <= kept2
-        cos = 0.0 if inside else math.sqrt(away2 - kept2) / away2
-        sin = 1.0 / math.sqrt(away2) if inside else keep[i] / away2
-        left[j, 0], left[j, 1] = dx * cos - dy * sin, dy * cos + dx * sin
-        right[j, 0], right[j, 1] = dx * cos + dy * sin, dy * cos - dx * sin
+        cos = math.sqrt(max(away2 - keep * keep, 0.0)) / away2
+        sin = 1.0 / math.sqrt(away2) if away2 <= keep * keep else keep / away2
+        tangents[0, j], tangents[1, j] = dx * cos - dy * sin, dy * cos + dx * sin
+        tangents[2, j], tangents[3, j] = dx * cos + dy * sin, dy * cos - dx * sin
     outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
+    x, y = np.empty(cells), np.empty(cells)
     edges, met = np.empty((2 * cells, 5)), np.empty(2 * cells, dtype=np.intp)
-    for side, u in ((1.0, left), (-1.0, right)):
+    for left in (True, False):
+        side, u, v = 1.0 if left else -1.0, tangents[0 if left else 2], tangents[1 if left else 3]
         for cell in range(cells):
-            begin = outmost[cell] = first[cell]
-            most = 0.0
+            begin = furthest = first[cell]
+            ux, uy, most = u[begin], v[begin], 0.0
             for j in range(begin + 1, begin + counts[cell]):
-                beyond = side * (u[begin, 0] * u[j, 1] - u[begin, 1] * u[j, 0])
-                if beyond > 0.0 and u[begin, 0] * u[j, 0] + u[begin, 1] * u[j, 1] < 0.0:
+                beyond = side * (ux * v[j] - uy * u[j])
+                if beyond > 0.0 and ux * u[j] + uy * v[j] < 0.0:
                     beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
                 if beyond > most:
-                    outmost[cell], most = j, beyond
-            ends[cell] = True
+                    furthest, most = j, beyond
+            outmost[cell], x[cell], y[cell], ends[cell] = furthest, u[furthest], v[furthest], True
         # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
         for pair in range(len(one)):
-            j, k = outmost[one[pair]], outmost[other[pair]]
-            beyond = side * (u[j, 0] * u[k, 1] - u[j, 1] * u[k, 0])
-            if beyond > 0.0:
-                ends[one[pair]] = False
-            elif beyond < 0.0:
-                ends[other[pair]] = False
+            j, k = one[pair], other[pair]
+            beyond = side * (x[j] * y[k] - y[j] * x[k])
+            ends[j] &= not beyond > 0.0
+            ends[k] &= not beyond < 0.0
         for cell in range(cells):
+            if not ends[cell]:
+                continue
             j = outmost[cell]
-            i = members[j]
-            dx, dy = points[i, 0] - east, points[i, 1] - north
-            touch2 = dx * dx + dy * dy - keep[i] * keep[i]
-            if not ends[cell] or touch2 <= 0.0:
+            dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
+            touch2 = dx * dx + dy * dy - keep * keep
+            if touch2 <= 0.0:
                 continue
             off = side * EDGE_OFF_RAD
-            towards, aside = u[j, 0] - off * u[j, 1], u[j, 1] + off * u[j, 0]
-            clear, met[count] = first_met(points, keep, order, block, circles, east, north, towards, aside)
+            towards, aside = x[cell] - off * y[cell], y[cell] + off * x[cell]
+            clear, met[count] = first_met(places, block, circles, east, north, towards, aside)
             edges[count] = (towards, aside, math.sqrt(touch2), clear, side)
             count += 1
     return edges[:count], met[:count]
 
 
-@compiled(ROWS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
 def hugged(
-    points: FloatArray,
-    members: IntArray,
-    east: float,
-    north: float,
-    ux: float,
-    uy: float,
-    outer: float,
-    touch: float,
+    own: FloatArray, east: float, north: float, ux: float, uy: float, outer: float, touch: float
 ) -> float:
     """How far along a ray an outer distance from an obstacle, which it touches, is reached again; 0: it never is.
 
     Args:
-        points: all edge points.
-        members: indices of the obstacle's.
+        own: (3, m) east and north of the obstacle's points, and what is not asked for here.
         east: where the ray begins.
         north: where the ray begins.
         ux: along the ray.
@@ -164,9 +149,9 @@ def hugged(
         outer: that distance.
         touch: distance along the ray at which it touches.
     """
-    begin, end, count = np.empty(len(members)), np.empty(len(members)), 0
-    for i in members:
-        dx, dy = points[i, 0] - east, points[i, 1] - north
+    begin, end, count = np.empty(len(own[0])), np.empty(len(own[0])), 0
+    for j in range(len(own[0])):
+        dx, dy = own[0, j] - east, own[1, j] - north
         ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
         reach = outer * outer - beside * beside
         if reach > 0.0 and ahead > -outer:
@@ -181,27 +166,32 @@ def hugged(
     return furthest
 
 
-@compiled(ROWS, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
 def entered(
-    points: FloatArray, keep: FloatArray, ax: float, ay: float, bx: float, by: float
+    places: FloatArray, first: IntArray, circles: FloatArray, ax: float, ay: float, bx: float, by: float
 ) -> tuple[FloatArray, IntArray]:
-    """The discs about points that the line from a to b enters: distances from a, and their indices.
+    """The discs about points by squares that the line from a to b enters: distances from a, and their indices.
 
     A disc that holds `a` counts only when the line leads deeper into it.
     """
-    entry, which, count = np.empty(len(points)), np.empty(len(points), dtype=np.intp), 0
+    entry, which, count = np.empty(len(places[0])), np.empty(len(places[0]), dtype=np.intp), 0
     length = math.hypot(bx - ax, by - ay)
     if length < 1e-9:
         return entry[:0], which[:0]
     ux, uy = (bx - ax) / length, (by - ay) / length
-    for i in range(len(points)):
-        dx, dy = points[i, 0] - ax, points[i, 1] - ay
-        ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
-        past = max(ahead - length, 0.0)
-        room = keep[i] * keep[i] - beside * beside
-        if room > past * past and ahead > 0.0:
-            entry[count], which[count] = ahead - math.sqrt(room), i
-            count += 1
+    for block in range(len(first) - 1):
+        dx, dy, reach = circles[0, block] - ax, circles[1, block] - ay, circles[2, block]
+        ahead = dx * ux + dy * uy
+        if abs(dx * uy - dy * ux) >= reach or ahead <= -reach or ahead - reach >= length:
+            continue
+        for k in range(first[block], first[block + 1]):
+            dx, dy = places[0, k] - ax, places[1, k] - ay
+            ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+            past = max(ahead - length, 0.0)
+            room = places[2, k] * places[2, k] - beside * beside
+            if room > past * past and ahead > 0.0:
+                entry[count], which[count] = ahead - math.sqrt(room), k
+                count += 1
     return entry[:count], which[:count]
 
 

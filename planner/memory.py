@@ -41,6 +41,7 @@ class ObstacleMemory:
         self._count = 0
         self._with_moving: tuple[FloatArray, IntArray] | None = None
         self._of_cell: dict[tuple[int, int], int] = {}
+        self._cells: dict[int, list[tuple[int, int]]] = {}  # of each obstacle
         self._next = 0
 
     @property
@@ -150,7 +151,8 @@ class ObstacleMemory:
         if new.start == 0:
             cells, which = np.unique(at, axis=0, return_inverse=True)
             labels = _gathered(cells)
-            self._of_cell = dict(zip(map(tuple, cells.tolist()), labels.tolist(), strict=True))
+            for cell, label in zip(map(tuple, cells.tolist()), labels.tolist(), strict=True):
+                self._put(cell, label)
             self._next = len(cells)
             self._labels[new] = labels[which.ravel()]
             return
@@ -174,12 +176,15 @@ class ObstacleMemory:
         found = {self._of_cell[near] for near in around if near in self._of_cell}
         label = min(found) if found else self._next
         self._next += not found
-        self._of_cell[cell] = label
+        self._put(cell, label)
         for other in found - {label}:
             self._labels[: self._count][self._labels[: self._count] == other] = label
-            for key, value in self._of_cell.items():
-                if value == other:
-                    self._of_cell[key] = label
+            for joined in self._cells.pop(other):
+                self._put(joined, label)
+
+    def _put(self, cell: tuple[int, int], label: int) -> None:
+        self._of_cell[cell] = label
+        self._cells.setdefault(label, []).append(cell)
 
 
 def _gathered(cells: IntArray) -> IntArray:

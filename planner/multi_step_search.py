@@ -15,11 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.clearance import all_entered, first_entry
 from planner.cost_to_go import CostToGo
 from planner.curves import Point
 from planner.step_model import distance_left_m
-from planner.window import PLACE, SectorEdge, Window, guide_vector
+from planner.window import SectorEdge, Window, guide_vector
 
 SHORT_OF = 0.005
 """A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
@@ -115,21 +114,19 @@ def search(
         if len(visited) > most_tracks:
             return
         yield None
-        window.tally.add(1, PLACE, len(window.points_m))
-        _, hit = first_entry(here, goal, window.points_m, window.keep_m)
+        entry_m, labels = window.entered(here, goal)
         count += 1
-        if hit < 0:
+        if not len(labels):
             heapq.heappush(
                 queue, (track.cost_m, count, depth, Track((*track.nodes, goal), track.cost_m, 0.0))
             )
             continue
         if depth == steps:
             continue
-        beside = [int(window.labels[hit]), *(around if not depth else ())]
+        beside = [int(labels[entry_m.argmin()]), *(around if not depth else ())]
         if wide:
             # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
-            entered = all_entered(here, goal, window.points_m, window.keep_m)
-            beside += np.unique(window.labels[entered]).tolist()
+            beside += np.unique(labels).tolist()
             beside += [] if track.last is None else [track.last.obstacle]
         for edge in window.sector_edges(here, beside):
             if not wide and _leads_away(track, edge):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
-from planner.clearance import first_breach, inside_bounds, line_is_clear
+from planner.clearance import discs, first_breach, inside_bounds, line_is_clear
 from planner.curves import Limits, Point, Pose, fillet
 from planner.interface import FloatArray, Path
 from planner.window import PLACE, Tally
@@ -41,7 +42,11 @@ class Terrain:
     def admits_line(self, a: Point, b: Point) -> bool:
         """Whether the line from a to b keeps its distance."""
         self.tally.add(1, PLACE, len(self.points_m))
-        return line_is_clear(a, b, self.points_m, self.keep_m)
+        return line_is_clear(a, b, self._discs)
+
+    @cached_property
+    def _discs(self) -> FloatArray:
+        return discs(self.points_m, self.keep_m)
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.blocks import Cells, blocks, cells
+from planner.blocks import Blocks, Cells, blocks, cells, places
 from planner.curves import Point
-from planner.fans import fan_edges, hugged
+from planner.fans import entered, fan_edges, hugged
 from planner.interface import FloatArray, IntArray
 
 MOST_HIDING = 12
@@ -70,6 +70,10 @@ class SectorEdge(NamedTuple):
     side: float
 
 
+_Obstacle = tuple[FloatArray, Cells]
+"""(3, m) its points as `planner.blocks.places` has them, and their squares."""
+
+
 @dataclass(frozen=True, eq=False)
 class Window:
     """The planning window U_1 and the obstacles that are known in it.
@@ -91,20 +95,28 @@ class Window:
     cell_m: float
     keep_m: FloatArray
     tally: Tally = field(default_factory=Tally)
-    _cells: dict[int, Cells] = field(default_factory=dict, init=False, repr=False)
+    _obstacles: dict[int, _Obstacle] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
-    def _blocks(self) -> tuple[IntArray, IntArray, FloatArray]:
+    def _blocks(self) -> tuple[IntArray, Blocks]:
         self.tally.add(1, TANGENT, len(self.points_m))
         return blocks(self.points_m, self.keep_m, BLOCK_CELLS * self.cell_m)
 
-    def _obstacle(self, label: int) -> Cells:
-        """The points of an obstacle, gathered once, as `planner.blocks.cells` has them."""
-        if label not in self._cells:
+    def _obstacle(self, label: int) -> _Obstacle:
+        """The points of an obstacle, gathered once."""
+        if label not in self._obstacles:
             members = np.flatnonzero(self.labels == label)
             self.tally.add(4, TANGENT, len(members))
-            self._cells[label] = cells(self.points_m, members, self.cell_m)
-        return self._cells[label]
+            members, squares = cells(self.points_m, members, self.cell_m)
+            self._obstacles[label] = places(self.points_m, self.keep_m, members), squares
+        return self._obstacles[label]
+
+    def entered(self, origin: Point, goal: Point) -> tuple[FloatArray, IntArray]:
+        """Where the line to the goal enters what is to be kept free, m from the origin, and the label of each."""
+        order, squares = self._blocks
+        self.tally.add(1, PLACE, len(self.points_m))
+        entry, which = entered(*squares, *origin, *goal)
+        return entry, self.labels[order[which]]
 
     def nearest_obstacles(self, most: int) -> list[int]:
         """The obstacles nearest to the centre, so many at most."""
@@ -121,13 +133,16 @@ class Window:
         edges: list[SectorEdge] = []
         pending = list(dict.fromkeys(beside))
         looked_at = set(pending)
+        order, blocked = self._blocks
         while pending:
             obstacle = pending.pop()
-            members = self._obstacle(obstacle)
-            ends, met = fan_edges(self.points_m, self.keep_m, *self._blocks, *members, *origin)
-            self.tally.add(1, TANGENT, len(members[0]))
-            self.tally.add(0, PLACE, len(met) * len(self._blocks[2]))
-            for (ux, uy, touch_m, clear_m, side), hiding in zip(ends.tolist(), met.tolist(), strict=True):
+            own, squares = self._obstacle(obstacle)
+            ends, met = fan_edges(*blocked, own, *squares, *origin)
+            self.tally.add(1, TANGENT, len(own[0]))
+            self.tally.add(0, PLACE, len(met) * len(blocked[2][0]))
+            for (ux, uy, touch_m, clear_m, side), hiding in zip(
+                ends.tolist(), order[met].tolist(), strict=True
+            ):
                 if clear_m >= touch_m:
                     edges.append(SectorEdge(ux, uy, touch_m, clear_m, obstacle, side))
                 # Hidden, or closed right behind: the way goes round what hides it.
@@ -140,9 +155,9 @@ class Window:
 
     def hugged_m(self, origin: Point, edge: SectorEdge, outer_m: float) -> float:
         """How far along an edge an outer distance from the obstacle that it touches is reached again."""
-        members = self._obstacle(edge.obstacle)[0]
-        self.tally.add(1, PLACE, len(members))
-        return hugged(self.points_m, members, *origin, edge.ux, edge.uy, outer_m, edge.touch_m)
+        own, _ = self._obstacle(edge.obstacle)
+        self.tally.add(1, PLACE, len(own[0]))
+        return hugged(own, *origin, edge.ux, edge.uy, outer_m, edge.touch_m)
 
     def free_sectors(self, origin: Point) -> FloatArray:
         """(k, 4) free sectors at a track point: unit vectors of the right and the left edge of each.

@@ -34,7 +34,8 @@ def test_in_the_open_it_is_the_distance(place: Point) -> None:
     far = np.array([(0.0, 0.0), (10_000.0, 0.0), (0.0, 5000.0), (10_000.0, 5000.0)])
     assume(np.hypot(*(far - place).T).min() > KEEP)
     straight = math.dist(place, GOAL)
-    assert straight <= spread(far)(place) <= straight + 2.0 * KEEP / cost_to_go.CELLS
+    # Both ends lie somewhere in their cells, and what a level is short of is made up for after five.
+    assert straight <= spread(far)(place) <= straight + 3.0 * KEEP / cost_to_go.CELLS
 
 
 def test_round_a_wall(wall: MakePoints) -> None:
