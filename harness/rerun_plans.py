@@ -71,7 +71,7 @@ def send_plans(
     if not plans:
         return
     times = [look.time_column(np.array([each.time_s for each in plans]))]
-    pictures = [each.plan.picture for each in plans]
+    pictures = [each.plan.picture() if each.plan.picture else None for each in plans]
     paths = [polyline(each.segments, chord_error_m) for each in plans]
     waypoints = [each.plan.waypoints_m for each in plans]
     guides = np.array([p.guide_m for p in pictures if p]).reshape(-1, 2, 2)

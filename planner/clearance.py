@@ -136,6 +136,16 @@ def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bo
     return _inside_bounds(path.segments, *bounds_m)
 
 
+@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+def to_nearer(points: FloatArray, ax: float, ay: float, bx: float, by: float) -> FloatArray:
+    """(m,) distance of each point to the nearer of two places a and b, m."""
+    away = np.empty(len(points))
+    for i in range(len(points)):
+        ux, uy, vx, vy = points[i, 0] - ax, points[i, 1] - ay, points[i, 0] - bx, points[i, 1] - by
+        away[i] = math.sqrt(min(ux * ux + uy * uy, vx * vx + vy * vy))
+    return away
+
+
 def discs(points_m: FloatArray, radius_m: float | FloatArray) -> FloatArray:
     """(3, m) east, north and radius of discs about (m, 2) points, of one radius or of one for each."""
     return np.array((*points_m.T, _each(radius_m, points_m)))

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -120,7 +121,8 @@ class DubinsTree:
             else "way to the goal in view",
             np.array([request.position_m, *(along(node, node[5])[:2] for node in nodes)]),
             Path(np.array([*prefix, *segments])),
-            PlanPicture(
+            partial(
+                PlanPicture,
                 np.array([request.position_m, self._mission.goal_m]),
                 self._mission.sensor_range_m,
                 np.zeros((0, 4)),

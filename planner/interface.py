@@ -6,6 +6,7 @@ Curvature is positive for a left (counter-clockwise) turn.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -232,7 +233,7 @@ class Plan:
         reason: one sentence for the event log.
         waypoints_m: (k, 2) fixed-altitude waypoints; empty unless FOUND.
         path: the curve through them; None unless FOUND.
-        picture: how it came about, where the planner can tell.
+        picture: makes a picture of how it came about, where the planner can tell: asked for only where somebody looks.
 
     Raises:
         ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
@@ -242,7 +243,7 @@ class Plan:
     reason: str
     waypoints_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     path: Path | None = None
-    picture: PlanPicture | None = None
+    picture: Callable[[], PlanPicture] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from planner.clearance import to_nearer
 from planner.cost_to_go import CostToGo
 from planner.course import Course
 from planner.curves import Limits, Point, Pose, Segment, onward_in_turn
@@ -274,10 +275,7 @@ class LocalPlanning:
 
     def _room(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
-        ends = (start.pose, self._mission.goal_m)
-        room = [np.hypot(points[:, 0] - end[0], points[:, 1] - end[1]) - 1e-3 for end in ends]
-        nearer: FloatArray = np.minimum(*room)
-        return nearer
+        return to_nearer(points, *start.pose[:2], *self._mission.goal_m) - 1e-3
 
     def _searches(
         self,

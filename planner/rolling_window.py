@@ -23,6 +23,7 @@ radius can be moved at the clearance, within the area.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -253,19 +254,15 @@ class RollingWindow:
     def _found(
         self, request: PlanRequest, start: Start, course: Course, certified: Certified, tracks: list[Track]
     ) -> Plan:
-        goal, keep = self._mission.goal_m, np.full(len(self._memory.points_m), self._mission.clearance_m)
+        goal, points, nodes = self._mission.goal_m, self._memory.points_m, course.nodes
+        window = self._local.window(start, np.full(len(points), self._mission.clearance_m))
         plan = Plan(
             PlanStatus.FOUND,
-            sentence(request.position_m, goal, course.nodes),
-            waypoints_m=np.array([start.position, *course.nodes]),
+            sentence(request.position_m, goal, nodes),
+            waypoints_m=np.array([start.position, *nodes]),
             path=certified.path,
-            picture=picture(
-                start.position,
-                goal,
-                course.nodes,
-                tracks,
-                self._local.window(start, keep),
-                self._memory.points_m[self._memory.known :],
+            picture=partial(
+                picture, start.position, goal, nodes, tracks, window, points[self._memory.known :]
             ),
         )
         self._proposed = Effect(plan, certified.path, course, certified.leaves_m)

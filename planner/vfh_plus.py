@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -230,7 +231,8 @@ class VfhPlus:
             f"steering {math.degrees(math.pi / 2 - choice) % 360:.0f} degrees",
             np.array([request.position_m, *(row[:2] for row in turn[1:]), target]),
             path,
-            PlanPicture(
+            partial(
+                PlanPicture,
                 np.array([request.position_m, self._mission.goal_m]),
                 self._window_m,
                 np.column_stack(

@@ -13,6 +13,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Generic, Literal, Self, TypeVar
 
 import numpy as np
@@ -216,7 +217,7 @@ class Walker(ABC, Generic[State]):
             self.says(legs[0].state),
             np.array([*(segment[:2] for segment in segments), last]),
             Path(np.array(segments)),
-            PlanPicture(np.array([here, self.goal]), self.mission.sensor_range_m, np.zeros((0, 4))),
+            partial(PlanPicture, np.array([here, self.goal]), self.mission.sensor_range_m, np.zeros((0, 4))),
         )
         return self._plan
 

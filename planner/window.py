@@ -99,7 +99,6 @@ class Window:
 
     @cached_property
     def _blocks(self) -> tuple[IntArray, Blocks]:
-        self.tally.add(1, TANGENT, len(self.points_m))
         return blocks(self.points_m, self.keep_m, BLOCK_CELLS * self.cell_m)
 
     def _obstacle(self, label: int) -> _Obstacle:
@@ -134,6 +133,8 @@ class Window:
         pending = list(dict.fromkeys(beside))
         looked_at = set(pending)
         order, blocked = self._blocks
+        if not self._obstacles:
+            self.tally.add(1, TANGENT, len(self.points_m))
         while pending:
             obstacle = pending.pop()
             own, squares = self._obstacle(obstacle)

@@ -46,12 +46,15 @@ def plan(
     segments: Sequence[Sequence[float]],
     index: int = 0,
     time_s: float = 0.0,
-    picture: PlanPicture | None = None,
+    picture: Callable[[], PlanPicture] | None = None,
 ) -> AcceptedPlan:
     path = Path(np.array(segments, dtype=np.float64))
     waypoints = path.segments[:, :2]
     return AcceptedPlan(
-        index, time_s, 2.5, Plan(PlanStatus.FOUND, "a way was found", waypoints, path, picture)
+        index,
+        time_s,
+        2.5,
+        Plan(PlanStatus.FOUND, "a way was found", waypoints, path, picture),
     )
 
 

@@ -86,7 +86,7 @@ def record(
 ) -> Flight:
     """100 s north, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
     track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
-    first = make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=PICTURE)
+    first = make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE)
     second = make_plan([(0, 1250, 0, 1, 0.0, 1250.0)], index=1, time_s=50.0)
     log = RerunLog(path, SCENE, recording_id="a")
     for tick in range(200):

@@ -289,12 +289,13 @@ def test_off_the_path_a_plan_begins_at_the_aircraft() -> None:
 def test_a_plan_shows_how_it_came_about(ring: MakePoints) -> None:
     plan = planner().plan(first_request(seen_at_once(ring(6000.0, 0.0, 1000.0, SPACING))))
     assert plan.picture is not None
-    np.testing.assert_allclose(plan.picture.guide_m, [(0.0, 0.0), MISSION.goal_m])
-    assert plan.picture.window_m == MISSION.sensor_range_m
-    np.testing.assert_allclose(plan.picture.candidates[0], plan.waypoints_m)
-    assert len(plan.picture.candidates) > 1
+    picture = plan.picture()
+    np.testing.assert_allclose(picture.guide_m, [(0.0, 0.0), MISSION.goal_m])
+    assert picture.window_m == MISSION.sensor_range_m
+    np.testing.assert_allclose(picture.candidates[0], plan.waypoints_m)
+    assert len(picture.candidates) > 1
     half = math.asin(1200.0 / 6000.0)
-    right, left = plan.picture.sectors[0, :2], plan.picture.sectors[0, 2:]
+    right, left = picture.sectors[0, :2], picture.sectors[0, 2:]
     assert math.atan2(right[1], right[0]) == pytest.approx(half, abs=0.01)
     assert math.atan2(left[1], left[0]) == pytest.approx(-half, abs=0.01)
 
