@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import math
 
-from planner.curves import Point
+from planner.curves import Point, Pose
+from planner.interface import Mission
+from planner.memory import ObstacleMemory
 
 ENOUGH = 2
 """So many turns before a place show what can be seen of it."""
 
 
 class DeadEnds:
-    """Counts how often the aircraft had to turn before a place.
+    """Counts how often the aircraft had to turn before a place, and gives places up.
 
     Args:
-        reach_m: places nearer to each other than this are one.
+        mission: goal and limits.
+        memory: what is given up is refused there.
     """
 
-    def __init__(self, reach_m: float) -> None:
-        self._reach = reach_m
+    def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
+        self._mission, self._memory = mission, memory
+        self._reach = 2.0 * mission.clearance_m  # places nearer to each other are one
         self._places: list[Point] = []
 
     def turned_before(self, place: Point) -> bool:
@@ -29,3 +33,15 @@ class DeadEnds:
             return False
         self._places = [each for each in self._places if each not in near]
         return True
+
+    def give_up(self, place: Pose) -> None:
+        """Gives up a place on a course, and what lies to its sides: a turn takes so much room."""
+        east, north, along_east, along_north = place
+        clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
+        beside = int(radius_m / clearance_m)
+        if math.dist((east, north), self._mission.goal_m) < radius_m:
+            # The goal is in view, and no turn: it is to be approached another way.
+            east, north, beside = east - radius_m * along_east, north - radius_m * along_north, 0
+        for i in range(-beside, beside + 1):
+            aside_m = i * clearance_m
+            self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))

@@ -11,10 +11,18 @@ import numpy as np
 from planner.clearance import first_breach
 from planner.course import Course
 from planner.curves import Point, between
-from planner.interface import FloatArray, Path, Plan
+from planner.interface import FloatArray, Mission, Path, Plan
 
 WATCHED_TOGETHER = 16
 """Edges that are not near are compared with the course once in so many scans."""
+
+PROLONG = 0.6
+"""A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
+
+UNHURRIED, CUT, GRAZED = 0.0625, 0.02, 0.005
+"""The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step. Where the
+course is cut, after a share that is smaller, for what lies ahead may be a dead end: not so where the last search made
+the way longer by less than a third share of that distance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +57,30 @@ class Effect:
 
 
 class Watch:
-    """Compares edges as they come in with the plan in effect.
+    """Compares edges as they come in with the plan in effect, and tells when to look for another.
 
     Args:
+        mission: sensing range and goal.
         keep_m: a course that comes nearer to an edge is cut there.
         turn_keeps_m: a certified turn that comes nearer to one is broken.
-        urgent_m: edges nearer to the aircraft are compared at once.
+        urgent_m: edges nearer to the aircraft are compared at once; what is wrong nearer to it is urgent.
+        lead_m: the least way between two searches.
+        step_m: the rolling step, where nothing is urgent.
     """
 
-    def __init__(self, *, keep_m: float, turn_keeps_m: float, urgent_m: float) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        *,
+        keep_m: float,
+        turn_keeps_m: float,
+        urgent_m: float,
+        lead_m: float,
+        step_m: float,
+    ) -> None:
         self._keep, self._turn_keeps, self._urgent = keep_m, turn_keeps_m, urgent_m
+        self._lead, self._step = lead_m, step_m
+        self._prolong, self._goal_radius = PROLONG * mission.sensor_range_m, mission.goal_radius_m
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
         self._since = WATCHED_TOGETHER  # scans since edges were compared
@@ -66,6 +88,8 @@ class Watch:
         """Station at which the course comes too near to an edge seen since it was found."""
         self.broken = False
         """Its certified part does so, or its turn."""
+        self.lengthened_m = math.inf
+        """By so much the last search made the way longer."""
 
     def begin(self, effect: Effect, points_m: FloatArray, gone: int = 0) -> None:
         """A new plan is in effect: it may be cut by what came in while it was looked for (see `cut_at`)."""
@@ -107,3 +131,25 @@ class Watch:
             self.cut_m < effect.leaves_m or first_breach(effect.turn, edges, self._turn_keeps) < math.inf
         )
         return self.cut_m < before
+
+    def due(self, effect: Effect, here_m: float, since_m: float, newly_cut: bool) -> bool:
+        """Whether to roll the window: the nearer ahead something is wrong with the plan in effect, the sooner.
+
+        Args:
+            effect: the plan in effect.
+            here_m: station of the aircraft on it.
+            since_m: flown since the last search.
+            newly_cut: as `look` has it.
+        """
+        wrong = min(self.cut_m, effect.leaves_m) - here_m
+        near = wrong < self._urgent
+        if near and (self.broken or newly_cut):
+            return True
+        serves = effect.course.shortest and self.cut_m == math.inf and not self.broken
+        whole = effect.leaves_m >= effect.course.path.length_m - self._goal_radius
+        if serves and (whole or effect.leaves_m - here_m > self._prolong):
+            return False
+        if self.cut_m < math.inf:
+            grazed = self.lengthened_m < GRAZED * wrong
+            return since_m >= max(self._lead, (UNHURRIED if grazed else CUT) * wrong)
+        return since_m >= max(self._lead if near else self._step, UNHURRIED * wrong)

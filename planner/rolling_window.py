@@ -52,19 +52,11 @@ BETTER = 0.005
 BROKEN_SHARE = 0.99
 """Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
-PROLONG = 0.6
-"""A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
-
 PORTIONS = (4000.0, 12_000.0)
 """Work of a search in the first scan and in each further one (`planner.window.Tally`): most are done in the first."""
 
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
-
-UNHURRIED, CUT, GRAZED = 0.0625, 0.02, 0.005
-"""The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step. Where the
-course is cut, after a share that is smaller, for what lies ahead may be a dead end: not so where the last search made
-the way longer by less than a third share of that distance."""
 
 HOLD_SHARES = (1.0, 0.5, 0.25)
 """Shares of the clearance with which a turn is sought where the certificate is broken."""
@@ -84,7 +76,6 @@ class RollingWindow:
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
         self._mission = mission
-        self._rolling_step_m = config.rolling_step_m
         self._memory = ObstacleMemory(mission.clearance_m)
         self._local = LocalPlanning(
             mission,
@@ -102,7 +93,7 @@ class RollingWindow:
         self._proof_for_turns = Proof(mission, self._memory, self._turns_keep_m, mission.turn_radius_m)
         self._given_up = Proof(mission, self._memory, self._local.least_keeps_m, with_refused=True)
         self._thinking: Deliberation | None = None
-        self._dead_ends = DeadEnds(2.0 * mission.clearance_m)
+        self._dead_ends = DeadEnds(mission, self._memory)
         self._turning: Effect | None = None  # the last plan that was flown into its turn
         self._proposed: Effect | None = None
         self._effect: Effect | None = None
@@ -110,14 +101,16 @@ class RollingWindow:
         self._searched_with = 0
         self._gone = 0  # how many points had been let go of when the last search began
         self._moving_s = -math.inf  # when something was last known to move
-        self._lengthened_m = math.inf  # by so much the last search made the way longer
         self._effort = 0  # grows with every search that was in vain
         self._forgiven = False  # what was given up is, or was, tried again
         self._refused_at_m = 0.0
         self._watch = Watch(
+            mission,
             keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
             turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
             urgent_m=self._urgent_m,
+            lead_m=self._lead_m,
+            step_m=config.rolling_step_m,
         )
 
     def plan(self, request: PlanRequest) -> Plan:
@@ -138,37 +131,15 @@ class RollingWindow:
             here = on_loiter(effect.path, here)
             self._note_turn(effect, request.seen)
         newly_cut = self._watch.look(effect, here, request.position_m, fresh)
-        if not self._is_due(effect, here, request.station_m - self._searched_at_m, newly_cut):
+        since_m = request.station_m - self._searched_at_m
+        if self._effort == MOST_EFFORT and self._searched_with == self._memory.known:
+            due = since_m >= math.tau * self._mission.turn_radius_m
+        else:
+            due = self._watch.due(effect, here, since_m, newly_cut)
+        if self._thinking is None and not due:
             return KEPT
         self._searched_at_m = request.station_m
         return self._roll(request, effect, here)
-
-    def _is_due(self, effect: Effect, here: float, since: float, newly_cut: bool) -> bool:
-        """Whether to roll the window: the nearer ahead something is wrong with the plan in effect, the sooner.
-
-        Args:
-            effect: the plan in effect.
-            here: station of the aircraft on it, m.
-            since: flown since the last search, m.
-            newly_cut: its course was cut anew, or nearer than before.
-        """
-        watch = self._watch
-        if self._thinking is not None:
-            return True
-        if self._effort == MOST_EFFORT and self._searched_with == self._memory.known:
-            return since >= math.tau * self._mission.turn_radius_m
-        wrong = min(watch.cut_m, effect.leaves_m) - here
-        near = wrong < self._urgent_m
-        if near and (watch.broken or newly_cut):
-            return True
-        serves = effect.course.shortest and watch.cut_m == math.inf and not watch.broken
-        whole = effect.leaves_m >= effect.course.path.length_m - self._mission.goal_radius_m
-        if serves and (whole or effect.leaves_m - here > PROLONG * self._mission.sensor_range_m):
-            return False
-        if watch.cut_m < math.inf:
-            grazed = self._lengthened_m < GRAZED * wrong
-            return since >= max(self._lead_m, (UNHURRIED if grazed else CUT) * wrong)
-        return since >= max(self._lead_m if near else self._rolling_step_m, UNHURRIED * wrong)
 
     def _take_effect(self, request: PlanRequest, proposed: Effect) -> None:
         """Begins to watch what was proposed last, if it is flown now."""
@@ -214,7 +185,7 @@ class RollingWindow:
                 if certified is not None and self._leads_on(certified, course):
                     self._thinking, self._searched_with, self._effort = None, thinking.known, 0
                     before_m = -math.inf if ahead is None else ahead.path.length_m
-                    self._lengthened_m = course.path.length_m - before_m
+                    self._watch.lengthened_m = course.path.length_m - before_m
                     return self._found(request, start, course, certified, thinking.tracks)
                 thinking.stuck = thinking.stuck or course
             if thinking.done:
@@ -311,7 +282,7 @@ class RollingWindow:
         if stuck is not None and turned:
             # The whole turn has shown nothing more: what lies ahead there cannot be entered.
             self._refused_at_m = request.station_m
-            self._give_up(stuck, request.seen)
+            self._dead_ends.give_up(self._unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
             if no_room and still:
                 gap = 2.0 * self._turns_keep_m
@@ -333,25 +304,14 @@ class RollingWindow:
         if effect is self._turning or not effect.course.to_goal:
             return
         self._turning = effect
-        if self._dead_ends.turned_before(self._unseen(effect.course, seen)[:2]):
-            self._give_up(effect.course, seen)
+        place = self._unseen(effect.course, seen)
+        if self._dead_ends.turned_before(place[:2]):
+            self._dead_ends.give_up(place)
 
     def _unseen(self, course: Course, seen: SeenWorld) -> Pose:
         """The first place of a course that has not been seen to be free."""
         free_to_m = self._certifier(seen.spacing_m).seen_free_to_m(course.path, seen)
         return place_on(course.path, free_to_m)[0]
-
-    def _give_up(self, course: Course, seen: SeenWorld) -> None:
-        """Gives up the first unseen place of a course, and what lies to its sides: a turn takes so much room."""
-        east, north, along_east, along_north = self._unseen(course, seen)
-        clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
-        beside = int(radius_m / clearance_m)
-        if math.dist((east, north), self._mission.goal_m) < radius_m:
-            # The goal is in view, and no turn: it is to be approached another way.
-            east, north, beside = east - radius_m * along_east, north - radius_m * along_north, 0
-        for i in range(-beside, beside + 1):
-            aside_m = i * clearance_m
-            self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))
 
     def _turn_away(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """A turn that only keeps away from what is known, for want of one that is seen to be free."""

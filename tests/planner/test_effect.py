@@ -8,13 +8,30 @@ import numpy as np
 import pytest
 
 from planner.course import Course
-from planner.effect import Effect, Watch
-from planner.interface import Path, Plan, PlanStatus
+from planner.effect import CUT, UNHURRIED, Effect, Watch
+from planner.interface import Mission, Path, Plan, PlanStatus
 
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
 TURN = (2000.0, 0.0, 1.0, 0.0, 0.01, 2.0 * math.pi * 100.0)
 COMMITTED = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 2000.0), TURN]), loiter=True)
 EDGES = np.array([(1000.0, 900.0), (5000.0, 100.0), (1500.0, -50.0)])
+
+
+MISSION = Mission(
+    goal_m=(9000.0, 0.0),
+    goal_radius_m=50.0,
+    clearance_m=200.0,
+    sensor_range_m=3000.0,
+    speed_mps=25.0,
+    turn_radius_m=100.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    bounds_m=(-1e5, -1e5, 1e5, 1e5),
+)
+
+
+def watching() -> Watch:
+    return Watch(MISSION, keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0, lead_m=50.0, step_m=500.0)
 
 
 def effect(known: int) -> Effect:
@@ -24,7 +41,7 @@ def effect(known: int) -> Effect:
 
 @pytest.mark.parametrize(("known", "cut", "broken"), [(3, False, False), (2, True, True), (1, True, True)])
 def test_a_plan_is_cut_by_what_came_in_while_it_was_looked_for(known: int, cut: bool, broken: bool) -> None:
-    watch = Watch(keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0)
+    watch = watching()
     watch.begin(effect(known), EDGES)
     assert math.isfinite(watch.cut_m) is cut
     assert watch.broken is broken
@@ -33,7 +50,7 @@ def test_a_plan_is_cut_by_what_came_in_while_it_was_looked_for(known: int, cut: 
 
 
 def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
-    watch = Watch(keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0)
+    watch = watching()
     course = effect(4).course  # one of the four is gone; the last of the edges is new
     assert watch.cut_at(course, EDGES) == math.inf
     assert 1200.0 <= watch.cut_at(course, EDGES, gone=2) <= 1500.0
@@ -42,7 +59,31 @@ def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
 
 
 def test_a_cut_beyond_the_turn_does_not_break_the_plan() -> None:
-    watch = Watch(keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0)
+    watch = watching()
     watch.begin(effect(1), EDGES[:2])
     assert 4700.0 <= watch.cut_m <= 5000.0
     assert not watch.broken
+
+
+def test_the_window_rolls_on_the_sooner_the_nearer_something_is_wrong() -> None:
+    flown, watch = effect(3), watching()
+    assert not watch.due(flown, 0.0, 1e4, newly_cut=False)  # all is well, and the turn far ahead
+    assert watch.due(flown, 300.0, 500.0, newly_cut=False)  # the turn comes nearer: a rolling step
+    assert not watch.due(flown, 300.0, 499.0, newly_cut=False)
+    assert watch.due(flown, 1100.0, 60.0, newly_cut=False)  # it is near
+    assert not watch.due(flown, 1100.0, 40.0, newly_cut=False)
+    watch.begin(effect(1), EDGES[:2])
+    least_m = CUT * watch.cut_m
+    assert not watch.due(effect(1), 0.0, 0.9 * 50.0, newly_cut=False)
+    assert watch.due(effect(1), 0.0, max(least_m, 50.0), newly_cut=False)
+    assert watch.due(effect(1), 1100.0, 0.0, newly_cut=True)
+
+
+def test_a_way_that_grazes_what_cuts_it_is_looked_at_again_later() -> None:
+    flown, watch = effect(1), watching()
+    watch.begin(flown, EDGES[:2])
+    since_m = 0.5 * (CUT + UNHURRIED) * flown.leaves_m
+    assert watch.due(flown, 0.0, since_m, newly_cut=False)
+    watch.lengthened_m = 0.0
+    assert not watch.due(flown, 0.0, since_m, newly_cut=False)
+    assert watch.due(flown, 0.0, UNHURRIED * watch.cut_m, newly_cut=False)
