@@ -104,7 +104,7 @@ class LocalPlanning:
         candidates: int,
     ) -> None:
         self._mission, self._memory = mission, memory
-        self._window_m, self._margin_m = window_m, margin_m
+        self.window_m, self._margin_m = window_m, margin_m
         self._steps, self._candidates = steps, candidates
         self.tally = Tally()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
@@ -171,7 +171,9 @@ class LocalPlanning:
         start, _ = now()
         points = self._memory.points_m
         room = self._room(start, points)
-        window = self.window(start, np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room))
+        keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
+        labels = self._memory.labels.copy()
+        window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.tally)
         begun = start
         fitted: list[tuple[float, Route]] = []
 
@@ -257,11 +259,6 @@ class LocalPlanning:
                 return route
             yield
         return None
-
-    def window(self, start: Start, keep_m: FloatArray) -> Window:
-        """The planning window about the start of a plan, with what is to be kept from each of the (m,) points."""
-        points, labels = self._memory.points_m, self._memory.labels.copy()
-        return Window(start.pose[:2], self._window_m, points, labels, self._memory.cell_m, keep_m, self.tally)
 
     def terrain(self, keep_m: float, refused: bool = True) -> Terrain:
         """Where a curve may lie that keeps one distance from all edge points; or from all but what was refused."""

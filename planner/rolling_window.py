@@ -225,15 +225,15 @@ class RollingWindow:
     def _found(
         self, request: PlanRequest, start: Start, course: Course, certified: Certified, tracks: list[Track]
     ) -> Plan:
-        goal, points, nodes = self._mission.goal_m, self._memory.points_m, course.nodes
-        window = self._local.window(start, np.full(len(points), self._mission.clearance_m))
+        goal, nodes, keep_m = self._mission.goal_m, course.nodes, self._mission.clearance_m
+        points, met = self._memory.points_m, self._memory.points_m[self._memory.known :]
         plan = Plan(
             PlanStatus.FOUND,
             sentence(request.position_m, goal, nodes),
             waypoints_m=np.array([start.position, *nodes]),
             path=certified.path,
             picture=partial(
-                picture, start.position, goal, nodes, tracks, window, points[self._memory.known :]
+                picture, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
             ),
         )
         self._proposed = Effect(plan, certified.path, course, certified.leaves_m)

@@ -172,7 +172,7 @@ class TangentBug(Walker[State]):
         distance = np.hypot(*(self.known.points_m - place).T)
         near = np.flatnonzero((distance < reach) & (distance > self.known.radii_m * (1.0 + 1e-9)))
         window = Window(
-            place, reach, self.known.points_m[near], labels[near], self.known.cell_m, self.known.radii_m[near]
+            place, self.known.points_m[near], labels[near], self.known.cell_m, self.known.radii_m[near]
         )
         for label in sorted(wanted & set(np.unique(window.labels).tolist())):
             for edge in window.sector_edges(place, [label]):

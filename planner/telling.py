@@ -10,7 +10,7 @@ import numpy as np
 from planner.curves import Point
 from planner.interface import FloatArray, PlanPicture
 from planner.multi_step_search import Track
-from planner.window import Window, guide_vector
+from planner.window import free_sectors, guide_vector
 
 
 def sentence(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
@@ -39,14 +39,16 @@ def picture(
     goal: Point,
     nodes: Sequence[Point],
     tracks: Iterable[Track],
-    window: Window,
+    window_m: float,
+    points_m: FloatArray,
+    keep_m: float,
     met_m: FloatArray,
 ) -> PlanPicture:
     """Guide vector, planning window with its free sectors, what was compared (the chosen course first), what is met."""
     return PlanPicture(
         guide_m=np.array([position, goal]),
-        window_m=window.radius_m,
-        sectors=window.free_sectors(position),
+        window_m=window_m,
+        sectors=free_sectors(points_m, keep_m, position),
         candidates=(np.array([position, *nodes]), *(np.array(track.nodes) for track in tracks)),
         met_m=met_m,
     )

@@ -76,11 +76,10 @@ _Obstacle = tuple[FloatArray, Cells]
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """The planning window U_1 and the obstacles that are known in it.
+    """The obstacles that are known about a track point, to be searched through.
 
     Attributes:
         center_m: the present track point w_k.
-        radius_m: r_1.
         points_m: (m, 2) sensed edge points.
         labels: (m,) the obstacle that each belongs to.
         cell_m: points within a square of this side are looked at as one piece of wall.
@@ -89,7 +88,6 @@ class Window:
     """
 
     center_m: Point
-    radius_m: float
     points_m: FloatArray
     labels: IntArray
     cell_m: float
@@ -111,7 +109,7 @@ class Window:
         return self._obstacles[label]
 
     def entered(self, origin: Point, goal: Point) -> tuple[FloatArray, IntArray]:
-        """Where the line to the goal enters what is to be kept free, m from the origin, and the label of each."""
+        """Where the line to the goal comes too near to edge points, m from the origin, and the obstacle of each."""
         order, squares = self._blocks
         self.tally.add(1, PLACE, len(self.points_m))
         entry, which = entered(*squares, *origin, *goal)
@@ -160,26 +158,32 @@ class Window:
         self.tally.add(1, PLACE, len(own[0]))
         return hugged(own, *origin, edge.ux, edge.uy, outer_m, edge.touch_m)
 
-    def free_sectors(self, origin: Point) -> FloatArray:
-        """(k, 4) free sectors at a track point: unit vectors of the right and the left edge of each.
 
-        Fans that overlap or hide each other are merged. With nothing in the window all is free and there is no
-        row.
-        """
-        if not len(self.points_m):
-            return np.zeros((0, 4))
-        dx, dy = self.points_m[:, 0] - origin[0], self.points_m[:, 1] - origin[1]
-        half = np.arcsin(np.minimum(self.keep_m / np.maximum(np.hypot(dx, dy), 1e-9), 1.0))
-        low = np.arctan2(dy, dx) - half
-        high = low + 2.0 * half
-        start = low[0]
-        begin = (low - start) % math.tau
-        order = np.argsort(begin)
-        begin, furthest = begin[order], np.maximum.accumulate((begin + high - low)[order])
-        # What reaches beyond a full turn covers the beginning again.
-        covered = np.maximum(np.append(0.0, furthest[:-1]), furthest[-1] - math.tau)
-        gap = begin > covered
-        right, left = start + covered[gap], start + begin[gap]
-        if furthest[-1] < math.tau:
-            right, left = np.append(right, start + furthest[-1]), np.append(left, start + math.tau)
-        return np.column_stack((np.cos(right), np.sin(right), np.cos(left), np.sin(left)))
+def free_sectors(points_m: FloatArray, keep_m: float | FloatArray, origin: Point) -> FloatArray:
+    """(k, 4) free sectors at a track point: unit vectors of the right and the left edge of each.
+
+    Fans that overlap or hide each other are merged. With nothing in the window all is free and there is no
+    row.
+
+    Args:
+        points_m: (m, 2) sensed edge points.
+        keep_m: distance to be kept, one for all or one for each of them.
+        origin: the track point.
+    """
+    if not len(points_m):
+        return np.zeros((0, 4))
+    dx, dy = points_m[:, 0] - origin[0], points_m[:, 1] - origin[1]
+    half = np.arcsin(np.minimum(keep_m / np.maximum(np.hypot(dx, dy), 1e-9), 1.0))
+    low = np.arctan2(dy, dx) - half
+    high = low + 2.0 * half
+    start = low[0]
+    begin = (low - start) % math.tau
+    order = np.argsort(begin)
+    begin, furthest = begin[order], np.maximum.accumulate((begin + high - low)[order])
+    # What reaches beyond a full turn covers the beginning again.
+    covered = np.maximum(np.append(0.0, furthest[:-1]), furthest[-1] - math.tau)
+    gap = begin > covered
+    right, left = start + covered[gap], start + begin[gap]
+    if furthest[-1] < math.tau:
+        right, left = np.append(right, start + furthest[-1]), np.append(left, start + math.tau)
+    return np.column_stack((np.cos(right), np.sin(right), np.cos(left), np.sin(left)))

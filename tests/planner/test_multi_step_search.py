@@ -47,7 +47,7 @@ def window_of(*obstacles: FloatArray) -> Window:
     points = np.concatenate((np.zeros((0, 2)), *obstacles))
     memory = ObstacleMemory(200.0)
     memory.take_in(_Still(points))
-    return Window(START, 10_000.0, points, memory.labels.copy(), SPACING, np.full(len(points), KEEP))
+    return Window(START, points, memory.labels.copy(), SPACING, np.full(len(points), KEEP))
 
 
 def tracks_in(

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from planner.interface import FloatArray
-from planner.window import SectorEdge, Window, guide_vector
+from planner.window import SectorEdge, Window, free_sectors, guide_vector
 
 MakePoints = Callable[..., FloatArray]
 SPACING = 25.0
@@ -25,7 +25,7 @@ def window_of(*obstacles: FloatArray, keep_m: float = KEEP) -> Window:
     """A window in which each array of edge points is one obstacle, labelled 0, 1, ..."""
     points = np.concatenate(obstacles) if obstacles else np.zeros((0, 2))
     labels: NDArray[np.intp] = np.repeat(np.arange(len(obstacles)), [len(each) for each in obstacles])
-    return Window((0.0, 0.0), 10_000.0, points, labels, SPACING, np.full(len(points), keep_m))
+    return Window((0.0, 0.0), points, labels, SPACING, np.full(len(points), keep_m))
 
 
 def bearing(east: float, north: float) -> float:
@@ -66,8 +66,7 @@ def test_free_sectors_are_the_bearings_on_which_a_ray_meets_nothing(seed: int, c
     points, keep = rng.uniform(-2000.0, 2000.0, (count, 2)), rng.uniform(20.0, 400.0, count)
     origin = rng.uniform(-500.0, 500.0, 2)
     assume((np.hypot(*(points - origin).T) - keep).min() > 1.0)
-    window = Window((0.0, 0.0), 1e4, points, np.arange(count), SPACING, keep)
-    sectors = window.free_sectors((float(origin[0]), float(origin[1])))
+    sectors = free_sectors(points, keep, (float(origin[0]), float(origin[1])))
     angles = rng.uniform(-math.pi, math.pi, 180)
     rays = np.column_stack((np.cos(angles), np.sin(angles)))
     lines = shapely.linestrings(np.stack((np.broadcast_to(origin, (180, 2)), origin + 9e3 * rays), axis=1))
@@ -82,18 +81,18 @@ def test_free_sectors_are_the_bearings_on_which_a_ray_meets_nothing(seed: int, c
 
 
 def test_nothing_in_the_window_cuts_no_sector() -> None:
-    assert window_of().free_sectors((0.0, 0.0)).shape == (0, 4)
+    assert free_sectors(np.zeros((0, 2)), KEEP, (0.0, 0.0)).shape == (0, 4)
 
 
 def test_fans_that_overlap_leave_one_sector(ring: MakePoints) -> None:
     ahead, behind_it = ring(3000.0, 0.0, 400.0, SPACING), ring(6000.0, 500.0, 900.0, SPACING)
     beside = ring(0.0, 3000.0, 400.0, SPACING)
-    assert len(window_of(ahead, behind_it).free_sectors((0.0, 0.0))) == 1
-    assert len(window_of(ahead, beside).free_sectors((0.0, 0.0))) == 2
+    assert len(free_sectors(np.concatenate((ahead, behind_it)), KEEP, (0.0, 0.0))) == 1
+    assert len(free_sectors(np.concatenate((ahead, beside)), KEEP, (0.0, 0.0))) == 2
 
 
 def test_within_a_closed_ring_there_is_no_free_sector(ring: MakePoints) -> None:
-    assert len(window_of(ring(0.0, 0.0, 900.0, SPACING)).free_sectors((100.0, 50.0))) == 0
+    assert len(free_sectors(ring(0.0, 0.0, 900.0, SPACING), KEEP, (100.0, 50.0))) == 0
 
 
 @pytest.mark.parametrize("east", [-3000.0, 3000.0])
