@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.clearance import discs, first_entry
+from planner.clearance import first_entry
 from planner.curves import SHORTEST_M, Point, Segment
 from planner.interface import BoolArray, FloatArray, IntArray, Mission, SeenWorld
 from planner.memory import ObstacleMemory
@@ -116,7 +116,7 @@ class GrownObstacles:
 
     def first_hit(self, a: Point, b: Point) -> tuple[float, int]:
         """Where the line from a to b first enters a disc: distance (m) and disc; infinite and -1 for never."""
-        return first_entry(a, b, discs(self.points_m, self.radii_m))
+        return first_entry(a, b, self.points_m, self.radii_m)
 
     def turned_back(self, place: Point, target: Point) -> bool:
         """Whether the line from a place on the boundary to a target begins inside the obstacle."""

@@ -146,30 +146,22 @@ def to_nearer(points: FloatArray, ax: float, ay: float, bx: float, by: float) ->
     return away
 
 
-def discs(points_m: FloatArray, radius_m: float | FloatArray) -> FloatArray:
-    """(3, m) east, north and radius of discs about (m, 2) points, of one radius or of one for each."""
-    return np.array((*points_m.T, _each(radius_m, points_m)))
-
-
-def line_is_clear(a: Point, b: Point, about: FloatArray) -> bool:
-    """Whether the line from a to b enters none of (3, m) discs."""
-    return first_entry(a, b, about)[1] < 0
-
-
-def first_entry(a: Point, b: Point, about: FloatArray) -> tuple[float, int]:
-    """Where the line from a to b first enters one of some discs.
+def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> tuple[float, int]:
+    """Where the line from a to b first enters one of the discs about some points.
 
     A disc that holds `a` counts only when the line leads deeper into it.
 
     Args:
         a: start.
         b: end.
-        about: (3, m) discs, see `discs`.
+        points_m: (m, 2) centres.
+        radius_m: radius, one for all or one for each disc.
 
     Returns:
         Distance from a (m) and index of the disc; infinite and -1 where the line is clear.
     """
-    entry, which = entered(about, np.array([0, len(about[0])]), EVERYWHERE, *a, *b)
+    discs, count = np.array((*points_m.T, _each(radius_m, points_m))), len(points_m)
+    entry, which = entered(discs, np.array([0, count]), EVERYWHERE, *a, *b, count)
     if not len(which):
         return math.inf, -1
     first = int(entry.argmin())

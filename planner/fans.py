@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from planner.compiled import COUNTS, FLOAT, ROWS, compiled
+from planner.compiled import COUNT, COUNTS, FLOAT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
 EDGE_OFF_RAD = 1e-7
@@ -166,15 +166,23 @@ def hugged(
     return furthest
 
 
-@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, COUNT)
 def entered(
-    places: FloatArray, first: IntArray, circles: FloatArray, ax: float, ay: float, bx: float, by: float
+    places: FloatArray,
+    first: IntArray,
+    circles: FloatArray,
+    ax: float,
+    ay: float,
+    bx: float,
+    by: float,
+    most: int,
 ) -> tuple[FloatArray, IntArray]:
     """The discs about points by squares that the line from a to b enters: distances from a, and their indices.
 
-    A disc that holds `a` counts only when the line leads deeper into it.
+    A disc that holds `a` counts only when the line leads deeper into it. So many at most are looked for.
     """
-    entry, which, count = np.empty(len(places[0])), np.empty(len(places[0]), dtype=np.intp), 0
+    most = min(most, len(places[0]))
+    entry, which, count = np.empty(most), np.empty(most, dtype=np.intp), 0
     length = math.hypot(bx - ax, by - ay)
     if length < 1e-9:
         return entry[:0], which[:0]
@@ -192,7 +200,33 @@ def entered(
             if room > past * past and ahead > 0.0:
                 entry[count], which[count] = ahead - math.sqrt(room), k
                 count += 1
+                if count == most:
+                    return entry, which
     return entry[:count], which[:count]
+
+
+@compiled(ROWS, COUNTS, ROWS, ROWS)
+def shortcuts(
+    places: FloatArray, first: IntArray, circles: FloatArray, nodes: FloatArray
+) -> tuple[IntArray, int]:
+    """Which of (n, 2) track points are left where each is followed by the furthest that it sees, or by the next.
+
+    Returns:
+        (k,) indices, the first and the last among them; how many lines were looked along.
+    """
+    kept, count, here, lines = np.zeros(len(nodes), dtype=np.intp), 1, 0, 0
+    while here < len(nodes) - 1:
+        there = len(nodes) - 1
+        while there > here + 1:
+            a, b = nodes[here], nodes[there]
+            lines += 1
+            if not len(entered(places, first, circles, a[0], a[1], b[0], b[1], 1)[1]):
+                break
+            there -= 1
+        here = there
+        kept[count] = here
+        count += 1
+    return kept[:count], lines
 
 
 @compiled(ROWS, ROWS)

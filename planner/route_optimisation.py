@@ -7,10 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from planner.clearance import discs, first_breach, inside_bounds, line_is_clear
+import numpy as np
+
+from planner.blocks import Blocks, blocks
+from planner.clearance import first_breach, inside_bounds
 from planner.curves import Limits, Point, Pose, fillet
+from planner.fans import shortcuts
 from planner.interface import FloatArray, Path
 from planner.window import PLACE, Tally
+
+SQUARE = 3.0
+"""Side of the squares in which points near a line are looked for, in distances kept."""
 
 MOST_LEFT_OUT = 6
 """So many corners at most, from the first on, are tried to be left out."""
@@ -39,14 +46,11 @@ class Terrain:
         self.tally.add(1, PLACE, len(self.points_m) * len(path.segments))
         return math.isinf(first_breach(path, self.points_m, self.keep_m))
 
-    def admits_line(self, a: Point, b: Point) -> bool:
-        """Whether the line from a to b keeps its distance."""
-        self.tally.add(1, PLACE, len(self.points_m))
-        return line_is_clear(a, b, self._discs)
-
     @cached_property
-    def _discs(self) -> FloatArray:
-        return discs(self.points_m, self.keep_m)
+    def squares(self) -> Blocks:
+        """The edge points by squares."""
+        side_m = SQUARE * max(float(self.keep_m.max(initial=0.0)), 1.0)
+        return blocks(self.points_m, self.keep_m, side_m)[1]
 
 
 @dataclass(frozen=True)
@@ -59,14 +63,9 @@ class Route:
 
 def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
     """Drops the track points between each one and the furthest that it sees; the first and the last stay."""
-    kept = [nodes[0]]
-    i = 0
-    while i < len(nodes) - 1:
-        furthest = range(len(nodes) - 1, i + 1, -1)
-        sees = (k for k in furthest if terrain.admits_line(nodes[i], nodes[k]))
-        i = next(sees, i + 1)
-        kept.append(nodes[i])
-    return kept
+    kept, lines = shortcuts(*terrain.squares, np.array(nodes))
+    terrain.tally.add(lines, PLACE, lines * len(terrain.points_m))
+    return [nodes[i] for i in kept.tolist()]
 
 
 def optimise(

@@ -112,7 +112,7 @@ class Window:
         """Where the line to the goal comes too near to edge points, m from the origin, and the obstacle of each."""
         order, squares = self._blocks
         self.tally.add(1, PLACE, len(self.points_m))
-        entry, which = entered(*squares, *origin, *goal)
+        entry, which = entered(*squares, *origin, *goal, len(order))
         return entry, self.labels[order[which]]
 
     def nearest_obstacles(self, most: int) -> list[int]:

@@ -75,9 +75,13 @@ def test_a_line_enters_what_it_enters_among_all_points(seed: int, count: int, le
     rng = np.random.default_rng(seed)
     points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
     whole, parts = blocks(points, keep, 20_000.0), blocks(points, keep, 500.0)
+    line = 100.0, -50.0, 100.0 + length, -50.0
     found = [
         dict(zip(order[which].tolist(), entry.tolist(), strict=True))
         for order, squares in (whole, parts)
-        for entry, which in [entered(*squares, 100.0, -50.0, 100.0 + length, -50.0)]
+        for entry, which in [entered(*squares, *line, count)]
     ]
     assert found[0] == found[1]
+    one = entered(*parts[1], *line, 1)[0]
+    assert len(one) == min(len(found[0]), 1)
+    assert set(one) <= set(found[0].values())

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.clearance import discs, distances, first_breach, first_entry, inside_bounds, line_is_clear
+from planner.clearance import distances, first_breach, first_entry, inside_bounds
 from planner.curves import Pose, along, full_turn, pose_at
 from planner.interface import FloatArray, Path
 
@@ -129,12 +129,11 @@ def test_first_entry_against_shapely(seed: int, count: int) -> None:
     assume((np.hypot(*(points - a).T) > radius).all())
     assume((np.abs(shapely.distance(line, shapely.points(points)) - radius) > 1.0).all())
     # Circles of 4 * 200 chords are 2 mm too small at most.
-    circles = [shapely.Point(p).buffer(r, quad_segs=200) for p, r in zip(points, radius, strict=True)]
-    entries = [line.intersection(disc).distance(shapely.Point(a)) for disc in circles]
+    discs = [shapely.Point(p).buffer(r, quad_segs=200) for p, r in zip(points, radius, strict=True)]
+    entries = [line.intersection(disc).distance(shapely.Point(a)) for disc in discs]
     entries = [entry if math.isfinite(entry) else math.inf for entry in entries]
-    distance, index = first_entry((a[0], a[1]), (b[0], b[1]), discs(points, radius))
+    distance, index = first_entry((a[0], a[1]), (b[0], b[1]), points, radius)
     assert math.isfinite(distance) == any(math.isfinite(entry) for entry in entries)
-    assert line_is_clear((a[0], a[1]), (b[0], b[1]), discs(points, radius)) == math.isinf(distance)
     if math.isinf(distance):
         assert index == -1
     else:
@@ -143,13 +142,13 @@ def test_first_entry_against_shapely(seed: int, count: int) -> None:
 
 
 def test_a_disc_about_the_start_bars_only_the_way_deeper_into_it() -> None:
-    disc = discs(np.array([(30.0, 0.0)]), 50.0)
-    assert first_entry((0.0, 0.0), (500.0, 0.0), disc) == (0.0, 0)
-    assert first_entry((0.0, 0.0), (-500.0, 0.0), disc) == (math.inf, -1)
-    assert line_is_clear((0.0, 0.0), (0.0, 500.0), disc)
-    assert not line_is_clear((0.0, 0.0), (100.0, 500.0), disc)
+    disc = np.array([(30.0, 0.0)])
+    assert first_entry((0.0, 0.0), (500.0, 0.0), disc, 50.0) == (0.0, 0)
+    assert first_entry((0.0, 0.0), (-500.0, 0.0), disc, 50.0) == (math.inf, -1)
+    assert first_entry((0.0, 0.0), (0.0, 500.0), disc, 50.0) == (math.inf, -1)
+    assert first_entry((0.0, 0.0), (100.0, 500.0), disc, 50.0) == (0.0, 0)
 
 
 def test_no_points_and_no_line_are_clear() -> None:
-    assert line_is_clear((0.0, 0.0), (10.0, 0.0), discs(np.zeros((0, 2)), 50.0))
-    assert first_entry((5.0, 5.0), (5.0, 5.0), discs(np.array([(5.0, 5.0)]), 50.0)) == (math.inf, -1)
+    assert first_entry((0.0, 0.0), (10.0, 0.0), np.zeros((0, 2)), 50.0) == (math.inf, -1)
+    assert first_entry((5.0, 5.0), (5.0, 5.0), np.array([(5.0, 5.0)]), 50.0) == (math.inf, -1)
