@@ -223,17 +223,14 @@ def u_traps(config: UTraps, rng: np.random.Generator) -> GeneratedWorld:
 def _placed(config: _Scattered, radii: FloatArray, rng: np.random.Generator) -> list[Place | None]:
     """A middle for each disc of these radii, None for one without a place."""
     largest = float(radii.max(initial=0.0))
-    taken = _Taken(max(2 * largest + config.gap_m, max(config.size_m) / MOST_COLUMNS))
-    ends = config.world(())
+    cell_m = max(2 * largest + config.gap_m, largest + config.room_m, max(config.size_m) / MOST_COLUMNS)
+    taken, ends = _Taken(cell_m), config.world(())
+    for end in (ends.start_m, ends.goal_m):
+        taken.add(end, config.room_m)
     found: list[Place | None] = []
     in_vain = 0
     for radius in radii.tolist():
-        free = (
-            place
-            for place in _tries(config, rng)
-            if all(_apart(place, end, config.room_m + radius) for end in (ends.start_m, ends.goal_m))
-            and taken.leaves(place, radius)
-        )
+        free = (place for place in _tries(config, rng) if taken.leaves(place, radius))
         place = next(free, None) if in_vain < FULL else None
         found.append(place)
         if place is None:
@@ -249,32 +246,30 @@ def _tries(config: _Scattered, rng: np.random.Generator) -> Iterator[Place]:
 
 
 class _Taken:
-    """Discs, in square cells so large that those which can matter to another lie in its cell or the next."""
+    """Discs, by square cells so large that those which can matter to another lie in its cell or the next."""
 
     def __init__(self, cell_m: float) -> None:
         self._cell_m = cell_m
-        self._cells: defaultdict[tuple[int, int], list[tuple[Place, float]]] = defaultdict(list)
+        # East, north and what is kept of all that can matter to a cell.
+        self._near: defaultdict[tuple[int, int], list[tuple[float, float, float]]] = defaultdict(list)
 
     def add(self, place: Place, kept_m: float) -> None:
-        # The large ones first: they are the most likely to be in the way.
-        insort(self._cells[self._cell(place)], (place, kept_m), key=lambda disc: -disc[1])
+        column, row = self._cell(place)
+        for near in itertools.product((column - 1, column, column + 1), (row - 1, row, row + 1)):
+            # The large ones first: they are the most likely to be in the way.
+            insort(self._near[near], (*place, kept_m), key=lambda disc: -disc[2])
 
     def leaves(self, place: Place, radius_m: float) -> bool:
         """Whether a disc keeps from every other one what that asks for."""
-        column, row = self._cell(place)
-        return all(
-            _apart(place, other, kept_m + radius_m)
-            for near in itertools.product((column - 1, column, column + 1), (row - 1, row, row + 1))
-            for other, kept_m in self._cells.get(near, ())
-        )
+        east, north = place
+        for x, y, kept_m in self._near.get(self._cell(place), ()):
+            apart_m = kept_m + radius_m
+            if (east - x) * (east - x) + (north - y) * (north - y) < apart_m * apart_m:
+                return False
+        return True
 
     def _cell(self, place: Place) -> tuple[int, int]:
         return int(place[0] // self._cell_m), int(place[1] // self._cell_m)
-
-
-def _apart(place: Place, other: Place, distance_m: float) -> bool:
-    east, north = place[0] - other[0], place[1] - other[1]
-    return east * east + north * north >= distance_m * distance_m
 
 
 def _circle(place: Place, radius_m: float) -> ObstacleKeys:
