@@ -19,7 +19,7 @@ from harness.run import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop, s
 from harness.scenario import Scenario
 from harness.stopwatch import Stopwatch
 
-ROUNDS = 5
+ROUNDS = 3
 """Each round is one bare run, one flight without and one with the recording."""
 
 T = TypeVar("T")
