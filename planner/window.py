@@ -131,7 +131,7 @@ class Window:
         pending = list(dict.fromkeys(beside))
         looked_at = set(pending)
         order, blocked = self._blocks
-        if not self._obstacles:
+        if not self._obstacles:  # the squares were laid for this
             self.tally.add(1, TANGENT, len(self.points_m))
         while pending:
             obstacle = pending.pop()
