@@ -230,8 +230,8 @@ def _placed(config: _Scattered, radii: FloatArray, rng: np.random.Generator) -> 
     found: list[Place | None] = []
     in_vain = 0
     for radius in radii.tolist():
-        free = (place for place in _tries(config, rng) if taken.leaves(place, radius))
-        place = next(free, None) if in_vain < FULL else None
+        free = (taken.first_free(places, radius) for places in _tries(config, rng))
+        place = next(filter(None, free), None) if in_vain < FULL else None
         found.append(place)
         if place is None:
             in_vain += 1
@@ -240,9 +240,9 @@ def _placed(config: _Scattered, radii: FloatArray, rng: np.random.Generator) -> 
     return found
 
 
-def _tries(config: _Scattered, rng: np.random.Generator) -> Iterator[Place]:
+def _tries(config: _Scattered, rng: np.random.Generator) -> Iterator[list[Place]]:
     for _ in range(TRIES // AT_ONCE):
-        yield from map(tuple, (rng.random((AT_ONCE, 2)) * config.size_m).tolist())
+        yield (rng.random((AT_ONCE, 2)) * config.size_m).tolist()
 
 
 class _Taken:
@@ -254,22 +254,22 @@ class _Taken:
         self._near: defaultdict[tuple[int, int], list[tuple[float, float, float]]] = defaultdict(list)
 
     def add(self, place: Place, kept_m: float) -> None:
-        column, row = self._cell(place)
+        column, row = (int(along_m // self._cell_m) for along_m in place)
         for near in itertools.product((column - 1, column, column + 1), (row - 1, row, row + 1)):
             # The large ones first: they are the most likely to be in the way.
             insort(self._near[near], (*place, kept_m), key=lambda disc: -disc[2])
 
-    def leaves(self, place: Place, radius_m: float) -> bool:
-        """Whether a disc keeps from every other one what that asks for."""
-        east, north = place
-        for x, y, kept_m in self._near.get(self._cell(place), ()):
-            apart_m = kept_m + radius_m
-            if (east - x) * (east - x) + (north - y) * (north - y) < apart_m * apart_m:
-                return False
-        return True
-
-    def _cell(self, place: Place) -> tuple[int, int]:
-        return int(place[0] // self._cell_m), int(place[1] // self._cell_m)
+    def first_free(self, places: Iterable[Place], radius_m: float) -> Place | None:
+        """The first place where a disc keeps from every other one what that asks for; None where there is none."""
+        near, cell_m = self._near, self._cell_m
+        for east, north in places:
+            for x, y, kept_m in near.get((int(east // cell_m), int(north // cell_m)), ()):
+                apart_m = kept_m + radius_m
+                if (east - x) * (east - x) + (north - y) * (north - y) < apart_m * apart_m:
+                    break
+            else:
+                return east, north
+        return None
 
 
 def _circle(place: Place, radius_m: float) -> ObstacleKeys:
