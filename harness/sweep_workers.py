@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -27,7 +28,9 @@ RECORDED_EACH: Final = 25
 """Flights of a process that records: rerun 0.41 keeps the layout of every recording, about 3 MB, for ever."""
 
 CONNECT_S: Final = 10.0
-WAITING_PER_THREAD: Final = 2
+JOBS_EACH: Final = 2
+"""Jobs handed out for each that can be flown at a time: nobody waits for the next while an answer is written down."""
+
 SAME: Final = ("wayproof", "jsbsim", "numba", "numpy")
 
 
@@ -54,31 +57,53 @@ class Workers(Protocol):
         ...
 
 
+class _Line:
+    """Jobs that wait for a process, the first that came first."""
+
+    def __init__(self) -> None:
+        self.changing = threading.Lock()
+        self.waiting: deque[tuple[Job, Future[Answer]]] = deque()
+
+
 class _Lane:
     """One process, one job at a time: when it dies, it is known of what."""
 
     TRIES: Final = 2
 
-    def __init__(self, flights_each: int | None) -> None:
+    def __init__(self, line: _Line, flights_each: int | None) -> None:
         self.busy = False
+        self._line = line
         self._closed = False
         self._flights_each = self._left = flights_each
         self._pool: ProcessPoolExecutor | None = None
 
-    def start(self, job: Job) -> Future[Answer]:
-        self.busy = True
-        answer: Future[Answer] = Future()
+    def go_on(self, *, over: bool = False) -> None:
+        """Takes the next job of the line, unless one is being flown that is not `over`."""
+        with self._line.changing:
+            if self.busy and not over:
+                return
+            self.busy = bool(self._line.waiting)
+            if not self.busy:
+                return
+            job, answer = self._line.waiting.popleft()
         self._try(job, answer, self.TRIES)
-        return answer
 
     def _try(self, job: Job, answer: Future[Answer], tries: int) -> None:
         try:
-            flown = self._process().submit(fly_job, job)
+            flown = self._submitted(job)
+        except (OSError, RuntimeError) as error:
+            # No process can be begun.
+            answer.set_exception(error)
+            return
+        flown.add_done_callback(lambda flown: self._over(flown, job, answer, tries - 1))
+
+    def _submitted(self, job: Job) -> Future[Answer]:
+        try:
+            return self._process().submit(fly_job, job)
         except BrokenProcessPool:
             # It died while it had nothing to do.
             self._pool = None
-            flown = self._process().submit(fly_job, job)
-        flown.add_done_callback(lambda flown: self._over(flown, job, answer, tries - 1))
+            return self._process().submit(fly_job, job)
 
     def _process(self) -> ProcessPoolExecutor:
         if self._pool is None:
@@ -102,7 +127,7 @@ class _Lane:
             self._left -= 1
             if self._left == 0:
                 self._retire()
-        self.busy = False
+        self.go_on(over=True)
         if error is None:
             answer.set_result(flown.result())
         else:
@@ -122,18 +147,26 @@ class LocalWorkers:
     """Processes of this machine."""
 
     def __init__(self, number: int, flights_each: int | None) -> None:
-        self._lanes = [_Lane(flights_each) for _ in range(number)]
+        self._line = _Line()
+        self._lanes = [_Lane(self._line, flights_each) for _ in range(number)]
 
     def free(self) -> int:
-        """Idle processes."""
-        return sum(not lane.busy for lane in self._lanes)
+        """Room for a job that flies and one that waits for each process."""
+        with self._line.changing:
+            out = len(self._line.waiting) + sum(lane.busy for lane in self._lanes)
+        return JOBS_EACH * len(self._lanes) - out
 
     def start(self, job: Job) -> Future[Answer]:
-        """Hands a job to an idle process."""
-        return next(lane for lane in self._lanes if not lane.busy).start(job)
+        """Hands a job to an idle process, or to the first that will be."""
+        answer: Future[Answer] = Future()
+        self._line.waiting.append((job, answer))
+        for lane in self._lanes:
+            lane.go_on()
+        return answer
 
     def close(self) -> None:
         """Takes no more jobs."""
+        self._line.waiting.clear()
         for lane in self._lanes:
             lane.close()
 
@@ -211,7 +244,7 @@ class DaskWorkers:
             threads: int = sum(self._client.nthreads().values())
         except OSError as error:
             raise SchedulerGoneError from error
-        return WAITING_PER_THREAD * threads - self._flying
+        return JOBS_EACH * threads - self._flying
 
     def start(self, job: Job) -> Future[Answer]:
         """Hands a job to the scheduler."""
