@@ -60,7 +60,7 @@ def test_the_first_command_flies_the_papers_scenario_and_prints_what_readme_show
 
 
 def test_the_second_command_runs_these_tests_and_is_what_ci_runs() -> None:
-    assert f"{SET_UP}-e '.[dev]' && .venv/bin/pytest" == TESTS
+    assert f"{SET_UP}-e '.[dev]' && .venv/bin/pytest -n 2" == TESTS
     ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     assert "tests=$(grep -m1 '^python3 -m venv .*pytest' README.md)" in ci
     assert 'bash -c "$tests"' in ci
