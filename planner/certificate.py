@@ -97,8 +97,8 @@ class Certifier:
         step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
         stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
         for some in (stations[i : i + AT_ONCE] for i in range(0, len(stations), AT_ONCE)):
-            free = [self._discs_free(path, some, side, seen).tolist() for side in SIDES]
-            for station, *sides_free in zip(some.tolist(), *free, strict=True):
+            free = self._discs_free(path, some, seen).tolist()
+            for station, sides_free in zip(some.tolist(), free, strict=True):
                 for side, disc_free in zip(SIDES, sides_free, strict=True):
                     if disc_free:
                         turn = self._turn(path, station, side)
@@ -107,15 +107,16 @@ class Certifier:
                             return Certified(Path(np.array([*way, *turn]), loiter=True), station)
         return None
 
-    def _discs_free(self, path: Path, stations: FloatArray, side: float, seen: SeenWorld) -> BoolArray:
-        """(k,) whether the disc of a turn off a path, at each of (k,) stations, has been seen to be free."""
-        poses, bends = poses_at(path, stations), curvature_at(path, stations)
+    def _discs_free(self, path: Path, stations: FloatArray, seen: SeenWorld) -> BoolArray:
+        """(k, 2) whether the disc of a turn to each side, at each of (k,) stations, has been seen to be free."""
+        poses, bends = poses_at(path, stations)[:, None], curvature_at(path, stations)[:, None]
         # Where the path turns the other way, the turn begins after room to roll.
-        roll = np.where(side * bends < 0.0, self._limits.roll_m, 0.0)[:, None]
-        leftwards = np.column_stack((-poses[:, 3], poses[:, 2]))
-        centres = poses[:, :2] + roll * poses[:, 2:] + side * self._limits.radius_m * leftwards
-        places = (centres[:, None] + self._disc).reshape(-1, 2)
-        free: BoolArray = np.all(seen.seen_free(places).reshape(len(stations), -1), axis=1)
+        roll = np.where(np.array(SIDES) * bends < 0.0, self._limits.roll_m, 0.0)[..., None]
+        leftwards = np.concatenate((-poses[..., 3:], poses[..., 2:3]), axis=2)
+        aside = np.array(SIDES)[:, None] * self._limits.radius_m * leftwards
+        centres = poses[..., :2] + roll * poses[..., 2:] + aside
+        places = (centres[:, :, None] + self._disc).reshape(-1, 2)
+        free: BoolArray = np.all(seen.seen_free(places).reshape(len(stations), len(SIDES), -1), axis=2)
         return free
 
     def _turn(self, path: Path, station_m: float, side: float) -> list[Segment]:

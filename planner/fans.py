@@ -55,85 +55,6 @@ def first_met(
     return max(nearest, 0.0), met
 
 
-@compiled(ROWS, COUNTS, ROWS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT)
-def fan_edges(
-    places: FloatArray,
-    block: IntArray,
-    circles: FloatArray,
-    own: FloatArray,
-    first: IntArray,
-    counts: IntArray,
-    one: IntArray,
-    other: IntArray,
-    east: float,
-    north: float,
-) -> tuple[FloatArray, IntArray]:
-    """The tangents to the ends of an obstacle's fan, and how far each is free.
-
-    Args:
-        places: all edge points by squares, as `planner.blocks.blocks` has them,
-        block: where each square begins among them,
-        circles: and the circle about it.
-        own: (3, m) east, north and the distance to be kept of the obstacle's points, those of a cell next to each
-            other.
-        first: where each cell begins in `own`.
-        counts: how many points it has.
-        one: a cell,
-        other: and one that touches it; each pair once.
-        east: of the track point.
-        north: of the track point.
-
-    Returns:
-        (k, 5) unit vector, distance at which it touches, distance up to which it is free, side (1 for M, -1 for N);
-        (k,) index in `places` of the point that it comes too near to first.
-    """
-    cells, count = len(first), 0
-    tangents = np.empty((4, len(own[0])))
-    for j in range(len(own[0])):
-        # The direction towards a point, turned to its tangents; from too near they lead square past it.
-        dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
-        away2 = max(dx * dx + dy * dy, 1e-12)
-        cos = math.sqrt(max(away2 - keep * keep, 0.0)) / away2
-        sin = 1.0 / math.sqrt(away2) if away2 <= keep * keep else keep / away2
-        tangents[0, j], tangents[1, j] = dx * cos - dy * sin, dy * cos + dx * sin
-        tangents[2, j], tangents[3, j] = dx * cos + dy * sin, dy * cos - dx * sin
-    outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
-    x, y = np.empty(cells), np.empty(cells)
-    edges, met = np.empty((2 * cells, 5)), np.empty(2 * cells, dtype=np.intp)
-    for left in (True, False):
-        side, u, v = 1.0 if left else -1.0, tangents[0 if left else 2], tangents[1 if left else 3]
-        for cell in range(cells):
-            begin = furthest = first[cell]
-            ux, uy, most = u[begin], v[begin], 0.0
-            for j in range(begin + 1, begin + counts[cell]):
-                beyond = side * (ux * v[j] - uy * u[j])
-                if beyond > 0.0 and ux * u[j] + uy * v[j] < 0.0:
-                    beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
-                if beyond > most:
-                    furthest, most = j, beyond
-            outmost[cell], x[cell], y[cell], ends[cell] = furthest, u[furthest], v[furthest], True
-        # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
-        for pair in range(len(one)):
-            j, k = one[pair], other[pair]
-            beyond = side * (x[j] * y[k] - y[j] * x[k])
-            ends[j] &= not beyond > 0.0
-            ends[k] &= not beyond < 0.0
-        for cell in range(cells):
-            if not ends[cell]:
-                continue
-            j = outmost[cell]
-            dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
-            touch2 = dx * dx + dy * dy - keep * keep
-            if touch2 <= 0.0:
-                continue
-            off = side * EDGE_OFF_RAD
-            towards, aside = x[cell] - off * y[cell], y[cell] + off * x[cell]
-            clear, met[count] = first_met(places, block, circles, east, north, towards, aside)
-            edges[count] = (towards, aside, math.sqrt(touch2), clear, side)
-            count += 1
-    return edges[:count], met[:count]
-
-
 @compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
 def hugged(
     own: FloatArray, east: float, north: float, ux: float, uy: float, outer: float, touch: float
@@ -164,6 +85,98 @@ def hugged(
             return furthest
         furthest = max(furthest, end[k]) if i else end[k]
     return furthest
+
+
+@compiled(ROWS, COUNTS, ROWS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT)
+def fan_edges(
+    places: FloatArray,
+    block: IntArray,
+    circles: FloatArray,
+    labels: IntArray,
+    own: FloatArray,
+    first: IntArray,
+    counts: IntArray,
+    one: IntArray,
+    other: IntArray,
+    east: float,
+    north: float,
+    outer: float,
+) -> tuple[FloatArray, IntArray, int]:
+    """The tangents to the ends of an obstacle's fan that are free as far as they touch, and what hides the others.
+
+    Args:
+        places: all edge points by squares, as `planner.blocks.blocks` has them,
+        block: where each square begins among them,
+        circles: and the circle about it.
+        labels: the obstacle of each of these points.
+        own: (3, m) east, north and the distance to be kept of the obstacle's points, those of a cell next to each
+            other.
+        first: where each cell begins in `own`.
+        counts: how many points it has.
+        one: a cell,
+        other: and one that touches it; each pair once.
+        east: of the track point.
+        north: of the track point.
+        outer: distance from the obstacle of interest on a tangent.
+
+    Returns:
+        (k, 6) unit vector, distance at which it touches, distance up to which it is free, side (1 for M, -1 for N),
+        distance at which the outer distance is reached again (`hugged`);
+        (h,) the obstacles that hide a tangent, or close it right behind the place where it touches;
+        how many tangents were looked along.
+    """
+    cells, count = len(first), 0
+    tangents = np.empty((4, len(own[0])))
+    for j in range(len(own[0])):
+        # The direction towards a point, turned to its tangents; from too near they lead square past it.
+        dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
+        away2 = max(dx * dx + dy * dy, 1e-12)
+        cos = math.sqrt(max(away2 - keep * keep, 0.0)) / away2
+        sin = 1.0 / math.sqrt(away2) if away2 <= keep * keep else keep / away2
+        tangents[0, j], tangents[1, j] = dx * cos - dy * sin, dy * cos + dx * sin
+        tangents[2, j], tangents[3, j] = dx * cos + dy * sin, dy * cos - dx * sin
+    outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
+    x, y = np.empty(cells), np.empty(cells)
+    edges, hiding, hides, looked = np.empty((2 * cells, 6)), np.empty(2 * cells, dtype=np.intp), 0, 0
+    for left in (True, False):
+        side, u, v = 1.0 if left else -1.0, tangents[0 if left else 2], tangents[1 if left else 3]
+        for cell in range(cells):
+            begin = furthest = first[cell]
+            ux, uy, most = u[begin], v[begin], 0.0
+            for j in range(begin + 1, begin + counts[cell]):
+                beyond = side * (ux * v[j] - uy * u[j])
+                if beyond > 0.0 and ux * u[j] + uy * v[j] < 0.0:
+                    beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
+                if beyond > most:
+                    furthest, most = j, beyond
+            outmost[cell], x[cell], y[cell], ends[cell] = furthest, u[furthest], v[furthest], True
+        # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
+        for pair in range(len(one)):
+            j, k = one[pair], other[pair]
+            beyond = side * (x[j] * y[k] - y[j] * x[k])
+            ends[j] &= not beyond > 0.0
+            ends[k] &= not beyond < 0.0
+        for cell in range(cells):
+            if not ends[cell]:
+                continue
+            j = outmost[cell]
+            dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
+            touch2 = dx * dx + dy * dy - keep * keep
+            if touch2 <= 0.0:
+                continue
+            off = side * EDGE_OFF_RAD
+            towards, aside = x[cell] - off * y[cell], y[cell] + off * x[cell]
+            touch = math.sqrt(touch2)
+            clear, met = first_met(places, block, circles, east, north, towards, aside)
+            looked += 1
+            if clear >= touch:
+                again = hugged(own, east, north, towards, aside, outer, touch)
+                edges[count] = (towards, aside, touch, clear, side, again)
+                count += 1
+            if clear < touch + places[2, met] and not (hides and hiding[hides - 1] == labels[met]):
+                hiding[hides] = labels[met]
+                hides += 1
+    return edges[:count], hiding[:hides], looked
 
 
 @compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, COUNT)

@@ -128,10 +128,10 @@ def search(
             # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
             beside += np.unique(labels).tolist()
             beside += [] if track.last is None else [track.last.obstacle]
-        for edge in window.sector_edges(here, beside):
+        for edge in window.sector_edges(here, beside, outer_m):
             if not wide and _leads_away(track, edge):
                 continue
-            child = _step(window, track, edge, goal, outer_m)
+            child = _step(track, edge, goal, outer_m)
             if child is not None and _inside(child.nodes[-1], bounds_m):
                 count += 1
                 cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
@@ -149,18 +149,19 @@ def _leads_away(track: Track, edge: SectorEdge) -> bool:
     return abs(turn) > BACK_RAD or turn * track.last.side > AWAY_RAD
 
 
-def _step(window: Window, track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
+def _step(track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
     """One step along the edge of a free sector; None where it leads nowhere."""
     here = track.nodes[-1]
-    hugged = window.hugged_m(here, edge, outer_m)
-    length = min(hugged, edge.clear_m - SHORT_OF * outer_m)
+    length = min(edge.hugged_m, edge.clear_m - SHORT_OF * outer_m)
     if length < 1e-2 * outer_m:
         return None
     x, y = here[0] + edge.ux * length, here[1] + edge.uy * length
     gx, gy, left = guide_vector(here, goal)
     off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
     left = distance_left_m(left, length, off_guide)
-    return Track((*track.nodes, (x, y)), track.flown_m + length, left, edge if length == hugged else None)
+    return Track(
+        (*track.nodes, (x, y)), track.flown_m + length, left, edge if length == edge.hugged_m else None
+    )
 
 
 def _inside(point: Point, bounds_m: tuple[float, float, float, float]) -> bool:

@@ -20,7 +20,7 @@ import numpy as np
 
 from planner.blocks import Blocks, Cells, blocks, cells, places
 from planner.curves import Point
-from planner.fans import entered, fan_edges, hugged
+from planner.fans import entered, fan_edges
 from planner.interface import FloatArray, IntArray
 
 MOST_HIDING = 12
@@ -29,8 +29,8 @@ MOST_HIDING = 12
 BLOCK_CELLS = 4
 """Side of the squares in which points near a line are looked for, in cells."""
 
-CALL, TANGENT, PLACE = 14.0, 0.04, 0.0016
-"""Work of a question, and more of it for each point that tangents are laid at and for each that is compared."""
+CALL, TANGENT, PLACE, HUGGED = 14.0, 0.04, 0.0016, 0.006
+"""Work of a question, and more of it for each point that tangents are laid at, is compared, or may be hugged."""
 
 
 class Tally:
@@ -58,16 +58,18 @@ class SectorEdge(NamedTuple):
         ux, uy: unit vector along the edge, tangent to the obstacle.
         touch_m: distance at which it touches the obstacle.
         clear_m: distance up to which the direction is free; infinite where nothing is met.
-        obstacle: label of the obstacle.
         side: 1 for M, -1 for N.
+        hugged_m: distance at which an outer distance from the obstacle is reached again; 0: never.
+        obstacle: label of the obstacle.
     """
 
     ux: float
     uy: float
     touch_m: float
     clear_m: float
-    obstacle: int
     side: float
+    hugged_m: float
+    obstacle: int
 
 
 _Obstacle = tuple[FloatArray, Cells]
@@ -96,8 +98,10 @@ class Window:
     _obstacles: dict[int, _Obstacle] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
-    def _blocks(self) -> tuple[IntArray, Blocks]:
-        return blocks(self.points_m, self.keep_m, BLOCK_CELLS * self.cell_m)
+    def _blocks(self) -> tuple[Blocks, IntArray]:
+        """The points by squares, and the obstacle of each."""
+        order, squares = blocks(self.points_m, self.keep_m, BLOCK_CELLS * self.cell_m)
+        return squares, self.labels[order]
 
     def _obstacle(self, label: int) -> _Obstacle:
         """The points of an obstacle, gathered once."""
@@ -110,10 +114,10 @@ class Window:
 
     def entered(self, origin: Point, goal: Point) -> tuple[FloatArray, IntArray]:
         """Where the line to the goal comes too near to edge points, m from the origin, and the obstacle of each."""
-        order, squares = self._blocks
-        self.tally.add(1, PLACE, len(self.points_m))
-        entry, which = entered(*squares, *origin, *goal, len(order))
-        return entry, self.labels[order[which]]
+        blocked, labels = self._blocks
+        self.tally.add(1, PLACE, len(labels))
+        entry, which = entered(*blocked, *origin, *goal, len(labels))
+        return entry, labels[which]
 
     def nearest_obstacles(self, most: int) -> list[int]:
         """The obstacles nearest to the centre, so many at most."""
@@ -121,42 +125,37 @@ class Window:
         order = np.argsort(np.hypot(*(self.points_m - self.center_m).T))
         return list(itertools.islice(dict.fromkeys(self.labels[order].tolist()), most))
 
-    def sector_edges(self, origin: Point, beside: Iterable[int]) -> list[SectorEdge]:
+    def sector_edges(self, origin: Point, beside: Iterable[int], outer_m: float = 0.0) -> list[SectorEdge]:
         """The edges M and N of the free sectors beside some obstacles, as seen from a track point.
 
         Where something hides an edge, or closes it right behind the place where it touches, the edges of that are
         taken as well.
+
+        Args:
+            origin: the track point.
+            beside: labels of the obstacles.
+            outer_m: distance from an obstacle up to which an edge hugs it.
         """
         edges: list[SectorEdge] = []
         pending = list(dict.fromkeys(beside))
         looked_at = set(pending)
-        order, blocked = self._blocks
+        blocked, labels = self._blocks
         if not self._obstacles:  # the squares were laid for this
             self.tally.add(1, TANGENT, len(self.points_m))
         while pending:
             obstacle = pending.pop()
             own, squares = self._obstacle(obstacle)
-            ends, met = fan_edges(*blocked, own, *squares, *origin)
+            found, hiding, looked = fan_edges(*blocked, labels, own, *squares, *origin, outer_m)
             self.tally.add(1, TANGENT, len(own[0]))
-            self.tally.add(0, PLACE, len(met) * len(blocked[2][0]))
-            for (ux, uy, touch_m, clear_m, side), hiding in zip(
-                ends.tolist(), order[met].tolist(), strict=True
-            ):
-                if clear_m >= touch_m:
-                    edges.append(SectorEdge(ux, uy, touch_m, clear_m, obstacle, side))
-                # Hidden, or closed right behind: the way goes round what hides it.
-                if clear_m < touch_m + self.keep_m[hiding]:
-                    other = int(self.labels[hiding])
-                    if other not in looked_at and len(looked_at) < MOST_HIDING:
-                        looked_at.add(other)
-                        pending.append(other)
+            self.tally.add(0, PLACE, looked * len(labels))
+            self.tally.add(0, HUGGED, len(found) * len(own[0]))
+            edges += [SectorEdge._make((*edge, obstacle)) for edge in found.tolist()]
+            # Hidden, or closed right behind: the way goes round what hides it.
+            for other in hiding.tolist():
+                if other not in looked_at and len(looked_at) < MOST_HIDING:
+                    looked_at.add(other)
+                    pending.append(other)
         return edges
-
-    def hugged_m(self, origin: Point, edge: SectorEdge, outer_m: float) -> float:
-        """How far along an edge an outer distance from the obstacle that it touches is reached again."""
-        own, _ = self._obstacle(edge.obstacle)
-        self.tally.add(1, PLACE, len(own[0]))
-        return hugged(own, *origin, edge.ux, edge.uy, outer_m, edge.touch_m)
 
 
 def free_sectors(points_m: FloatArray, keep_m: float | FloatArray, origin: Point) -> FloatArray:
