@@ -79,8 +79,8 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     """Flies a mission to its end.
 
     Everything happens at whole steps of the flight model: guidance and log at one rate, a scan at the
-    sensor's. A scan or a plan that is late takes effect at the first of these steps after its delay. Time is a
-    count of steps.
+    sensor's. The planner is asked after a scan, and twice a step of guidance while it goes on. A scan or a plan
+    that is late takes effect at the first of these steps after its delay. Time is a count of steps.
 
     Args:
         loop: all parts of the flight; used up by it.
@@ -110,9 +110,11 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             late.append(scan)
             for observer in observers:
                 observer.on_scan(scan, state)
-        if late and late[0].available_s <= state.time_s + 1e-9:
+        scanned = bool(late) and late[0].available_s <= state.time_s + 1e-9
+        if scanned:
             seen.update(late.popleft())
-            verdict = plans.ask(state, station)
+        if scanned or (tick and plans.go_on):
+            verdict = plans.ask(state, station, scanned)
             if verdict is not None:
                 break
         if tick:
@@ -125,6 +127,13 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
             if progress is not None and state.time_s >= next_report:
                 progress(state.time_s, judge.to_go_m(state), plans.state)
                 next_report = state.time_s + PROGRESS_EVERY_S
+        if plans.go_on:
+            model.advance(steps // 2)
+            state = model.state()
+            verdict = plans.ask(state, station, scanned=False)
+            if verdict is not None:
+                break
+            steps -= steps // 2
         model.advance(steps)
     log.add(state, roll_command, cross_track, station, plans.index)
     outcome, reason = verdict
@@ -173,6 +182,9 @@ class _Plans:
         """When the plan on its way takes effect."""
         self.index = -1
         """Index of the plan in effect, -1 before the first."""
+        self.go_on = False
+        """The planner is to be asked again before the next scan."""
+        self._told, self._scanned = "", False
         self._station, self._turns_at = 0.0, math.inf
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
@@ -184,8 +196,9 @@ class _Plans:
             "waiting" if not self.accepted else "holding" if self._station > self._turns_at else "following"
         )
 
-    def ask(self, state: AircraftState, station_m: float) -> tuple[Outcome, str] | None:
+    def ask(self, state: AircraftState, station_m: float, scanned: bool) -> tuple[Outcome, str] | None:
         """Asks the planner, unless it is still at work; returns how the flight ends if that is its answer."""
+        self._scanned |= scanned
         if self._coming is not None:
             return None
         self._station = station_m
@@ -198,18 +211,22 @@ class _Plans:
             seen=self._loop.seen,
             flown=flown,
             station_m=station_m if flown else 0.0,
+            scanned=self._scanned,
         )
+        self._scanned = False
         begun = time.perf_counter()
         try:
             plan = self._loop.planner.plan(request)
         except Exception as error:
             return Outcome.PLANNER_FAILED, f"the planner raised {type(error).__name__}: {error}"
         compute_ms = 1e3 * (time.perf_counter() - begun)
+        told, self._told = self._told, plan.reason
+        self.go_on = plan.goes_on
         if plan.status is not PlanStatus.KEPT:
             self.compute_ms.append(compute_ms)
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
             return Outcome.UNREACHABLE, plan.reason
-        if plan.status is PlanStatus.NO_PATH:
+        if plan.status is PlanStatus.NO_PATH and plan.reason != told:
             for observer in self._observers:
                 observer.on_event(state.time_s, plan.reason)
         if plan.status is PlanStatus.FOUND:

@@ -1,7 +1,7 @@
 """Thinking about the way to the goal in portions of work, while the plan in effect is flown.
 
 The plan in effect ends in a turn that is seen to be free, so that there is time to think: a search that is not done
-within its portion goes on with the next scan. How much is done in a portion is counted, never timed. What
+within its portion goes on when the planner is asked next. How much is done in a portion is counted, never timed. What
 is found is fitted to where the aircraft has got to by then.
 """
 

@@ -14,7 +14,7 @@ from planner.curves import Point, between
 from planner.interface import FloatArray, Mission, Path, Plan
 
 WATCHED_TOGETHER = 16
-"""Edges that are not near are compared with the course once in so many scans."""
+"""Edges that are not near are compared with the course once in so many times that the planner is asked."""
 
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
@@ -83,7 +83,7 @@ class Watch:
         self._prolong, self._goal_radius = PROLONG * mission.sensor_range_m, mission.goal_radius_m
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
-        self._since = WATCHED_TOGETHER  # scans since edges were compared
+        self._since = WATCHED_TOGETHER  # times asked since edges were compared
         self.cut_m = math.inf
         """Station at which the course comes too near to an edge seen since it was found."""
         self.broken = False
@@ -107,7 +107,7 @@ class Watch:
         return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._keep)
 
     def look(self, effect: Effect, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
-        """Takes in new edges, (k, 2): compares them at once where one is near, else those of a few scans together.
+        """Takes in new edges, (k, 2): compares them at once where one is near, else those of a few times together.
 
         Returns:
             Whether the course is cut anew, or nearer than before.

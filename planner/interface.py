@@ -190,6 +190,7 @@ class PlanRequest(NamedTuple):
         seen: what is known of the world.
         flown: the plan in effect, None before the first.
         station_m: how far along `flown.path` the aircraft is.
+        scanned: a scan has come in since the last request.
     """
 
     time_s: float
@@ -198,6 +199,7 @@ class PlanRequest(NamedTuple):
     seen: SeenWorld
     flown: Plan | None = None
     station_m: float = 0.0
+    scanned: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,6 +236,7 @@ class Plan:
         waypoints_m: (k, 2) fixed-altitude waypoints; empty unless FOUND.
         path: the curve through them; None unless FOUND.
         picture: makes a picture of how it came about, where the planner can tell: asked for only where somebody looks.
+        goes_on: more is looked for: the planner wants to be asked again before the next scan.
 
     Raises:
         ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
@@ -244,6 +247,7 @@ class Plan:
     waypoints_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     path: Path | None = None
     picture: Callable[[], PlanPicture] | None = None
+    goes_on: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))
@@ -258,7 +262,10 @@ class Plan:
 
 
 class Planner(Protocol):
-    """A local planner for one flight. It is asked after every scan, in order of time."""
+    """A local planner for one flight. It is asked after every scan, in order of time.
+
+    Between scans it is asked at every step of guidance for as long as its last answer says that it goes on.
+    """
 
     def plan(self, request: PlanRequest) -> Plan:
         """Answers one request. Must not use clocks or randomness of its own: same requests, same plans."""

@@ -4,7 +4,7 @@ In every rolling step: take the planning window about the track point where the 
 steps deep among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum
 turn radius (`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that
 part is put into effect which ends in a turn seen to be free (`certificate`), and flown until the window rolls
-on. A search that takes long is spread over several scans (`deliberation`).
+on. A search that takes long goes on while the plan in effect is flown (`deliberation`).
 
 Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
 way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.
@@ -52,8 +52,9 @@ BETTER = 0.005
 BROKEN_SHARE = 0.99
 """Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
 
-PORTIONS = (4000.0, 12_000.0)
-"""Work of a search in the first scan and in each further one (`planner.window.Tally`): most are done in the first."""
+SERVED, CUT, PRESSED = (3000.0, 1000.0), (5000.0, 2000.0), (12_000.0, 12_000.0)
+"""Work of a search (`planner.window.Tally`) when it begins, and each further time that the planner is asked: while the
+plan in effect serves, where it does not, and where no safe one is flown. Most are done when they begin."""
 
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
@@ -169,15 +170,10 @@ class RollingWindow:
                     lambda: self._proof.closed(request.position_m),
                     roomy=self._forgiven,
                 )
-            unhurried = (
-                effect is not None and effect.leaves_m - here > self._urgent_m and not self._watch.broken
-            )
-            work = PORTIONS[0] if begins and unhurried else PORTIONS[1]
-            for course in thinking.courses(start, ahead, work):
+            work = PRESSED if self._pressed(effect, here) else SERVED if serves else CUT
+            for course in thinking.courses(start, ahead, work[0 if begins else 1]):
                 if tuple(course.path.segments[0, :2]) != tuple(start.prefix[0][:2]):
-                    raise RuntimeError(
-                        f"a course was found that begins elsewhere than at {start.prefix[0][:2]}"
-                    )
+                    raise RuntimeError(f"a course begins elsewhere than at {start.prefix[0][:2]}")
                 if serves and course.path.length_m > worth_m:
                     thinking.done = True
                     break
@@ -194,10 +190,11 @@ class RollingWindow:
                 return self._no_way(request, effect, here, thinking)
         assert ahead is not None
         assert effect is not None
-        certified = self._certify(ahead, request)
+        certified = self._certify(ahead, request) if request.scanned else None
         if certified is not None and certified.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m:
             return self._found(request, start, ahead, certified, [])
-        return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other")
+        goes_on = self._thinking is not None
+        return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other", goes_on=goes_on)
 
     def _pressed(self, effect: Effect | None, here: float) -> bool:
         """Whether there is no safe plan in effect to think on."""
@@ -235,6 +232,7 @@ class RollingWindow:
             picture=partial(
                 picture, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
             ),
+            goes_on=self._thinking is not None,
         )
         self._proposed = Effect(plan, certified.path, course, certified.leaves_m)
         return plan
@@ -268,7 +266,7 @@ class RollingWindow:
         tried = self._effort >= in_vain or (only_given_up and self._forgiven)
         no_room = tried and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
-            return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn")
+            return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn", goes_on=True)
         stuck = None if thinking is None else thinking.stuck
         still = request.time_s - self._moving_s > EVADING_S  # what moves proves nothing
         if stuck is None and still and self._proof.closed(request.position_m):
