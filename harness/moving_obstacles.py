@@ -27,7 +27,7 @@ import numpy as np
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
-from harness.scan_comparison import MISSING, come, drawn_back, in_a_row, looked_through, runs_of
+from harness.scan_comparison import MISSING, any_come, come, drawn_back, in_a_row, looked_through, runs_of
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
 COMPARED_S = 12.0
@@ -144,10 +144,19 @@ class MovingObstacles:
             while len(self._before) > 2 and self._before[1].scan.time_s <= scan.time_s - self._compared_s:
                 self._before.popleft()
             now = _Looked(scan.kept(), *self._returns(scan))
-            if len(self._before) >= 2 and scan.nearest_m < math.inf:
+            if len(self._before) >= 2 and scan.nearest_m < math.inf and self._may_differ(now):
                 self._look(now, moving)
             self._before.append(now)
         return moving
+
+    def _may_differ(self, now: _Looked) -> bool:
+        """Whether anything at all has come since a scan before, or drawn back: in a still world mostly nothing."""
+        if any_come(self._before[0].scan, now.places, self._sure):
+            return True
+        late = self._before[-1]
+        return self._noise == 0.0 and (
+            any_come(late.scan, now.places, self._sure) or any_come(now.scan, late.places, self._sure)
+        )
 
     def _look(self, now: _Looked, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before, or has drawn back."""

@@ -27,6 +27,11 @@ def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     return looked_through(before, places, sure_m) if some.any() else some
 
 
+def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
+    """Whether `come` may hold for any of (k,) places: in a still world it mostly does not."""
+    return bool(looked_through(before, places, sure_m, every=FEWEST).any())
+
+
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
     """(n,) which rays of a scan look through where something was before: what they meet may have drawn back.
 
