@@ -163,13 +163,13 @@ class _Scene:
 
         free = self._inside(begin) & self._inside(end)
         rows = np.flatnonzero(free)
-        along = end[rows] - begin[rows]
-        square = np.maximum((along * along).sum(axis=1), 1e-300)[:, None]
-        from_begin = self.hubs - begin[rows, None]
-        share = np.clip((from_begin * along[:, None]).sum(axis=2) / square, 0.0, 1.0)
-        off = from_begin - share[:, :, None] * along[:, None]
-        gaps = np.hypot(off[:, :, 0], off[:, :, 1])
-        free[rows] = (gaps >= self.hub_radii - self.slack_m).all(axis=1)
+        x, y = (end[rows] - begin[rows]).T[:, :, None]
+        # From where each begins to each hub, and from the nearest place on it.
+        east, north = self.hubs.T[:, None] - begin[rows].T[:, :, None]
+        share = np.clip((east * x + north * y) / np.maximum(x * x + y * y, 1e-300), 0.0, 1.0)
+        east, north = east - share * x, north - share * y
+        least = np.maximum(self.hub_radii - self.slack_m, 0.0)
+        free[rows] = (east * east + north * north >= least * least).all(axis=1)
         rows = np.flatnonzero(free)
         lines = shapely.linestrings(np.stack((begin[rows], end[rows]), axis=1))
         free[rows[self._tree.query(lines, "dwithin", self.clearance_m)[0]]] = False
