@@ -28,7 +28,8 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
     plans that were in effect. Cross-track figures are of the rows flown under a plan, altitude figures of all
     rows. `clearance_violation_s` counts the intervals at whose end the distance to an obstacle edge was below
     the wanted clearance. `replans` counts the plans accepted after the first. `compute_ms` is over all
-    searches, `smoothness` is defined in `harness.smoothness`, `trackability` in `harness.trackability`.
+    calls in which the planner searched, `smoothness` is defined in `harness.smoothness`, `trackability` in
+    `harness.trackability`.
 
     Args:
         flight: the flight; its track has at least one row.

@@ -233,7 +233,7 @@ class AcceptedPlan:
     Attributes:
         plan_index: 0 for the first; row of `plans.parquet`.
         time_s: in effect from this simulated time on.
-        compute_ms: wall-clock time of the search that found it.
+        compute_ms: wall-clock time of the call that found it.
         plan: the planner's answer; its `path` is not None.
     """
 
@@ -267,7 +267,7 @@ class Flight:
         plans: the plans flown, in order; `plans[i].plan_index == i`.
         outcome: how it ended.
         reason: the same as one sentence.
-        compute_ms: wall-clock time of every search, also of those that found nothing new.
+        compute_ms: wall-clock time of every call in which the planner searched, also where it found nothing new.
         sim_s: simulated time flown.
         wall_s: wall-clock time that took.
     """
