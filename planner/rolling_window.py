@@ -54,7 +54,7 @@ BROKEN_SHARE = 0.99
 
 SERVED, CUT, PRESSED = (3000.0, 1000.0), (5000.0, 2000.0), (12_000.0, 12_000.0)
 """Work of a search (`planner.window.Tally`) when it begins, and each further time that the planner is asked: while the
-plan in effect serves, where it does not, and where no safe one is flown. Most are done when they begin."""
+plan in effect serves; where it does not; and where no safe one is flown, or something moves. Most are done at once."""
 
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
@@ -170,7 +170,8 @@ class RollingWindow:
                     lambda: self._proof.closed(request.position_m),
                     roomy=self._forgiven,
                 )
-            work = PRESSED if self._pressed(effect, here) else SERVED if serves else CUT
+            hurried = self._pressed(effect, here) or len(request.seen.moving) > 0
+            work = PRESSED if hurried else SERVED if serves else CUT
             for course in thinking.courses(start, ahead, work[0 if begins else 1]):
                 if tuple(course.path.segments[0, :2]) != tuple(start.prefix[0][:2]):
                     raise RuntimeError(f"a course begins elsewhere than at {start.prefix[0][:2]}")
