@@ -44,8 +44,8 @@ in the turn in effect, which it must not break."""
 BLUR = 0.25
 """What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
 
-TIME_LIMIT_S = 8000.0
-"""To prove that there is no way takes 7,556 s in 365, and less than 3,500 s in all others."""
+TIME_LIMIT_S, LONGER_S = 6000.0, {365: 8000.0}
+"""All flights but one take less than 3,500 s; to prove that there is no way in 365 takes 7,556 s."""
 
 Place = tuple[float, float]
 Obstacles = list[dict[str, Any]]
@@ -251,7 +251,7 @@ def scenario_of(seed: int, family: str, start: Place, goal: Place, obstacles: Ob
             "start_m": list(start),
             "goal_m": list(goal),
             "goal_radius_m": GOAL_RADIUS_M,
-            "time_limit_s": TIME_LIMIT_S,
+            "time_limit_s": LONGER_S.get(seed, TIME_LIMIT_S),
         },
         "sensor": {"range_m": 1000.0, "rays": 360, "rate_hz": 1.0},
         "planner": {"kind": "rolling_window", "clearance_m": CLEARANCE_M},

@@ -83,10 +83,10 @@ def test_a_portion_is_hardly_larger_than_asked_for(trap: SeenWorld) -> None:
     portions = 0
     while not thinking.done:
         before = local.tally.done
-        list(thinking.courses(START, None, 1000.0))
-        assert local.tally.done - before < 2 * 1000.0
+        list(thinking.courses(START, None, 800.0))
+        assert local.tally.done - before < 2 * 800.0
         portions += 1
-    assert portions > 5
+    assert portions > 7
 
 
 def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: SeenWorld) -> None:
