@@ -9,8 +9,8 @@ for a Latin hypercube, whose slices depend on their number.
 from __future__ import annotations
 
 import itertools
-import json
 import math
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,6 +20,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.campaign import MAX_RUNS, Base, CampaignFile
+from harness.campaign_cells import cell_of, kind_of
 from harness.sampling import FloatArray, design
 from harness.scenario import Scenario, overridden, with_key
 from harness.strict_yaml import (
@@ -41,6 +42,9 @@ SEED, WORLD, DRAW, DESIGN = range(4)
 
 MAX_DESIGNED: Final = 10_000_000
 """Values that a design may have in all, which are kept: 80 MB."""
+
+MOST_KEPT: Final = 100_000_000
+"""Bytes of scenarios that are kept from the check on: to make one takes some six times as long as to unpack it."""
 
 DEFAULT_PLANNER: Final = "rolling_window"
 DEFAULT_AIRCRAFT: Final = "aerosonde"
@@ -109,6 +113,7 @@ class CampaignRuns:
         self._sizes = sizes
         self._designs: dict[int, FloatArray] = {}
         self._last_world: tuple[int, list[_Change]] = (-1, [])
+        self._made: dict[int, bytes] = {}  # by `check`
         if self._number > MAX_RUNS:
             raise InputError(f"{file.source}: has {self._number} runs; must be at most {MAX_RUNS}")
         designed = 0 if campaign.sampler == "independent" else self.cases * len(campaign.random)
@@ -132,9 +137,9 @@ class CampaignRuns:
     @cached_property
     def varied(self) -> dict[str, str]:
         """Columns of `results.parquet` for the varied keys: number, int, bool or text by key path."""
-        grid = {_path(name): _kind(values) for name, values in self.campaign.grid.items()}
+        grid = {_path(name): kind_of(values) for name, values in self.campaign.grid.items()}
         drawn = {
-            _path(name): _kind(each.choice) if each.choice else "number"
+            _path(name): kind_of(each.choice) if each.choice else "number"
             for name, each in self.campaign.random.items()
         }
         return grid | drawn
@@ -156,7 +161,7 @@ class CampaignRuns:
             else base.word(("aircraft", "model"), DEFAULT_AIRCRAFT),
             self._seed(place.case),
             {
-                key_path(each.loc): _cell(each.node.plain(), self.varied[key_path(each.loc)])
+                key_path(each.loc): cell_of(each.node.plain(), self.varied[key_path(each.loc)])
                 for each in changes
             },
         )
@@ -171,6 +176,8 @@ class CampaignRuns:
         Raises:
             InputError: it is not a scenario; the faults name what in the campaign makes it so.
         """
+        if number in self._made and not overrides:
+            return Scenario.model_validate_json(zlib.decompress(self._made[number]))
         place = self._place(number)
         base = self.file.bases[place.base]
         root, changes = base.root, self._changes(place)
@@ -191,7 +198,7 @@ class CampaignRuns:
             raise in_lines(lines, self.file.source) from error
 
     def check(self, progress: Callable[[int], None] | None = None) -> None:
-        """Makes every scenario of the campaign once.
+        """Makes every scenario of the campaign once; the first ones are kept for when they are flown.
 
         Args:
             progress: told how many have been made.
@@ -199,8 +206,14 @@ class CampaignRuns:
         Raises:
             InputError: one is not a scenario.
         """
+        room = MOST_KEPT
         for number in range(len(self)):
-            self.scenario(number)
+            scenario = self.scenario(number)
+            if room > 0:
+                kept = self._made[number] = zlib.compress(
+                    scenario.model_dump_json(by_alias=True).encode(), level=1
+                )
+                room -= len(kept)
             if progress is not None:
                 progress(number + 1)
 
@@ -338,19 +351,3 @@ def _without_course(root: Node) -> Node:
 
 def _path(name: str) -> str:
     return key_path(loc_of(name))
-
-
-def _kind(values: Sequence[Any]) -> str:
-    """What a column of these values holds, nulls aside."""
-    kinds = {type(value) for value in values if value is not None}
-    for name, of in (("bool", {bool}), ("int", {int}), ("number", {int, float}), ("text", {str})):
-        if kinds <= of:
-            return name
-    return "json"
-
-
-def _cell(value: Any, kind: str) -> Scalar:
-    """A value as its column has it."""
-    if kind == "json":
-        return json.dumps(value)
-    return float(value) if kind == "number" and value is not None else value

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from harness import campaign_runs
 from harness.campaign import CampaignFile, campaign_schema, is_campaign, load_campaign
 from harness.campaign_runs import CampaignRuns, Run
 from harness.cli import main
@@ -127,6 +128,18 @@ def test_a_scenario_has_what_its_run_says(place: Path) -> None:
         assert scenario.environment.wind
         assert scenario.environment.wind.speed_mps == run.varied["environment.wind.speed_mps"]
         assert (scenario.environment.turbulence is None) == (run.varied["environment.turbulence"] == "null")
+
+
+@pytest.mark.parametrize("room", [0, 1500, 10**8])
+def test_what_a_check_keeps_is_what_is_flown(place: Path, room: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign_runs, "MOST_KEPT", room)
+    checked, fresh = runs_of(place), runs_of(place)
+    checked.check()
+    assert (len(checked._made) == 0, len(checked._made) == len(checked)) == (room == 0, room == 10**8)
+    for number in range(len(checked)):
+        assert checked.scenario(number) == fresh.scenario(number)
+    other = checked.scenario(0, [("mission.time_limit_s", "77")])
+    assert other.mission.time_limit_s == 77.0
 
 
 def test_the_scenario_of_a_run_without_changes_is_the_file_but_for_its_seed(place: Path) -> None:
