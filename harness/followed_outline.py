@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.registration import Outline
+from harness.registration import FEWEST, Outline
+from planner.interface import ComplexArray
 
 LEAST_MPS = 0.5
 """What is slower than this stands still."""
@@ -114,3 +115,22 @@ class FollowedOutline:
         base = last - velocity * (last_s - self.outline_s)
         self.outline, self.base = self.outline.moved(base - self.base), base
         self.velocity = velocity * min(1.0, MOST_MPS / max(abs(velocity), MOST_MPS))
+
+
+def extent_m(points: ComplexArray) -> float:
+    """How far the ends of an outline lie apart."""
+    return float(abs(points[-1] - points[0]))
+
+
+def bow(places: ComplexArray, apart_m: float) -> ComplexArray:
+    """The parabola that suits (k,) places best, from end to end: points no further apart than some distance."""
+    chord = places[-1] - places[0]
+    chord /= max(abs(chord), 1e-9)
+    turned = (places - places[0]) * chord.conjugate()
+    start, end = float(turned.real.min()), float(turned.real.max())
+    if end - start < 1e-3 * apart_m:
+        return places  # all at one distance along the chord: no curve lies through them
+    along = np.linspace(start, end, max(math.ceil((end - start) / apart_m), FEWEST + 1) + 1)
+    across = np.polyval(np.polyfit(turned.real, turned.imag, 2), along)
+    bow: ComplexArray = places[0] + chord * (along + 1j * across)
+    return bow

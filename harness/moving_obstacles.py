@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline
+from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline, bow, extent_m
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
 from harness.scan_comparison import MISSING, any_come, come, drawn_back, in_a_row, looked_through, runs_of
@@ -87,8 +87,10 @@ class MovingObstacles:
         noise_m: float,
         false_returns: bool = True,
         is_free: Callable[[FloatArray], BoolArray] | None = None,
+        stands: Callable[[FloatArray], BoolArray] | None = None,
     ) -> None:
-        self._noise, self._false_returns, self._is_free = noise_m, false_returns, is_free
+        self._noise, self._false_returns = noise_m, false_returns
+        self._is_free, self._stands = is_free, stands
         self._clearance = clearance_m
         self._flawed = noise_m > 0.0 or false_returns
         self._apart = clearance_m + 6.0 * noise_m
@@ -200,17 +202,27 @@ class MovingObstacles:
         self, scan: RangeScan, moving: BoolArray | None, is_free: Callable[[FloatArray], BoolArray]
     ) -> None:
         """Begins to follow what has come to places that were seen to be free."""
-        hits, places = self._returns(scan)
+        hits, places = self._not_standing(*self._returns(scan))
         appeared = is_free(_pairs(places))
         if moving is not None:
             appeared &= ~moving[hits]
-        hits, places = hits[appeared], places[appeared]
-        if len(hits) < FEWEST:
+        come = appeared.nonzero()[0]
+        if len(come) < FEWEST:
             return
-        closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
-        for run in runs_of(hits, places, np.full(len(hits), self._apart), closed):
-            if len(run) >= FEWEST and not self._is_followed(places[run], scan.time_s):
-                self._tracks.append(FollowedOutline(self._outline(scan, hits[run], places[run]), scan.time_s))
+        closed = all_round(scan) and hits[come[0]] + len(scan.ranges_m) - hits[come[-1]] <= 2
+        for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), closed):
+            if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
+                whole = self._grown(come[run], hits, places)
+                self._tracks.append(
+                    FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
+                )
+
+    def _not_standing(self, hits: IntArray, places: ComplexArray) -> tuple[IntArray, ComplexArray]:
+        """Rays that returned something, and where, but for those from where something has long stood."""
+        if not self._stands:
+            return hits, places
+        others = ~self._stands(_pairs(places))
+        return hits[others], places[others]
 
     def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
         """Rays that returned something, but for false returns, and where."""
@@ -222,7 +234,7 @@ class MovingObstacles:
         """The outline that neighbouring returns show: where they lie closer than they err, means of several."""
         if self._is_free:
             return Outline(
-                _bow(places, NO_STEP * self._clearance),
+                bow(places, NO_STEP * self._clearance),
                 ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
             )
         away = np.abs(places - complex(scan.east_m, scan.north_m)).mean()
@@ -246,7 +258,7 @@ class MovingObstacles:
 
     def _follow(self, scan: RangeScan) -> BoolArray | None:
         """Moves the tracks on; which rays met one that moves."""
-        hits, places = self._returns(scan)
+        hits, places = self._not_standing(*self._returns(scan))
         moving = np.zeros(len(scan.ranges_m), dtype=np.bool_)
         kept: list[FollowedOutline] = []
         for track in self._tracks:
@@ -299,7 +311,7 @@ class MovingObstacles:
         if len(mine) >= FEWEST:
             track.seen_s = scan.time_s
             whole = self._grown(mine, hits, places) if self._is_free else mine
-            more = _extent(places[whole]) > GROWN * _extent(track.outline.points)
+            more = extent_m(places[whole]) > GROWN * extent_m(track.outline.points)
             if scan.time_s - track.outline_s > NEW_OUTLINE_S or (self._is_free and more):
                 track.renew(self._outline(scan, hits[whole], places[whole]), scan.time_s)
         return mine
@@ -326,25 +338,6 @@ def _all(flags: Iterable[BoolArray]) -> BoolArray:
             break
     assert common is not None
     return common
-
-
-def _extent(points: ComplexArray) -> float:
-    """How far the ends of an outline lie apart."""
-    return float(abs(points[-1] - points[0]))
-
-
-def _bow(places: ComplexArray, apart_m: float) -> ComplexArray:
-    """The parabola that suits (k,) places best, from end to end: points no further apart than some distance."""
-    chord = places[-1] - places[0]
-    chord /= max(abs(chord), 1e-9)
-    turned = (places - places[0]) * chord.conjugate()
-    start, end = float(turned.real.min()), float(turned.real.max())
-    if end - start < 1e-3 * apart_m:
-        return places  # all at one distance along the chord: no curve lies through them
-    along = np.linspace(start, end, max(math.ceil((end - start) / apart_m), FEWEST + 1) + 1)
-    across = np.polyval(np.polyfit(turned.real, turned.imag, 2), along)
-    bow: ComplexArray = places[0] + chord * (along + 1j * across)
-    return bow
 
 
 def _pairs(points: ComplexArray) -> FloatArray:

@@ -33,6 +33,8 @@ DOUBT = 0.3
 """What is an edge remains one down to this part of both."""
 FORGET_AT = 48.0
 """Counts are halved from so many on: what has gone fades, what is new counts."""
+STOOD_S = 20.0
+"""What has been an edge for so long stands: what moves is elsewhere by then."""
 
 
 class ReflectionMap:
@@ -64,6 +66,8 @@ class ReflectionMap:
         )  # rays it stopped, let through, that ended before
         self._edge = np.zeros(1024, dtype=np.bool_)
         self._since = np.zeros(1024, dtype=np.int64)  # revision at which it last became an edge
+        self._since_s = np.zeros(1024)  # and when
+        self._time_s = 0.0
         self._revision = self._taken_back_at = 0
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
@@ -91,8 +95,21 @@ class ReflectionMap:
         points = self._points[slots[np.argsort(since[slots], kind="stable")]]
         return points.view(np.float64).reshape(-1, 2)
 
+    def stands(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) places lies no further than ranges err from a cell that has long been an edge."""
+        reach = math.ceil(self._noise / self._cell)
+        aside = np.arange(-reach, reach + 1)
+        corner = (self._origin.real, self._origin.imag)
+        at = np.floor((points_m - corner) / self._cell).astype(np.int64)[:, :, None] + aside
+        column, row = at[:, 0].clip(0, self._nx - 1), at[:, 1].clip(0, self._ny - 1)
+        slots = self._slot.take(column[:, :, None] * self._ny + row[:, None, :])
+        long = self._edge[: self._count] & (self._since_s[: self._count] <= self._time_s - STOOD_S)
+        found: BoolArray = np.append(long, False)[slots].any(axis=(1, 2))  # no slot: the last
+        return found
+
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan, but for some of its rays."""
+        self._time_s = scan.time_s
         taken = scan.ranges_m < math.inf
         self._add_cells(scan, (taken if ignored is None else taken & ~ignored).nonzero()[0])
         if self._count:
@@ -122,6 +139,7 @@ class ReflectionMap:
             self._counts = np.concatenate((self._counts, np.zeros((more, 3), dtype=np.float32)))
             self._edge = np.concatenate((self._edge, np.zeros(more, dtype=np.bool_)))
             self._since = np.concatenate((self._since, np.zeros(more, dtype=np.int64)))
+            self._since_s = np.concatenate((self._since_s, np.zeros(more)))
         new = np.arange(self._count, end, dtype=np.int32)
         self._slot[fresh] = new
         column, row = np.divmod(fresh, self._ny)
@@ -183,6 +201,6 @@ class ReflectionMap:
             self._revision += 1
             gone = was[changed].any()
             self._edge[slots[changed]] = now[changed]
-            self._since[slots[changed]] = self._revision
+            self._since[slots[changed]], self._since_s[slots[changed]] = self._revision, self._time_s
             if gone:
                 self._taken_back_at = self._revision

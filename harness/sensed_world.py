@@ -64,18 +64,17 @@ class SensedWorld:
     ) -> None:
         noisy = noise_m > NOISY * clearance_m
         self._clearance = clearance_m
-        self._edges: Edges = (
-            ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
-            if noisy
-            else ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
-        )
+        self._edges: Edges
         self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
         self._noisy = noisy
-        self._moving = (
-            MovingObstacles(clearance_m, ERR * noise_m, is_free=self._free.surrounds)
-            if noisy
-            else MovingObstacles(clearance_m, noise_m, false_returns)
-        )
+        if noisy:
+            self._edges = edges = ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
+            self._moving = MovingObstacles(
+                clearance_m, ERR * noise_m, is_free=self._free.surrounds, stands=edges.stands
+            )
+        else:
+            self._edges = ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
+            self._moving = MovingObstacles(clearance_m, noise_m, false_returns)
         self._found: tuple[MovingEdges, ...] = ()
         self._surprised_s = -math.inf
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))

@@ -12,7 +12,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness import ray_casting
-from harness.moving_obstacles import COASTS_S, MovingObstacles, _bow
+from harness.followed_outline import bow
+from harness.moving_obstacles import COASTS_S, MovingObstacles
 from harness.obstacle import Circle, Obstacle, Polygon
 from harness.range_sensor import RangeScan
 from harness.world import World
@@ -293,6 +294,6 @@ def test_in_a_still_world_few_scans_are_read(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize("chord", [0j, 40.0 + 30.0j])
 def test_returns_from_one_place_are_laid_on_no_curve(chord: complex) -> None:
     places = np.array([100.0 + 50.0j] * 4)
-    np.testing.assert_array_equal(_bow(places, 10.0), places)
-    bow = _bow(places + chord * np.linspace(0.0, 1.0, 4), 10.0)
-    np.testing.assert_allclose(bow[[0, -1]], [100.0 + 50.0j, 100.0 + 50.0j + chord])
+    np.testing.assert_array_equal(bow(places, 10.0), places)
+    curve = bow(places + chord * np.linspace(0.0, 1.0, 4), 10.0)
+    np.testing.assert_allclose(curve[[0, -1]], [100.0 + 50.0j, 100.0 + 50.0j + chord])

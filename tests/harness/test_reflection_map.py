@@ -181,3 +181,22 @@ def test_rays_that_met_what_moves_say_nothing_of_what_stands() -> None:
         seen.update(blank, ignored=np.ones(len(blank.ranges_m), dtype=np.bool_))
     assert len(before) > 50
     np.testing.assert_array_equal(edges(seen), before)
+
+
+def test_what_has_long_stood_is_told_from_what_has_just_come() -> None:
+    pops = Obstacle(Circle((3000.0, 2200.0), 60.0), active_s=(28.0, 500.0))
+    on_wall, on_circle = np.array([(2700.0, 2500.0), (3200.0, 2500.0)]), np.array([(2960.0, 2155.0)])
+    elsewhere = np.array([(2700.0, 2500.0 - 4.0 * NOISE), (100.0, 5900.0), (-50.0, 7000.0)])
+    seen, told_s = empty_map(), 0.0
+    assert not seen.stands(on_wall).any()
+    eye = sensor(World([Obstacle(WALL), pops], BOUNDS), range_noise_m=NOISE)
+    for scan in flight(eye, 60.0, (2600.0, 1500.0), speed=5.0):
+        seen.update(scan)
+        if not told_s and np.hypot(*(edges(seen) - on_circle).T).min(initial=np.inf) < NOISE:
+            told_s = scan.time_s
+            assert seen.stands(on_wall).all()
+            assert not seen.stands(np.concatenate((on_circle, elsewhere))).any()
+    assert told_s >= 28.0
+    assert seen.stands(np.concatenate((on_wall, on_circle))).all()
+    assert not seen.stands(elsewhere).any()
+    assert seen.stands(np.zeros((0, 2))).shape == (0,)

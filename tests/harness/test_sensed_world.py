@@ -188,6 +188,27 @@ def test_with_much_noise_what_moves_is_followed(
     assert known_s[-1] > 40.0
 
 
+@pytest.mark.parametrize("east", [2785.0, 2790.0, 2795.0])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_with_much_noise_what_stands_is_not_taken_for_a_part_of_what_passes_by(
+    east: float, seed: int
+) -> None:
+    """It all but touches three that stand in a row."""
+    moves = Obstacle(Circle((east, 2750.0), 60.0), velocity_mps=(0.0, -8.0))
+    row = [Circle(place, 40.0) for place in ((2890.0, 2350.0), (2940.0, 2430.0), (2990.0, 2490.0))]
+    world, seen = world_of(moves, *row), empty_world(noise_m=NOISE, false_returns=True)
+    mover, told = World(world.obstacles[:1], BOUNDS), 0
+    for scan in flight(sensor(world, seed, **FLAWS), 75.0, (3250.0, 1900.0), speed=5.0):
+        seen.update(scan)
+        for each in seen.moving:
+            told += 1
+            if each.velocity_mps == (0.0, 0.0):  # what has just come into view
+                assert np.median(np.abs(off(world, each.points_m, scan.time_s))) < 2.0 * NOISE
+            else:
+                assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 2.0 * NOISE
+    assert told > 10
+
+
 def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_free() -> None:
     pops = Obstacle(Circle((3050.0, 2200.0), 60.0), active_s=(20.0, 500.0))
     seen, told_s = empty_world(noise_m=NOISE, false_returns=True), []
