@@ -1,15 +1,21 @@
-"""Places that a course led to and that could not be seen to be safe to enter."""
+"""Places that a course led to and that could not be seen to be safe to enter, and when they are tried again."""
 
 from __future__ import annotations
 
 import math
 
 from planner.curves import Point, Pose
-from planner.interface import Mission
+from planner.interface import Mission, SeenWorld
 from planner.memory import ObstacleMemory
 
 ENOUGH = 2
 """So many turns before a place show what can be seen of it."""
+
+RETRY_S = 60.0
+"""So long after something last moved or appeared, what was given up is tried again: it may have been in the way."""
+
+SETTLED_S = 600.0
+"""So long after that no goal is called unreachable: what closes the way may go again."""
 
 
 class DeadEnds:
@@ -24,6 +30,8 @@ class DeadEnds:
         self._mission, self._memory = mission, memory
         self._reach = 2.0 * mission.clearance_m  # places nearer to each other are one
         self._places: list[Point] = []
+        self._changed_s = -math.inf  # when something last moved or appeared
+        self._retry_s = math.inf
 
     def turned_before(self, place: Point) -> bool:
         """Counts one more turn before a place; returns whether these are enough to give it up."""
@@ -33,6 +41,24 @@ class DeadEnds:
             return False
         self._places = [each for each in self._places if each not in near]
         return True
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything has moved or appeared so far."""
+        return math.isfinite(self._changed_s)
+
+    def settled(self, time_s: float) -> bool:
+        """Whether nothing has moved or appeared for so long that what closes the way is taken to stay."""
+        return time_s - self._changed_s > SETTLED_S
+
+    def note_change(self, time_s: float, seen: SeenWorld) -> None:
+        """Has what was given up tried again when what moved or appeared may have left the way."""
+        changed_s = time_s if seen.moving else seen.surprised_s
+        if changed_s > self._changed_s:
+            self._changed_s, self._retry_s = changed_s, changed_s + RETRY_S
+        if time_s > self._retry_s:
+            self._retry_s, self._places = math.inf, []
+            self._memory.forgive()
 
     def give_up(self, place: Pose) -> None:
         """Gives up a place on a course, and what lies to its sides: a turn takes so much room."""

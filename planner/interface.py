@@ -53,7 +53,7 @@ class MovingEdges:
     Attributes:
         time_s: when it was there.
         points_m: (k, 2) edge points.
-        velocity_mps: east and north.
+        velocity_mps: east and north; (0, 0) where it has just appeared and is not known yet.
     """
 
     time_s: float

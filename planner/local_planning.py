@@ -260,9 +260,9 @@ class LocalPlanning:
             yield
         return None
 
-    def terrain(self, keep_m: float, refused: bool = True) -> Terrain:
-        """Where a curve may lie that keeps one distance from all edge points; or from all but what was refused."""
-        points = self._memory.points_m if refused else self._memory.sensed_m
+    def terrain(self, keep_m: float, standing: bool = False) -> Terrain:
+        """Where a curve may lie that keeps one distance from all edge points, or from those that were seen to stand."""
+        points = self._memory.genuine_m if standing else self._memory.points_m
         return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m, self.tally)
 
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:

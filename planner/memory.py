@@ -30,6 +30,8 @@ class ObstacleMemory:
         self.cell_m = clearance_m / math.sqrt(2.0)
         self.gone = 0
         """How many points have been let go of so far: the others have moved up in their order by no more."""
+        self.taken_back = False
+        """Whether any of them had been seen: the sensor errs, or something has gone."""
         self._outlines: Sequence[FloatArray] = ()
         self._revision = -1
         self._forget()
@@ -63,11 +65,6 @@ class ObstacleMemory:
     def genuine_m(self) -> FloatArray:
         """(k, 2) those points that were seen to stand still, not refused."""
         return self._points[: self._count][self._genuine[: self._count]]
-
-    @property
-    def sensed_m(self) -> FloatArray:
-        """(k, 2) those points that were seen, not refused: of what stands still and of what moves."""
-        return np.concatenate((self.genuine_m, self.points_m[self.known :]))
 
     @property
     def refused_m(self) -> FloatArray:
@@ -124,7 +121,7 @@ class ObstacleMemory:
     def _take_in(self, seen: SeenWorld) -> FloatArray:
         fresh = seen.edges_since(self._revision)
         if seen.taken_back_at > self._revision >= 0:
-            known = seen.edges_since(-1)
+            self.taken_back, known = True, seen.edges_since(-1)
             self._keep_only(known[: len(known) - len(fresh)], self.refused_m)
         self._revision = seen.revision
         if len(fresh):

@@ -4,7 +4,8 @@ In every rolling step: take the planning window about the track point where the 
 steps deep among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum
 turn radius (`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that
 part is put into effect which ends in a turn seen to be free (`certificate`), and flown until the window rolls
-on. A search that takes long goes on while the plan in effect is flown (`deliberation`).
+on. A search that takes long goes on while the plan in effect is flown (`deliberation`). Where something moves or has
+just appeared, no plan is flown that would meet it, and one that would is left (`escape`, `evasion`).
 
 Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
 way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.
@@ -28,15 +29,16 @@ from functools import partial
 import numpy as np
 
 from planner.barrier import Proof
-from planner.certificate import CertificateBroken, Certified, Certifier
+from planner.certificate import Certified, Certifier
 from planner.course import Course
 from planner.curves import Pose, Segment, along, moved, on_loiter, onward, place_on
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
 from planner.encounters import encounters
-from planner.hold import hold
-from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus, SeenWorld
+from planner.escape import Escapes, left_of, room_m
+from planner.evasion import Threats
+from planner.interface import FloatArray, Mission, Plan, PlanRequest, PlanStatus, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
 from planner.multi_step_search import Track
@@ -58,12 +60,6 @@ plan in effect serves; where it does not; and where no safe one is flown, or som
 
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
-
-HOLD_SHARES = (1.0, 0.5, 0.25)
-"""Shares of the clearance with which a turn is sought where the certificate is broken."""
-
-EVADING_S = 60.0
-"""The certificate holds for a world that stands still: so long after something appeared it may be broken."""
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 
@@ -95,13 +91,15 @@ class RollingWindow:
         self._given_up = Proof(mission, self._memory, self._local.least_keeps_m, with_refused=True)
         self._thinking: Deliberation | None = None
         self._dead_ends = DeadEnds(mission, self._memory)
+        self._escapes = Escapes(mission, self._memory, self._local)
         self._turning: Effect | None = None  # the last plan that was flown into its turn
         self._proposed: Effect | None = None
         self._effect: Effect | None = None
         self._searched_at_m = 0.0  # station and number of edge points at the last search
         self._searched_with = 0
         self._gone = 0  # how many points had been let go of when the last search began
-        self._moving_s = -math.inf  # when something was last known to move
+        self._threats: Threats | None = None  # while something moves or has just appeared
+        self._least_room_m = BROKEN_SHARE * mission.clearance_m
         self._effort = 0  # grows with every search that was in vain
         self._forgiven = False  # what was given up is, or was, tried again
         self._refused_at_m = 0.0
@@ -118,9 +116,11 @@ class RollingWindow:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
         met: list[FloatArray] = []
         if request.seen.moving:
-            self._moving_s, met = request.time_s, encounters(request, self._mission)
+            met = encounters(request, self._mission)
+        self._dead_ends.note_change(request.time_s, request.seen)
         fresh = self._memory.take_in(request.seen, met)
         self._local.trail.add(request.position_m)
+        self._threats = self._escapes.threats(request)
         if self._proposed is not None:
             self._take_effect(request, self._proposed)
         effect = self._effect
@@ -132,15 +132,22 @@ class RollingWindow:
             here = on_loiter(effect.path, here)
             self._note_turn(effect, request.seen)
         newly_cut = self._watch.look(effect, here, request.position_m, fresh)
+        met_in_time = self._threats is not None and self._met_in_time(effect, here)
+        self._watch.broken |= met_in_time
         since_m = request.station_m - self._searched_at_m
         if self._effort == MOST_EFFORT and self._searched_with == self._memory.known:
             due = since_m >= math.tau * self._mission.turn_radius_m
         else:
-            due = self._watch.due(effect, here, since_m, newly_cut)
+            due = self._watch.due(effect, here, since_m, newly_cut) or met_in_time
         if self._thinking is None and not due:
             return KEPT
         self._searched_at_m = request.station_m
         return self._roll(request, effect, here)
+
+    def _met_in_time(self, effect: Effect, here: float) -> bool:
+        """Whether the plan in effect would come too near to what moves or has just appeared."""
+        left = left_of(effect, here, self._mission)
+        return room_m(left, self._threats, self._least_room_m) < self._least_room_m
 
     def _take_effect(self, request: PlanRequest, proposed: Effect) -> None:
         """Begins to watch what was proposed last, if it is flown now."""
@@ -206,7 +213,10 @@ class RollingWindow:
         certifier = self._certifier(1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
         cut_m = self._watch.cut_at(course, self._standing_m(), self._memory.gone - self._gone)
-        return certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
+        certified = certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
+        if certified is None or room_m(certified.path, self._threats) < self._mission.clearance_m:
+            return None  # what moves may come to what is free now
+        return certified
 
     def _certifier(self, spacing_m: float) -> Certifier:
         mission = self._mission
@@ -269,8 +279,8 @@ class RollingWindow:
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn", goes_on=True)
         stuck = None if thinking is None else thinking.stuck
-        still = request.time_s - self._moving_s > EVADING_S  # what moves proves nothing
-        if stuck is None and still and self._proof.closed(request.position_m):
+        settled = self._dead_ends.settled(request.time_s)
+        if stuck is None and settled and self._proof.closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
             return Plan(PlanStatus.UNREACHABLE, no_way_through(f"no gap in it is wider than {gap:.0f} m"))
         if effect is None:
@@ -283,7 +293,8 @@ class RollingWindow:
             self._refused_at_m = request.station_m
             self._dead_ends.give_up(self._unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
-            if no_room and still:
+            untried = not self._certain() and len(self._memory.refused_m) > 0
+            if no_room and settled and not untried:
                 gap = 2.0 * self._turns_keep_m
                 return Plan(
                     PlanStatus.UNREACHABLE,
@@ -297,6 +308,10 @@ class RollingWindow:
                 self._forgiven = True
             self._effort = min(self._effort + 1, MOST_EFFORT)
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
+
+    def _certain(self) -> bool:
+        """Whether all that was seen still stands, and nothing has come to what was free."""
+        return not (self._memory.taken_back or self._dead_ends.changed)
 
     def _note_turn(self, effect: Effect, seen: SeenWorld) -> None:
         """Gives up the place that a course could not be seen to enter, if it is the same again."""
@@ -313,36 +328,19 @@ class RollingWindow:
         return place_on(course.path, free_to_m)[0]
 
     def _turn_away(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
-        """A turn that only keeps away from what is known, for want of one that is seen to be free."""
-        limits = self._local.limits
+        """An answer where nothing is certified."""
         if effect is None:
-            straight = (*request.position_m, *request.direction, 0.0, self._lead_m)
-            path, here, last = Path(np.array([straight])), 0.0, self._lead_m
+            escape = self._escapes.at_start(request, self._threats, self._lead_m)
         else:
-            path, last = effect.path, min(self._watch.cut_m, effect.leaves_m)
-        for share in HOLD_SHARES:
-            # What was only refused stands in nobody's way.
-            terrain = self._local.terrain(share * self._local.path_keeps_m, refused=False)
-            if effect is not None and terrain.admits(effect.left(here)):
-                self._watch.broken = False
-                return Plan(
-                    PlanStatus.NO_PATH,
-                    "the plan in effect goes on into its turn, nearer to something than wanted",
-                )
-            turn = hold(path, here, last, limits, terrain)
-            if turn is not None:
-                reason = "no way on can be seen to be safe; turning away"
-                waypoints = np.array([request.position_m, turn.segments[-1, :2]])
-                plan = Plan(PlanStatus.FOUND, reason, waypoints, turn)
-                leaves = turn.length_m - float(turn.segments[-1, 5])
-                self._proposed = Effect(
-                    plan, turn, Course(turn, (request.position_m,), 0, shortest=False, to_goal=False), leaves
-                )
-                return plan
-        if effect is None:
-            return Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start")
-        if request.time_s - request.seen.surprised_s < EVADING_S:
-            return Plan(
-                PlanStatus.NO_PATH, "something has appeared in the way; there is no room to turn away"
+            escape = self._escapes.from_plan(
+                request,
+                self._threats,
+                effect,
+                here,
+                until_m=min(self._watch.cut_m, effect.leaves_m),
+                prefix=self._start(request, effect, here).prefix,
+                certain=self._certain(),
             )
-        raise CertificateBroken(request.time_s)
+        self._watch.broken = escape.broken
+        self._proposed = escape.effect or self._proposed
+        return escape.plan

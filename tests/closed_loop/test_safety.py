@@ -230,7 +230,7 @@ def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(
     if told:
         # The map says that something appeared: no fault of the planner's, which goes on as best it can.
         assert flight.outcome is Outcome.COLLISION
-        assert any("something has appeared" in text for text in events.texts)
+        assert any("something is in the way" in text for text in events.texts)
         return
     assert flight.outcome is Outcome.PLANNER_FAILED, flight.reason
     assert "CertificateBroken" in flight.reason

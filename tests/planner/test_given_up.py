@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanStatus
+from planner.dead_ends import RETRY_S, SETTLED_S
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
 from planner.rolling_window import MOST_EFFORT, RollingWindow
 from tests.planner.test_rolling_window import (
     MISSION,
@@ -90,3 +91,50 @@ def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, search
         for _ in range(searches + 1 - pilot._effort)
     ]
     assert told == [PlanStatus.NO_PATH] * (len(told) - 1) + [PlanStatus.UNREACHABLE]
+
+
+def far_on(pilot: RollingWindow, seen: HalfOpen, plan: Plan, flown_m: float, time_s: float) -> None:
+    pilot.plan(request_on(plan, flown_m, seen)._replace(time_s=time_s))
+
+
+@pytest.mark.parametrize("change", ["moves", "appears"])
+def test_what_was_given_up_is_tried_again_a_minute_after_something_was_in_the_way(change: str) -> None:
+    pilot, seen, plan, flown_m = circling(MISSION, 3000.0)
+    begin_s = flown_m / 25.0 + 1.0
+    refused = given_up(pilot)
+    assert len(refused) > 0
+    if change == "moves":
+        seen.moving = (MovingEdges(3.0, np.array([(9000.0, 9000.0)]), (1.0, 0.0)),)
+        far_on(pilot, seen, plan, flown_m, begin_s)
+        seen.moving = ()
+    else:
+        seen.surprised_s = begin_s
+        far_on(pilot, seen, plan, flown_m, begin_s)
+    far_on(pilot, seen, plan, flown_m, begin_s + RETRY_S - 1.0)
+    np.testing.assert_array_equal(given_up(pilot), refused)
+    far_on(pilot, seen, plan, flown_m, begin_s + RETRY_S + 1.0)
+    assert len(given_up(pilot)) == 0
+
+
+@pytest.mark.parametrize("for_turns_alone", [False, True])
+def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_turns_alone: bool) -> None:
+    """All is given up, and the edges leave no way."""
+    pilot, seen, plan, flown_m = circling(replace(MISSION, turn_radius_m=500.0), 3000.0)
+    changed_s = flown_m / 25.0
+    seen.surprised_s = changed_s
+    far_on(pilot, seen, plan, flown_m, changed_s)
+    effect = pilot._effect
+    assert effect is not None
+    pilot._proof.closed = lambda position: not for_turns_alone  # type: ignore[method-assign]
+    pilot._proof_for_turns.closed = lambda position: True  # type: ignore[method-assign]
+    in_vain = SimpleNamespace(done=True, stuck=None, tracks=[])
+
+    def told(time_s: float) -> list[PlanStatus]:
+        request = request_on(plan, flown_m, seen)._replace(time_s=time_s)
+        return [
+            pilot._no_way(request, effect, flown_m, in_vain).status  # type: ignore[arg-type]
+            for _ in range(MOST_EFFORT + 2)
+        ]
+
+    assert set(told(changed_s + SETTLED_S - 1.0)) == {PlanStatus.NO_PATH}
+    assert told(changed_s + SETTLED_S + 1.0)[-1] is PlanStatus.UNREACHABLE
