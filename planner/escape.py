@@ -98,7 +98,8 @@ class Escapes:
         Raises:
             CertificateBroken: there is no room for a turn, though all is certain.
         """
-        left, ways = left_of(effect, here, self._mission), list(rolled_out(prefix, self._local.limits))
+        left = left_of(effect, here, self._mission)
+        ways: list[Path] = []  # made when they are first asked for: most plans in effect will do
         # What hides behind something that moves or has appeared is no better than that: space seen to be free first.
         for seen_free, share in itertools.product((True, False) if threats else (False,), HOLD_SHARES):
             # A turn that keeps so much of all that stands can be flown for ever.
@@ -111,6 +112,7 @@ class Escapes:
             if turn is not None and fits(turn):
                 return self._away(request, turn, "no way on can be seen to be safe; turning away")
             if threats is not None:
+                ways = ways or list(rolled_out(prefix, self._local.limits))
                 way = next((each for each in ways if fits(each) and terrain.admits(each)), None)
                 if way is not None:
                     return self._away(request, way, "something is in the way; turning away")
@@ -118,6 +120,7 @@ class Escapes:
             raise CertificateBroken(request.time_s)
         threats = threats or self._near(request)
         more_than_m = threats.room_m(left) + CLEARER * self._local.path_keeps_m
+        ways = ways or list(rolled_out(prefix, self._local.limits))
         clear = clearest(ways, self._mission.bounds_m, threats, more_than_m)
         if clear is not None:
             return self._away(request, clear, "something is in the way; turning away")
