@@ -43,6 +43,7 @@ class FollowedOutline:
         error_mps: standard error of it.
         seen_s: when it was last seen.
         moves: it is known to.
+        shown: all that was seen of it at `seen_s`, where that is more than the outline.
     """
 
     outline: Outline
@@ -54,6 +55,7 @@ class FollowedOutline:
     error_mps: float = math.inf
     seen_s: float = field(init=False)
     moves: bool = False
+    shown: ComplexArray | None = None
 
     def __post_init__(self) -> None:
         self.begun_s = self.seen_s = self.outline_s
@@ -62,6 +64,12 @@ class FollowedOutline:
     def at(self, time_s: float) -> Outline:
         """The outline where it is at a time."""
         return self.outline.moved(self.velocity * (time_s - self.outline_s))
+
+    def shown_at(self, time_s: float) -> ComplexArray:
+        """All that is known of it, where it is at a time."""
+        if self.shown is None:
+            return self.at(time_s).points
+        return self.shown + self.velocity * (time_s - self.seen_s)
 
     def note(self, time_s: float, further: complex) -> None:
         """Takes in that the outline was found elsewhere than expected by a shift."""
@@ -73,7 +81,13 @@ class FollowedOutline:
             self._measure()
 
     def renew(self, outline: Outline, time_s: float) -> None:
-        """Goes on with an outline as it was just found."""
+        """Goes on with an outline as it was just found.
+
+        Where the one before told nothing of shifts along its face, and this one does, only what is found from now on
+        tells the velocity.
+        """
+        if outline.is_definite and not self.outline.is_definite:
+            self.shifts = deque([self.shifts[-1]])
         self.outline, self.outline_s, self.base = outline, time_s, self.shifts[-1][1]
 
     @property
@@ -109,7 +123,7 @@ class FollowedOutline:
         off = shifts - shifts.mean() - velocity * times
         self.error_mps = math.sqrt(float((np.abs(off) ** 2).sum()) / (len(off) - 2) / spread)
         if self.error_mps > VAGUE_MPS:
-            velocity = 0j
+            velocity = self.velocity if self.moves else 0j
         # The outline stays where it has been found.
         last_s, last = self.shifts[-1]
         base = last - velocity * (last_s - self.outline_s)

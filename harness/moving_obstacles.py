@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +27,18 @@ import numpy as np
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline, bow, extent_m
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
-from harness.scan_comparison import MISSING, any_come, come, drawn_back, in_a_row, looked_through, runs_of
+from harness.scan_comparison import (
+    any_come,
+    come,
+    drawn_back,
+    grown,
+    in_a_row,
+    in_all,
+    joined,
+    looked_through,
+    near_any,
+    runs_of,
+)
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
 COMPARED_S = 12.0
@@ -49,11 +60,13 @@ COASTS_S = 15.0
 NEW_OUTLINE_S = 12.0
 """Outlines are compared with one no older than this."""
 GROWN = 1.3
-"""What comes out from behind something is compared with a new outline whenever it has grown by so much."""
+"""What comes into view is compared with a new outline whenever so many times as much is seen as the old one shows."""
 NO_STEP = 0.25
 """Share of the clearance: returns of neighbouring rays that lie nearer to each other are of one thing."""
 SLANT = 4.0
 """Neighbouring returns of one face are no further apart than this many times what one broadside would show."""
+OWN = 0.1
+"""Share of the clearance: what was met so near to where something that moves was, was it."""
 NEAR = 1.5
 """In standard deviations of ranges: returns so near to an outline may be its."""
 FACES = 1.5
@@ -112,7 +125,7 @@ class MovingObstacles:
         return tuple(
             MovingEdges(
                 self._time_s,
-                _pairs(track.at(self._time_s).points),
+                _pairs(track.shown_at(self._time_s)),
                 (track.velocity.real, track.velocity.imag) if track.moves else (0.0, 0.0),
             )
             for track in self._tracks
@@ -166,10 +179,15 @@ class MovingObstacles:
         long_ago, of_late = (self._before[0], self._before[1]), (self._before[-1], self._before[-2])
         # A scan that errs may be wrong about a place; two are not.
         many = 2 if self._flawed else 1
-        changed = _all(come(before.scan, places, self._sure) for before in long_ago[:many])
+        changed = in_all(come(before.scan, places, self._sure) for before in long_ago[:many])
         if self._noise == 0.0:  # else too little has changed of late
-            late = _all(come(before.scan, places, self._sure) for before in of_late[:many])
-            late |= _all(self._drawn_back(before, scan)[hits] for before in of_late[:many])
+            late = in_all(come(before.scan, places, self._sure) for before in of_late[:many])
+            late |= in_all(
+                drawn_back(before.places, scan, self._sure, MOST_MPS * (scan.time_s - before.scan.time_s))[
+                    hits
+                ]
+                for before in of_late[:many]
+            )
             if late.any():
                 # Where rays are far apart an outline ends anywhere.
                 changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)
@@ -177,14 +195,10 @@ class MovingObstacles:
             changed &= ~moving[hits]
         if np.count_nonzero(changed) < FEWEST:
             return
-        for run in self._runs(scan, hits, places):
+        closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
+        for run in runs_of(hits, places, self._step(scan, hits), closed):
             if in_a_row(changed[run]) >= FEWEST and not self._is_followed(places[run], scan.time_s):
                 self._tracks.append(FollowedOutline(self._outline(scan, hits[run], places[run]), scan.time_s))
-
-    def _runs(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> list[IntArray]:
-        """Returns of neighbouring rays without a step between them, run by run."""
-        closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
-        return runs_of(hits, places, self._step(scan, hits), closed)
 
     def _step(self, scan: RangeScan, hits: IntArray) -> FloatArray:
         """(k,) returns of one face lie no further apart than this where they are so far away."""
@@ -192,11 +206,6 @@ class MovingObstacles:
             NO_STEP * self._clearance + 6.0 * self._noise, SLANT * scan.spacing_rad * scan.ranges_m[hits]
         )
         return np.minimum(step, self._apart)
-
-    def _drawn_back(self, before: _Looked, scan: RangeScan) -> BoolArray:
-        """(n,) which rays of a scan meet what may have drawn back since another."""
-        most_m = MOST_MPS * (scan.time_s - before.scan.time_s)
-        return drawn_back(before.places, scan, self._sure, most_m)
 
     def _look_at_free(
         self, scan: RangeScan, moving: BoolArray | None, is_free: Callable[[FloatArray], BoolArray]
@@ -212,7 +221,7 @@ class MovingObstacles:
         closed = all_round(scan) and hits[come[0]] + len(scan.ranges_m) - hits[come[-1]] <= 2
         for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), closed):
             if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
-                whole = self._grown(come[run], hits, places)
+                whole = grown(come[run], hits, places, NO_STEP * self._clearance, scan)
                 self._tracks.append(
                     FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
                 )
@@ -301,43 +310,40 @@ class MovingObstacles:
         unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
         gate = self._gate + unknown_mps * (scan.time_s - track.seen_s)
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
+        some = self._of_it(track, places)
+        own_hits, own = hits[some], places[some]
         laid = register(
-            track.at(scan.time_s), hits, places, scan, gate, self._apart, stiff, NEAR * self._noise
+            track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR * self._noise
         )
         if laid is None:
             return np.zeros(0, dtype=np.intp)
         track.note(scan.time_s, laid.shift)
-        mine = laid.members
+        mine = whole = laid.members
         if len(mine) >= FEWEST:
             track.seen_s = scan.time_s
-            whole = self._grown(mine, hits, places) if self._is_free else mine
-            more = extent_m(places[whole]) > GROWN * extent_m(track.outline.points)
-            if scan.time_s - track.outline_s > NEW_OUTLINE_S or (self._is_free and more):
-                track.renew(self._outline(scan, hits[whole], places[whole]), scan.time_s)
-        return mine
+            if self._is_free or track.moves:
+                whole = grown(mine, own_hits, own, NO_STEP * self._clearance, scan)
+            if self._is_free:
+                more = extent_m(own[whole]) > GROWN * extent_m(track.outline.points)
+            else:
+                more = len(whole) > GROWN * len(mine)
+            if more or scan.time_s - track.outline_s > NEW_OUTLINE_S:
+                new = whole if more or self._is_free else mine
+                track.renew(self._outline(scan, own_hits[new], own[new]), scan.time_s)
+            if track.moves and not self._is_free:
+                track.shown = own[whole][joined(own[whole], self._step(scan, own_hits[whole]))]
+                mine = whole
+        return some[mine]
 
-    def _grown(self, mine: IntArray, hits: IntArray, places: ComplexArray) -> IntArray:
-        """Returns that belong to an outline, and those that go on from its ends without a step."""
-        near = (np.diff(hits) <= MISSING + 1) & (np.abs(np.diff(places)) < NO_STEP * self._clearance)
-        first, last = int(mine[0]), int(mine[-1])
-        if first > last:
-            return mine  # it lies behind, where the fan begins and ends
-        while first > 0 and near[first - 1]:
-            first -= 1
-        while last < len(hits) - 1 and near[last]:
-            last += 1
-        return np.arange(first, last + 1)
-
-
-def _all(flags: Iterable[BoolArray]) -> BoolArray:
-    """Which are true in all of some arrays; those after one without any are not asked for."""
-    common: BoolArray | None = None
-    for each in flags:
-        common = each if common is None else common & each
-        if not common.any():
-            break
-    assert common is not None
-    return common
+    def _of_it(self, track: FollowedOutline, places: ComplexArray) -> IntArray:
+        """Which places may be of something that moves: where no scan of some time before met something else."""
+        if self._is_free or not track.moves:
+            return np.arange(len(places))
+        before = self._before[0]
+        others = before.places[
+            ~near_any(before.places, track.shown_at(before.scan.time_s), OWN * self._clearance)
+        ]
+        return (~near_any(places, others, NO_STEP * self._clearance)).nonzero()[0]
 
 
 def _pairs(points: ComplexArray) -> FloatArray:

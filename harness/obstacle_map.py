@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from harness.edge_grid import EdgeGrid
 from harness.hit_counting import CONFIRMED, count_hits, ends, news
 from harness.range_sensor import RangeScan, all_round, supported
-from harness.scan_comparison import looked_through
+from harness.scan_comparison import looked_through, near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 SUPPORT = 0.5
@@ -128,7 +128,9 @@ class ObstacleMap:
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Forgets all that is no further from some points, (k, 2)."""
-        slots = within(self._points[: self._count], points_m, within_m)
+        slots = near_any(
+            self._points[: self._count], points_m[:, 0] + 1j * points_m[:, 1], within_m
+        ).nonzero()[0]
         slots = slots[self._score[self._key[slots]] > 0]
         if len(slots):
             self._score[self._key[slots]] = 0
@@ -257,17 +259,3 @@ class ObstacleMap:
 def _pairs(points: ComplexArray) -> FloatArray:
     """(k, 2) east and north of points east + i north."""
     return points.view(np.float64).reshape(-1, 2)
-
-
-def within(known: ComplexArray, points_m: FloatArray, within_m: float) -> IntArray:
-    """(k,) which of (n,) known points, east + i north, lie no further than that from one of (m, 2) points."""
-    if not len(points_m):
-        return np.zeros(0, dtype=np.intp)
-    (west, south), (east, north) = points_m.min(axis=0) - within_m, points_m.max(axis=0) + within_m
-    x, y = known.real, known.imag
-    slots = ((x >= west) & (x <= east) & (y >= south) & (y <= north)).nonzero()[0]
-    near = np.zeros(len(slots), dtype=np.bool_)
-    for point in points_m[:, 0] + 1j * points_m[:, 1]:
-        near |= np.abs(known[slots] - point) <= within_m
-    found: IntArray = slots[near]
-    return found

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.edge_grid import EdgeGrid
-from harness.obstacle_map import within
 from harness.range_sensor import RangeScan, all_round, clockwise_from
+from harness.scan_comparison import near_any
 from planner.interface import BoolArray, FloatArray
 
 LEAST_STOPPED = 5.0
@@ -117,7 +117,9 @@ class ReflectionMap:
 
     def forget(self, points_m: FloatArray, within_m: float) -> None:
         """Forgets all that is no further from some points, (k, 2)."""
-        slots = within(self._points[: self._count], points_m, within_m)
+        slots = near_any(
+            self._points[: self._count], points_m[:, 0] + 1j * points_m[:, 1], within_m
+        ).nonzero()[0]
         if len(slots):
             self._counts[slots] = 0.0
             self._edge[slots] = False

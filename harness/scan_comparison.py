@@ -6,7 +6,7 @@ Places are complex: east + i north, m.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -143,6 +143,56 @@ def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: b
     return runs
 
 
+def grown(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, scan: RangeScan) -> IntArray:
+    """Some returns in clockwise order, and those that go on from their ends without a step.
+
+    Args:
+        mine: (k,) indices of the returns.
+        hits: (n,) rays of the scan that returned something.
+        places: (n,) where they did.
+        step_m: each is nearer to the one before.
+        scan: the scan.
+    """
+    next_hits, next_places = np.roll(hits, -1), np.roll(places, -1)
+    near = ((next_hits - hits) % len(scan.ranges_m) <= MISSING + 1) & (np.abs(next_places - places) < step_m)
+    near[-1] &= all_round(scan)
+    count = len(hits)
+    first, last = int(mine[0]), int(mine[-1])
+    more = count - 1 - (last - first) % count
+    while more and near[first - 1]:
+        first, more = (first - 1) % count, more - 1
+    while more and near[last]:
+        last, more = (last + 1) % count, more - 1
+    return (first + np.arange((last - first) % count + 1)) % count
+
+
+def joined(places: ComplexArray, apart_m: FloatArray) -> BoolArray:
+    """(k,) which places of a run are near to one before or after them: false returns are not."""
+    away = np.abs(np.diff(places, prepend=math.inf, append=math.inf))
+    near: BoolArray = np.minimum(away[:-1], away[1:]) < apart_m
+    return near
+
+
+@compiled(PLACES, PLACES, FLOAT)
+def near_any(places: ComplexArray, others: ComplexArray, within_m: float) -> BoolArray:
+    """(k,) which of (k,) places lie no further than that from one of (m,) others."""
+    near = np.zeros(len(places), dtype=np.bool_)
+    if not len(others):
+        return near
+    west, east = others.real.min() - within_m, others.real.max() + within_m
+    south, north = others.imag.min() - within_m, others.imag.max() + within_m
+    for i in range(len(places)):
+        x, y = places[i].real, places[i].imag
+        if not (west <= x <= east and south <= y <= north):
+            continue
+        for j in range(len(others)):
+            dx, dy = others[j].real - x, others[j].imag - y
+            if dx * dx + dy * dy <= within_m * within_m:
+                near[i] = True
+                break
+    return near
+
+
 def in_a_row(flags: Sequence[bool] | BoolArray) -> int:
     """The longest row of true ones."""
     longest = row = 0
@@ -150,3 +200,14 @@ def in_a_row(flags: Sequence[bool] | BoolArray) -> int:
         row = row + 1 if flag else 0
         longest = max(longest, row)
     return longest
+
+
+def in_all(flags: Iterable[BoolArray]) -> BoolArray:
+    """Which are true in all of some arrays; those after one without any are not asked for."""
+    common: BoolArray | None = None
+    for each in flags:
+        common = each if common is None else common & each
+        if not common.any():
+            break
+    assert common is not None
+    return common

@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.clearance import first_breach
 from planner.course import Course
-from planner.curves import Point, between
+from planner.curves import Point, Pose, Segment, between, moved, onward, place_on
 from planner.interface import FloatArray, Mission, Path, Plan
 
 WATCHED_TOGETHER = 16
@@ -49,6 +49,12 @@ class Effect:
     def holds(self, station_m: float) -> bool:
         """Whether an aircraft there is in the turn."""
         return station_m >= self.leaves_m
+
+    def onward_from(self, pose: Pose, station_m: float, length_m: float, near_m: float) -> list[Segment]:
+        """What of it is flown next. An aircraft that is not near it bends as that does until it is told otherwise."""
+        flown = onward(self.path, station_m, length_m)
+        off_m = math.dist(place_on(self.path, station_m)[0][:2], pose[:2])
+        return flown if off_m <= near_m or not flown else moved(flown, pose)
 
     def left(self, station_m: float) -> Path:
         """What is left of it: the way to its turn, and the turn."""

@@ -12,14 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from planner.blocks import Blocks, blocks
 from planner.clearance import inside_bounds
-from planner.compiled import FLOAT, ROWS, compiled
+from planner.compiled import COUNTS, FLOAT, ROWS, compiled
 from planner.curves import Limits, Point, Pose, Segment, along, full_turn, poses_at
 from planner.encounters import EARLIEST, LATEST
-from planner.interface import FloatArray, Mission, Path, PlanRequest
+from planner.interface import FloatArray, IntArray, Mission, Path, PlanRequest
 
 AHEAD_S = 30.0
 """So far ahead what moves is taken to keep its velocity, and ways are judged."""
@@ -27,11 +29,14 @@ AHEAD_S = 30.0
 LATER = 0.05
 """For every metre that something is met later along a way, the way counts as if it kept so many metres more from it."""
 
-UNKNOWN_MPS, UNKNOWN_S = 5.0, 8.0
+UNKNOWN_MPS, UNKNOWN_S = 10.0, 8.0
 """What has just appeared may come nearer so fast, for so long: of what is told to stand the velocity is not known."""
 
 STEP_SHARE, LEAST_STEP = 0.25, 0.02
 """Ways are looked at every so much of the clearance, and no more often than every so much of the turn radius."""
+
+SQUARE_STEPS = 8.0
+"""What stands is looked at by squares of so many steps."""
 
 FIRST_DEG, BACK_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0), (0.0, 20.0, 45.0, 75.0, 110.0)
 """Turns to one side, and back to the other."""
@@ -92,7 +97,12 @@ class Threats:
             begin = path.length_m - turn
             stations = np.where(stations > begin, begin + (stations - begin) % turn, stations)
         places = np.ascontiguousarray(poses_at(path, stations)[:, :2])
-        return _room(places, self.still_m, self.moving, self.step_m, self.speed_mps, least_m, later)
+        return _room(places, *self._still, self.moving, self.step_m, self.speed_mps, least_m, later)
+
+    @cached_property
+    def _still(self) -> Blocks:
+        """What stands by squares."""
+        return blocks(self.still_m, np.zeros(len(self.still_m)), SQUARE_STEPS * self.step_m)[1]
 
 
 def step_along_m(mission: Mission) -> float:
@@ -118,39 +128,47 @@ def far_side(face_m: FloatArray, position_m: Point) -> FloatArray:
     return behind
 
 
-@compiled(ROWS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
 def _room(
     places: FloatArray,
     still: FloatArray,
+    first: IntArray,
+    circles: FloatArray,
     moving: FloatArray,
     step: float,
     speed: float,
     least: float,
     farther: float,
 ) -> float:
-    room, i, fastest = math.inf, 0, 0.0
+    room, i, fastest, beside = math.inf, 0, 0.0, 0
     for j in range(len(moving)):
         fastest = max(fastest, math.hypot(moving[j, 2], moving[j, 3]) + moving[j, 4])
     # So much nearer at most something comes from one place to the next.
     closer = step * (1.0 + LATEST * fastest / speed)
     while i < len(places) and room >= least:
         x, y, later = places[i, 0], places[i, 1], farther * step * i
-        nearest = math.inf
-        for j in range(len(still)):
-            dx, dy = still[j, 0] - x, still[j, 1] - y
-            nearest = min(nearest, dx * dx + dy * dy)
-        nearest = math.sqrt(nearest)
-        first = EARLIEST * step * i / speed
-        lasts = LATEST * step * i / speed - first
+        nearest, squared, begin = math.inf, math.inf, beside
+        for k in range(len(first) - 1):
+            block = (begin + k) % (len(first) - 1)
+            dx, dy, reach = circles[0, block] - x, circles[1, block] - y, circles[2, block] + nearest
+            if dx * dx + dy * dy >= reach * reach:
+                continue
+            for j in range(first[block], first[block + 1]):
+                dx, dy = still[0, j] - x, still[1, j] - y
+                if dx * dx + dy * dy < squared:
+                    squared, beside = dx * dx + dy * dy, block
+            nearest = math.sqrt(squared)
+        begins = EARLIEST * step * i / speed
+        lasts = LATEST * step * i / speed - begins
         for j in range(len(moving)):
             # To the line along which the point moves while the aircraft may be here.
             vx, vy = moving[j, 2] * lasts, moving[j, 3] * lasts
-            dx, dy = moving[j, 0] + moving[j, 2] * first - x, moving[j, 1] + moving[j, 3] * first - y
+            dx, dy = moving[j, 0] + moving[j, 2] * begins - x, moving[j, 1] + moving[j, 3] * begins - y
             share = 0.0
             if vx != 0.0 or vy != 0.0:
                 share = min(max(-(dx * vx + dy * vy) / (vx * vx + vy * vy), 0.0), 1.0)
             away = math.hypot(dx + share * vx, dy + share * vy)
-            nearest = min(nearest, away - moving[j, 4] * min(first + lasts, UNKNOWN_S))
+            nearest = min(nearest, away - moving[j, 4] * min(begins + lasts, UNKNOWN_S))
         if nearest == math.inf:
             break
         here = nearest + later

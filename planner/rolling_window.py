@@ -29,9 +29,9 @@ from functools import partial
 import numpy as np
 
 from planner.barrier import Proof
-from planner.certificate import Certified, Certifier
+from planner.certificate import Certifier
 from planner.course import Course
-from planner.curves import Pose, Segment, along, moved, on_loiter, onward, place_on
+from planner.curves import Pose, Segment, along, on_loiter, place_on
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
@@ -99,6 +99,7 @@ class RollingWindow:
         self._searched_with = 0
         self._gone = 0  # how many points had been let go of when the last search began
         self._threats: Threats | None = None  # while something moves or has just appeared
+        self._nearer: Effect | None = None  # certified, but would come too near to that
         self._least_room_m = BROKEN_SHARE * mission.clearance_m
         self._effort = 0  # grows with every search that was in vain
         self._forgiven = False  # what was given up is, or was, tried again
@@ -158,7 +159,7 @@ class RollingWindow:
 
     def _roll(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
-        start = self._start(request, effect, here)
+        start, self._nearer = self._start(request, effect, here), None
         ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
         serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
         known = self._memory.known
@@ -179,18 +180,23 @@ class RollingWindow:
                 )
             hurried = self._pressed(effect, here) or len(request.seen.moving) > 0
             work = PRESSED if hurried else SERVED if serves else CUT
+            nearer_m = -math.inf
             for course in thinking.courses(start, ahead, work[0 if begins else 1]):
                 if tuple(course.path.segments[0, :2]) != tuple(start.prefix[0][:2]):
                     raise RuntimeError(f"a course begins elsewhere than at {start.prefix[0][:2]}")
                 if serves and course.path.length_m > worth_m:
                     thinking.done = True
                     break
-                certified = self._certify(course, request)
-                if certified is not None and self._leads_on(certified, course):
-                    self._thinking, self._searched_with, self._effort = None, thinking.known, 0
-                    before_m = -math.inf if ahead is None else ahead.path.length_m
-                    self._watch.lengthened_m = course.path.length_m - before_m
-                    return self._found(request, start, course, certified, thinking.tracks)
+                found = self._certified(request, start, course, thinking.tracks)
+                if found is not None and self._leads_on(found):
+                    keeps_m = room_m(found.path, self._threats)
+                    if keeps_m >= self._mission.clearance_m:
+                        self._thinking, self._searched_with, self._effort = None, thinking.known, 0
+                        before_m = -math.inf if ahead is None else ahead.path.length_m
+                        self._watch.lengthened_m = course.path.length_m - before_m
+                        return self._propose(found)
+                    if keeps_m > nearer_m:  # what moves may come to what is free now
+                        nearer_m, self._nearer = keeps_m, found
                 thinking.stuck = thinking.stuck or course
             if thinking.done:
                 self._thinking, self._searched_with = None, thinking.known
@@ -198,41 +204,35 @@ class RollingWindow:
                 return self._no_way(request, effect, here, thinking)
         assert ahead is not None
         assert effect is not None
-        certified = self._certify(ahead, request) if request.scanned else None
-        if certified is not None and certified.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m:
-            return self._found(request, start, ahead, certified, [])
         goes_on = self._thinking is not None
+        longer = self._certified(request, start, ahead, [], goes_on) if request.scanned else None
+        if (
+            longer is not None
+            and longer.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m
+            and room_m(longer.path, self._threats) >= self._mission.clearance_m
+        ):
+            return self._propose(longer)
         return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other", goes_on=goes_on)
+
+    def _propose(self, found: Effect) -> Plan:
+        self._proposed = found
+        return found.plan
 
     def _pressed(self, effect: Effect | None, here: float) -> bool:
         """Whether there is no safe plan in effect to think on."""
         near_m = 0.0 if effect is None else min(self._watch.cut_m, effect.leaves_m) - here
         return effect is None or (self._watch.broken and near_m < self._urgent_m)
 
-    def _certify(self, course: Course, request: PlanRequest) -> Certified | None:
+    def _certified(
+        self, request: PlanRequest, start: Start, course: Course, tracks: list[Track], goes_on: bool = False
+    ) -> Effect | None:
+        """The part of a course that ends in a turn seen to be free."""
         certifier = self._certifier(1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
         cut_m = self._watch.cut_at(course, self._standing_m(), self._memory.gone - self._gone)
         certified = certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
-        if certified is None or room_m(certified.path, self._threats) < self._mission.clearance_m:
-            return None  # what moves may come to what is free now
-        return certified
-
-    def _certifier(self, spacing_m: float) -> Certifier:
-        mission = self._mission
-        return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)
-
-    def _standing_m(self) -> FloatArray:
-        """(m, 2) edge points of what stands still: what moves is looked at whenever it has moved on."""
-        return self._memory.points_m[: self._memory.known]
-
-    def _leads_on(self, certified: Certified, course: Course) -> bool:
-        """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
-        return certified.leaves_m >= min(self._least_m, course.path.length_m - self._mission.goal_radius_m)
-
-    def _found(
-        self, request: PlanRequest, start: Start, course: Course, certified: Certified, tracks: list[Track]
-    ) -> Plan:
+        if certified is None:
+            return None
         goal, nodes, keep_m = self._mission.goal_m, course.nodes, self._mission.clearance_m
         points, met = self._memory.points_m, self._memory.points_m[self._memory.known :]
         plan = Plan(
@@ -243,21 +243,30 @@ class RollingWindow:
             picture=partial(
                 picture, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
             ),
-            goes_on=self._thinking is not None,
+            goes_on=goes_on,
         )
-        self._proposed = Effect(plan, certified.path, course, certified.leaves_m)
-        return plan
+        return Effect(plan, certified.path, course, certified.leaves_m)
+
+    def _certifier(self, spacing_m: float) -> Certifier:
+        mission = self._mission
+        return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)
+
+    def _standing_m(self) -> FloatArray:
+        """(m, 2) edge points of what stands still: what moves is looked at whenever it has moved on."""
+        return self._memory.points_m[: self._memory.known]
+
+    def _leads_on(self, found: Effect) -> bool:
+        """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
+        return found.leaves_m >= min(self._least_m, found.course.path.length_m - self._mission.goal_radius_m)
 
     def _start(self, request: PlanRequest, effect: Effect | None, here: float) -> Start:
         """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
         prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
         if effect is not None:
-            off_m = math.dist(place_on(effect.path, here)[0][:2], request.position_m)
             uncut_m = math.inf if effect.holds(here) else max(0.0, self._watch.cut_m - here)
-            if flown := onward(effect.path, here, min(self._lead_m, uncut_m)):
-                near = off_m <= max(1.0, OFF_PATH * self._mission.tracking_error_m)
-                # An aircraft off the path bends as that does until it is told otherwise.
-                prefix = flown if near else moved(flown, Pose(*request.position_m, *request.direction))
+            near_m = max(1.0, OFF_PATH * self._mission.tracking_error_m)
+            pose = Pose(*request.position_m, *request.direction)
+            prefix = effect.onward_from(pose, here, min(self._lead_m, uncut_m), near_m) or prefix
         last = prefix[-1]
         return Start(request.position_m, along(last, last[5]), last[4], prefix)
 
@@ -340,6 +349,7 @@ class RollingWindow:
                 until_m=min(self._watch.cut_m, effect.leaves_m),
                 prefix=self._start(request, effect, here).prefix,
                 certain=self._certain(),
+                nearer=self._nearer,
             )
         self._watch.broken = escape.broken
         self._proposed = escape.effect or self._proposed

@@ -99,6 +99,15 @@ def test_what_shows_only_a_face_that_comes_nearer_is_told_as_soon(speed: float) 
     assert max(errors(found, velocity)) < 1.5
 
 
+def test_velocity_is_told_anew_when_another_face_comes_into_view() -> None:
+    """Of a lone face only motion across it is known; with the next one all is, and what was believed is dropped."""
+    world, velocity = passing(5.0, 0.0, 400.0, 1.0, 105.0, 5)
+    found = watched(flight(sensor(world), 28.0, START))
+    off_mps = {time_s: errors([(time_s, each)], velocity) for time_s, each in found}
+    assert off_mps[15.0][0] > 1.5
+    assert all(max(off_mps[time_s]) < 0.1 for time_s in np.arange(19.0, 28.0, 0.5))
+
+
 @pytest.mark.parametrize("corners", [0, 4])
 @pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}, {"field_of_view_deg": 180.0}])
 def test_it_is_where_it_is_told_to_be(corners: int, flaws: dict[str, Any]) -> None:

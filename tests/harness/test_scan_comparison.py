@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from harness.range_sensor import RangeScan
 from harness.registration import FEWEST
-from harness.scan_comparison import come, drawn_back, looked_through
+from harness.scan_comparison import come, drawn_back, grown, joined, looked_through, near_any
 
 RAYS, RANGE = 60, 1000.0
 AT = complex(300.0, -200.0)
@@ -82,3 +82,42 @@ def test_few_places_in_a_row_tell_nothing(several: int) -> None:
         assert come(scan, shifted, 20.0).any() == sampled
         assert drawn_back(shifted, scan, 20.0, 1000.0).any() == sampled
     assert several + 1 < FEWEST or sampled
+
+
+@settings(deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), within_m=st.floats(1.0, 200.0), count=st.integers(0, 30))
+def test_near_is_what_is_no_further_from_any(seed: int, within_m: float, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    places, others = (rng.uniform(-300, 300, n) + 1j * rng.uniform(-300, 300, n) for n in (20, count))
+    away = np.abs(np.subtract.outer(places, others)).min(axis=1, initial=math.inf)
+    np.testing.assert_array_equal(near_any(places, others, within_m), away <= within_m)
+
+
+@pytest.mark.parametrize("turned", range(0, RAYS, 7))
+def test_what_goes_on_without_a_step_belongs_to_it_also_where_the_fan_begins(turned: int) -> None:
+    """A face of 20 rays, nearer than what is beside it; two returns of it are missing."""
+    ranges = np.roll(np.where(np.arange(RAYS) < 20, 100.0, 400.0), turned)
+    ranges[(turned + np.array([7, 8])) % RAYS] = math.inf
+    scan = scan_of(ranges, math.tau)
+    hits = (ranges < math.inf).nonzero()[0]
+    inner = np.searchsorted(hits, np.array([turned + 4, turned + 5]) % RAYS)
+    face = hits[grown(inner, hits, scan.ends_m(hits), 40.0, scan)]
+    expected = [(turned + i) % RAYS for i in range(20) if i not in (7, 8)]
+    np.testing.assert_array_equal(face, expected)
+    # All round it never ends: each return once.
+    whole = scan_of(np.full(RAYS, 100.0), math.tau)
+    every = grown(np.array([turned]), np.arange(RAYS), whole.ends_m(np.arange(RAYS)), 40.0, whole)
+    assert sorted(every) == list(range(RAYS))
+
+
+def test_a_narrow_fan_ends_where_it_ends() -> None:
+    scan = scan_of(np.full(RAYS, 100.0), math.pi)
+    face = grown(np.array([3]), np.arange(RAYS), scan.ends_m(np.arange(RAYS)), 40.0, scan)
+    np.testing.assert_array_equal(face, np.arange(RAYS))
+
+
+def test_a_place_away_from_those_before_and_after_it_is_not_joined_to_them() -> None:
+    places = np.array([0.0, 1.0, 30.0 + 5j, 2.0, 3.0, 90.0])
+    np.testing.assert_array_equal(
+        joined(places + 0j, np.full(6, 5.0)), [True, True, False, True, True, False]
+    )

@@ -79,6 +79,27 @@ def test_edges_of_what_moves_are_not_among_the_still_ones_and_leave_no_trail(cor
     assert (np.abs(off(still, seen.edges_since(-1))) < 1.0).sum() > 50
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_of_what_moves_also_that_is_known_to_which_comes_into_view_as_one_passes_by(side: float) -> None:
+    """It is met head on, and passed with its other flank in view in the end; beside it stands something."""
+    velocity = (-7.0 * side, 4.0)
+    body = Obstacle(Circle((3000.0 + side * 450.0, 2000.0), 140.0), velocity_mps=velocity)
+    world = world_of(body, Circle((3000.0 - side * 260.0, 2300.0), 60.0))
+    mover, still = (World(world.obstacles[part], BOUNDS) for part in (slice(1), slice(1, None)))
+    seen, looks = empty_world(), 0
+    for scan in flight(sensor(world), 55.0, (3000.0, 1300.0), speed=22.0):
+        seen.update(scan)
+        if seen.moving:
+            edges, ends = seen.edges_since(-1), scan.ends_m((scan.ranges_m < math.inf).nonzero()[0])
+            assert (np.abs(off(still, edges)) > CLEARANCE).sum() <= 6
+            met = np.column_stack((ends.real, ends.imag))
+            met = met[np.abs(off(mover, met, scan.time_s)) < 1.0]
+            away = np.hypot(*(met[:, None] - seen.moving[0].points_m).transpose(2, 0, 1)).min(axis=1)
+            assert np.quantile(away, 0.9) < 0.2 * CLEARANCE
+            looks += 1
+    assert looks > 80
+
+
 def test_free_space_is_taken_back_where_something_appears_and_in_its_shadow_only() -> None:
     pops = Obstacle(Circle((3100.0, 2200.0), 60.0), active_s=(20.0, 500.0))
     eye = sensor(world_of(pops))

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner.curves import Limits, onward, pose_at, poses_at, sample
 from planner.encounters import EARLIEST, LATEST
-from planner.escape import HOLD_SHARES
+from planner.escape import CLEARER, HOLD_SHARES
 from planner.evasion import AHEAD_S, LATER, UNKNOWN_MPS, UNKNOWN_S, Threats, clearest, far_side, rolled_out
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
 from planner.rolling_window import RollingWindow
@@ -221,6 +221,33 @@ def test_where_something_has_appeared_what_is_flown_keeps_away_to_the_end_of_its
     ways = rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits)
     if max(room_m(flown), *(room_m(way) for way in ways)) > least_m + 0.05:
         assert room_m(answer.path or flown) > least_m - 0.05
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.lists(st.tuples(st.floats(150, 900), st.floats(-400, 400)), min_size=8, max_size=30))
+def test_where_all_that_is_wanted_cannot_be_kept_the_clearest_way_is_flown(
+    places: list[tuple[float, float]],
+) -> None:
+    """But for so much less as another has to keep more. Of nothing it is certain that it is free."""
+    seen = Partly(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.show(np.array(places))
+    seen.surprised_s, seen.hidden = 1.0, lambda north: north < math.inf
+    request = request_on(plan, 25.0, seen)
+    answer = pilot.plan(request)
+    near = pilot._escapes.threats(request)
+    assert near is not None
+    assert plan.path is not None
+    keeps_m = pilot._local.path_keeps_m
+    kept_m = near.room_m(answer.path or Path(np.array(onward(plan.path, 25.0, AHEAD_S * SPEED))))
+    for way in rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits):
+        line = shapely.LineString(sample(way, 20.0, 0.01))
+        stands_m = float(shapely.distance(line, shapely.points(places)).min())
+        for share in HOLD_SHARES:
+            keeps_it_for_ever = stands_m > share * keeps_m + 0.05
+            room_m = near.room_m(way, later=share * LATER)
+            if keeps_it_for_ever and room_m > share * keeps_m:
+                assert kept_m > min(room_m, keeps_m) - CLEARER * keeps_m - 0.05
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
