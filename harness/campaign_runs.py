@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,7 +21,7 @@ from pydantic import ValidationError
 from harness.campaign import MAX_RUNS, Base, CampaignFile
 from harness.campaign_cells import cell_of, kind_of
 from harness.sampling import FloatArray, design
-from harness.scenario import Scenario, overridden, with_key
+from harness.scenario import Scenario, overridden, packed, unpacked, with_key
 from harness.strict_yaml import (
     InputError,
     Loc,
@@ -177,7 +176,7 @@ class CampaignRuns:
             InputError: it is not a scenario; the faults name what in the campaign makes it so.
         """
         if number in self._made and not overrides:
-            return Scenario.model_validate_json(zlib.decompress(self._made[number]))
+            return unpacked(self._made[number])
         place = self._place(number)
         base = self.file.bases[place.base]
         root, changes = base.root, self._changes(place)
@@ -197,6 +196,10 @@ class CampaignRuns:
             lines = [blame.line(loc, sentence) for loc, sentence in faults(error, Scenario)]
             raise in_lines(lines, self.file.source) from error
 
+    def packed(self, number: int) -> bytes:
+        """The same as `harness.scenario.packed` has it."""
+        return self._made.get(number) or packed(self.scenario(number))
+
     def check(self, progress: Callable[[int], None] | None = None) -> None:
         """Makes every scenario of the campaign once; the first ones are kept for when they are flown.
 
@@ -210,10 +213,8 @@ class CampaignRuns:
         for number in range(len(self)):
             scenario = self.scenario(number)
             if room > 0:
-                kept = self._made[number] = zlib.compress(
-                    scenario.model_dump_json(by_alias=True).encode(), level=1
-                )
-                room -= len(kept)
+                self._made[number] = packed(scenario)
+                room -= len(self._made[number])
             if progress is not None:
                 progress(number + 1)
 

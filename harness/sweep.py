@@ -75,7 +75,7 @@ def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:
         if number not in folder.done:
             yield Job(
                 number,
-                runs.scenario(number),
+                runs.packed(number),
                 (folder.path / RUNS / str(number)).resolve(),
                 campaign.recordings,
                 campaign.optimum,

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 
 from harness.record import RunFolderError
 from harness.results import ERROR, metric_cells, time_cells
-from harness.scenario import Scenario
+from harness.scenario import Scenario, unpacked
 
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """What a disk that takes no more says, a temporary file's too: that is no fault of the run."""
@@ -23,14 +23,14 @@ class Job:
 
     Attributes:
         run: its number.
-        scenario: what to fly, complete.
+        packed: the scenario to fly (`harness.scenario.packed`).
         folder: the run folder, if it is kept.
         recordings: when it is kept.
         optimum: whether to compute the shortest path of the world.
     """
 
     run: int
-    scenario: Scenario
+    packed: bytes
     folder: Path
     recordings: Literal["all", "failures", "none"]
     optimum: bool
@@ -59,8 +59,10 @@ def fly_job(job: Job) -> Answer:
         RunFolderError: the same.
     """
     try:
-        metrics = _flown(job)
-        cells = metric_cells(metrics, job.scenario.planner.clearance_m, _optimum_m(job))
+        scenario = unpacked(job.packed)
+        metrics = _flown(job, scenario)
+        optimum_m = _optimum_m(scenario) if job.optimum else None
+        cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
     except (OSError, RunFolderError):
         raise
     except Exception as error:
@@ -76,27 +78,25 @@ def failed(run: int, reason: str, error: str) -> Answer:
     return Answer(run, {"outcome": ERROR, **dict(zip(("reason", "error"), same, strict=True))}, {})
 
 
-def _flown(job: Job) -> dict[str, Any]:
+def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
     from harness.closed_loop import fly
     from harness.metrics import metrics
     from harness.run import flight_limits, fly_to_folder, make_loop
 
     if job.recordings == "all":
-        return fly_to_folder(job.scenario, job.folder, recording=True)
-    found = metrics(fly(make_loop(job.scenario)), flight_limits(job.scenario))
+        return fly_to_folder(scenario, job.folder, recording=True)
+    found = metrics(fly(make_loop(scenario)), flight_limits(scenario))
     if job.recordings == "failures" and found["outcome"] != "reached":
         # Failures are few: to fly them again costs less than to record every flight.
-        fly_to_folder(job.scenario, job.folder, recording=True)
+        fly_to_folder(scenario, job.folder, recording=True)
     return found
 
 
-def _optimum_m(job: Job) -> float | None:
-    if not job.optimum:
-        return None
+def _optimum_m(scenario: Scenario) -> float | None:
     from harness.optimum import shortest_path
     from harness.world import World
 
-    world, mission = World.from_scenario(job.scenario), job.scenario.mission
+    world, mission = World.from_scenario(scenario), scenario.mission
     return shortest_path(
-        world.obstacles, world.bounds_m, mission.start_m, mission.goal_m, job.scenario.planner.clearance_m
+        world.obstacles, world.bounds_m, mission.start_m, mission.goal_m, scenario.planner.clearance_m
     ).length_m

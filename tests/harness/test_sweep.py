@@ -385,7 +385,7 @@ def test_a_worker_killed_in_mid_run_costs_nothing(long_campaign: Path) -> None:
 
 def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
-    job = Job(0, runs.scenario(0), place / "run", "none", optimum=False)
+    job = Job(0, runs.packed(0), place / "run", "none", optimum=False)
     with local_workers(1) as workers:
         first = workers.start(job).result(timeout=60)
         for child in multiprocessing.active_children():
@@ -458,7 +458,7 @@ from harness.sweep_flight import Job, fly_job
 runs = CampaignRuns(load_campaign(Path("campaign.yaml")))
 grown = []
 for number in range(len(runs)):
-    answer = fly_job(Job(number, runs.scenario(number), Path("run"), "none", True))
+    answer = fly_job(Job(number, runs.packed(number), Path("run"), "none", True))
     assert answer.row["outcome"] == "reached", answer.row
     grown.append(psutil.Process().memory_info().rss / 2**20)
 sys.stdout.write(json.dumps(grown))
