@@ -65,6 +65,8 @@ NO_STEP = 0.25
 """Share of the clearance: returns of neighbouring rays that lie nearer to each other are of one thing."""
 SLANT = 4.0
 """Neighbouring returns of one face are no further apart than this many times what one broadside would show."""
+LATELY_S = 5.0
+"""What has been an edge so long is not what has come into view of something that moves."""
 OWN = 0.1
 """Share of the clearance: what was met so near to where something that moves was, was it."""
 NEAR = 1.5
@@ -100,7 +102,7 @@ class MovingObstacles:
         noise_m: float,
         false_returns: bool = True,
         is_free: Callable[[FloatArray], BoolArray] | None = None,
-        stands: Callable[[FloatArray], BoolArray] | None = None,
+        stands: Callable[..., BoolArray] | None = None,
     ) -> None:
         self._noise, self._false_returns = noise_m, false_returns
         self._is_free, self._stands = is_free, stands
@@ -221,7 +223,7 @@ class MovingObstacles:
         closed = all_round(scan) and hits[come[0]] + len(scan.ranges_m) - hits[come[-1]] <= 2
         for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), closed):
             if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
-                whole = grown(come[run], hits, places, NO_STEP * self._clearance, scan)
+                whole = self._whole(come[run], hits, places, scan)
                 self._tracks.append(
                     FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
                 )
@@ -322,7 +324,7 @@ class MovingObstacles:
         if len(mine) >= FEWEST:
             track.seen_s = scan.time_s
             if self._is_free or track.moves:
-                whole = grown(mine, own_hits, own, NO_STEP * self._clearance, scan)
+                whole = self._whole(mine, own_hits, own, scan)
             if self._is_free:
                 more = extent_m(own[whole]) > GROWN * extent_m(track.outline.points)
             else:
@@ -334,6 +336,17 @@ class MovingObstacles:
                 track.shown = own[whole][joined(own[whole], self._step(scan, own_hits[whole]))]
                 mine = whole
         return some[mine]
+
+    def _whole(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+        """Returns of something that moves, and those that go on from their ends, but for what was there before."""
+        may = np.ones(len(places), dtype=np.bool_)
+        if self._stands:
+            may = ~self._stands(_pairs(places), LATELY_S)
+            may[mine] = True
+        some = may.nonzero()[0]
+        return some[
+            grown(np.searchsorted(some, mine), hits[some], places[some], NO_STEP * self._clearance, scan)
+        ]
 
     def _of_it(self, track: FollowedOutline, places: ComplexArray) -> IntArray:
         """Which places may be of something that moves: where no scan of some time before met something else."""

@@ -95,15 +95,15 @@ class ReflectionMap:
         points = self._points[slots[np.argsort(since[slots], kind="stable")]]
         return points.view(np.float64).reshape(-1, 2)
 
-    def stands(self, points_m: FloatArray) -> BoolArray:
-        """(k,) whether each of (k, 2) places lies no further than ranges err from a cell that has long been an edge."""
+    def stands(self, points_m: FloatArray, since_s: float = STOOD_S) -> BoolArray:
+        """(k,) which of (k, 2) places lie no further than ranges err from a cell that has been an edge so long."""
         reach = math.ceil(self._noise / self._cell)
         aside = np.arange(-reach, reach + 1)
         corner = (self._origin.real, self._origin.imag)
         at = np.floor((points_m - corner) / self._cell).astype(np.int64)[:, :, None] + aside
         column, row = at[:, 0].clip(0, self._nx - 1), at[:, 1].clip(0, self._ny - 1)
         slots = self._slot.take(column[:, :, None] * self._ny + row[:, None, :])
-        long = self._edge[: self._count] & (self._since_s[: self._count] <= self._time_s - STOOD_S)
+        long = self._edge[: self._count] & (self._since_s[: self._count] <= self._time_s - since_s)
         found: BoolArray = np.append(long, False)[slots].any(axis=(1, 2))  # no slot: the last
         return found
 
