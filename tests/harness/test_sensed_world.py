@@ -230,6 +230,33 @@ def test_with_much_noise_what_stands_is_not_taken_for_a_part_of_what_passes_by(
     assert told > 10
 
 
+@pytest.mark.parametrize(
+    ("seed", "east", "north", "radius", "velocity", "behind_s"),
+    [
+        (19, 2733.0, 2296.0, 145.0, (8.9, -0.6), 20.0),
+        (25, 2610.0, 2341.0, 131.0, (6.9, -1.8), 21.0),
+        (38, 2655.0, 2446.0, 109.0, (6.1, -1.5), 13.0),
+        (39, 2631.0, 2264.0, 84.0, (7.0, -0.9), 12.0),
+    ],
+)
+def test_with_much_noise_what_appeared_is_not_taken_for_a_part_of_what_comes_out_of_it(
+    seed: int, east: float, north: float, radius: float, velocity: tuple[float, float], behind_s: float
+) -> None:
+    """Their faces go on from one to the other without a step: only when each was seen first tells them apart."""
+    begin = (east - velocity[0] * behind_s, north - velocity[1] * behind_s)
+    moves = Obstacle(Circle(begin, radius), velocity_mps=velocity)
+    pops = Obstacle(Circle((east, 2250.0), 180.0), active_s=(12.0, 500.0))
+    seen, wrong = empty_world(noise_m=NOISE, false_returns=True), 0
+    mover = World([moves], BOUNDS)
+    for scan in flight(sensor(world_of(moves, pops), seed, **FLAWS), 50.0, (3000.0, 1500.0), speed=12.0):
+        seen.update(scan)
+        for each in seen.moving:
+            if each.velocity_mps != (0.0, 0.0):
+                wrong += math.dist(each.velocity_mps, velocity) > 4.0
+                assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 2.0 * NOISE
+    assert wrong <= 2
+
+
 def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_free() -> None:
     pops = Obstacle(Circle((3050.0, 2200.0), 60.0), active_s=(20.0, 500.0))
     seen, told_s = empty_world(noise_m=NOISE, false_returns=True), []
