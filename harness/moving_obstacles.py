@@ -18,37 +18,18 @@ Points are complex: east + i north, m.
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
+from harness.earlier_scans import NO_STEP, EarlierScans, Look
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline, bow, extent_m
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
-from harness.scan_comparison import (
-    any_come,
-    come,
-    drawn_back,
-    grown,
-    in_a_row,
-    in_all,
-    joined,
-    looked_through,
-    near_any,
-    runs_of,
-)
+from harness.scan_comparison import grown, in_a_row, joined, looked_through, runs_of
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
-COMPARED_S = 12.0
-"""Scans are compared with the last ones looked at, and with those taken so long before,"""
-SLOW_MPS = 5.0
-"""and as much longer as something so slow takes to leave the noise."""
 NOWHERE = np.zeros((0, 2))
-LOOK_EVERY_S = 3.0
-LOOK_EVERY = 0.6
-"""What has come in is looked for that often, or as often as the fastest moves on by this share of the clearance."""
 DECIDED_S = 5.0
 """Whether something moves is decided after so long at the soonest, and when it is sure."""
 UNDECIDED_S = 30.0
@@ -61,26 +42,14 @@ NEW_OUTLINE_S = 12.0
 """Outlines are compared with one no older than this."""
 GROWN = 1.3
 """What comes into view is compared with a new outline whenever so many times as much is seen as the old one shows."""
-NO_STEP = 0.25
-"""Share of the clearance: returns of neighbouring rays that lie nearer to each other are of one thing."""
 SLANT = 4.0
 """Neighbouring returns of one face are no further apart than this many times what one broadside would show."""
 LATELY_S = 5.0
 """What has been an edge so long is not what has come into view of something that moves."""
-OWN = 0.1
-"""Share of the clearance: what was met so near to where something that moves was, was it."""
 NEAR = 1.5
 """In standard deviations of ranges: returns so near to an outline may be its."""
 FACES = 1.5
 """What comes into view so many times as near as that is another face of what moves."""
-
-
-class _Looked(NamedTuple):
-    """A scan that was looked at, the rays that returned something, and where."""
-
-    scan: RangeScan
-    hits: IntArray
-    places: ComplexArray
 
 
 class MovingObstacles:
@@ -107,14 +76,11 @@ class MovingObstacles:
         self._noise, self._false_returns = noise_m, false_returns
         self._is_free, self._stands = is_free, stands
         self._clearance = clearance_m
-        self._flawed = noise_m > 0.0 or false_returns
         self._apart = clearance_m + 6.0 * noise_m
         self._sure = 4.0 * noise_m + 0.02 * clearance_m
-        self._compared_s = 0.0 if is_free else COMPARED_S + self._sure / SLOW_MPS
+        exact, flawed = noise_m == 0.0, noise_m > 0.0 or false_returns
+        self._earlier = EarlierScans(clearance_m, self._sure, exact=exact, flawed=flawed)
         self._gate = max(0.5 * clearance_m, 3.0 * noise_m)
-        self._before: deque[_Looked] = deque()
-        self._look_every_s = max(LOOK_EVERY_S, LOOK_EVERY * clearance_m / MOST_MPS)
-        self._looked_s = -math.inf
         self._tracks: list[FollowedOutline] = []
         self._new: list[FollowedOutline] = []
         self._time_s = 0.0
@@ -140,10 +106,11 @@ class MovingObstacles:
         if not self._new:
             return NOWHERE
         step_s = [self._gate / max(abs(track.velocity), LEAST_MPS) for track in self._new]
+        compared_s = 0.0 if self._is_free else self._earlier.compared_s
         past = [
             track.at(time_s).points
             for track, step in zip(self._new, step_s, strict=True)
-            for time_s in np.arange(self._time_s, track.begun_s - self._compared_s - step, -step)
+            for time_s in np.arange(self._time_s, track.begun_s - compared_s - step, -step)
         ]
         points = _pairs(np.concatenate(past))
         return points[np.unique(np.floor(points / self._gate), axis=0, return_index=True)[1]]
@@ -156,43 +123,18 @@ class MovingObstacles:
         if self._is_free:
             if scan.nearest_m < math.inf:
                 self._look_at_free(scan, moving, self._is_free)
-        elif scan.time_s - self._looked_s >= self._look_every_s:
-            self._looked_s = scan.time_s
-            while len(self._before) > 2 and self._before[1].scan.time_s <= scan.time_s - self._compared_s:
-                self._before.popleft()
-            now = _Looked(scan.kept(), *self._returns(scan))
-            if len(self._before) >= 2 and scan.nearest_m < math.inf and self._may_differ(now):
-                self._look(now, moving)
-            self._before.append(now)
+        elif self._earlier.due(scan.time_s):
+            now = Look(scan.kept(), *self._returns(scan))
+            self._look(now, moving)
+            self._earlier.keep(now)
         return moving
 
-    def _may_differ(self, now: _Looked) -> bool:
-        """Whether anything at all has come since a scan before, or drawn back: in a still world mostly nothing."""
-        if any_come(self._before[0].scan, now.places, self._sure):
-            return True
-        late = self._before[-1]
-        return self._noise == 0.0 and (
-            any_come(late.scan, now.places, self._sure) or any_come(now.scan, late.places, self._sure)
-        )
-
-    def _look(self, now: _Looked, moving: BoolArray | None) -> None:
+    def _look(self, now: Look, moving: BoolArray | None) -> None:
         """Begins to follow what has come to places that were looked through before, or has drawn back."""
+        changed = self._earlier.changed(now)
+        if changed is None:
+            return
         scan, hits, places = now
-        long_ago, of_late = (self._before[0], self._before[1]), (self._before[-1], self._before[-2])
-        # A scan that errs may be wrong about a place; two are not.
-        many = 2 if self._flawed else 1
-        changed = in_all(come(before.scan, places, self._sure) for before in long_ago[:many])
-        if self._noise == 0.0:  # else too little has changed of late
-            late = in_all(come(before.scan, places, self._sure) for before in of_late[:many])
-            late |= in_all(
-                drawn_back(before.places, scan, self._sure, MOST_MPS * (scan.time_s - before.scan.time_s))[
-                    hits
-                ]
-                for before in of_late[:many]
-            )
-            if late.any():
-                # Where rays are far apart an outline ends anywhere.
-                changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)
         if moving is not None:
             changed &= ~moving[hits]
         if np.count_nonzero(changed) < FEWEST:
@@ -301,9 +243,8 @@ class MovingObstacles:
         if self._is_free:
             return True
         first = track.at(scan.time_s).points - track.moved
-        come_or_gone = [looked_through(scan, first, self._sure)]
-        come_or_gone += [come(before.scan, places, self._sure) for before in self._before]
-        return any(np.count_nonzero(each) >= FEWEST for each in come_or_gone)
+        gone = np.count_nonzero(looked_through(scan, first, self._sure)) >= FEWEST
+        return bool(gone) or self._earlier.have_come(places, FEWEST)
 
     def _found_again(
         self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
@@ -312,7 +253,9 @@ class MovingObstacles:
         unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
         gate = self._gate + unknown_mps * (scan.time_s - track.seen_s)
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
-        some = self._of_it(track, places)
+        some = np.arange(len(places))
+        if track.moves and not self._is_free:
+            some = self._earlier.of_it(track, places)
         own_hits, own = hits[some], places[some]
         laid = register(
             track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR * self._noise
@@ -347,16 +290,6 @@ class MovingObstacles:
         return some[
             grown(np.searchsorted(some, mine), hits[some], places[some], NO_STEP * self._clearance, scan)
         ]
-
-    def _of_it(self, track: FollowedOutline, places: ComplexArray) -> IntArray:
-        """Which places may be of something that moves: where no scan of some time before met something else."""
-        if self._is_free or not track.moves:
-            return np.arange(len(places))
-        before = self._before[0]
-        others = before.places[
-            ~near_any(before.places, track.shown_at(before.scan.time_s), OWN * self._clearance)
-        ]
-        return (~near_any(places, others, NO_STEP * self._clearance)).nonzero()[0]
 
 
 def _pairs(points: ComplexArray) -> FloatArray:

@@ -1,0 +1,112 @@
+"""Scans that were looked at before, for later ones to be compared with.
+
+The last ones tell of what has just come out from behind something, those of long before of what is slow.
+
+Places are complex: east + i north, m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.followed_outline import MOST_MPS, FollowedOutline
+from harness.range_sensor import RangeScan
+from harness.scan_comparison import any_come, come, drawn_back, in_all, near_any
+from planner.interface import BoolArray, ComplexArray, IntArray
+
+COMPARED_S = 12.0
+"""Scans are compared with the last ones looked at, and with those taken so long before,"""
+SLOW_MPS = 5.0
+"""and as much longer as something so slow takes to leave the noise."""
+LOOK_EVERY_S = 3.0
+LOOK_EVERY = 0.6
+"""What has come in is looked for that often, or as often as the fastest moves on by this share of the clearance."""
+NO_STEP = 0.25
+"""Share of the clearance: returns of neighbouring rays that lie nearer to each other are of one thing."""
+OWN = 0.1
+"""Share of the clearance: what was met so near to where something that moves was, was it."""
+
+
+class Look(NamedTuple):
+    """A scan that was looked at, the rays that returned something, and where."""
+
+    scan: RangeScan
+    hits: IntArray
+    places: ComplexArray
+
+
+class EarlierScans:
+    """The scans of the last seconds that were looked at.
+
+    Args:
+        clearance_m: wanted distance from obstacles.
+        sure_m: places further apart are surely not the same.
+        exact: ranges do not err.
+        flawed: ranges err, or some returns are false.
+    """
+
+    def __init__(self, clearance_m: float, sure_m: float, *, exact: bool, flawed: bool) -> None:
+        self.compared_s = COMPARED_S + sure_m / SLOW_MPS
+        self._clearance, self._sure, self._exact = clearance_m, sure_m, exact
+        # A scan that errs may be wrong about a place; two are not.
+        self._many = 2 if flawed else 1
+        self._every_s = max(LOOK_EVERY_S, LOOK_EVERY * clearance_m / MOST_MPS)
+        self._looked_s = -math.inf
+        self._looks: deque[Look] = deque()
+
+    def due(self, time_s: float) -> bool:
+        """Whether it is time to look at a scan; then it is taken as looked at."""
+        if time_s - self._looked_s < self._every_s:
+            return False
+        self._looked_s = time_s
+        while len(self._looks) > 2 and self._looks[1].scan.time_s <= time_s - self.compared_s:
+            self._looks.popleft()
+        return True
+
+    def keep(self, look: Look) -> None:
+        """Keeps one more."""
+        self._looks.append(look)
+
+    def changed(self, now: Look) -> BoolArray | None:
+        """(k,) which returns have come to places that were looked through, or have drawn back; None: surely none."""
+        if len(self._looks) < 2 or now.scan.nearest_m == math.inf or not self._may_differ(now):
+            return None
+        scan, hits, places = now
+        long_ago, of_late = (self._looks[0], self._looks[1]), (self._looks[-1], self._looks[-2])
+        changed = in_all(come(before.scan, places, self._sure) for before in long_ago[: self._many])
+        if not self._exact:
+            return changed  # too little has changed of late
+        late = in_all(come(before.scan, places, self._sure) for before in of_late[: self._many])
+        late |= in_all(self._drawn_back(before, scan)[hits] for before in of_late[: self._many])
+        if late.any():
+            # Where rays are far apart an outline ends anywhere.
+            changed |= late & (scan.spacing_rad * scan.ranges_m[hits] < NO_STEP * self._clearance)
+        return changed
+
+    def have_come(self, places: ComplexArray, fewest: int) -> bool:
+        """Whether so many of some places at least were looked through by one of the scans."""
+        return any(np.count_nonzero(come(each.scan, places, self._sure)) >= fewest for each in self._looks)
+
+    def of_it(self, track: FollowedOutline, places: ComplexArray) -> IntArray:
+        """Which places may be of something that moves: where the first of the scans met nothing else."""
+        before = self._looks[0]
+        own = near_any(before.places, track.shown_at(before.scan.time_s), OWN * self._clearance)
+        return (~near_any(places, before.places[~own], NO_STEP * self._clearance)).nonzero()[0]
+
+    def _may_differ(self, now: Look) -> bool:
+        """Whether anything at all has come since a scan before, or drawn back: in a still world mostly nothing."""
+        if any_come(self._looks[0].scan, now.places, self._sure):
+            return True
+        late = self._looks[-1]
+        return self._exact and (
+            any_come(late.scan, now.places, self._sure) or any_come(now.scan, late.places, self._sure)
+        )
+
+    def _drawn_back(self, before: Look, scan: RangeScan) -> BoolArray:
+        """(n,) which rays of a scan meet what may have drawn back since another."""
+        most_m = MOST_MPS * (scan.time_s - before.scan.time_s)
+        return drawn_back(before.places, scan, self._sure, most_m)
