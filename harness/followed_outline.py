@@ -43,7 +43,7 @@ class FollowedOutline:
         error_mps: standard error of it.
         seen_s: when it was last seen.
         moves: it is known to.
-        shown: all that was seen of it at `seen_s`, where that is more than the outline.
+        shown: all that was seen of it at `seen_s`; None: the outline.
     """
 
     outline: Outline

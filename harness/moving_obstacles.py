@@ -276,7 +276,8 @@ class MovingObstacles:
                 new = whole if more or self._is_free else mine
                 track.renew(self._outline(scan, own_hits[new], own[new]), scan.time_s)
             if track.moves and not self._is_free:
-                track.shown = own[whole][joined(own[whole], self._step(scan, own_hits[whole]))]
+                near = joined(own[whole], self._step(scan, own_hits[whole]))
+                track.shown = own[whole][near] if near.any() else None
                 mine = whole
         return some[mine]
 

@@ -11,13 +11,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from harness import ray_casting
+from harness import moving_obstacles, ray_casting
 from harness.followed_outline import bow
 from harness.moving_obstacles import COASTS_S, MovingObstacles
 from harness.obstacle import Circle, Obstacle, Polygon
 from harness.range_sensor import RangeScan
 from harness.world import World
-from planner.interface import MovingEdges
+from planner.interface import BoolArray, ComplexArray, FloatArray, MovingEdges
 from tests.harness.sensing import CLEARANCE, SCAN_S, SPEED, block, flight, off, regular, sensor, world_of
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -106,6 +106,20 @@ def test_velocity_is_told_anew_when_another_face_comes_into_view() -> None:
     off_mps = {time_s: errors([(time_s, each)], velocity) for time_s, each in found}
     assert off_mps[15.0][0] > 1.5
     assert all(max(off_mps[time_s]) < 0.1 for time_s in np.arange(19.0, 28.0, 0.5))
+
+
+def test_what_moves_has_an_outline_though_no_two_returns_of_it_are_near_each_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def apart(places: ComplexArray, _: FloatArray) -> BoolArray:
+        return np.zeros(len(places), dtype=np.bool_)
+
+    monkeypatch.setattr(moving_obstacles, "joined", apart)
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    found = [each for _, all_found in watched(flight(sensor(world), 35.0, START)) for each in all_found]
+    assert len(found) > 20
+    assert min(len(each.points_m) for each in found) >= 3
+    assert abs(complex(*found[-1].velocity_mps) - velocity) < 0.2
 
 
 @pytest.mark.parametrize("corners", [0, 4])
