@@ -51,10 +51,10 @@ def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
     if standing:
         points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
         rings = [_outline(shape, points) for shape in standing]
-        outlines = lines_2d(rings, look.OUTLINE, 1.5, 10)
-        rec.log(f"{look.PLAN}/outlines", outlines, static=True)
-        rims = _rims(rings, scene.obstacle_top_m, look.OUTLINE)
-        rec.log(f"{look.WORLD}/outlines", rims, static=True)
+        # Of many obstacles each of these is large: none is kept while the next is made.
+        rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
+        rec.log(f"{look.WORLD}/outlines", _rims(rings, scene.obstacle_top_m, look.OUTLINE), static=True)
+        del rings
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", standing, scene.obstacle_top_m, look.OBSTACLE)
     _log_aircraft(rec, scene)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
@@ -138,7 +138,7 @@ def lines_2d(
     """Polylines (k, 2) in the plan view, `width` in points of the screen."""
     several = colours if polylines and isinstance(colours[0], tuple) else [colours]
     return rr.LineStrips2D(
-        [points[:, :2] for points in polylines],
+        _strips([points[:, :2] for points in polylines]),
         colors=several,
         radii=rr.Radius.ui_points(0.5 * width),
         draw_order=order,
@@ -192,7 +192,13 @@ def _rims(outlines: Sequence[FloatArray], top_m: float, colour: Colour) -> rr.Li
     rims = [
         np.column_stack((ring, np.full(len(ring), height))) for ring in outlines for height in (0.0, top_m)
     ]
-    return rr.LineStrips3D(rims, colors=[colour], radii=rr.Radius.ui_points(0.5))
+    return rr.LineStrips3D(_strips(rims), colors=[colour], radii=rr.Radius.ui_points(0.5))
+
+
+def _strips(polylines: list[FloatArray]) -> np.ndarray[Any, np.dtype[np.float32]] | list[FloatArray]:
+    """Polylines as rerun takes them: as one array where all are of one length, for else it makes one of each."""
+    same = len({len(points) for points in polylines}) == 1
+    return np.stack(polylines).astype(np.float32) if same else polylines
 
 
 def _outline(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> FloatArray:
