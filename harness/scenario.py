@@ -30,7 +30,7 @@ from harness.scenario_sections import (
 )
 from harness.strict_yaml import COMMAND_LINE, InputError, Loc, Node
 from harness.validation import KeyFault, input_error
-from harness.yaml_writer import dump
+from harness.yaml_pieces import dump_in_pieces
 
 if TYPE_CHECKING:
     from aircraft.interface import Performance
@@ -139,13 +139,13 @@ def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = 
     Raises:
         InputError: it is not a scenario; its faults name the command line.
     """
-    root = strict_yaml.parse(dump(dict(keys)), "command line").moved(COMMAND_LINE)
+    root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
     return _validated(overridden(root, overrides), "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:
     """The YAML text of a scenario, all defaults written out; it loads back to an equal one, bit for bit."""
-    return dump(scenario.model_dump(by_alias=True, exclude_none=True))
+    return dump_in_pieces(scenario.model_dump(by_alias=True, exclude_none=True))
 
 
 def packed(scenario: Scenario) -> bytes:

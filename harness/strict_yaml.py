@@ -299,3 +299,29 @@ def _replaced(node: Node, loc: Loc, depth: int, new: Node) -> Node:
         inner = _replaced(entries.get(step, Node({}, COMMAND_LINE)), loc, depth + 1, new)
         return Node({**entries, step: inner}, node.line)
     raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], "no such key; see `wayproof schema`"))
+
+
+# Writes text in quotes wherever a YAML 1.2 reader would take it for something else, and no aliases: those are refused.
+_Dumper: Any = type(
+    "_Dumper",
+    (yaml.CSafeDumper if yaml.__with_libyaml__ else yaml.SafeDumper,),
+    {"ignore_aliases": lambda _dumper, _value: True},
+)
+
+
+def _represent_text(dumper: Any, text: str) -> yaml.ScalarNode:
+    style = None if isinstance(value_of(text), str) else "'"
+    node: yaml.ScalarNode = dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+    return node
+
+
+_Dumper.add_representer(str, _represent_text)
+_Dumper.add_representer(tuple, _Dumper.represent_list)
+
+
+def dump(value: Any) -> str:
+    """Plain values as YAML text that `parse` reads back to the same values, floats to the last bit."""
+    text = yaml.dump(
+        value, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
+    )
+    return str(text)

@@ -10,7 +10,7 @@ from harness.closed_loop import fly
 from harness.record import Flight
 from harness.run import make_loop
 from harness.scenario import Scenario, parse_scenario
-from harness.yaml_writer import dump
+from harness.strict_yaml import dump
 from planner import registry
 from planner.interface import Mission, Plan, PlanRequest
 from planner.registry import PlannerKind

@@ -23,7 +23,7 @@ from harness.closed_loop import fly
 from harness.record import FloatArray, Outcome
 from harness.run import make_loop
 from harness.scenario import Scenario, dump_scenario, mission_of, parse_scenario
-from harness.yaml_writer import dump
+from harness.strict_yaml import dump
 
 SIDE_M, CLEARANCE_M, THICK_M = 5000.0, 40.0, 30.0
 GOAL_RADIUS_M, APART_M = 60.0, 2000.0

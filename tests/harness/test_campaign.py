@@ -17,8 +17,7 @@ from harness.campaign_runs import CampaignRuns, Run
 from harness.cli import main
 from harness.scenario import load_scenario
 from harness.shipped import shipped_campaigns, shipped_scenarios
-from harness.strict_yaml import InputError
-from harness.yaml_writer import dump
+from harness.strict_yaml import InputError, dump
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = """\

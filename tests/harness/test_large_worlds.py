@@ -8,11 +8,12 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness import yaml_writer
 from harness.rerun_scene import circle, lines_2d
+from harness.strict_yaml import dump
+from harness.yaml_pieces import PIECE, dump_in_pieces
 from planner.interface import FloatArray
 
-NUMBER = 2 * yaml_writer.PIECE + 3
+NUMBER = 2 * PIECE + 3
 
 
 def one_by_one(number: int) -> dict[str, object]:
@@ -38,17 +39,21 @@ def one_by_one(number: int) -> dict[str, object]:
 @pytest.mark.parametrize("left_out", [(), ("mission", "note"), ("mission",), ("schema", "area"), ("area",)])
 def test_a_long_list_in_pieces_is_the_same_text(left_out: tuple[str, ...]) -> None:
     value = {key: inner for key, inner in one_by_one(NUMBER).items() if key not in left_out}
-    whole = yaml_writer._dumped(value)
-    assert yaml_writer.dump(value) == whole
+    whole = dump(value)
+    assert dump_in_pieces(value) == whole
     few = {**value, "obstacles": value["obstacles"][:5]}  # type: ignore[index]
-    assert yaml_writer.dump(few) == yaml_writer._dumped(few)
+    assert dump_in_pieces(few) == dump(few)
 
 
 @pytest.mark.parametrize("inner", [1.5, "yes", [1.0, 2.0], {"a": 1}, {"a": {}}])
 def test_so_is_a_long_list_of_anything(inner: object) -> None:
-    for value in ({"a": {"b": 1}, "long": [inner] * NUMBER}, {"long": [inner] * NUMBER}, [inner] * NUMBER):
-        text = yaml_writer.dump(value)
-        assert text == yaml_writer._dumped(value)
+    for value in (
+        {"a": {"b": 1}, "long": [inner] * NUMBER},
+        {"long": [inner] * NUMBER},
+        {"long": [inner] * NUMBER, "b": 2},
+    ):
+        text = dump_in_pieces(value)
+        assert text == dump(value)
         assert yaml.safe_load(text) == value
 
 

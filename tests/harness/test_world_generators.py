@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from harness.generated_world import GeneratedWorld
 from harness.scenario import parse_scenario
+from harness.strict_yaml import dump
 from harness.world_generators import GENERATORS, WorldSpec, generated
-from harness.yaml_writer import dump
 
 ROUNDING_M = 0.2
 BOUNDED = settings(
