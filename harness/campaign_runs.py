@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from pydantic import ValidationError
 
-from harness.campaign import MAX_RUNS, Base, CampaignFile
+from harness.campaign import MAX_RUNS, CampaignFile
 from harness.campaign_cells import cell_of, kind_of
 from harness.sampling import FloatArray, design
 from harness.scenario import Scenario, overridden, packed, unpacked, with_key
@@ -192,8 +192,7 @@ class CampaignRuns:
         try:
             return Scenario.model_validate(root.plain())
         except ValidationError as error:
-            blame = _Blame(self, base, root, changes, number)
-            lines = [blame.line(loc, sentence) for loc, sentence in faults(error, Scenario)]
+            lines = [self._fault(number, root, changes, *fault) for fault in faults(error, Scenario)]
             raise in_lines(lines, self.file.source) from error
 
     def packed(self, number: int) -> bytes:
@@ -314,31 +313,21 @@ class CampaignRuns:
         assert node is not None
         return node
 
-    def _line(self, origin: Loc, sentence: str) -> str:
-        return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
-
-
-class _Blame:
-    """Says which line a fault of a run's scenario comes from."""
-
-    def __init__(
-        self, runs: CampaignRuns, base: Base, root: Node, changes: Sequence[_Change], number: int
-    ) -> None:
-        self._runs, self._base, self._root = runs, base, root
-        self._changes, self._number = changes, number
-
-    def line(self, loc: Loc, sentence: str) -> str:
-        """The fault at `loc` of the scenario as a person reads it."""
-        for change in reversed(self._changes):
+    def _fault(self, number: int, root: Node, changes: Sequence[_Change], loc: Loc, sentence: str) -> str:
+        """The fault at `loc` of a run's scenario as a person reads it, and which line it comes from."""
+        for change in reversed(changes):
             shared = min(len(loc), len(change.loc))
             if shared and change.loc[:shared] == loc[:shared]:
                 named = loc == change.loc and change.origin[0] != "worlds"
                 inner = "" if named else f"{key_path(loc)}: "
-                return self._runs._line(change.origin, f"{inner}{sentence} (run {self._number})")
-        varied = self._runs.run(self._number).varied
-        told = "".join(f", {name} {value}" for name, value in varied.items())
-        where = f"(run {self._number} of {self._runs.file.source}{told})"
-        return fault_line(self._base.source, self._root.line_of(loc), loc, f"{sentence} {where}")
+                return self._line(change.origin, f"{inner}{sentence} (run {number})")
+        told = "".join(f", {name} {value}" for name, value in self.run(number).varied.items())
+        where = f"(run {number} of {self.file.source}{told})"
+        source = self.file.bases[self._place(number).base].source
+        return fault_line(source, root.line_of(loc), loc, f"{sentence} {where}")
+
+    def _line(self, origin: Loc, sentence: str) -> str:
+        return fault_line(self.file.source, self.file.root.line_of(origin), origin, sentence)
 
 
 def _without_course(root: Node) -> Node:

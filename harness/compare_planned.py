@@ -13,7 +13,7 @@ from harness.record import AcceptedPlan, FloatArray, Track
 from harness.smoothness import CORNER_RAD, window_m
 
 if TYPE_CHECKING:
-    from harness.run_folder import PlanRow
+    from harness.plans_table import PlanRow
 
 SAME_TURN = 1e-3
 """Curvatures that differ by no more than this share of them are equal."""

@@ -21,16 +21,12 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Final
-
-import numpy as np
+from typing import Any, Final
 
 from harness.folder_lock import FolderLock
 from harness.input_file import read_text
-from harness.record import TRACK_FIELDS, AcceptedPlan, FloatArray, RunFolderError, Track, polyline
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+from harness.plans_table import PlanRow, plan_rows, plans_table
+from harness.record import TRACK_FIELDS, AcceptedPlan, RunFolderError, Track
 
 SCENARIO = "scenario.yaml"
 MANIFEST = "manifest.json"
@@ -58,35 +54,6 @@ DISTRIBUTIONS = ("wayproof", "jsbsim", "numba", "numpy", "shapely", "rerun-sdk",
 COMPRESSION = "lz4"
 SPLIT = [name for name in TRACK_FIELDS if name != "plan_index"]
 """Columns whose bytes are written first bytes first: half the size and half the time."""
-
-
-@dataclass(frozen=True, eq=False)
-class PlanRow:
-    """One row of `plans.parquet`.
-
-    Attributes:
-        plan_index: 0 for the first plan.
-        time_s: in effect from this simulated time on.
-        status: how the planner's call ended, a value of `planner.interface.PlanStatus`.
-        compute_ms: wall-clock time of the call that found it.
-        waypoints_m: (k, 2) east, north.
-        path_m: (m, 2) dense polyline, east, north.
-        segments: (n, 6) the same path exactly, as in `planner.interface.Path`.
-        loiter: whether its last segment is a full circle, flown for ever.
-        length_m: length of the path.
-        max_curvature_1pm: its largest absolute curvature.
-    """
-
-    plan_index: int
-    time_s: float
-    status: str
-    compute_ms: float
-    waypoints_m: FloatArray
-    path_m: FloatArray
-    segments: FloatArray
-    loiter: bool
-    length_m: float
-    max_curvature_1pm: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +166,7 @@ class RunFolder:
         text = _json(metrics)
         self._close_track()
         os.replace(self.path / (TRACK + PARTIAL), self.path / TRACK)
-        pq.write_table(_plans_table(plans), self.path / (PLANS + PARTIAL), compression=COMPRESSION)
+        pq.write_table(plans_table(plans), self.path / (PLANS + PARTIAL), compression=COMPRESSION)
         os.replace(self.path / (PLANS + PARTIAL), self.path / PLANS)
         replace_text(self.path / METRICS, text)
         tables = (TRACK, PLANS, RECORDING)
@@ -246,7 +213,7 @@ def load_run(path: Path) -> Run:
             scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),
             manifest=manifest,
             track=Track(**{name: table[name].to_numpy() for name in TRACK_FIELDS}),
-            plans=_plan_rows(pq.read_table(path / PLANS)),
+            plans=plan_rows(pq.read_table(path / PLANS)),
             metrics=json.loads(read_text(path / METRICS, MAX_JSON_BYTES, "metrics, in JSON")),
         )
     except (OSError, pa.ArrowException, *WRONG_CONTENT) as error:
@@ -344,42 +311,3 @@ def replace_text(path: Path, text: str) -> None:
     partial = path.with_name(path.name + PARTIAL)
     partial.write_text(text, encoding="utf-8")
     os.replace(partial, path)
-
-
-def _plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
-    import pyarrow as pa
-
-    paths = [accepted.plan.path for accepted in plans]
-    columns = {
-        "plan_index": pa.array([accepted.plan_index for accepted in plans], pa.int64()),
-        "time_s": pa.array([accepted.time_s for accepted in plans], pa.float64()),
-        "status": pa.array([accepted.plan.status.value for accepted in plans], pa.string()),
-        "compute_ms": pa.array([accepted.compute_ms for accepted in plans], pa.float64()),
-        "waypoints": _points_column([accepted.plan.waypoints_m for accepted in plans]),
-        "path": _points_column([polyline(accepted.segments) for accepted in plans]),
-        "segments": _points_column([accepted.segments for accepted in plans], 6),
-        "loiter": pa.array([accepted.loiter for accepted in plans], pa.bool_()),
-        "length_m": pa.array([path.length_m for path in paths if path], pa.float64()),
-        "max_curvature_1pm": pa.array([path.max_curvature_1pm for path in paths if path], pa.float64()),
-    }
-    return pa.table(columns)
-
-
-def _points_column(rows: Sequence[FloatArray], width: int = 2) -> pa.Array:
-    """A column of lists of rows: by default of [east_m, north_m]."""
-    import pyarrow as pa
-
-    flat = np.concatenate([np.zeros((0, width)), *rows]).ravel()
-    offsets = np.cumsum([0, *(len(each) for each in rows)])
-    values = pa.FixedSizeListArray.from_arrays(pa.array(flat), width)
-    return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), values)
-
-
-def _plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
-    rows = []
-    for row in table.to_pylist():
-        row["waypoints_m"] = np.array(row.pop("waypoints"), dtype=np.float64).reshape(-1, 2)
-        row["path_m"] = np.array(row.pop("path"), dtype=np.float64).reshape(-1, 2)
-        row["segments"] = np.array(row["segments"], dtype=np.float64).reshape(-1, 6)
-        rows.append(PlanRow(**row))
-    return tuple(rows)

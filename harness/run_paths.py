@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from aircraft.frames import LocalPlane
+from harness.plans_table import PlanRow
 from harness.record import FloatArray
-from harness.run_folder import PlanRow, Run
+from harness.run_folder import Run
 from harness.scenario import parse_scenario
 
 FORWARD_M = 0.5
