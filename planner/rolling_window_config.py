@@ -19,8 +19,9 @@ class RollingWindowConfig:
     planning_window_m: float | None = field(
         default=None,
         metadata={
-            "doc": "radius r1 of the planning window, at most the sensor range; default: the sensor range. The recording "
-            "shows it, and the rolling step is a share of it; the search goes through all that is remembered",
+            "doc": "radius r1 of the planning window, at most the sensor range; default: the sensor range. The "
+            "recording shows it, and the rolling step is a share of it; the search goes through all that is "
+            "remembered",
             "unit": "m",
             "above": 0.0,
         },
