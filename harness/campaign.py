@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -101,7 +101,20 @@ class Campaign(Section):
         for section, keys in (("set", self.set_), ("grid", self.grid), ("random", self.random)):
             for name in keys:
                 self._check_key((section, name), taken)
+        for section, entries in (("planners", self.planners), ("aircraft", self.aircraft)):
+            self._check_entries(section, entries, taken)
         return self
+
+    @staticmethod
+    def _check_entries(section: str, entries: Sequence[Section], taken: dict[Loc, str]) -> None:
+        """Refuses an entry that stands there already, or whose key is given for every entry elsewhere."""
+        for index, entry in enumerate(entries):
+            if entry in entries[:index]:
+                raise KeyFault((section, index), "is there already; leave it out or give it another key")
+            for name in entry.model_fields_set | (entry.model_extra or {}).keys():
+                named = taken.get((section.removesuffix("s"), name), "set")
+                if not named.startswith("set"):
+                    raise KeyFault((section, index, name), f"is given under {named} too; keep one of them")
 
     def _check_key(self, where: tuple[str, str], taken: dict[Loc, str]) -> None:
         """Refuses a key path that is none, is not for a campaign to give, or is given already."""
@@ -245,14 +258,18 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
         if path.is_file():
             return [path]
         if path.is_dir():
-            if files := [file for file in sorted(path.glob("*.yaml")) if not is_campaign(file)]:
+            if files := [file for file in sorted(path.glob("*.y*ml")) if _is_scenario(file)]:
                 return files
-            raise fault(f"is {entry!r}, a folder without scenario files (*.yaml)")
+            raise fault(f"is {entry!r}, a folder without scenario files (*.yaml, *.yml)")
     except OSError as error:
         raise fault(f"is {shown(entry)}: {error.strerror}") from error
     if entry in shipped:
         return [shipped[entry]]
     raise fault(f"is {entry!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}")
+
+
+def _is_scenario(file: Path) -> bool:
+    return file.suffix in (".yaml", ".yml") and not is_campaign(file)
 
 
 def _with_folders(root: Node, folder: Path) -> Node:

@@ -13,25 +13,28 @@ import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Final
 
+from aircraft.airframes import airframe
 from harness.campaign_runs import CampaignRuns
 from harness.record import RunFolderError
 from harness.results import METRICS, RESULTS, RUN, SCHEMA, TIMES, TIMINGS, table
-from harness.run_folder import PARTIAL
+from harness.versions import versions
+from harness.whole_file import PARTIAL, replace_text
+from planner.registry import distribution_of
 
 INDEX: Final = "campaign.json"
 JOURNAL: Final = "journal.jsonl"
 LOCK: Final = "lock"
 RUNS: Final = "runs"
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
-FLOWN_WITH: Final = ("wayproof", "jsbsim", "numba", "numpy", "shapely")
-"""What a flight's bits depend on: a campaign is not gone on with another version."""
 
+ABSENT: Final = object()
 MAX_TOLD: Final = 3
+IN_ORDER: Final = ("campaign.grid", "campaign.random")
+"""What a run flies follows from the order of the keys there, too."""
 
 
 class CampaignFolder:
@@ -136,7 +139,7 @@ class CampaignFolder:
                 f"{path} is of another campaign: {told}; change it back or choose another folder"
             )
         if before != now:
-            _replace(path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
+            replace_text(path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
         if (path / JOURNAL).exists():
             os.truncate(path / JOURNAL, kept_bytes)
         return done
@@ -145,7 +148,9 @@ class CampaignFolder:
         """The content of `campaign.json`, as it is read back."""
         about = {
             "schema": FOLDER_SCHEMA,
-            "versions": {name: _version(name) for name in FLOWN_WITH},
+            "versions": versions(),
+            "planners": {kind: distribution_of(kind) for kind in self._runs.planners},
+            "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
             **self._runs.file.plain(),
         }
         read: dict[str, Any] = json.loads(json.dumps(about))
@@ -190,8 +195,12 @@ def _lines(journal: Path) -> Iterator[tuple[dict[str, Any], int]]:
 def _changes(before: Any, now: Any, where: str = "") -> Iterator[str]:
     """What differs between two contents, a sentence each."""
     if isinstance(before, dict) and isinstance(now, dict):
-        for name in before.keys() | now.keys() if before.keys() != now.keys() else before:
-            yield from _changes(before.get(name), now.get(name), f"{where}.{name}".lstrip("."))
+        for name in dict.fromkeys([*before, *now]):
+            yield from _changes(
+                before.get(name, ABSENT), now.get(name, ABSENT), f"{where}.{name}".lstrip(".")
+            )
+        if where in IN_ORDER and before.keys() == now.keys() and list(before) != list(now):
+            yield f"{where} had its keys in the order {', '.join(before)}, has {', '.join(now)}"
     elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
         for index, pair in enumerate(zip(before, now, strict=True)):
             yield from _changes(*pair, f"{where}[{index}]")
@@ -200,22 +209,5 @@ def _changes(before: Any, now: Any, where: str = "") -> Iterator[str]:
 
 
 def _shown(value: Any) -> str:
-    text = "not there" if value is None else json.dumps(value)
+    text = "not there" if value is ABSENT else json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _version(distribution: str) -> str | None:
-    try:
-        return version(distribution)
-    except PackageNotFoundError:
-        return None
-
-
-def _replace(path: Path, text: str) -> None:
-    """Writes a file so that it is either the old one or the whole new one."""
-    partial = path.with_name(path.name + PARTIAL)
-    with partial.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
-    partial.replace(path)

@@ -57,12 +57,21 @@ def grouped(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
     if numeric:
         if len(set(given)) > MOST_NUMBERS:
             return _binned(key, values)
-        labels = {value: f"{value:.6g}" for value in sorted(set(given))}
+        labels = dict(zip(sorted(set(given)), _numbers(sorted(set(given))), strict=True))
     else:
         labels = _names(given)
     texts = [NONE if value is None else labels[_hashable(value)] for value in values]
     order = tuple(dict.fromkeys([*labels.values(), *(text for text in texts if text == NONE)]))
     return Axis(key, order, numeric=numeric), _indices(order, texts)
+
+
+def _numbers(values: Sequence[float], digits: int = 6) -> list[str]:
+    """Different numbers with as many digits as tell them apart."""
+    for count in range(digits, 18):
+        texts = [f"{value:.{count}g}" for value in values]
+        if len(set(texts)) == len(texts):
+            return texts
+    raise ValueError(f"not all different: {values}")
 
 
 def _names(given: Sequence[Any]) -> dict[Any, str]:
@@ -81,7 +90,7 @@ def _binned(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
     numbers = np.array([np.nan if value is None else value for value in values], dtype=np.float64)
     missing = np.isnan(numbers)
     edges = np.unique(np.quantile(numbers[~missing], np.linspace(0.0, 1.0, BINS + 1)))
-    labels = tuple(f"{low:.4g} to {high:.4g}" for low, high in itertools.pairwise(edges))
+    labels = tuple(f"{low} to {high}" for low, high in itertools.pairwise(_numbers(edges.tolist(), 4)))
     index = np.searchsorted(edges[1:-1], numbers, side="right")
     if missing.any():
         index[missing] = len(labels)

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from harness.campaign_table import Runs
+from harness.campaign_table import IntArray, Runs
 from harness.record import FloatArray
 
 CONFIDENCE: Final = 0.95
@@ -31,7 +31,7 @@ class Estimate:
 
     Attributes:
         value: None where no pair gives one.
-        low: lower end; None where fewer than two different values leave nothing to resample.
+        low: lower end; None where a single case, or one value alone, leaves nothing to resample.
         high: upper end, likewise.
     """
 
@@ -65,23 +65,13 @@ class Duel:
     length: Estimate
 
 
-def duels(runs: Runs) -> tuple[tuple[Duel, ...], tuple[str, ...]]:
-    """Every planner against every other, in the order in which they first appear.
-
-    Returns:
-        The pairs; and the planners that are in none because they flew a case more than once with the same
-        aircraft, as one does that is named twice with different keys.
-    """
+def duels(runs: Runs) -> tuple[Duel, ...]:
+    """Every planner against every other, in the order in which they first appear."""
     flown: dict[str, dict[tuple[int, str], int]] = {}
-    unpaired: dict[str, None] = {}
-    for row, (planner, aircraft) in enumerate(
-        zip(runs.names["planner"], runs.names["aircraft"], strict=True)
-    ):
-        case = int(runs.case[row]), aircraft
-        if flown.setdefault(planner, {}).setdefault(case, row) != row:
-            unpaired[planner] = None
-    pairs = itertools.combinations([planner for planner in flown if planner not in unpaired], 2)
-    return tuple(_duel(runs, first, second, flown) for first, second in pairs), tuple(unpaired)
+    planners, aircraft = runs.names["planner"], runs.names["aircraft"]
+    for row, planner in enumerate(planners):
+        flown.setdefault(planner, {})[int(runs.case[row]), aircraft[row]] = row
+    return tuple(_duel(runs, first, second, flown) for first, second in itertools.combinations(flown, 2))
 
 
 def _duel(runs: Runs, first: str, second: str, flown: Mapping[str, Mapping[tuple[int, str], int]]) -> Duel:
@@ -92,38 +82,43 @@ def _duel(runs: Runs, first: str, second: str, flown: Mapping[str, Mapping[tuple
     both = won & lost
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = np.log(runs.flown_length_m[ours][both] / runs.flown_length_m[theirs][both])
-    length = mean_estimate(logs[np.isfinite(logs)])
+    finite, of_case = np.isfinite(logs), runs.case[ours]
+    length = mean_estimate(logs[finite], of_case[both][finite])
     return Duel(
         first,
         second,
         pairs=len(common),
         only_first=int((won & ~lost).sum()),
         only_second=int((lost & ~won).sum()),
-        success=mean_estimate(won.astype(np.float64) - lost),
+        success=mean_estimate(won.astype(np.float64) - lost, of_case),
         both_reached=int(both.sum()),
         length=Estimate(*(None if each is None else float(np.exp(each)) for each in _ends(length))),
     )
 
 
-def mean_estimate(differences: FloatArray) -> Estimate:
-    """The mean of paired differences with the percentile bootstrap interval over the pairs.
+def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
+    """The mean of paired differences with the percentile bootstrap interval over the cases.
 
-    Resampling differences is resampling pairs. Efron and Tibshirani, An Introduction to the Bootstrap (1993),
-    chapter 13.
+    All pairs of a case, one an aircraft, are drawn together: they share its world, weather and seed. Efron and
+    Tibshirani, An Introduction to the Bootstrap (1993), chapters 8 and 13.
 
     Args:
         differences: (n,) one a pair, all finite.
+        cases: (n,) case of each.
     """
     if not len(differences):
         return Estimate()
     mean = float(differences.mean())
-    if np.ptp(differences) == 0.0:
+    _, index = np.unique(cases, return_inverse=True)
+    if np.ptp(differences) == 0.0 or index.max() == 0:
         return Estimate(mean)
     from scipy import stats
 
     interval = stats.bootstrap(
-        (differences,),
-        np.mean,
+        (np.bincount(index, differences), np.bincount(index)),
+        lambda sums, counts, axis: sums.sum(axis=axis) / counts.sum(axis=axis),
+        paired=True,
+        vectorized=True,
         confidence_level=CONFIDENCE,
         n_resamples=RESAMPLES,
         batch=BATCH,

@@ -83,7 +83,7 @@ def _success_briefly(cell: Cell) -> str:
 
 
 def _two_digits(value: float | None) -> str:
-    return DASH if value is None else f"{value:.0f}" if value >= 10 else f"{value:.2g}"
+    return DASH if value is None else f"{value:.{0 if value >= 10 else 1 if value >= 1 else 2}f}"
 
 
 def _length(cell: Cell) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
+import shlex
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -12,8 +12,9 @@ from typing import Any
 from harness.campaign_questions import QUESTIONS, difference, percent, ratio, shade
 from harness.campaign_summary import Summary
 from harness.compare_rows import number
+from harness.record import WriteError
 from harness.report import Picture, rendered
-from harness.strict_yaml import InputError
+from harness.whole_file import replace_text
 
 PAGE = "summary.html"
 PLAIN = "summary.json"
@@ -24,15 +25,16 @@ def write_summary(summary: Summary, folder: Path) -> Path:
     """Writes the page and the same answers as JSON into a campaign's folder; returns the path of the page.
 
     Raises:
-        InputError: the folder cannot be written.
+        WriteError: they could not be written.
     """
     page = folder / PAGE
     try:
-        _replace(folder / PLAIN, json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
-        _replace(page, summary_html(summary))
+        replace_text(folder / PLAIN, json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
+        replace_text(page, summary_html(summary))
     except OSError as error:
-        raise InputError(
-            f"wayproof: cannot write the summary in {folder}: {error.strerror or error}"
+        raise WriteError(
+            f"cannot write the summary in {folder}: {error.strerror or error}; the results are whole, and "
+            f"`{shlex.join(['wayproof', 'report', str(folder)])}` makes it from them"
         ) from error
     return page
 
@@ -73,10 +75,3 @@ def _pictures(summary: Summary) -> Iterator[Picture]:
             "Distribution of the flown length over the clairvoyant optimum",
             "How long the ways were: the share of the goals reached with at most this length over the optimum.",
         )
-
-
-def _replace(path: Path, text: str) -> None:
-    """Writes a file so that it is either the old one or the whole new one."""
-    partial = path.with_name(f"{path.name}.partial")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)

@@ -20,8 +20,10 @@ from pydantic import ValidationError
 
 from harness.campaign import MAX_RUNS, CampaignFile
 from harness.campaign_cells import cell_of, kind_of
+from harness.key_types import takes_whole_numbers
 from harness.sampling import FloatArray, design
 from harness.scenario import Scenario, overridden, packed, unpacked, with_key
+from harness.scenario_sections import Section
 from harness.strict_yaml import (
     InputError,
     Loc,
@@ -114,7 +116,8 @@ class CampaignRuns:
         self._last_world: tuple[int, list[_Change]] = (-1, [])
         self._made: dict[int, bytes] = {}  # by `check`
         if self._number > MAX_RUNS:
-            raise InputError(f"{file.source}: has {self._number} runs; must be at most {MAX_RUNS}")
+            sentence = f"makes {self._number} runs with what is combined; must be at most {MAX_RUNS}"
+            raise InputError(self._line(("draws",) if campaign.draws > 1 else ("grid",), sentence))
         designed = 0 if campaign.sampler == "independent" else self.cases * len(campaign.random)
         if designed > MAX_DESIGNED:
             raise InputError(
@@ -133,15 +136,52 @@ class CampaignRuns:
         """How many cases there are."""
         return self._number // len(self._pairs)
 
+    @property
+    def planners(self) -> list[str]:
+        """The kinds of planners that fly."""
+        named = [each.kind for each in self.campaign.planners]
+        return named or [base.word(("planner", "kind"), DEFAULT_PLANNER) for base in self.file.bases]
+
+    @property
+    def aircraft(self) -> list[str]:
+        """The models of aircraft that fly."""
+        named = [each.model for each in self.campaign.aircraft]
+        return named or [base.word(("aircraft", "model"), DEFAULT_AIRCRAFT) for base in self.file.bases]
+
     @cached_property
     def varied(self) -> dict[str, str]:
         """Columns of `results.parquet` for the varied keys: number, int, bool or text by key path."""
+        entries = {
+            f"{into}.{name}": kind_of([self._of_entry(listed, index, name) for index in range(len(given))])
+            for listed, into, first, given in self._listed
+            for name in dict.fromkeys(key for each in given for key in _keys_of(each) if key != first)
+        }
         grid = {_path(name): kind_of(values) for name, values in self.campaign.grid.items()}
         drawn = {
-            _path(name): kind_of(each.choice) if each.choice else "number"
+            _path(name): kind_of(each.choice) if each.choice else "int" if name in self._whole else "number"
             for name, each in self.campaign.random.items()
         }
-        return grid | drawn
+        return grid | drawn | entries
+
+    @cached_property
+    def _whole(self) -> set[str]:
+        """Keys drawn at random that take whole numbers alone."""
+        return {name for name in self.campaign.random if takes_whole_numbers(loc_of(name))}
+
+    @property
+    def _listed(self) -> tuple[tuple[str, str, str, Sequence[Section]], ...]:
+        """Lists of entries: key of the campaign, section of a scenario, the key that each has, the entries."""
+        campaign = self.campaign
+        return (
+            ("planners", "planner", "kind", campaign.planners),
+            ("aircraft", "aircraft", "model", campaign.aircraft),
+        )
+
+    def _of_entry(self, listed: str, index: int, name: str) -> Any:
+        """What an entry of a list gives for a key; None where it does not."""
+        node = self.file.root.at((listed, index))
+        inner = node.value.get(name) if node is not None and isinstance(node.value, dict) else None
+        return None if inner is None else inner.plain()
 
     def run(self, number: int) -> Run:
         """Run `number`, from 0."""
@@ -149,6 +189,13 @@ class CampaignRuns:
         base = self.file.bases[place.base]
         planners, aircraft = self.campaign.planners, self.campaign.aircraft
         changes = [*self._grid(place), *self._drawn(place)]
+        given = {key_path(each.loc): each.node.plain() for each in changes}
+        for listed, into, _, _ in self._listed:
+            index = place.planner if listed == "planners" else place.aircraft
+            for column in self.varied:
+                section, _, name = column.partition(".")
+                if section == into and column not in given:
+                    given[column] = self._of_entry(listed, index, name)
         return Run(
             number,
             place.case,
@@ -159,10 +206,7 @@ class CampaignRuns:
             if aircraft
             else base.word(("aircraft", "model"), DEFAULT_AIRCRAFT),
             self._seed(place.case),
-            {
-                key_path(each.loc): cell_of(each.node.plain(), self.varied[key_path(each.loc)])
-                for each in changes
-            },
+            {column: cell_of(given[column], kind) for column, kind in self.varied.items()},
         )
 
     def scenario(self, number: int, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
@@ -287,7 +331,9 @@ class CampaignRuns:
             if each.choice:
                 node = self._at((*origin, "choice", each.chosen(share)))
             else:
-                node = Node(each.number(share), self.file.root.line_of(origin))
+                number = each.number(share)
+                whole = name in self._whole
+                node = Node(round(number) if whole else number, self.file.root.line_of(origin))
             changes.append(_Change(loc_of(name), node, origin))
         return changes
 
@@ -337,6 +383,14 @@ def _without_course(root: Node) -> Node:
         return root
     kept = {name: node for name, node in mission.value.items() if name != "course_deg"}
     return replaced(root, ("mission",), Node(kept, mission.line))
+
+
+def _keys_of(entry: Section) -> list[str]:
+    """The keys that an entry gives."""
+    return [
+        *(name for name in type(entry).model_fields if name in entry.model_fields_set),
+        *(entry.model_extra or {}),
+    ]
 
 
 def _path(name: str) -> str:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from harness.campaign_groups import Axis, grouped
 from harness.campaign_paired import CONFIDENCE, Duel, duels
-from harness.campaign_table import NAMED, Runs, load_tables, runs_of, varied_keys
+from harness.campaign_table import NAMED, Runs, load_tables, planned_runs, runs_of, varied_keys
 from harness.record import FloatArray
 from harness.results import ERROR, RESULTS
 from harness.run_folder import RECORDING
@@ -131,7 +131,7 @@ class Summary:
         lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
         worst: collisions first, then other failures, then what came closest to an obstacle.
         duels: planners on the same cases.
-        unpaired: planners that are in no duel, because they flew a case more than once with one aircraft.
+        planned: how many runs the campaign has, flown or not; None where the results do not say so.
     """
 
     name: str
@@ -143,31 +143,31 @@ class Summary:
     lengths: Mapping[str, tuple[float, ...]]
     worst: tuple[WorstRun, ...]
     duels: tuple[Duel, ...]
-    unpaired: tuple[str, ...]
+    planned: int | None = None
+
+    @property
+    def missing(self) -> int:
+        """How many runs are still to be flown, as far as is known."""
+        return 0 if self.planned is None else self.planned - self.total.runs
 
 
-def summarise(
-    folder: Path, varied: Sequence[str] | None = None, by: Sequence[Sequence[str]] | None = None
-) -> Summary:
+def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summary:
     """The answers of the campaign in a folder.
 
     Args:
         folder: with `results.parquet` and `timings.parquet`.
-        varied: columns that count as varied keys; default: as `varied_keys` finds them.
         by: one or two keys for each table; default: every two of the first varied keys.
 
     Raises:
         InputError: the folder holds no campaign, or a key is no column of it.
     """
     results, timings = load_tables(folder)
-    keys = list(varied_keys(results) if varied is None else varied)
-    chosen = [list(each) for each in (by if by is not None else _default_choice(keys))]
-    for each in chosen:
+    keys = varied_keys(results)
+    for each in by or ():
         if len(each) not in (1, 2) or len(set(each)) < len(each):
             raise InputError(f"wayproof: --by {','.join(each)}: must be one key, or two different ones")
-    asked = dict.fromkeys([*keys, *itertools.chain(*chosen), *NAMED])
-    runs = runs_of(results, timings, list(asked))
-    pairs, unpaired = duels(runs)
+    runs = runs_of(results, timings, list(dict.fromkeys([*keys, *itertools.chain(*(by or ())), *NAMED])))
+    chosen = [list(each) for each in (by if by is not None else _default_choice(keys, runs))]
     singles = dict.fromkeys(itertools.chain(*chosen))
     return Summary(
         name=folder.resolve().name,
@@ -178,14 +178,20 @@ def summarise(
         curves=tuple(table(runs, [key, "planner"]) for key in singles if key != "planner"),
         lengths=_lengths(runs),
         worst=_worst(runs, folder, keys),
-        duels=pairs,
-        unpaired=unpaired if len(set(runs.names["planner"])) > 1 else (),
+        duels=duels(runs),
+        planned=planned_runs(results),
     )
 
 
-def _default_choice(keys: Sequence[str]) -> list[tuple[str, ...]]:
-    """Every two of the first keys; a world stands for its scenario."""
-    first = [key for key in keys if key != "scenario" or "world" not in keys][:BY_DEFAULT]
+def _are_crossed(worlds: Sequence[str], scenarios: Sequence[str]) -> bool:
+    """Whether one world was flown with several scenarios: else it stands for its scenario."""
+    return len(set(zip(worlds, scenarios, strict=True))) > len(set(worlds))
+
+
+def _default_choice(keys: Sequence[str], runs: Runs) -> list[tuple[str, ...]]:
+    """Every two of the first keys."""
+    crossed = _are_crossed(runs.names["world"], runs.names["scenario"])
+    first = [key for key in keys if key != "scenario" or crossed or "world" not in keys][:BY_DEFAULT]
     return [tuple(first)] if len(first) == 1 else list(itertools.combinations(first, 2))
 
 
@@ -277,10 +283,12 @@ def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...
 def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[str]) -> WorstRun:
     number, names = int(runs.run[row]), runs.names
     kept, clearance = Path("runs") / str(number), float(runs.min_clearance_m[row])
-    world = names["world"][row] or names["scenario"][row]
+    world, scenario = names["world"][row], names["scenario"][row]
+    crossed = world and _are_crossed(names["world"], names["scenario"])
+    place = (scenario, world) if crossed else (world or scenario,)
     return WorstRun(
         run=number,
-        name=", ".join(filter(None, (world, names["planner"][row], names["aircraft"][row]))),
+        name=", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row]))),
         seed=int(runs.seed[row]),
         outcome=names["outcome"][row],
         reason=names["reason"][row],

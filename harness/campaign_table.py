@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -70,6 +71,8 @@ class Runs:
 def load_tables(folder: Path) -> tuple[pa.Table, pa.Table | None]:
     """Reads results and, where there are any, timings of a campaign.
 
+    A planner or an aircraft that is named more than once is told apart by the keys that each entry gives.
+
     Raises:
         InputError: the folder holds no campaign, or a file of it cannot be read.
     """
@@ -81,10 +84,50 @@ def load_tables(folder: Path) -> tuple[pa.Table, pa.Table | None]:
         raise InputError(f"wayproof: {folder} has no {RESULTS}: it is not the folder of a campaign")
     try:
         timings = folder / TIMINGS
-        return pq.read_table(path), pq.read_table(timings) if timings.is_file() else None
+        results = pq.read_table(path)
+        for name, entries, first in (("planner", "planners", "kind"), ("aircraft", "aircraft", "model")):
+            results = _told_apart(results, name, _campaign(results).get(entries, ()), first)
+        return results, pq.read_table(timings) if timings.is_file() else None
     except (OSError, pa.ArrowException) as error:
         text = str(error).splitlines()[0]
         raise InputError(f"wayproof: the campaign in {folder} is damaged: {text}") from error
+
+
+def planned_runs(results: pa.Table) -> int | None:
+    """How many runs the campaign has, flown or not; None where the table does not say so."""
+    runs: int | None = _about(results).get("runs")
+    return runs
+
+
+def _about(results: pa.Table) -> Mapping[str, Any]:
+    """What the table says of its campaign, as `harness.results.campaign_of` has it; empty if nothing."""
+    about: Mapping[str, Any] = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
+    return about
+
+
+def _campaign(results: pa.Table) -> Mapping[str, Any]:
+    campaign: Mapping[str, Any] = _about(results).get("campaign", {})
+    return campaign
+
+
+def _told_apart(results: pa.Table, name: str, entries: Sequence[Any], first: str) -> pa.Table:
+    """The table with entries of one planner, or aircraft, told apart by the keys that they give."""
+    import pyarrow as pa
+
+    given = [entry if isinstance(entry, Mapping) else {first: entry} for entry in entries]
+    named = [each.get(first) for each in given]
+    keys = [f"{name}.{key}" for key in dict.fromkeys(itertools.chain(*given)) if key != first]
+    keys = [key for key in keys if key in results.column_names]
+    texts = []
+    for row in results.select([name, *keys]).to_pylist() if name in results.column_names else ():
+        text = row[name]
+        if named.count(text) > 1:
+            told = (f"{key.partition('.')[2]} {row[key]}" for key in keys if row[key] is not None)
+            text = ", ".join((text, *told))
+        texts.append(text)
+    if not texts:
+        return results
+    return results.set_column(results.column_names.index(name), name, pa.array(texts, pa.string()))
 
 
 def varied_keys(results: pa.Table) -> list[str]:

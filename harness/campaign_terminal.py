@@ -29,7 +29,12 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     console = Console()
     width = min(WIDTH, console.width)
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
-    console.print(f"{escape(summary.name)}: {summary.total.runs} runs" + (f": {ended}" if ended else ""))
+    runs = (
+        f"{summary.total.runs} of {summary.planned} runs" if summary.missing else f"{summary.total.runs} runs"
+    )
+    console.print(f"{escape(summary.name)}: {runs}" + (f": {ended}" if ended else ""))
+    if summary.missing:
+        console.print(f"[bold yellow]not complete[/]: {summary.missing} are missing, --resume flies them")
     if not summary.total.runs:
         return
     shown = summary.tables if all_tables else summary.tables[:1]
@@ -64,9 +69,9 @@ def _columns(title: str) -> Grid:
     grid = Grid(
         title=escape(title), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False
     )
-    grid.add_column("", max_width=NAME_WIDTH, overflow="fold")
+    grid.add_column("", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
     for name in ("runs", *(question.short for question in QUESTIONS)):
-        grid.add_column(name, justify="right", overflow="fold")
+        grid.add_column(name, justify="right", no_wrap=True)
     return grid
 
 

@@ -12,6 +12,7 @@ from typing import Protocol
 
 from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.interface import AircraftState, Command, FlightModel, Route
+from harness.crash import in_a_line, sentence, trace
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
 from harness.sensed_world import SensedWorld
@@ -149,6 +150,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         tuple(plans.compute_ms),
         sim_s=state.time_s,
         wall_s=time.perf_counter() - begun,
+        error=plans.error,
     )
 
 
@@ -188,6 +190,8 @@ class _Plans:
         self._station, self._turns_at = 0.0, math.inf
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
+        self.error: str | None = None
+        """The traceback of what the planner raised."""
 
     @property
     def state(self) -> str:
@@ -217,15 +221,16 @@ class _Plans:
         begun = time.perf_counter()
         try:
             plan = self._loop.planner.plan(request)
-        except Exception as error:
-            return Outcome.PLANNER_FAILED, f"the planner raised {type(error).__name__}: {error}"
+        except (Exception, SystemExit) as error:
+            self.error = trace(error)
+            return Outcome.PLANNER_FAILED, f"the planner raised {sentence(error)}"
         compute_ms = 1e3 * (time.perf_counter() - begun)
         told, self._told = self._told, plan.reason
         self.go_on = plan.goes_on
         if plan.status is not PlanStatus.KEPT:
             self.compute_ms.append(compute_ms)
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
-            return Outcome.UNREACHABLE, plan.reason
+            return Outcome.UNREACHABLE, in_a_line(plan.reason)
         if plan.status is PlanStatus.NO_PATH and plan.reason != told:
             for observer in self._observers:
                 observer.on_event(state.time_s, plan.reason)

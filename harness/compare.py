@@ -25,6 +25,7 @@ from harness.record import RunFolderError
 from harness.run_folder import RECORDING, REPORT, load_run
 from harness.scenario import Scenario
 from harness.strict_yaml import InputError
+from harness.whole_file import replace_text
 
 if TYPE_CHECKING:
     from harness.report import Chapter
@@ -173,11 +174,7 @@ def _is_comparison(out: Path) -> bool:
 
 
 def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
-    partial = out / f"{INDEX}.partial"
-    partial.write_text(
-        json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n", encoding="utf-8"
-    )
-    partial.replace(out / INDEX)
+    replace_text(out / INDEX, json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n")
 
 
 def _entry(job: Job, answer: Answer, optima: Mapping[str, Optimum]) -> Entry:

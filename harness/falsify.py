@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from harness.crash import sentence
 from harness.falsify_folder import FALSIFIED, PICTURES, SCHEMA, Trial, trials_folder, write_index
 from harness.falsify_keys import Load, Vary, scenario_at
 from harness.falsify_search import Judge, Point, Searched, Verdict, search
@@ -66,13 +67,13 @@ class Breaking:
     example: tuple[tuple[float, ...], tuple[float, ...]] | None
     trials: tuple[Trial, ...]
 
-    def plain(self, complete: bool = True) -> dict[str, Any]:
+    def plain(self) -> dict[str, Any]:
         """The content of `falsify.json`: all but the flights, which are in `falsify.csv`."""
         content = {name: value for name, value in asdict(self).items() if name != "trials"}
         command = shlex.join(["wayproof", *sys.argv[1:]])
         return {
             "schema": SCHEMA,
-            "complete": complete,
+            "complete": True,
             "command": command,
             **content,
             "flights": len(self.trials),
@@ -113,8 +114,8 @@ def falsify(
     numbers = itertools.count()
 
     def judge(point: Point) -> Verdict:
-        condition, margins = next(numbers), []
         scenario = scenario_at(load, vary, point)
+        condition, margins = next(numbers), []
         values = tuple(each.value(place) for each, place in zip(vary, point, strict=True))
         for seed in range(base.seed, base.seed + seeds):
             figures = _flown(flown, scenario.model_copy(update={"seed": seed}))
@@ -163,8 +164,7 @@ def _flown(flown: Flown, scenario: Scenario) -> Mapping[str, Any]:
     except AircraftError as error:
         raise InputError(f"wayproof: cannot fly this condition: {error}") from error
     except Exception as error:
-        text = " ".join(str(error).split())
-        return {"outcome": "error", "reason": f"{type(error).__name__}: {text}", "trackable": None}
+        return {"outcome": "error", "reason": sentence(error), "trackable": None}
 
 
 def _columns(figures: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from typing import Any, Final
 from harness.falsify_keys import Vary
 from harness.falsify_search import Point
 from harness.record import RunFolderError
+from harness.whole_file import replace_text
 
 SCHEMA: Final = "wayproof/falsify/1"
 INDEX: Final = "falsify.json"
@@ -106,7 +107,5 @@ def _is_ours(out: Path) -> bool:
 
 
 def write_index(out: Path, content: Mapping[str, Any]) -> None:
-    """Writes `falsify.json` so that it is either the old one or the whole new one."""
-    partial = out / f"{INDEX}.partial"
-    partial.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    partial.replace(out / INDEX)
+    """Writes `falsify.json`."""
+    replace_text(out / INDEX, json.dumps(content, indent=2, allow_nan=False) + "\n")

@@ -23,6 +23,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from harness.record import FloatArray
+from harness.strict_yaml import InputError
 
 Point: TypeAlias = tuple[float, ...]
 """Displacement of each key, from 0 (mild) to 1 (hard)."""
@@ -32,6 +33,9 @@ STEPS: Final = 8
 
 POPULATION: Final = 8
 """Of the differential evolution; a power of two, as its Sobol points want it."""
+
+NO_CONDITION: Final = 2.0
+"""The margin of a place away from the diagonal where there is no scenario: behind all that passed."""
 
 LEAST: Final = 2
 """Fewer conditions than the two ends of the diagonal make no search."""
@@ -120,6 +124,7 @@ def search(
         if keys > 1 and reached > 0.0:
             before = len(tries.verdicts)
             edge = 1.0 if math.isinf(reached) else reached - tolerance
+            tries.off_the_diagonal = True
             _anywhere_below(keys, tries, edge, tolerance, seed)
             evolved = len(tries.verdicts) - before
             _taken_back(tries, tolerance)
@@ -137,7 +142,10 @@ class _Tries:
 
     def __init__(self, judge: Judge, snap: Snap, conditions: int) -> None:
         self._judge, self._snap = judge, snap
+        self._none: set[Point] = set()
         self.left = conditions
+        self.off_the_diagonal = False
+        """From then on a place where there is no scenario is passed over; before, that is an error."""
         self.verdicts: dict[Point, Verdict] = {}
 
     def snapped(self, point: Point) -> Point:
@@ -149,8 +157,17 @@ class _Tries:
         if place not in self.verdicts:
             if self.left == 0:
                 raise _SpentError
+            if place in self._none:
+                return Verdict(False, NO_CONDITION)
+            try:
+                verdict = self._judge(place)
+            except InputError:
+                if not self.off_the_diagonal:
+                    raise
+                self._none.add(place)
+                return Verdict(False, NO_CONDITION)
             self.left -= 1
-            self.verdicts[place] = self._judge(place)
+            self.verdicts[place] = verdict
         return self.verdicts[place]
 
     def mildest(self) -> Point | None:

@@ -29,7 +29,7 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
     rows. `clearance_violation_s` counts the intervals at whose end the distance to an obstacle edge was below
     the wanted clearance. `replans` counts the plans accepted after the first. `compute_ms` is over all
     calls in which the planner searched, `smoothness` is defined in `harness.smoothness`, `trackability` in
-    `harness.trackability`.
+    `harness.trackability`; `error` is the traceback of what the planner raised.
 
     Args:
         flight: the flight; its track has at least one row.
@@ -73,6 +73,7 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
             "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
         },
         "digest": digest(track),
+        "error": flight.error,
     }
 
 

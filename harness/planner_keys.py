@@ -45,10 +45,17 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
 
 
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
-    """The planner for one flight, from a section that `resolved` returned; nothing is left to compile in it."""
+    """The planner for one flight, from a section that `resolved` returned; nothing is left to compile in it.
+
+    Raises:
+        RuntimeError: making it would have ended the process.
+    """
     compile_all()
     kind = planner_kinds()[spec.kind]
-    return kind.make(kind.config(**spec.own), mission)
+    try:
+        return kind.make(kind.config(**spec.own), mission)
+    except SystemExit as error:
+        raise RuntimeError(f"the planner {spec.kind} would have ended the process") from error
 
 
 def json_schema(common: dict[str, Any]) -> dict[str, Any]:

@@ -270,6 +270,7 @@ class Flight:
         compute_ms: wall-clock time of every call in which the planner searched, also where it found nothing new.
         sim_s: simulated time flown.
         wall_s: wall-clock time that took.
+        error: the traceback of what the planner raised; None where it did not.
     """
 
     track: Track
@@ -279,6 +280,7 @@ class Flight:
     compute_ms: tuple[float, ...]
     sim_s: float
     wall_s: float
+    error: str | None = None
 
 
 def polyline(segments: FloatArray, chord_error_m: float = CHORD_ERROR_M) -> FloatArray:

@@ -17,8 +17,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final
@@ -27,6 +25,8 @@ from harness.folder_lock import FolderLock
 from harness.input_file import read_text
 from harness.plans_table import PlanRow, plan_rows, plans_table
 from harness.record import TRACK_FIELDS, AcceptedPlan, RunFolderError, Track
+from harness.versions import FLOWN_WITH, versions
+from harness.whole_file import PARTIAL, replace_text
 
 SCENARIO = "scenario.yaml"
 MANIFEST = "manifest.json"
@@ -45,12 +45,11 @@ REPORT_FILES = tuple(
     for kind in kinds
 )
 """What `wayproof report` adds to a run folder."""
-PARTIAL = ".partial"
 MAX_BYTES, MAX_JSON_BYTES = 64_000_000, 16_000_000
 """Of a scenario and of a JSON file in the folder."""
 
 SCHEMA = "wayproof/run/1"
-DISTRIBUTIONS = ("wayproof", "jsbsim", "numba", "numpy", "shapely", "rerun-sdk", "pyarrow")
+DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
 COMPRESSION = "lz4"
 SPLIT = [name for name in TRACK_FIELDS if name != "plan_index"]
 """Columns whose bytes are written first bytes first: half the size and half the time."""
@@ -107,10 +106,7 @@ class RunFolder:
             "complete": False,
             "command": list(command),
             "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-            "versions": {
-                "python": platform.python_version(),
-                **{name: _version(name) for name in DISTRIBUTIONS},
-            },
+            "versions": versions(DISTRIBUTIONS),
             "platform": {
                 "system": platform.platform(),
                 "machine": platform.machine(),
@@ -289,14 +285,6 @@ def _manifest(path: Path) -> dict[str, Any] | None:
     return manifest if isinstance(manifest, dict) and manifest.get("schema") == SCHEMA else None
 
 
-@cache
-def _version(distribution: str) -> str | None:
-    try:
-        return version(distribution)
-    except PackageNotFoundError:
-        return None
-
-
 def _json(content: Mapping[str, Any]) -> str:
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
@@ -304,10 +292,3 @@ def _json(content: Mapping[str, Any]) -> str:
 def _sha256(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def replace_text(path: Path, text: str) -> None:
-    """Writes a file so that it is either the old one or the whole new one."""
-    partial = path.with_name(path.name + PARTIAL)
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)

@@ -10,8 +10,9 @@ from harness.compare_rows import to_csv, to_markdown
 from harness.input_file import InputError
 from harness.record import RunFolderError
 from harness.report import run_html
-from harness.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run, replace_text
+from harness.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
 from harness.scenario import parse_scenario
+from harness.whole_file import replace_text
 
 
 def write_report(folder: Path) -> Path:

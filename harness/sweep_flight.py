@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import errno
-import re
-import traceback
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from harness.crash import sentence, trace
 from harness.record import RunFolderError
 from harness.results import ERROR, metric_cells, time_cells
 from harness.scenario import Scenario, unpacked
@@ -68,14 +67,13 @@ def fly_job(job: Job) -> Answer:
     except Exception as error:
         if isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL:
             raise error.__cause__ from error
-        return failed(job.run, f"{type(error).__name__}: {error}", traceback.format_exc())
+        return failed(job.run, sentence(error), trace(error))
     return Answer(job.run, cells, time_cells(metrics))
 
 
 def failed(run: int, reason: str, error: str) -> Answer:
-    """The answer of a run that did not come to an end; without what differs from process to process."""
-    same = (re.sub(r"\b0x[0-9a-f]{6,16}\b", "0x...", text) for text in (" ".join(reason.split()), error))
-    return Answer(run, {"outcome": ERROR, **dict(zip(("reason", "error"), same, strict=True))}, {})
+    """The answer of a run that did not come to an end."""
+    return Answer(run, {"outcome": ERROR, "reason": reason, "error": error}, {})
 
 
 def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:

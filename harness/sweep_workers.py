@@ -6,18 +6,18 @@ import logging
 import multiprocessing
 import os
 import signal
-import sys
+import socket
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final, Protocol
 
 from harness.strict_yaml import InputError
 from harness.sweep_flight import Answer, Job, fly_job
+from harness.versions import versions
 
 ONE_THREAD: Final = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"
@@ -28,10 +28,9 @@ RECORDED_EACH: Final = 25
 """Flights of a process that records: rerun 0.41 keeps the layout of every recording, about 3 MB, for ever."""
 
 CONNECT_S: Final = 10.0
+SCHEDULER_PORT: Final = 8786
 JOBS_EACH: Final = 2
 """Jobs handed out for each that can be flown at a time: nobody waits for the next while an answer is written down."""
-
-SAME: Final = ("wayproof", "jsbsim", "numba", "numpy")
 
 
 class WorkerDiedError(Exception):
@@ -216,17 +215,32 @@ def dask_workers(address: str) -> Iterator[Workers]:
     for logger in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
     try:
+        _knock(address)
         client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(f"wayproof: no Dask scheduler answers at {address}; start one there") from error
     with client:
-        ours = _versions()
+        ours = versions()
         if not client.nthreads():
             raise InputError(f"wayproof: {address} has no workers; start some, as `dask worker {address}`")
-        for worker, theirs in client.run(_versions).items():
+        for worker, theirs in client.run(versions).items():
             if theirs != ours:
                 raise InputError(f"wayproof: the worker {worker} has {theirs}; must have {ours}")
         yield DaskWorkers(client)
+
+
+def _knock(address: str) -> None:
+    """Tries whether anybody listens: a Client that finds nobody prints a traceback when it is thrown away.
+
+    Raises:
+        OSError: nobody does.
+        ValueError: it is no address.
+    """
+    from distributed.comm.addressing import parse_address, parse_host_port
+
+    scheme, place = parse_address(address)
+    if scheme in ("tcp", "tls"):
+        socket.create_connection(parse_host_port(place, SCHEDULER_PORT), CONNECT_S).close()
 
 
 class DaskWorkers:
@@ -285,14 +299,3 @@ def _end_with(joined: Callable[[], None]) -> None:
     """A parent that is killed takes its processes along."""
     joined()
     os._exit(1)
-
-
-def _versions() -> dict[str, str]:
-    """What a flight's bits depend on."""
-    found = {"python": sys.version.partition(" ")[0]}
-    for name in SAME:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found

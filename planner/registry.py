@@ -98,6 +98,16 @@ def planner_kinds() -> dict[str, PlannerKind]:
     return kinds
 
 
+def distribution_of(kind: str) -> str | None:
+    """Name and version of the other distribution that a planner kind comes from; None for a built-in one."""
+    if kind in (built_in.kind for built_in in BUILT_IN):
+        return None
+    for point in _outside(entry_points, tuple(sys.path)):
+        if point.load().kind == kind and point.dist is not None:
+            return f"{point.dist.name} {point.dist.version}"
+    return None
+
+
 @cache
 def _outside(find: Callable[..., EntryPoints], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""

@@ -59,7 +59,7 @@ def fly(
 
     0 goal reached with no collision and inside the area
 
-    1 flown, but not so
+    1 flown, but not so; or with --from not as the campaign flew it
 
     2 bad input or usage, nothing flown
 
@@ -73,9 +73,12 @@ def fly(
     loaded, digest = _asked(scenario, results, run, given)
     folder = out or _default_folder(loaded)
     metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
-    if digest and not given and metrics["digest"] != digest:
+    otherwise = bool(digest) and not given and metrics["digest"] != digest
+    if otherwise:
         typer.echo(
-            f"wayproof: run {run} was flown otherwise (digest {digest}): not with these versions", err=True
+            f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
+            "aircraft is made of, have changed since",
+            err=True,
         )
     if as_json:
         print_json(metrics)
@@ -86,7 +89,7 @@ def fly(
         typer.echo(f"run folder: {folder}")
     if view:
         open_viewer([folder])
-    return FLY_STATUS.get(metrics["outcome"], FAILED)
+    return FAILED if otherwise else FLY_STATUS.get(metrics["outcome"], FAILED)
 
 
 def _asked(

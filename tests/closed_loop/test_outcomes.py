@@ -125,6 +125,22 @@ def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWor
     assert (status, metrics["outcome"]) == (1, "planner_failed")
     assert metrics["reason"].startswith("the planner raised ZeroDivisionError: no room between")
     assert metrics["flight_time_s"] == 5.0
+    assert metrics["error"].startswith("Traceback")
+    assert "ZeroDivisionError" in metrics["error"]
+
+
+@pytest.mark.parametrize("status", [0, 3, "bye\n\udcff bye"])
+def test_planner_that_would_end_the_process(
+    fly: Fly, answering: Install, small_world: SmallWorld, status: int | str
+) -> None:
+    def leaves(mission: Mission, request: PlanRequest) -> Plan:
+        raise SystemExit(status)
+
+    answering(leaves)
+    ended, metrics = fly(small_world(planner={"kind": "stand_in"}))
+    assert (ended, metrics["outcome"]) == (1, "planner_failed")
+    told = str(status).encode("utf-8", "backslashreplace").decode().replace("\n", " ")
+    assert metrics["reason"] == f"the planner raised SystemExit: {told}"
 
 
 def test_planner_whose_tangents_are_no_unit_vectors(

@@ -62,9 +62,12 @@ def test_a_disk_that_is_full_for_the_summary_alone(place: Path, unbroken: bytes)
     assert run(place, *SWEEP) == (0, "", "")
     (place / "out" / "summary.html").unlink()
     status, out, err = run(place, *SWEEP, "--resume", file_bytes=25_000)
-    assert (status, out) == (2, "")
-    assert err == "wayproof: cannot write the summary in out: File too large\n"
-    assert not (place / "out" / "summary.html").exists()
+    assert (status, out) == (1, "")
+    assert err == (
+        "wayproof: cannot write the summary in out: File too large; the results are whole, and "
+        "`wayproof report out` makes it from them\n"
+    )
+    assert not list((place / "out").glob("summary.html*"))
     assert results(place) == unbroken
 
 

@@ -99,6 +99,8 @@ def test_every_combination_is_drawn_and_flown_by_every_pair(place: Path) -> None
         "environment.wind.from_deg": "number",
         "sensor.rays": "int",
         "sensor.dropout": "number",
+        "planner.clearance_m": "int",
+        "aircraft.airspeed_mps": "int",
     }
 
 
@@ -108,11 +110,39 @@ def test_runs_of_a_case_fly_the_same_and_cases_do_not(place: Path) -> None:
         by_case.setdefault(run.case, []).append(run)
     for own in by_case.values():
         assert len(own) == 4
-        assert len({(run.seed, json.dumps(run.varied)) for run in own}) == 1
+        shared = {
+            json.dumps({k: v for k, v in run.varied.items() if k.startswith(("environment", "sensor"))})
+            for run in own
+        }
+        assert (len({run.seed for run in own}), len(shared)) == (1, 1)
+        assert {(run.planner, run.varied["planner.clearance_m"]) for run in own} >= {("bug2", 50)}
     assert len({own[0].seed for own in by_case.values()}) == len(by_case)
     drawn = [own[0].varied["environment.wind.from_deg"] for own in by_case.values()]
     assert len(set(drawn)) == len(by_case)
     assert all(isinstance(angle, float) and 0 <= angle <= 360 for angle in drawn)
+
+
+def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> None:
+    text = CAMPAIGN.replace("sensor.rays: {choice", "trackability.altitude_m: {choice").replace(
+        "random:\n",
+        "random:\n  sensor.rays: {uniform: [100, 700]}\n  planner.steps: {normal: {mean: 9, sigma: 3, least: 1}}\n",
+    )
+    runs = runs_of(
+        place, text.replace("{kind: bug2, clearance_m: 50}", "{kind: rolling_window, clearance_m: 50}")
+    )
+    assert (runs.varied["sensor.rays"], runs.varied["planner.steps"]) == ("int", "int")
+    run, scenario = runs.run(5), runs.scenario(5)
+    assert scenario.sensor.rays == run.varied["sensor.rays"]
+    assert scenario.planner.own["steps"] == run.varied["planner.steps"]
+    drawn = {run.varied["sensor.rays"] for run in all_of(runs)}
+    assert all(isinstance(each, int) and 100 <= each <= 700 for each in drawn)
+    assert len(drawn) > 6
+
+
+def test_scenarios_of_a_folder_may_end_in_yml(place: Path) -> None:
+    (place / "more" / "c.yml").write_text(SCENARIO.format(name="c"))
+    runs = runs_of(place, CAMPAIGN.replace("ring.yaml", "more"))
+    assert {run.scenario for run in all_of(runs)} == {"a", "b", "c"}
 
 
 def test_a_scenario_has_what_its_run_says(place: Path) -> None:
@@ -286,7 +316,17 @@ def line_of(begin: str) -> int:
             "worlds: [{forest: {room_m: 20, gap_m: 0, density_1pkm2: 90}}]",
             "worlds[0].forest: mission.start_m: lies",
         ),
-        ("draws: 3", "draws: 1000000", "has 16000000 runs; must be at most 1000000"),
+        (
+            "draws: 3",
+            "draws: 1000000",
+            "18: draws: makes 16000000 runs with what is combined; must be at most",
+        ),
+        ("{kind: bug2, clearance_m: 50}", "rolling_window", "planners[1]: is there already"),
+        (
+            "  sensor.rays: {choice",
+            "  planner.clearance_m: {choice",
+            "planners[1].clearance_m: is given under random.planner.clearance_m too",
+        ),
         ("schema: wayproof/campaign/1", "schema: wayproof/campaign/2", "schema: is the text"),
     ],
 )

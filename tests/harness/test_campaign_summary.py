@@ -152,8 +152,6 @@ def test_without_a_choice_tables_are_of_the_first_varied_keys(tmp_path: Path) ->
     assert summary.varied == ("planner", WIND, "sensor.rays")
     keys = [(table.rows.key, table.columns.key if table.columns else None) for table in summary.tables]
     assert keys == [("planner", WIND), ("planner", "sensor.rays"), (WIND, "sensor.rays")]
-    told = summarise(tmp_path / "c", varied=[WIND])
-    assert [(table.rows.key, table.columns) for table in told.tables] == [(WIND, None)]
 
 
 def test_planners_are_compared_in_pairs(tmp_path: Path) -> None:
@@ -174,25 +172,107 @@ def test_rows_that_share_no_case_make_no_pair(tmp_path: Path) -> None:
     assert (duel.pairs, duel.success.value, duel.length.value) == (0, None, None)
 
 
-def test_a_planner_that_flew_a_case_twice_is_not_paired(tmp_path: Path) -> None:
-    rows = [row(0), row(1, case=0), row(2, case=0, planner="bug2"), row(3, case=0, planner="bug1")]
+def test_scenarios_are_told_apart_where_each_is_flown_in_every_world(tmp_path: Path) -> None:
+    places = [(scenario, world) for scenario in ("calm", "storm") for world in ("forest", "maze")]
+    rows = [
+        row(run, "reached" if scenario == "storm" else "collision", scenario=scenario, world=world)
+        for run, (scenario, world) in enumerate(places)
+    ]
     summary = summarise(campaign(tmp_path, rows))
-    assert summary.unpaired == ("rolling_window",)
-    assert [(duel.first, duel.second, duel.pairs) for duel in summary.duels] == [("bug2", "bug1", 1)]
-    page = write_summary(summary, tmp_path).read_text()
-    assert "rolling_window flew some cases more than once" in page
+    (first, *_) = summary.tables
+    assert first.columns is not None
+    assert (first.rows.key, first.columns.key) == ("world", "scenario")
+    assert summary.worst[0].name == "calm, forest, rolling_window, aerosonde"
 
 
 def test_the_bootstrap_interval_is_that_of_the_binomial_where_it_is_known() -> None:
     differences = np.array([1.0] * 300 + [0.0] * 700)
-    estimate = mean_estimate(differences)
+    estimate = mean_estimate(differences, np.arange(1000))
     low, high = (float(stats.binom.ppf(end, 1000, 0.3)) / 1000 for end in (0.025, 0.975))
     assert estimate.low is not None
     assert estimate.high is not None
     assert estimate.value == pytest.approx(0.3)
     assert estimate.low == pytest.approx(low, abs=0.003)
     assert estimate.high == pytest.approx(high, abs=0.003)
-    assert mean_estimate(differences) == estimate, "the same every time"
+    assert mean_estimate(differences, np.arange(1000)) == estimate, "the same every time"
+
+
+def test_pairs_of_one_case_are_drawn_together() -> None:
+    of_case = np.array([1.0] * 6 + [0.0] * 14)
+    one = mean_estimate(of_case, np.arange(20))
+    assert mean_estimate(np.repeat(of_case, 5), np.repeat(np.arange(20), 5)) == one
+    assert mean_estimate(np.array([1.0, 0.0]), np.array([3, 3])).low is None, "a single case"
+
+
+def test_numbers_that_differ_late_are_groups_of_their_own() -> None:
+    axis, index = grouped("w", [1000000.1, 1000000.4, 1000000.1])
+    assert axis.labels == ("1000000.1", "1000000.4")
+    assert index.tolist() == [0, 1, 0]
+    many, _ = grouped("w", [1000 + step / 1000 for step in range(20)])
+    assert len(set(many.labels)) == BINS
+
+
+def entries_campaign(folder: Path) -> Path:
+    """Two planners of one kind on two aircraft of one model, told apart by the keys that they are given."""
+    planners = [{"kind": "rolling_window", "clearance_m": 40}, {"kind": "rolling_window", "steps": 8}, "bug2"]
+    about = {
+        "schema": "wayproof/results/1",
+        "runs": 8,
+        "campaign": {
+            "planners": planners,
+            "aircraft": ["aerosonde", {"model": "aerosonde", "airspeed_mps": 30}],
+        },
+    }
+    rows: list[dict[str, Any]] = [
+        {"planner": "rolling_window", "planner.clearance_m": 40, "planner.steps": None},
+        {"planner": "rolling_window", "planner.clearance_m": None, "planner.steps": 8},
+        {"planner": "bug2", "planner.clearance_m": None, "planner.steps": None},
+    ]
+    every = [
+        row(3 * a + p, case=0) | each | {"aircraft.airspeed_mps": airspeed}
+        for a, airspeed in enumerate((None, 30))
+        for p, each in enumerate(rows)
+    ]
+    given = ("planner.clearance_m", "planner.steps", "aircraft.airspeed_mps")
+    fields = [*SCHEMA, *(pa.field(name, pa.int64()) for name in given)]
+    order = [f for f in fields if f.name in every[0]]
+    first = [f for f in order if f.name != "outcome" and fields.index(f) < SCHEMA.names.index("outcome")]
+    rest = [f for f in order if f not in first and f.name not in given]
+    added = [f for f in order if f.name in given]
+    schema = pa.schema([*first, *added, *rest], metadata={"wayproof": json.dumps(about)})
+    folder.mkdir()
+    pq.write_table(pa.Table.from_pylist(every, schema), folder / "results.parquet")
+    return folder
+
+
+def test_entries_of_one_kind_are_told_apart_and_paired(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = entries_campaign(tmp_path / "c")
+    summary = summarise(folder)
+    names = ["rolling_window, clearance_m 40", "rolling_window, steps 8", "bug2"]
+    assert list(summary.lengths) == names
+    assert {(duel.first, duel.second, duel.pairs) for duel in summary.duels} == {
+        (names[0], names[1], 2),
+        (names[0], names[2], 2),
+        (names[1], names[2], 2),
+    }
+    assert "planner.clearance_m" in summary.varied
+    assert summary.worst[0].name == "forest, rolling_window, clearance_m 40, aerosonde"
+
+
+def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = entries_campaign(tmp_path / "c")
+    summary = summarise(folder)
+    assert (summary.planned, summary.missing) == (8, 2)
+    print_summary(summary)
+    out = capsys.readouterr().out
+    assert "c: 6 of 8 runs" in out
+    assert "not complete: 2 are missing, --resume flies them" in out
+    page = write_summary(summary, folder).read_text()
+    assert "6 of 8 runs" in page
+    assert "2 runs are missing" in page
+    assert json.loads((folder / PLAIN).read_text())["planned"] == 8
 
 
 def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:

@@ -38,6 +38,7 @@ KEYS = {
     "compute_ms",
     "timing",
     "digest",
+    "error",
 }
 
 

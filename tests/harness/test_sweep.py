@@ -72,11 +72,21 @@ class Raises(RollingWindow):
         raise ValueError(f"not *to* be made: {object()}")
 
 
-DIES, RAISES = (
-    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Dies, Raises)
+class Leaves(RollingWindow):
+    def __init__(self, config, mission):
+        raise SystemExit(0)
+
+
+DIES, RAISES, LEAVES = (
+    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Dies, Raises, Leaves)
 )
 """
-ENTRY_POINTS = "[wayproof.planners]\ndies = campaign_plugin:DIES\nraises = campaign_plugin:RAISES\n"
+ENTRY_POINTS = "".join(
+    [
+        "[wayproof.planners]\n",
+        *(f"{name.lower()} = campaign_plugin:{name}\n" for name in ("DIES", "RAISES", "LEAVES")),
+    ]
+)
 
 
 @pytest.fixture
@@ -200,15 +210,21 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
         assert said in capsys.readouterr().err
 
 
+def with_plugin(place: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0") -> None:
+    """Installs a distribution with planners."""
+    site = place / f"site-{version}"
+    info = site / f"campaign_plugin-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: campaign_plugin\nVersion: {version}\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    (site / "campaign_plugin.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(site)
+
+
 def test_crashes_are_rows_with_their_tracebacks_and_end_nothing(
     place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    info = place / "site" / "campaign_plugin-1.0.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: campaign_plugin\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS)
-    (place / "site" / "campaign_plugin.py").write_text(PLUGIN)
-    monkeypatch.syspath_prepend(place / "site")
+    with_plugin(place, monkeypatch)
     text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[dies, rolling_window, raises]").replace(
         "draws: 2", "draws: 1\nrecordings: all"
     )
@@ -286,6 +302,95 @@ def test_resume_refuses_a_changed_campaign_and_says_what_changed(
     (place / file).write_text(changed.replace(new, old) if new else SCENARIO)
     (place / file).write_text(f"# a comment is no change\n{(place / file).read_text()}")
     assert sweep(place, "--resume") == 0
+
+
+def cut_short(place: Path, unbroken: Path) -> None:
+    """The campaign's folder after two of its runs."""
+    (place / "out").mkdir()
+    (place / "out" / "campaign.json").write_bytes((unbroken / "campaign.json").read_bytes())
+    lines = (unbroken / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (place / "out" / "journal.jsonl").write_bytes(b"".join(lines[:2]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "  environment.wind.speed_mps: [0, 5]\n",
+            "  environment.wind.speed_mps: [0, 5]\n  sensor.rays: [360, 720]\n",
+            "campaign.grid.sensor.rays was not there, is [360, 720]",
+        ),
+        ("seed: 5\n", "seed: 5\nset: {environment.gust: null}\n", "campaign.set was not there"),
+    ],
+)
+def test_resume_refuses_what_was_added(
+    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
+    cut_short(place, unbroken)
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))
+    assert sweep(place, "--resume") == 2
+    assert said in capsys.readouterr().err
+
+
+def test_resume_refuses_an_added_null_and_another_order_of_keys(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a run flies follows from the order of grid and random keys; a null replaces what the scenario has."""
+    grid = "  environment.wind.speed_mps: [0, 5]\n"
+    two = CAMPAIGN.replace(grid, f"{grid}  sensor.rays: [360, 720]\n").replace(
+        "seed: 5\n", "seed: 5\nset: {sensor.dropout: 0}\n"
+    )
+    (place / "campaign.yaml").write_text(two)
+    with CampaignFolder(
+        place / "out", CampaignRuns(load_campaign(place / "campaign.yaml")), resume=False
+    ) as folder:
+        folder.append(0, {"outcome": "reached"}, {})
+    other = two.replace(grid, "").replace("  sensor.rays: [360, 720]\n", f"  sensor.rays: [360, 720]\n{grid}")
+    (place / "campaign.yaml").write_text(other)
+    assert sweep(place, "--resume") == 2
+    assert "campaign.grid had its keys in the order environment.wind.speed_mps, sensor.rays, has" in (
+        capsys.readouterr().err
+    )
+    (place / "campaign.yaml").write_text(
+        two.replace("{sensor.dropout: 0}", "{sensor.dropout: 0, environment.gust: null}")
+    )
+    assert sweep(place, "--resume") == 2
+    assert "campaign.set.environment.gust was not there, is null" in capsys.readouterr().err
+
+
+def test_resume_refuses_another_aircraft_or_planner_of_the_same_name(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(ROOT / "aircraft" / "aerosonde", place / "mine")
+    with_plugin(place, monkeypatch)
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[rolling_window, leaves]\naircraft: [./mine]")
+    (place / "campaign.yaml").write_text(text)
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    with CampaignFolder(place / "out", runs, resume=False) as folder:
+        folder.append(0, {"outcome": "reached"}, {})
+    model = place / "mine" / "aerosonde.xml"
+    model.write_text(model.read_text() + "<!-- other -->\n")
+    assert sweep(place, "--resume") == 2
+    assert "aircraft." in capsys.readouterr().err
+    model.write_text(model.read_text().removesuffix("<!-- other -->\n"))
+    with_plugin(place, monkeypatch, "2.0")
+    assert sweep(place, "--resume") == 2
+    assert 'planners.leaves was "campaign_plugin 1.0", is "campaign_plugin 2.0"' in capsys.readouterr().err
+
+
+def test_a_planner_that_ends_the_process_is_a_row(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with_plugin(place, monkeypatch)
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[leaves, rolling_window]").replace(
+        "draws: 2", "draws: 1"
+    )
+    (place / "campaign.yaml").write_text(text)
+    assert sweep(place, "--workers", "1", "--quiet") == 1
+    rows = rows_of(place / "out")
+    assert [row["outcome"] for row in rows] == ["error", "reached"] * 2
+    assert "would have ended the process" in rows[0]["reason"]
+    assert "SystemExit" in rows[0]["error"]
 
 
 def test_resume_refuses_other_versions(

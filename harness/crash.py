@@ -1,0 +1,27 @@
+"""What is told of code of others that raised: the same in every process, and writable anywhere."""
+
+from __future__ import annotations
+
+import re
+import traceback
+
+
+def sentence(error: BaseException) -> str:
+    """Its type and what it says, in one line."""
+    return in_a_line(f"{type(error).__name__}: {error}")
+
+
+def trace(error: BaseException) -> str:
+    """Its traceback."""
+    return _same("".join(traceback.format_exception(error)))
+
+
+def in_a_line(text: str) -> str:
+    """Text of others as one line."""
+    return " ".join(_same(text).split())
+
+
+def _same(text: str) -> str:
+    """Text without addresses of objects, and without what UTF-8 has no bytes for."""
+    writable = text.encode("utf-8", "backslashreplace").decode()
+    return re.sub(r"\b0x[0-9a-f]{6,16}\b", "0x...", writable)
