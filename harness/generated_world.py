@@ -1,7 +1,7 @@
 """What a world generator makes, and what the keys of all generators have in common.
 
 Frame: local ENU plane, x = east, y = north, metres; the south-west corner of every generated area is (0, 0).
-Lengths are rounded to 0.1 m, so that a world can be read and written by hand.
+Places and sizes of obstacles are rounded to 0.1 m, so that a world can be read and written by hand.
 """
 
 from __future__ import annotations

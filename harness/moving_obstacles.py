@@ -26,7 +26,7 @@ from harness.earlier_scans import NO_STEP, EarlierScans, Look
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline, bow, extent_m
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
-from harness.scan_comparison import grown, in_a_row, joined, looked_through, runs_of
+from harness.scan_comparison import grown, in_a_row, joined, looked_through, near_any, runs_of
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
 NOWHERE = np.zeros((0, 2))
@@ -205,7 +205,7 @@ class MovingObstacles:
         for track in self._tracks:
             # What comes into view beside something that moves is another face of it.
             of, within_m = (places, FACES * self._apart) if track.moves else (middle, self._gate)
-            if np.abs(np.subtract.outer(of, track.at(time_s).points)).min() < within_m:
+            if near_any(of, track.at(time_s).points, within_m).any():
                 return True
         return False
 

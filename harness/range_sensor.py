@@ -43,7 +43,7 @@ class RangeScan:
         fan: (n,) unit vectors of the rays as the nose sees them, to its right + i ahead.
         ranges_m: (n,) measured ranges, +inf where nothing came back.
         max_range_m: no return is longer.
-        nearest_m: no return is shorter; +inf if nothing came back.
+        nearest_m: no return is shorter; +inf if surely nothing came back. It may be of a face out of view.
     """
 
     time_s: float
@@ -76,15 +76,6 @@ class RangeScan:
     def ends_m(self, rays: IntArray) -> ComplexArray:
         """(k,) where some rays ended, east + i north."""
         return self.from_sensor_m(rays) + complex(self.east_m, self.north_m)
-
-    def least_beside_m(self, aside: int) -> FloatArray:
-        """(n,) the least range of each ray and so many to either side; the ends of the fan are joined."""
-        rays = len(self.ranges_m)
-        ring = self.ranges_m.take(np.arange(-aside, rays + aside), mode="wrap")
-        least = ring[:rays]
-        for first in range(1, 2 * aside + 1):
-            least = np.minimum(least, ring[first : first + rays])
-        return least
 
     def kept(self) -> RangeScan:
         """The same, its rays followed by now: nothing leads from it to the world any more."""

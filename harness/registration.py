@@ -9,12 +9,14 @@ Points are complex: east + i north, m.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.range_sensor import RangeScan, all_round
+from planner.compiled import PLACES, compiled
 from planner.interface import ComplexArray, IntArray
 
 Ends = tuple[bool, bool]
@@ -119,11 +121,11 @@ def register(
     shift = 0j
     for i in range(ROUNDS):
         within_m = max(gate_m * CLOSER**i, near_m)
-        apart = places[near, None] - (outline.points + shift)
-        nearest = np.abs(apart).argmin(axis=1)
-        off = apart[np.arange(len(near)), nearest] * along[nearest].conj()  # along + i across
+        moved = outline.points + shift
+        own = nearest(places[near], moved)
+        off = (places[near] - moved[own]) * along[own].conj()  # along + i across
         inside = (np.abs(off.imag) < within_m) & (np.abs(off.real) < reach + BESIDE * gate_m)
-        inner = inside & straight[nearest] & (np.abs(off.real) < reach)
+        inner = inside & straight[own] & (np.abs(off.real) < reach)
         if np.count_nonzero(inner) < FEWEST:
             return None
         members = near[inside]
@@ -135,10 +137,23 @@ def register(
         ]
         # An end that is far off is another one: faces come into view and go out of it.
         ends = [end for end in ends if abs(end) < reach + BESIDE * gate_m]
-        shift += _least_squares(1j * along[nearest[inner]], off.imag[inner], ends, shift, stiff)
+        shift += _least_squares(1j * along[own[inner]], off.imag[inner], ends, shift, stiff)
     if abs(shift) > gate_m:
         return None
     return Laid(shift, np.asarray(members, dtype=np.intp))
+
+
+@compiled(PLACES, PLACES)
+def nearest(places: ComplexArray, points: ComplexArray) -> IntArray:
+    """(k,) which of (m,) points each of (k,) places is nearest to; no table of all distances is laid."""
+    which = np.zeros(len(places), dtype=np.intp)
+    for i in range(len(places)):
+        least = math.inf
+        for j in range(len(points)):
+            dx, dy = points[j].real - places[i].real, points[j].imag - places[i].imag
+            if dx * dx + dy * dy < least:
+                least, which[i] = dx * dx + dy * dy, j
+    return which
 
 
 def _least_squares(

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from aircraft.interface import Performance
     from planner.interface import Mission
 
+LEAST_CLEARANCE: Final = 0.02
+"""Share of the turn radius that planners keep from obstacles at the least, where less is wanted."""
 MAX_WIND_FRACTION: Final = 0.9
 """Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
 
@@ -159,7 +161,10 @@ def unpacked(kept: bytes) -> Scenario:
 
 
 def mission_of(scenario: Scenario) -> Mission:
-    """What a planner is told before the flight."""
+    """What a planner is told before the flight.
+
+    The clearance is no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size.
+    """
     from planner.interface import Mission
 
     performance = performance_of(scenario)
@@ -167,7 +172,7 @@ def mission_of(scenario: Scenario) -> Mission:
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
         bounds_m=scenario.area.bounds_m,
-        clearance_m=scenario.planner.clearance_m,
+        clearance_m=max(scenario.planner.clearance_m, LEAST_CLEARANCE * performance.turn_radius_m),
         turn_radius_m=performance.turn_radius_m,
         speed_mps=performance.airspeed_mps,
         roll_in_s=performance.roll_in_s,

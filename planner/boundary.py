@@ -83,11 +83,13 @@ class GrownObstacles:
         Returns:
             The (k, 2) new edge points, and whether some were taken back: then everything may be different.
         """
-        fresh = self._memory.take_in(seen)
-        taken_back = len(self._memory.points_m) + len(self._fence) != len(self.points_m) + len(fresh)
+        self._memory.take_in(seen)
+        # What moves comes last there: where it has moved, or new edges have come before it, all is laid anew.
+        points, known = self._memory.points_m, len(self.points_m) - len(self._fence)
+        taken_back = not np.array_equal(points[:known], self.points_m[len(self._fence) :])
         if taken_back:
             self._rebuild()
-            fresh = self._memory.points_m
+        fresh = points if taken_back else points[known:]
         if len(fresh):
             self._add(fresh)
         return fresh, taken_back
@@ -125,10 +127,6 @@ class GrownObstacles:
         distance = np.hypot(dx, dy)
         inward = dx * (target[0] - place[0]) + dy * (target[1] - place[1])
         return bool(((distance < self.radii_m[near] + TOUCH_SHARE * self.keep_m) & (inward > 0.0)).any())
-
-    def covers(self, place: Point) -> bool:
-        """Whether a place lies inside a disc."""
-        return bool(self._covered(np.array([place]), self._near(place))[0])
 
     def seat(self, place: Point) -> tuple[int, Point]:
         """The boundary place nearest to a place on or in an obstacle, and a disc it lies on."""

@@ -22,8 +22,8 @@ from planner.route_optimisation import Terrain
 
 DISC, BEYOND = 1.04, 0.5
 """The certified disc is so many times as large as the turn, for tracking error and rolling in, and reaches beyond it
-by this share of the clearance at the least. With all of the clearance forests become ways round (1.28 times the
-optimum instead of 1.07): trees hide each other until one is among them."""
+by this share of the clearance at the least. With all of the clearance forests become ways round: trees hide each other
+until one is among them."""
 
 MOST_STATIONS = 32
 

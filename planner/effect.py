@@ -57,9 +57,9 @@ class Effect:
         return flown if off_m <= near_m or not flown else moved(flown, pose)
 
     def left(self, station_m: float) -> Path:
-        """What is left of it: the way to its turn, and the turn."""
-        way = [] if self.holds(station_m) else between(self.path, station_m, self.leaves_m)
-        return Path(np.array([*way, *self.path.segments[-1:].tolist()]))
+        """What is left of it: the way to its turn, with the straight to roll on before that, and the turn."""
+        turn_at_m = self.path.length_m - self.turn.length_m
+        return Path(np.array([*between(self.path, station_m, turn_at_m), *self.path.segments[-1:].tolist()]))
 
 
 class Watch:

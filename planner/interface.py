@@ -52,7 +52,7 @@ class MovingEdges:
 
     Attributes:
         time_s: when it was there.
-        points_m: (k, 2) edge points.
+        points_m: (k, 2) edge points in order from one end of what is seen to the other; at least one.
         velocity_mps: east and north; (0, 0) where it has just appeared and is not known yet.
     """
 

@@ -23,6 +23,10 @@ from planner.window import PLACE, Tally, Window
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
 
+LEAST_HUG = 0.005
+"""Share of the clearance: track points lie so much further out than straight steps, even without a margin, for a step
+along an edge ends where that distance is reached again."""
+
 LEAST_MARGIN = 0.4
 """Share of the margin that is kept where there is no room for all of it."""
 
@@ -108,6 +112,7 @@ class LocalPlanning:
         self._steps, self._candidates = steps, candidates
         self.tally = Tally()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
+        self._hug_m = LEAST_HUG * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
         self.limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
 
@@ -313,7 +318,7 @@ class LocalPlanning:
             self._mission.bounds_m,
             steps=self._steps * widening,
             keep_best=self._candidates * widening,
-            outer_m=attempt.distance_m + attempt.margin_m,
+            outer_m=attempt.distance_m + max(attempt.margin_m, SEARCH_SHARE * attempt.margin_m + self._hug_m),
             most_tracks=MOST_TRACKS * widening,
             around=around,
             wide=widening > 1,

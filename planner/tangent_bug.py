@@ -248,7 +248,10 @@ class TangentBug(Walker[State]):
         """Along the boundary, the first part of it cut short by a way across a dent."""
         segments = self.boundary(state.anchor, state.side, self.horizon_m)
         off = math.dist(place, state.anchor) > self._progress_m or not state.on_boundary
-        station = self._seen_from(place, segments, 0.0 if off else 2.0 * self.look_again_m())
+        least_m = 0.0 if off else 2.0 * self.look_again_m()
+        station = self._beyond_a_dent(place, segments, state.side, least_m)
+        if off and not station and not self._sees(place, state.anchor):
+            station = self._seen_from(place, segments)
         if off or station > 0.0:
             onto = mark_at(segments, station).place
             way, _ = self.straight(place, onto)
@@ -268,14 +271,33 @@ class TangentBug(Walker[State]):
     def _gone_round(self) -> Enclosed:
         return Enclosed(f"{self.enclosed()}: its whole boundary has been gone round")
 
-    def _seen_from(self, place: Point, segments: Sequence[Segment], least_m: float) -> float:
-        """The furthest station of a boundary in sight from a place; 0 where none is beyond the least."""
+    def _beyond_a_dent(self, place: Point, segments: Sequence[Segment], side: float, least_m: float) -> float:
+        """The furthest station of a boundary in sight across a dent; 0 where none is beyond the least.
+
+        A dent lies on the other side of the way than the obstacle. A way that encloses the obstacle leads round it:
+        its end is in sight as well, behind.
+        """
+        stations = np.linspace(0.0, length_of(segments), SHORTCUTS + 1)
+        corners = np.array([mark_at(segments, station).place for station in stations]) - place
+        doubled = np.cumsum(corners[:-1, 0] * corners[1:, 1] - corners[:-1, 1] * corners[1:, 0])
+        dents = 0.5 * side * doubled <= self.keep_m * np.hypot(*corners[1:].T)
+        return self._seen_from(place, segments, least_m, dents.tolist())
+
+    def _seen_from(
+        self, place: Point, segments: Sequence[Segment], least_m: float = 0.0, among: Sequence[bool] = ()
+    ) -> float:
+        """The furthest station of a boundary in sight from a place, of some; 0 where none is beyond the least."""
         whole = length_of(segments)
         for i in range(SHORTCUTS, 0, -1):
             station = whole * i / SHORTCUTS
             if station <= least_m:
                 break
-            target = mark_at(segments, station).place
-            if self.known.first_hit(place, target)[0] > math.dist(place, target) - self._progress_m:
+            if among and not among[i - 1]:
+                continue
+            if self._sees(place, mark_at(segments, station).place):
                 return station
         return 0.0
+
+    def _sees(self, place: Point, target: Point) -> bool:
+        """Whether a straight way leads to a target, but for a little."""
+        return self.known.first_hit(place, target)[0] > math.dist(place, target) - self._progress_m

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.range_sensor import RangeScan
-from harness.registration import FEWEST
+from harness.registration import FEWEST, nearest
 from harness.scan_comparison import come, drawn_back, grown, joined, looked_through, near_any
 
 RAYS, RANGE = 60, 1000.0
@@ -121,3 +121,12 @@ def test_a_place_away_from_those_before_and_after_it_is_not_joined_to_them() -> 
     np.testing.assert_array_equal(
         joined(places + 0j, np.full(6, 5.0)), [True, True, False, True, True, False]
     )
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000), places=st.integers(0, 40), points=st.integers(1, 40))
+def test_the_nearest_of_some_points(seed: int, places: int, points: int) -> None:
+    rng = np.random.default_rng(seed)
+    here, there = (rng.normal(size=n) + 1j * rng.normal(size=n) for n in (places, points))
+    away = np.abs(np.subtract.outer(here, there))
+    assert nearest(here, there).tolist() == (away.argmin(axis=1).tolist() if places else [])

@@ -17,6 +17,7 @@ import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from harness.scenario import (
+    LEAST_CLEARANCE,
     Scenario,
     dump_scenario,
     load_scenario,
@@ -91,6 +92,14 @@ def test_mission_of_tells_the_planner_what_the_scenario_says() -> None:
     assert mission.bounds_m == (0.0, 0.0, 40000.0, 40000.0)
     assert mission.turn_radius_m == performance(airframe("aerosonde"), 25.0).turn_radius_m
     assert mission.sensor_range_m == scenario.sensor.range_m
+
+
+@pytest.mark.parametrize("wanted_m", [0.0, 0.01])
+def test_planners_keep_a_share_of_the_turn_radius_at_the_least(wanted_m: float) -> None:
+    scenario = parse_scenario(WITH_PLANNER.replace("clearance_m: 70", f"clearance_m: {wanted_m}"))
+    mission = mission_of(scenario)
+    assert scenario.planner.clearance_m == wanted_m
+    assert mission.clearance_m == LEAST_CLEARANCE * mission.turn_radius_m
 
 
 def test_the_planners_config_is_complete_and_resolved() -> None:

@@ -115,12 +115,17 @@ def test_a_seat_is_the_nearest_place_of_the_boundary(place: tuple[float, float])
     assert math.dist(seat, centers[disc - len(grown(np.zeros((0, 2))).points_m)]) == pytest.approx(KEEP)
 
 
+def covers(known: GrownObstacles, place: tuple[float, float]) -> bool:
+    """Whether a place lies inside a disc."""
+    return bool((np.hypot(*(known.points_m - place).T) < known.radii_m).any())
+
+
 def test_the_bounds_are_a_wall_with_all_of_the_area_but_the_margin_inside() -> None:
     known = grown(np.zeros((0, 2)))
     inside = [(25.0, 5000.0), (5000.0, 25.0), (9975.0, 5000.0), (25.0, 25.0), (9975.0, 9975.0)]
-    assert not any(known.covers(place) for place in inside)
+    assert not any(covers(known, place) for place in inside)
     assert all(
-        known.covers(place) for place in [(5.0, 5000.0), (5000.0, 9995.0), (-1.0, -1.0), (3333.0, 4.0)]
+        covers(known, place) for place in [(5.0, 5000.0), (5000.0, 9995.0), (-1.0, -1.0), (3333.0, 4.0)]
     )
 
 
@@ -128,13 +133,27 @@ def test_what_is_taken_back_is_forgotten() -> None:
     known = GrownObstacles(MISSION, 20.0)
     seen = Seen(np.array([(5000.0, 5000.0), (3000.0, 3000.0)]))
     assert known.take_in(seen)[1] is False
-    assert known.covers((3000.0, 3100.0))
+    assert covers(known, (3000.0, 3100.0))
     seen.points, seen.revision, seen.taken_back_at = seen.points[:1], 2, 2
     fresh, taken_back = known.take_in(seen)
     assert taken_back
     assert len(fresh) == 1
-    assert known.covers((5000.0, 5100.0))
-    assert not known.covers((3000.0, 3100.0))
+    assert covers(known, (5000.0, 5100.0))
+    assert not covers(known, (3000.0, 3100.0))
+
+
+def test_labels_stay_with_their_points_while_something_moves_a_little() -> None:
+    known = GrownObstacles(MISSION, 20.0)
+    seen = Seen(np.array([(3000.0, 3000.0)]))
+    outline = np.array([(8000.0, 8000.0), (8050.0, 8000.0)])
+    seen.moving = (MovingEdges(0.0, outline, (1.0, 0.0)),)
+    known.take_in(seen)
+    seen.points = np.array([(3000.0, 3000.0), (6000.0, 3000.0), (6050.0, 3000.0)])
+    seen.revision, seen.moving = 2, (MovingEdges(0.5, outline + 0.5, (1.0, 0.0)),)
+    known.take_in(seen)
+    of_place = dict(zip(map(tuple, known.points_m.tolist()), known.labels.tolist(), strict=True))
+    assert of_place[6000.0, 3000.0] == of_place[6050.0, 3000.0] != of_place[8000.0, 8000.0]
+    assert len({of_place[place] for place in [(3000.0, 3000.0), (6000.0, 3000.0), (8000.0, 8000.0)]}) == 3
 
 
 def test_turned_back_tells_inward_from_outward() -> None:

@@ -14,6 +14,7 @@ import shapely
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from planner import contract
 from planner.boundary import margin_of
 from planner.bug1 import Bug1, Bug1Config
 from planner.bug2 import Bug2, Bug2Config, crossings
@@ -152,6 +153,16 @@ def test_the_way_round_a_circle_has_the_length_that_geometry_gives(kind: str, ri
     expected = around_a_circle(kind, 1500.0 + KEEP, 7000.0, 14_000.0) - MISSION.goal_radius_m
     assert flight.length_m == pytest.approx(expected, abs=0.004 * expected + 50.0)
     assert nearest_m(flight.track_m, points) > MISSION.clearance_m + 0.5 * margin_of(MISSION)
+
+
+@pytest.mark.parametrize("range_m", [4000.0, 6000.0, 7000.0])
+def test_tangent_bug_takes_no_way_round_for_a_way_across_a_dent(range_m: float, ring: MakePoints) -> None:
+    """Nearly a whole round ahead along the boundary is in sight: right behind."""
+    points = np.concatenate([ring(*circle, SPACING) for circle in contract.CIRCLES])
+    mission = replace(contract.MISSION, sensor_range_m=range_m)
+    flight = walk("tangent_bug", points, contract.START, mission)
+    assert flight.reason == "reached"
+    assert flight.length_m < 1.1 * math.dist(contract.START, mission.goal_m)
 
 
 @pytest.mark.parametrize("aside", [-800.0, 800.0])

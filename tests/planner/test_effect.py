@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 from planner.course import Course
+from planner.curves import pose_at
 from planner.effect import CUT, UNHURRIED, Effect, Watch
 from planner.interface import Mission, Path, Plan, PlanStatus
 
@@ -47,6 +49,19 @@ def test_a_plan_is_cut_by_what_came_in_while_it_was_looked_for(known: int, cut: 
     assert watch.broken is broken
     if cut:
         assert 1200.0 <= watch.cut_m <= 1500.0
+
+
+def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
+    way, roll = (0.0, 0.0, 1.0, 0.0, 0.001, 400.0), 40.0
+    x, y, ux, uy = pose_at(Path(np.array([way])), 400.0)
+    turn = (x + roll * ux, y + roll * uy, ux, uy, -0.01, 2.0 * math.pi * 100.0)
+    path = Path(np.array([way, (x, y, ux, uy, 0.0, roll), turn]), loiter=True)
+    flown = Effect(Plan(PlanStatus.FOUND, "", path=path), path, effect(3).course, 400.0)
+    for station, lengths in ((100.0, [300.0, roll, turn[5]]), (410.0, [30.0, turn[5]]), (450.0, [turn[5]])):
+        left = flown.left(station)
+        assert left.segments[:, 5].tolist() == pytest.approx(lengths)
+        for before, after in itertools.pairwise(left.segments):
+            assert pose_at(Path(before[None]), before[5])[:2] == pytest.approx(after[:2])
 
 
 def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:

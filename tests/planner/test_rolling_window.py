@@ -92,10 +92,10 @@ def request_on(plan: Plan, station: float, seen: Seen) -> PlanRequest:
 
 
 def flight(
-    truth: FloatArray, mission: Mission = MISSION, step_m: float = 100.0
+    truth: FloatArray, mission: Mission = MISSION, step_m: float = 100.0, pilot: RollingWindow | None = None
 ) -> tuple[FloatArray, list[Plan], Plan]:
     """Places flown through without error, plans flown, and the last one, until the goal is reached."""
-    seen, pilot = Seen(truth, mission.sensor_range_m), planner(mission)
+    seen, pilot = Seen(truth, mission.sensor_range_m), pilot or planner(mission)
     seen.look(0.0, 0.0)
     plan = pilot.plan(first_request(seen))
     assert plan.status is PlanStatus.FOUND
@@ -338,6 +338,14 @@ def test_defaults_are_derived_from_the_mission() -> None:
     assert own.resolved(MISSION) == own
     assert RollingWindowConfig(planning_window_m=4000.0).resolved(MISSION).rolling_step_m == 250.0
     assert config.resolved(MISSION) == config
+
+
+@pytest.mark.parametrize("margin_m", [0.0, 0.1])
+def test_the_least_margins_are_flown(margin_m: float, ring: MakePoints) -> None:
+    places, _, _ = flight(
+        ring(6000.0, 0.0, 800.0, 50.0), pilot=RollingWindow(RollingWindowConfig(margin_m=margin_m), MISSION)
+    )
+    assert float(np.hypot(places[:, 0] - 6000.0, places[:, 1]).min()) > 800.0 + MISSION.clearance_m - 1.0
 
 
 def test_a_planning_window_beyond_the_sensor_is_refused() -> None:
