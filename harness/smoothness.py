@@ -18,7 +18,8 @@ import numpy as np
 from harness.record import AcceptedPlan, FloatArray, Track
 
 COURSE_WINDOW_S = 1.0
-"""Time over which the flown curvature is averaged, and over which the curvature rate is taken."""
+"""Time over which the curvature rate is taken. The flown curvature is averaged over an odd number of rows' intervals,
+the most that are no longer: 0.9 s at 10 Hz."""
 
 CORNER_RAD = 1e-6
 """A smaller change of tangent between two segments is rounding, not a corner."""
