@@ -88,7 +88,7 @@ def load_tables(folder: Path) -> tuple[pa.Table, pa.Table | None]:
         for name, entries, first in (("planner", "planners", "kind"), ("aircraft", "aircraft", "model")):
             results = _told_apart(results, name, _campaign(results).get(entries, ()), first)
         return results, pq.read_table(timings) if timings.is_file() else None
-    except (OSError, pa.ArrowException) as error:
+    except (OSError, pa.ArrowException, AttributeError, TypeError, ValueError) as error:
         text = str(error).splitlines()[0]
         raise InputError(f"wayproof: the campaign in {folder} is damaged: {text}") from error
 

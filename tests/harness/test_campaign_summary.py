@@ -261,6 +261,15 @@ def test_entries_of_one_kind_are_told_apart_and_paired(
     assert summary.worst[0].name == "forest, rolling_window, clearance_m 40, aerosonde"
 
 
+@pytest.mark.parametrize("about", ["{torn", "[1]", '{"campaign": {"planners": 3}}'])
+def test_a_table_that_says_nonsense_of_its_campaign_is_damaged(tmp_path: Path, about: str) -> None:
+    folder = campaign(tmp_path / "c", [row(0)])
+    rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": about})
+    pq.write_table(rows, folder / "results.parquet")
+    with pytest.raises(InputError, match="is damaged"):
+        summarise(folder)
+
+
 def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = entries_campaign(tmp_path / "c")
     summary = summarise(folder)
