@@ -261,7 +261,8 @@ class PlannerSpec(Section):
 
     kind: str = key("A name that `wayproof list planners` prints.", default="rolling_window")
     clearance_m: float = key(
-        "Wanted distance from every obstacle edge; the boundary must only not be crossed.",
+        "Wanted distance from every obstacle edge; the boundary must only not be crossed. Planners keep a fiftieth of "
+        "the turn radius at the least.",
         unit="m",
         derived="the planned turn radius, rounded up to 10 m",
         ge=0,
