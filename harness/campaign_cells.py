@@ -1,12 +1,39 @@
-"""Columns of `results.parquet` for the keys that a campaign varies: what they hold, and their cells."""
+"""What `results.parquet` says of a run before it is flown, and the columns of the keys that a campaign varies."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from harness.campaign import CampaignFile
 from harness.strict_yaml import Scalar
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a campaign, before it is flown.
+
+    Attributes:
+        run: its number.
+        case: runs of one case fly the same world with the same seed and draws.
+        scenario: name of the scenario.
+        world: name of its file, or of the generator.
+        planner: kind.
+        aircraft: model.
+        seed: the scenario's.
+        varied: drawn and grid values by key path; lists and mappings as JSON text.
+    """
+
+    run: int
+    case: int
+    scenario: str
+    world: str
+    planner: str
+    aircraft: str
+    seed: int
+    varied: dict[str, Scalar]
 
 
 def kind_of(values: Sequence[Any]) -> str:
@@ -23,3 +50,21 @@ def cell_of(value: Any, kind: str) -> Scalar:
     if kind == "json":
         return json.dumps(value)
     return float(value) if kind == "number" and value is not None else value
+
+
+def entry_columns(file: CampaignFile) -> dict[str, tuple[Any, ...]]:
+    """What each entry of `planners` and of `aircraft` gives for the keys that any of them gives, by key path.
+
+    Args:
+        file: the campaign.
+
+    Returns:
+        One value an entry, in order; None where it does not give the key.
+    """
+    columns: dict[str, tuple[Any, ...]] = {}
+    for listed, section, first in (("planners", "planner", "kind"), ("aircraft", "aircraft", "model")):
+        entries = file.root.plain().get(listed, ())
+        given: list[dict[str, Any]] = [each if isinstance(each, dict) else {} for each in entries]
+        for name in dict.fromkeys(name for each in given for name in each if name != first):
+            columns[f"{section}.{name}"] = tuple(each.get(name) for each in given)
+    return columns

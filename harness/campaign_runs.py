@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, NamedTuple
 
@@ -19,16 +18,14 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.campaign import MAX_RUNS, CampaignFile
-from harness.campaign_cells import cell_of, kind_of
+from harness.campaign_cells import Run, cell_of, entry_columns, kind_of
 from harness.key_types import takes_whole_numbers
 from harness.sampling import FloatArray, design
 from harness.scenario import Scenario, overridden, packed, unpacked, with_key
-from harness.scenario_sections import Section
 from harness.strict_yaml import (
     InputError,
     Loc,
     Node,
-    Scalar,
     fault_line,
     key_path,
     loc_of,
@@ -49,31 +46,6 @@ MOST_KEPT: Final = 100_000_000
 
 DEFAULT_PLANNER: Final = "rolling_window"
 DEFAULT_AIRCRAFT: Final = "aerosonde"
-
-
-@dataclass(frozen=True)
-class Run:
-    """One run of a campaign, before it is flown.
-
-    Attributes:
-        run: its number.
-        case: runs of one case fly the same world with the same seed and draws.
-        scenario: name of the scenario.
-        world: name of its file, or of the generator.
-        planner: kind.
-        aircraft: model.
-        seed: the scenario's.
-        varied: drawn and grid values by key path; lists and mappings as JSON text.
-    """
-
-    run: int
-    case: int
-    scenario: str
-    world: str
-    planner: str
-    aircraft: str
-    seed: int
-    varied: dict[str, Scalar]
 
 
 class _Change(NamedTuple):
@@ -136,13 +108,13 @@ class CampaignRuns:
         """How many cases there are."""
         return self._number // len(self._pairs)
 
-    @property
+    @cached_property
     def planners(self) -> list[str]:
         """The kinds of planners that fly."""
         named = [each.kind for each in self.campaign.planners]
         return named or [base.word(("planner", "kind"), DEFAULT_PLANNER) for base in self.file.bases]
 
-    @property
+    @cached_property
     def aircraft(self) -> list[str]:
         """The models of aircraft that fly."""
         named = [each.model for each in self.campaign.aircraft]
@@ -151,11 +123,7 @@ class CampaignRuns:
     @cached_property
     def varied(self) -> dict[str, str]:
         """Columns of `results.parquet` for the varied keys: number, int, bool or text by key path."""
-        entries = {
-            f"{into}.{name}": kind_of([self._of_entry(listed, index, name) for index in range(len(given))])
-            for listed, into, first, given in self._listed
-            for name in dict.fromkeys(key for each in given for key in _keys_of(each) if key != first)
-        }
+        entries = {name: kind_of(values) for name, values in self._of_entries.items()}
         grid = {_path(name): kind_of(values) for name, values in self.campaign.grid.items()}
         drawn = {
             _path(name): kind_of(each.choice) if each.choice else "int" if name in self._whole else "number"
@@ -168,43 +136,25 @@ class CampaignRuns:
         """Keys drawn at random that take whole numbers alone."""
         return {name for name in self.campaign.random if takes_whole_numbers(loc_of(name))}
 
-    @property
-    def _listed(self) -> tuple[tuple[str, str, str, Sequence[Section]], ...]:
-        """Lists of entries: key of the campaign, section of a scenario, the key that each has, the entries."""
-        campaign = self.campaign
-        return (
-            ("planners", "planner", "kind", campaign.planners),
-            ("aircraft", "aircraft", "model", campaign.aircraft),
-        )
-
-    def _of_entry(self, listed: str, index: int, name: str) -> Any:
-        """What an entry of a list gives for a key; None where it does not."""
-        node = self.file.root.at((listed, index))
-        inner = node.value.get(name) if node is not None and isinstance(node.value, dict) else None
-        return None if inner is None else inner.plain()
+    @cached_property
+    def _of_entries(self) -> dict[str, tuple[Any, ...]]:
+        return entry_columns(self.file)
 
     def run(self, number: int) -> Run:
         """Run `number`, from 0."""
         place = self._place(number)
         base = self.file.bases[place.base]
-        planners, aircraft = self.campaign.planners, self.campaign.aircraft
         changes = [*self._grid(place), *self._drawn(place)]
         given = {key_path(each.loc): each.node.plain() for each in changes}
-        for listed, into, _, _ in self._listed:
-            index = place.planner if listed == "planners" else place.aircraft
-            for column in self.varied:
-                section, _, name = column.partition(".")
-                if section == into and column not in given:
-                    given[column] = self._of_entry(listed, index, name)
+        for name, values in self._of_entries.items():
+            given[name] = values[place.planner if name.startswith("planner.") else place.aircraft]
         return Run(
             number,
             place.case,
             base.name,
             self.campaign.worlds[place.world].name if self.campaign.worlds else base.file,
-            planners[place.planner].kind if planners else base.word(("planner", "kind"), DEFAULT_PLANNER),
-            aircraft[place.aircraft].model
-            if aircraft
-            else base.word(("aircraft", "model"), DEFAULT_AIRCRAFT),
+            self.planners[place.planner if self.campaign.planners else place.base],
+            self.aircraft[place.aircraft if self.campaign.aircraft else place.base],
             self._seed(place.case),
             {column: cell_of(given[column], kind) for column, kind in self.varied.items()},
         )
@@ -383,14 +333,6 @@ def _without_course(root: Node) -> Node:
         return root
     kept = {name: node for name, node in mission.value.items() if name != "course_deg"}
     return replaced(root, ("mission",), Node(kept, mission.line))
-
-
-def _keys_of(entry: Section) -> list[str]:
-    """The keys that an entry gives."""
-    return [
-        *(name for name in type(entry).model_fields if name in entry.model_fields_set),
-        *(entry.model_extra or {}),
-    ]
 
 
 def _path(name: str) -> str:

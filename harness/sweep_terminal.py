@@ -21,7 +21,8 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from harness.campaign_runs import CampaignRuns, Run
+from harness.campaign_cells import Run
+from harness.campaign_runs import CampaignRuns
 from harness.strict_yaml import Scalar
 from harness.sweep_flight import Answer
 

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from harness import campaign_runs
 from harness.campaign import CampaignFile, campaign_schema, is_campaign, load_campaign
-from harness.campaign_runs import CampaignRuns, Run
+from harness.campaign_cells import Run
+from harness.campaign_runs import CampaignRuns
 from harness.cli import main
 from harness.scenario import load_scenario
 from harness.shipped import shipped_campaigns, shipped_scenarios
