@@ -66,9 +66,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
 
 
 def _columns(title: str) -> Grid:
-    grid = Grid(
-        title=escape(title), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False
-    )
+    grid = Grid(title=escape(title), box=box.SIMPLE, title_justify="left", padding=0, pad_edge=False)
     grid.add_column("", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
     for name in ("runs", *(question.short for question in QUESTIONS)):
         grid.add_column(name, justify="right", no_wrap=True)
