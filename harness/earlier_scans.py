@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.followed_outline import LEAST_MPS, MOST_MPS, FollowedOutline
+from harness.followed_outline import MOST_MPS, FollowedOutline
 from harness.range_sensor import RangeScan
 from harness.scan_comparison import any_come, come, drawn_back, in_all, near_any
 from planner.interface import BoolArray, ComplexArray, IntArray
@@ -92,15 +92,10 @@ class EarlierScans:
         return any(np.count_nonzero(come(each.scan, places, self._sure)) >= fewest for each in self._looks)
 
     def of_it(self, track: FollowedOutline, places: ComplexArray) -> IntArray:
-        """Which places may be of something that moves: where no scan from before it was there met anything else."""
-        near_m = NO_STEP * self._clearance
-        away_s = 2.0 * near_m / max(abs(track.velocity), LEAST_MPS)
-        may = np.ones(len(places), dtype=np.bool_)
-        for before in self._looks:
-            if before is self._looks[0] or before.scan.time_s < track.seen_s - away_s:
-                own = near_any(before.places, track.shown_at(before.scan.time_s), OWN * self._clearance)
-                may &= ~near_any(places, before.places[~own], near_m)
-        return may.nonzero()[0]
+        """Which places may be of something that moves: where the first of the scans met nothing else."""
+        before = self._looks[0]
+        own = near_any(before.places, track.shown_at(before.scan.time_s), OWN * self._clearance)
+        return (~near_any(places, before.places[~own], NO_STEP * self._clearance)).nonzero()[0]
 
     def _may_differ(self, now: Look) -> bool:
         """Whether anything at all has come since a scan before, or drawn back: in a still world mostly nothing."""
