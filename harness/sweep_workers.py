@@ -134,11 +134,13 @@ class _Lane:
 
     def close(self) -> None:
         self._closed = True
-        self._retire()
 
-    def _retire(self) -> None:
+    def end(self) -> None:
+        self._retire(wait=True)
+
+    def _retire(self, *, wait: bool = False) -> None:
         if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
+            self._pool.shutdown(wait=wait, cancel_futures=True)
             self._pool = None
 
 
@@ -169,6 +171,11 @@ class LocalWorkers:
         for lane in self._lanes:
             lane.close()
 
+    def end(self) -> None:
+        """Waits for what handed out jobs, once the processes have ended: at its end Python wakes it without a lock."""
+        for lane in self._lanes:
+            lane.end()
+
 
 @contextmanager
 def local_workers(number: int, *, recording: bool = False) -> Iterator[Workers]:
@@ -193,6 +200,7 @@ def local_workers(number: int, *, recording: bool = False) -> Iterator[Workers]:
         for child in set(multiprocessing.active_children()) - before:
             child.terminate()
             child.join()
+        workers.end()
 
 
 @contextmanager
