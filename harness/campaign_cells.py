@@ -23,7 +23,7 @@ class Run:
         planner: kind.
         aircraft: model.
         seed: the scenario's.
-        varied: drawn and grid values by key path; lists and mappings as JSON text.
+        varied: grid and drawn values, and those of its entries, by key path; lists and mappings as JSON text.
     """
 
     run: int

@@ -104,7 +104,8 @@ def search(
 
     Args:
         keys: how many, at least 1.
-        judge: tries a condition; called once for each.
+        judge: tries a condition; called once for each. Where there is none it raises InputError: away from the
+            diagonal such a place is passed over.
         conditions: at most so many are tried, at least LEAST.
         tolerance: a displacement is narrowed down to this.
         seed: of the differential evolution.

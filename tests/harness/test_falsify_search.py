@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.falsify_search import POPULATION, STEPS, Point, Searched, Verdict, search
+from harness.strict_yaml import InputError
 
 Fails = Callable[[Point], bool]
 
@@ -111,6 +112,20 @@ def test_a_milder_failure_off_the_diagonal_is_found_by_evolution() -> None:
     again, asked_again = found(fails, keys=2, conditions=100)
     assert (again.verdicts, asked_again) == (result.verdicts, asked)
     assert found(fails, keys=2, conditions=100, seed=2)[1] != asked
+
+
+def test_places_without_a_scenario_are_passed_over_away_from_the_diagonal() -> None:
+    def judge(point: Point) -> Verdict:
+        if point[0] > point[1] + 0.3:
+            raise InputError("the goal lies inside an obstacle")
+        return Verdict(True) if point[1] >= 0.7 else Verdict(False, 1.0 - max(point) / 2)
+
+    result = search(2, judge, 60, 0.01, 1)
+    assert result.mildest == pytest.approx((0.0, 0.7), abs=0.02)
+    assert result.evolved > 0
+    assert all(point[0] <= point[1] + 0.3 for point in result.verdicts)
+    with pytest.raises(InputError, match="inside an obstacle"):
+        search(2, lambda point: judge((point[1], 0.1)), 60, 0.01, 1)
 
 
 def test_few_conditions_leave_out_the_evolution_and_say_so() -> None:

@@ -15,6 +15,7 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -208,6 +209,18 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
     ):
         assert main(["fly", *arguments]) == 2
         assert said in capsys.readouterr().err
+
+
+def test_a_row_that_was_flown_otherwise_is_told(
+    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = pq.read_table(unbroken / "results.parquet")
+    column = rows.column_names.index("digest")
+    changed = rows.set_column(column, "digest", pa.array(["0" * 64] * len(rows)))
+    pq.write_table(changed.replace_schema_metadata(rows.schema.metadata), place / "r.parquet")
+    again = ["fly", "--from", str(place / "r.parquet"), "--run", "1", "--out", str(place / "run"), "--quiet"]
+    assert main(again) == 1
+    assert f"run 1 was flown otherwise (digest {'0' * 64})" in capsys.readouterr().err
 
 
 def with_plugin(place: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0") -> None:

@@ -134,6 +134,25 @@ def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.Captur
     assert f"no Dask scheduler answers at {address}" in capsys.readouterr().err
     assert time.monotonic() - begun < 60
     assert not out.exists()
+    nobody = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "harness",
+            "sweep",
+            "campaign.yaml",
+            "--scheduler",
+            "no-such-host",
+            "--out",
+            "nowhere",
+        ],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    line = "wayproof: no Dask scheduler answers at no-such-host; start one there\n"
+    assert (nobody.returncode, nobody.stderr) == (2, line), "no traceback at its end"
     for options, said in (
         (["--scheduler", address, "--workers", "2"], "--workers goes with this machine"),
         (["--scheduler", "nonsense://x"], "no Dask scheduler answers at nonsense://x"),
