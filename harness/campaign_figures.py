@@ -11,6 +11,8 @@ from harness.campaign_summary import CURVE_POINTS, Table
 from harness.figures import DASHES, colour, styled
 
 HEIGHT_IN = 2.9
+LEGEND_LETTERS, KEY_LETTERS = 66, 6
+"""Letters that a row of the legend has room for, and as many as the key before each name takes."""
 ROTATED_FROM = 5
 """From so many groups on, their labels stand slanted."""
 
@@ -67,4 +69,5 @@ def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
 
 def _legend(figure: Figure, planners: Sequence[str]) -> None:
     if len(planners) > 1:
-        figure.legend(loc="outside lower center", ncols=3, frameon=False)
+        columns = LEGEND_LETTERS // (KEY_LETTERS + max(map(len, planners)))
+        figure.legend(loc="outside lower center", ncols=min(max(columns, 1), 3), frameon=False)

@@ -16,10 +16,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from harness.campaign_figures import lengths
 from harness.campaign_groups import BINS, MOST_NAMES, NONE, grouped
 from harness.campaign_paired import mean_estimate
 from harness.campaign_report import PAGE, PLAIN, write_summary
-from harness.campaign_summary import Cell, Summary, summarise, wilson
+from harness.campaign_summary import CURVE_POINTS, Cell, Summary, summarise, wilson
 from harness.campaign_terminal import print_summary
 from harness.cli import main
 from harness.strict_yaml import InputError
@@ -447,3 +448,18 @@ def test_an_inner_edge_belongs_to_the_group_above() -> None:
     axis, index = grouped("key", [float(value) for value in range(9)])
     assert axis.edges == (0.0, 2.0, 4.0, 6.0, 8.0)
     assert index.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 3]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("rolling_window", "tangent_bug", "bug2"),
+        ("rolling_window, clearance_m 120", "rolling_window, clearance_m 200", "vfh_plus"),
+    ],
+)
+def test_the_legend_lies_within_the_figure(names: tuple[str, ...]) -> None:
+    figure = lengths({name: [1.0 + 0.001 * step for step in range(CURVE_POINTS)] for name in names})
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    box, whole = legend.get_window_extent(), figure.bbox
+    assert whole.x0 <= box.x0 < box.x1 <= whole.x1
