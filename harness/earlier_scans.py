@@ -15,7 +15,7 @@ import numpy as np
 
 from harness.followed_outline import MOST_MPS, FollowedOutline
 from harness.range_sensor import RangeScan
-from harness.scan_comparison import any_come, come, drawn_back, in_all, near_any
+from harness.scan_comparison import any_come, come, drawn_back, in_all, looked_through, near_any, near_line
 from planner.interface import BoolArray, ComplexArray, IntArray
 
 COMPARED_S = 12.0
@@ -28,7 +28,9 @@ LOOK_EVERY = 0.6
 NO_STEP = 0.25
 """Share of the clearance: returns of neighbouring rays that lie nearer to each other are of one thing."""
 OWN = 0.1
-"""Share of the clearance: what was met so near to where something that moves was, was it."""
+"""Share of the clearance: what was met so near to where something was, was it."""
+OFF = 3.0
+"""In standard errors: a velocity is off by no more."""
 
 
 class Look(NamedTuple):
@@ -91,11 +93,25 @@ class EarlierScans:
         """Whether so many of some places at least were looked through by one of the scans."""
         return any(np.count_nonzero(come(each.scan, places, self._sure)) >= fewest for each in self._looks)
 
-    def of_it(self, track: FollowedOutline, places: ComplexArray) -> IntArray:
-        """Which places may be of something that moves: where the first of the scans met nothing else."""
-        before = self._looks[0]
-        own = near_any(before.places, track.shown_at(before.scan.time_s), OWN * self._clearance)
-        return (~near_any(places, before.places[~own], NO_STEP * self._clearance)).nonzero()[0]
+    def met(self, places: ComplexArray) -> BoolArray:
+        """(k,) whether something was met at places by the first of the scans."""
+        return near_line(places, self._looks[0].places, OWN * self._clearance, self._clearance)
+
+    def of_it(self, track: FollowedOutline, places: ComplexArray, time_s: float) -> IntArray:
+        """Which places may be of something that moves.
+
+        Those where the first of the scans met nothing else; and, where its outline tells all of its velocity, which
+        none of the scans looked through where they would have been then, if they were its.
+        """
+        first = self._looks[0]
+        own = near_any(first.places, track.shown_at(first.scan.time_s), OWN * self._clearance)
+        may = ~near_any(places, first.places[~own], NO_STEP * self._clearance)
+        if track.outline.is_definite:
+            for before in self._looks:
+                past_s = time_s - before.scan.time_s
+                off_m = max(self._sure, NO_STEP * self._clearance) + OFF * track.error_mps * past_s
+                may &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
+        return may.nonzero()[0]
 
     def _may_differ(self, now: Look) -> bool:
         """Whether anything at all has come since a scan before, or drawn back: in a still world mostly nothing."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.registration import FEWEST, Outline
-from planner.interface import ComplexArray
+from planner.interface import ComplexArray, FloatArray
 
 LEAST_MPS = 0.5
 """What is slower than this stands still."""
@@ -21,7 +21,7 @@ SURE = 8.0
 """In standard errors of the velocity."""
 VAGUE_MPS = 1.5
 """With a velocity that errs more than this it is not told where a thing will be."""
-FAR = 10.0
+FAR = 5.0
 """Something of which only a straight face is seen moves when it has come so many times as far across it as another
 has to."""
 HISTORY_S = 40.0
@@ -101,14 +101,15 @@ class FollowedOutline:
         Of a straight face without both of its ends other parts come into view along it: there only motion across
         it tells, and by far.
         """
-        moved, velocity, further_m = self.moved, self.velocity, sure_m
+        if len(self.shifts) < FEWEST_SHIFTS or self.error_mps >= VAGUE_MPS:
+            return False
+        moved, velocity, error_mps, further_m = self.moved, self.velocity, self.error_mps, sure_m
         if not self.outline.is_definite:
-            face = self.outline.points[-1] - self.outline.points[0]
-            along = face / max(abs(face), 1e-9)
-            moved, velocity = ((each * along.conjugate()).imag * 1j for each in (moved, velocity))
-            further_m = FAR * sure_m
-        sure = self.error_mps < VAGUE_MPS and abs(velocity) >= LEAST_MPS + SURE * self.error_mps
-        return sure and abs(moved) > further_m
+            back = self.outline.along.conjugate()
+            times_s, shifts = self._remembered()
+            _, error_mps = _slope(times_s, (shifts * back).imag)
+            moved, velocity, further_m = (moved * back).imag, (velocity * back).imag, FAR * sure_m
+        return abs(velocity) >= LEAST_MPS + SURE * error_mps and abs(moved) > further_m
 
     def surely_stands(self) -> bool:
         """Whether its velocity is surely too little."""
@@ -116,12 +117,7 @@ class FollowedOutline:
 
     def _measure(self) -> None:
         """Velocity: the slope of the shifts over time."""
-        times, shifts = (np.array(each) for each in zip(*self.shifts, strict=True))
-        times = times - times.mean()
-        spread = float((times * times).sum())
-        velocity = complex((times * shifts).sum() / spread)
-        off = shifts - shifts.mean() - velocity * times
-        self.error_mps = math.sqrt(float((np.abs(off) ** 2).sum()) / (len(off) - 2) / spread)
+        velocity, self.error_mps = _slope(*self._remembered())
         if self.error_mps > VAGUE_MPS:
             velocity = self.velocity if self.moves else 0j
         # The outline stays where it has been found.
@@ -129,6 +125,20 @@ class FollowedOutline:
         base = last - velocity * (last_s - self.outline_s)
         self.outline, self.base = self.outline.moved(base - self.base), base
         self.velocity = velocity * min(1.0, MOST_MPS / max(abs(velocity), MOST_MPS))
+
+    def _remembered(self) -> tuple[FloatArray, ComplexArray]:
+        """When it was found, s, and how far from where it was first."""
+        times, shifts = zip(*self.shifts, strict=True)
+        return np.array(times), np.array(shifts)
+
+
+def _slope(times_s: FloatArray, shifts: FloatArray | ComplexArray) -> tuple[complex, float]:
+    """The slope of some shifts over time, by least squares, and its standard error."""
+    times = times_s - times_s.mean()
+    spread = float((times * times).sum())
+    slope = (times * shifts).sum() / spread
+    off = shifts - shifts.mean() - slope * times
+    return complex(slope), math.sqrt(float((np.abs(off) ** 2).sum()) / (len(off) - 2) / spread)
 
 
 def extent_m(points: ComplexArray) -> float:

@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from harness.earlier_scans import NO_STEP, EarlierScans, Look
+from harness.earlier_scans import NO_STEP, OWN, EarlierScans, Look
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline, bow, extent_m
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
@@ -141,8 +141,25 @@ class MovingObstacles:
             return
         closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
         for run in runs_of(hits, places, self._step(scan, hits), closed):
-            if in_a_row(changed[run]) >= FEWEST and not self._is_followed(places[run], scan.time_s):
-                self._tracks.append(FollowedOutline(self._outline(scan, hits[run], places[run]), scan.time_s))
+            if in_a_row(changed[run]) >= FEWEST:
+                self._begin(scan, changed[run], hits[run], places[run])
+
+    def _begin(self, scan: RangeScan, changed: BoolArray, hits: IntArray, places: ComplexArray) -> None:
+        """Begins to follow what has changed in a run of returns, without what stood there before beside it.
+
+        Of a straight face all is followed: where it slides along itself it only seems to have stood.
+        """
+        others = (changed | ~self._earlier.met(places)).nonzero()[0]
+        apart = np.abs(np.diff(places[others])) > self._clearance
+        for part in np.split(others, apart.nonzero()[0] + 1):
+            some = slice(int(part[0]), int(part[-1]) + 1)
+            if in_a_row(changed[some]) < FEWEST or self._is_followed(places[some], scan.time_s):
+                continue
+            outline = self._outline(scan, hits[some], places[some])
+            if not outline.is_definite:
+                some = _face(places, some, outline.along, OWN * self._clearance)
+                outline = self._outline(scan, hits[some], places[some])
+            self._tracks.append(FollowedOutline(outline, scan.time_s))
 
     def _step(self, scan: RangeScan, hits: IntArray) -> FloatArray:
         """(k,) returns of one face lie no further apart than this where they are so far away."""
@@ -255,7 +272,7 @@ class MovingObstacles:
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
         some = np.arange(len(places))
         if track.moves and not self._is_free:
-            some = self._earlier.of_it(track, places)
+            some = self._earlier.of_it(track, places, scan.time_s)
         own_hits, own = hits[some], places[some]
         laid = register(
             track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR * self._noise
@@ -291,6 +308,14 @@ class MovingObstacles:
         return some[
             grown(np.searchsorted(some, mine), hits[some], places[some], NO_STEP * self._clearance, scan)
         ]
+
+
+def _face(places: ComplexArray, some: slice, along: complex, within_m: float) -> slice:
+    """Some places of a run, and those that go on from their ends in a direction."""
+    off_m = ((places - places[some.start]) * along.conjugate()).imag
+    bent = (np.abs(off_m) > within_m).nonzero()[0]
+    before, after = bent[bent < some.start], bent[bent >= some.stop]
+    return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(places))
 
 
 def _pairs(points: ComplexArray) -> FloatArray:

@@ -59,9 +59,22 @@ class Outline(NamedTuple):
         """Whether it tells of shifts in every direction: it shows both of its ends, or is not straight."""
         if all(self.ends):
             return True
+        return abs(self._turned) < FLAT
+
+    @property
+    def along(self) -> complex:
+        """Unit vector along a straight one, either way."""
+        along = self._turned**0.5
+        return along / max(abs(along), 1e-9)
+
+    @property
+    def _turned(self) -> complex:
+        """Mean of its tangents, each turned by twice its angle; of its chord where it is straight nowhere."""
         along, straight = _tangents(self.points)
-        turned = along[straight] ** 2
-        return len(turned) > 0 and abs(turned.mean()) < FLAT
+        if straight.any():
+            return complex((along[straight] ** 2).mean())
+        chord = complex(self.points[-1] - self.points[0])
+        return (chord / max(abs(chord), 1e-9)) ** 2
 
     def moved(self, by: complex) -> Outline:
         """The outline elsewhere."""

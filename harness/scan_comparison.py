@@ -173,20 +173,30 @@ def joined(places: ComplexArray, apart_m: FloatArray) -> BoolArray:
     return near
 
 
-@compiled(PLACES, PLACES, FLOAT)
 def near_any(places: ComplexArray, others: ComplexArray, within_m: float) -> BoolArray:
     """(k,) which of (k,) places lie no further than that from one of (m,) others."""
+    return near_line(places, others, within_m, 0.0)
+
+
+@compiled(PLACES, PLACES, FLOAT, FLOAT)
+def near_line(places: ComplexArray, line: ComplexArray, within_m: float, apart_m: float) -> BoolArray:
+    """(k,) which of (k,) places lie no further than that from a line through (m,) others, broken where it is apart."""
     near = np.zeros(len(places), dtype=np.bool_)
-    if not len(others):
+    if not len(line):
         return near
-    west, east = others.real.min() - within_m, others.real.max() + within_m
-    south, north = others.imag.min() - within_m, others.imag.max() + within_m
+    west, east = line.real.min() - within_m, line.real.max() + within_m
+    south, north = line.imag.min() - within_m, line.imag.max() + within_m
     for i in range(len(places)):
         x, y = places[i].real, places[i].imag
         if not (west <= x <= east and south <= y <= north):
             continue
-        for j in range(len(others)):
-            dx, dy = others[j].real - x, others[j].imag - y
+        for j in range(len(line)):
+            ahead = line[min(j + 1, len(line) - 1)] - line[j]
+            dx, dy = x - line[j].real, y - line[j].imag
+            squared = ahead.real * ahead.real + ahead.imag * ahead.imag
+            if 0.0 < squared <= apart_m * apart_m:
+                share = min(max((dx * ahead.real + dy * ahead.imag) / squared, 0.0), 1.0)
+                dx, dy = dx - share * ahead.real, dy - share * ahead.imag
             if dx * dx + dy * dy <= within_m * within_m:
                 near[i] = True
                 break

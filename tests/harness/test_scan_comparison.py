@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import cmath
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely import LineString, MultiPoint, Point, unary_union
 
 from harness.range_sensor import RangeScan
 from harness.registration import FEWEST, nearest
-from harness.scan_comparison import come, drawn_back, grown, joined, looked_through, near_any
+from harness.scan_comparison import come, drawn_back, grown, joined, looked_through, near_any, near_line
 
 RAYS, RANGE = 60, 1000.0
 AT = complex(300.0, -200.0)
@@ -91,6 +93,26 @@ def test_near_is_what_is_no_further_from_any(seed: int, within_m: float, count: 
     places, others = (rng.uniform(-300, 300, n) + 1j * rng.uniform(-300, 300, n) for n in (20, count))
     away = np.abs(np.subtract.outer(places, others)).min(axis=1, initial=math.inf)
     np.testing.assert_array_equal(near_any(places, others, within_m), away <= within_m)
+
+
+@settings(deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    within_m=st.floats(1.0, 200.0),
+    apart_m=st.floats(0.0, 500.0),
+    count=st.integers(0, 12),
+)
+def test_near_a_line_is_what_is_no_further_from_one_of_its_pieces(
+    seed: int, within_m: float, apart_m: float, count: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    places, line = (rng.uniform(-300, 300, n) + 1j * rng.uniform(-300, 300, n) for n in (20, count))
+    pieces = [
+        LineString([(p.real, p.imag), (q.real, q.imag)]) for p, q in pairwise(line) if abs(q - p) <= apart_m
+    ]
+    shape = MultiPoint([(p.real, p.imag) for p in line]).union(unary_union(pieces))
+    wanted = [not shape.is_empty and shape.distance(Point(p.real, p.imag)) <= within_m for p in places]
+    np.testing.assert_array_equal(near_line(places, line, within_m, apart_m), wanted)
 
 
 @pytest.mark.parametrize("turned", range(0, RAYS, 7))
