@@ -24,9 +24,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from aircraft.interface import AircraftState, Route
+from aircraft.route import SegmentRow, arc_point
 
 GRAVITY_MPS2 = 9.80665
 UPDATE_RATE_HZ = 10
@@ -59,9 +58,6 @@ class GuidanceLimits:
     roll_lag_s: float
     roll_delay_s: float
     bandwidth_radps: float
-
-
-_Row = tuple[float, float, float, float, float, float]
 
 
 class GuidanceOutput(NamedTuple):
@@ -101,7 +97,7 @@ class PathFollower:
         self._two_zeta_omega = 2.0 * DAMPING * limits.bandwidth_radps
         self._pull_per_s = limits.bandwidth_radps / (2.0 * DAMPING)
         self._roll = 0.0
-        self._rows: list[_Row] = []
+        self._rows: list[SegmentRow] = []
         self._starts: list[float] = []
         self._stops: list[float] = []
         self._turned: list[float] = []
@@ -242,7 +238,7 @@ def _within(limit: float, value: float) -> float:
     return value if -limit <= value <= limit else math.copysign(limit, value)
 
 
-def _on_arc(row: _Row, east: float, north: float, near_m: float) -> tuple[float, float, float, float]:
+def _on_arc(row: SegmentRow, east: float, north: float, near_m: float) -> tuple[float, float, float, float]:
     """Where a point is along and to the right of an arc, and the unit tangent there.
 
     The point is within half a turn of a place along the arc.
@@ -301,54 +297,3 @@ def air_direction(
     north = ground * bearing_north - wind_north_mps
     length = max(math.hypot(east, north), 1e-9)
     return east / length, north / length
-
-
-def arc_point(row: _Row, along_m: float) -> tuple[float, float, float, float]:
-    """Point and unit tangent on a segment of constant curvature.
-
-    Args:
-        row: start east, start north, tangent east, tangent north, curvature (1/m, positive left), length (m).
-        along_m: distance from the segment's start.
-
-    Returns:
-        East, north (m), tangent east, tangent north.
-    """
-    east, north, tangent_east, tangent_north, curvature, _ = row
-    half = 0.5 * curvature * along_m
-    sine, cosine = math.sin(half), math.cos(half)
-    chord = along_m * (sine / half if abs(half) > 1e-9 else 1.0)
-    chord_east = tangent_east * cosine - tangent_north * sine
-    chord_north = tangent_east * sine + tangent_north * cosine
-    return (
-        east + chord * chord_east,
-        north + chord * chord_north,
-        chord_east * cosine - chord_north * sine,
-        chord_east * sine + chord_north * cosine,
-    )
-
-
-def route_length(route: Route) -> float:
-    """Length of a route (m), one turn of a closing loiter included."""
-    return float(route.segments[:, 5].sum())
-
-
-def route_point(route: Route, station_m: float) -> tuple[float, float, float, float]:
-    """Point and unit tangent of a route at a station.
-
-    Args:
-        route: any route.
-        station_m: distance from its start; beyond the end a loiter goes round, any other route straight on.
-
-    Returns:
-        East, north (m), tangent east, tangent north.
-    """
-    starts = np.concatenate(([0.0], np.cumsum(route.segments[:-1, 5])))
-    index = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
-    east, north, tangent_east, tangent_north, curvature, length = route.segments[index].tolist()
-    along = station_m - float(starts[index])
-    over = 0.0
-    if index == len(starts) - 1 and not route.loiter:
-        over = max(along - length, 0.0)
-    row = (east, north, tangent_east, tangent_north, curvature, length)
-    east, north, tangent_east, tangent_north = arc_point(row, along - over)
-    return east + over * tangent_east, north + over * tangent_north, tangent_east, tangent_north

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from aircraft.guidance import GuidanceOutput, route_length, route_point
+from aircraft.guidance import GuidanceOutput
 from aircraft.interface import AircraftState, Command, FloatArray, Route
+from aircraft.route import route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 
 STEP_RATE_HZ = 120

@@ -16,7 +16,7 @@ from aircraft.airframes import FIGURES, AircraftError, Airframe, Entry
 from aircraft.autopilot import Derivatives, Gains, gains
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import GRAVITY_MPS2, UPDATE_RATE_HZ, PathFollower, arc_point
+from aircraft.guidance import GRAVITY_MPS2, UPDATE_RATE_HZ, PathFollower
 from aircraft.interface import AircraftState, Command, Route
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,
@@ -28,6 +28,7 @@ from aircraft.jsbsim_loading import (
 )
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import ModelFiles, TrimError
+from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
 
 SLOWEST_MPS, FASTEST_MPS = 8.0, 300.0

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from harness.campaign_summary import CURVE_POINTS, Table
-from harness.figures import DASHES, colour, styled
+from harness.figure_style import DASHES, colour, styled
 
 HEIGHT_IN = 2.9
 LEGEND_LETTERS, KEY_LETTERS = 66, 6

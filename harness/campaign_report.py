@@ -61,7 +61,7 @@ def summary_html(summary: Summary) -> str:
 
 def _pictures(summary: Summary) -> Iterator[Picture]:
     from harness import campaign_figures
-    from harness.figures import svg
+    from harness.figure_style import svg
 
     for table in summary.curves:
         yield Picture(

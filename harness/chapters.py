@@ -143,7 +143,7 @@ def _drawn(flight: Entry) -> DrawnRun | None:
 
 def _picture(stem: Path, figure: Any, caption: str) -> Picture:
     """Writes a figure as SVG and PNG."""
-    from harness.figures import png, svg
+    from harness.figure_style import png, svg
     from harness.report import Picture
 
     content = svg(figure)

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from harness.figures import colour, png, styled, svg
+from harness.figure_style import colour, png, styled, svg
 
 if TYPE_CHECKING:
     from harness.falsify import Breaking

@@ -5,20 +5,18 @@ Drawn without a screen. The same values give the same files: SVG carries no date
 
 from __future__ import annotations
 
-import io
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib import patches
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from harness.compare_planned import PlannedRows
+from harness.figure_style import DASHES, WIDTH_IN, colour, styled
 from harness.obstacle import Circle
 from harness.smoothness import flown_lengths, flown_profile
 
@@ -28,30 +26,7 @@ if TYPE_CHECKING:
     from harness.obstacle import Obstacle
     from harness.record import FloatArray, Track
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Of the planners in order; told apart with any colour vision (Okabe and Ito, 2008)."""
-
-DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1)), (0, (6, 1, 1, 1)), (0, (1, 1)))
-"""Of the planners in order, so that they differ in print too."""
-
 PLANNED_DASHES: Any = (0, (4, 2))
-
-STYLE: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
-    "legend.fontsize": 8,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "font.family": "DejaVu Sans",
-    "axes.linewidth": 0.7,
-    "lines.solid_capstyle": "round",
-    "svg.hashsalt": "wayproof",
-    "svg.fonttype": "path",
-    "path.simplify": True,
-}
-WIDTH_IN = 4.8
-"""Narrow, so that the letters stay legible on a phone and in a column of a paper."""
 
 LEGEND_ROW_IN = 0.19
 CLOSE_UP_IN = 2.3
@@ -176,32 +151,6 @@ def profiles(scene: Scene, runs: Numbered) -> Figure:
         strips[-1].set_xlabel("distance flown, km")
         figure.align_ylabels()
     return figure
-
-
-def svg(figure: Figure) -> bytes:
-    """A figure as SVG."""
-    return _saved(figure, "svg", metadata={"Date": None, "Creator": None})
-
-
-def png(figure: Figure) -> bytes:
-    """A figure as PNG, 200 dots an inch."""
-    return _saved(figure, "png", dpi=200, metadata={"Software": None})
-
-
-def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
-    file = io.BytesIO()
-    with mpl.rc_context(STYLE):
-        # A map of fixed shape gives room back only once it has been laid out.
-        figure.draw_without_rendering()
-        figure.savefig(file, format=kind, **options)
-    return file.getvalue()
-
-
-@contextmanager
-def styled(height_in: float) -> Iterator[Figure]:
-    """A figure in our style, as wide as all of them."""
-    with mpl.rc_context(STYLE):
-        yield Figure(figsize=(WIDTH_IN, height_in), layout="compressed")
 
 
 def _map_height_in(scene: Scene) -> float:
@@ -369,8 +318,3 @@ def _round_length_m(half_m: float) -> float:
     third = 2 * half_m / 3
     size = 10.0 ** np.floor(np.log10(third))
     return float(max(step * size for step in (1, 2, 5) if step * size <= third))
-
-
-def colour(index: int) -> str:
-    """Of a planner, by its number."""
-    return COLOURS[index % len(COLOURS)]

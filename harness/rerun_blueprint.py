@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
@@ -109,6 +109,13 @@ OVERLAY: tuple[Colour, ...] = (
     (200, 200, 210),
 )
 """Colours of overlaid runs, in order."""
+
+
+def error_colours(share: FloatArray) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """(n, 3) colours of the track for errors, as shares of the one from which on it is not tracked."""
+    scale = np.array(ERROR_COLOURS, dtype=np.float64).T
+    place = 0.5 * np.arange(len(ERROR_COLOURS))
+    return np.column_stack([np.interp(share, place, part) for part in scale]).astype(np.uint8)
 
 
 @dataclass(frozen=True)

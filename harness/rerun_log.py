@@ -311,7 +311,7 @@ class RerunLog:
         self._whole.append(np.concatenate(pieces))
         starts = np.append(0, ends[:-1] + 1)
         off = np.maximum.reduceat(np.nan_to_num(np.abs(block.cross_track_m)), starts)
-        colours = error_colours(off / self._scene.limits.cross_track_threshold_m)
+        colours = look.error_colours(off / self._scene.limits.cross_track_threshold_m)
         times = [look.time_column(block.time_s[ends])]
         for entity, strips in (
             (look.PLAN, rr.LineStrips2D.columns(strips=[piece[:, :2] for piece in pieces], colors=colours)),
@@ -342,10 +342,3 @@ class RerunLog:
                         rr.Transform3D.columns(translation=moved),
                     )
         self._shown_until_s = until
-
-
-def error_colours(share: FloatArray) -> np.ndarray[Any, np.dtype[np.uint8]]:
-    """(n, 3) colours of the track for errors, as shares of the one from which on it is not tracked."""
-    scale = np.array(look.ERROR_COLOURS, dtype=np.float64).T
-    place = 0.5 * np.arange(len(look.ERROR_COLOURS))
-    return np.column_stack([np.interp(share, place, part) for part in scale]).astype(np.uint8)

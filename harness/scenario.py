@@ -16,12 +16,12 @@ from pydantic import FailFast, Strict, ValidationError, ValidationInfo, model_va
 
 from harness import planner_keys, strict_yaml
 from harness.scenario_checks import check_start_and_goal
+from harness.scenario_obstacles import Obstacle
 from harness.scenario_sections import (
     AircraftSpec,
     Area,
     Environment,
     MissionSpec,
-    Obstacle,
     PlannerSpec,
     Section,
     Sensor,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from harness.scenario_sections import Area, MissionSpec, Obstacle, Point
+from harness.scenario_obstacles import Obstacle
+from harness.scenario_sections import Area, MissionSpec, Point
 from harness.validation import KeyFault
 
 

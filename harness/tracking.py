@@ -16,8 +16,9 @@ import numpy as np
 from aircraft.airframes import Airframe, airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import UPDATE_RATE_HZ, PathFollower, arc_point
+from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.interface import Command, Route
+from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
 
 ALTITUDE_M: Final = 300.0

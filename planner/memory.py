@@ -62,6 +62,16 @@ class ObstacleMemory:
         return self._all()[1]
 
     @property
+    def standing_m(self) -> FloatArray:
+        """(`known`, 2) the points of what stands still."""
+        return self.points_m[: self.known]
+
+    @property
+    def met_m(self) -> FloatArray:
+        """(k, 2) the others: what moves, where it is met."""
+        return self.points_m[self.known :]
+
+    @property
     def genuine_m(self) -> FloatArray:
         """(k, 2) those points that were seen to stand still, not refused."""
         return self._points[: self._count][self._genuine[: self._count]]

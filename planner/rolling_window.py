@@ -154,7 +154,7 @@ class RollingWindow:
         """Begins to watch what was proposed last, if it is flown now."""
         if request.flown is proposed.plan:
             self._effect, self._proposed = proposed, None
-            self._watch.begin(proposed, self._standing_m(), self._memory.gone - self._gone)
+            self._watch.begin(proposed, self._memory.standing_m, self._memory.gone - self._gone)
             self._searched_at_m = self._refused_at_m = 0.0
 
     def _roll(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
@@ -194,7 +194,8 @@ class RollingWindow:
                         self._thinking, self._searched_with, self._effort = None, thinking.known, 0
                         before_m = -math.inf if ahead is None else ahead.path.length_m
                         self._watch.lengthened_m = course.path.length_m - before_m
-                        return self._propose(found)
+                        self._proposed = found
+                        return found.plan
                     if keeps_m > nearer_m:  # what moves may come to what is free now
                         nearer_m, self._nearer = keeps_m, found
                 thinking.stuck = thinking.stuck or course
@@ -211,12 +212,9 @@ class RollingWindow:
             and longer.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m
             and room_m(longer.path, self._threats) >= self._mission.clearance_m
         ):
-            return self._propose(longer)
+            self._proposed = longer
+            return longer.plan
         return Plan(PlanStatus.NO_BETTER, "the plan in effect serves as well as any other", goes_on=goes_on)
-
-    def _propose(self, found: Effect) -> Plan:
-        self._proposed = found
-        return found.plan
 
     def _pressed(self, effect: Effect | None, here: float) -> bool:
         """Whether there is no safe plan in effect to think on."""
@@ -229,12 +227,12 @@ class RollingWindow:
         """The part of a course that ends in a turn seen to be free."""
         certifier = self._certifier(1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        cut_m = self._watch.cut_at(course, self._standing_m(), self._memory.gone - self._gone)
+        cut_m = self._watch.cut_at(course, self._memory.standing_m, self._memory.gone - self._gone)
         certified = certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
         if certified is None:
             return None
         goal, nodes, keep_m = self._mission.goal_m, course.nodes, self._mission.clearance_m
-        points, met = self._memory.points_m, self._memory.points_m[self._memory.known :]
+        points, met = self._memory.points_m, self._memory.met_m
         plan = Plan(
             PlanStatus.FOUND,
             sentence(request.position_m, goal, nodes),
@@ -250,10 +248,6 @@ class RollingWindow:
     def _certifier(self, spacing_m: float) -> Certifier:
         mission = self._mission
         return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)
-
-    def _standing_m(self) -> FloatArray:
-        """(m, 2) edge points of what stands still: what moves is looked at whenever it has moved on."""
-        return self._memory.points_m[: self._memory.known]
 
     def _leads_on(self, found: Effect) -> bool:
         """Whether a certified plan gets anywhere: past its first turn, or to the goal."""

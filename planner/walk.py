@@ -18,7 +18,8 @@ from typing import Generic, Literal, Self, TypeVar
 
 import numpy as np
 
-from planner.boundary import Contact, GrownObstacles, margin_of
+from planner.boundary import GrownObstacles, margin_of
+from planner.boundary_path import Contact
 from planner.clearance import distances, first_breach
 from planner.curves import SHORTEST_M, Point, Segment, along, between, end_of, pose_at
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus

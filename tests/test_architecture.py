@@ -43,7 +43,7 @@ ONLY_IN = {
     "rerun": ("harness/rerun_*.py",),
     "yaml": ("aircraft/airframes.py", "harness/strict_yaml.py"),
     "typer": ("harness/cli.py", "harness/commands/*.py"),
-    "matplotlib": ("harness/figures.py", "harness/campaign_figures.py", "harness/falsify_figure.py"),
+    "matplotlib": ("harness/*figure*.py",),
     "jinja2": ("harness/report.py",),
     "scipy": (
         "harness/sampling.py",
@@ -65,7 +65,7 @@ LATE = {
     "scipy": (),
     "shapely": (),
     "typer": ("harness/cli.py", "harness/commands/*.py"),
-    "matplotlib": ("harness/figures.py", "harness/campaign_figures.py", "harness/falsify_figure.py"),
+    "matplotlib": ("harness/*figure*.py",),
     "jinja2": ("harness/report.py",),
     "ompl": (),
     "distributed": (),

@@ -16,12 +16,10 @@ from aircraft.guidance import (
     GuidanceLimits,
     GuidanceOutput,
     PathFollower,
-    arc_point,
-    route_length,
-    route_point,
 )
 from aircraft.interface import AircraftState, Command, Route
 from aircraft.point_mass import STEP_RATE_HZ, PointMass
+from aircraft.route import arc_point, route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 
 AIRSPEED = 25.0

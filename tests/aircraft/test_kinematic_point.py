@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.guidance import route_length, route_point
 from aircraft.interface import Command, FlightModel, Route
 from aircraft.kinematic_point import KinematicPoint
+from aircraft.route import route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 
 NORTH = StartConditions(east_m=0.0, north_m=0.0, altitude_m=300.0, course_rad=0.0, airspeed_mps=20.0)

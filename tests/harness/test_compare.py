@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from harness import figures
+from harness import figure_style, figures
 from harness.cli import main
 from harness.compare_planned import PlannedRows, planned_rows
 from harness.compare_rows import Row, number, row_of, to_csv, to_markdown
@@ -480,7 +480,7 @@ def test_the_map_shows_the_track_and_the_tightest_turn(drawn: tuple[figures.Scen
     assert flown[0] == pytest.approx((0.5, 0.0))
     assert flown[-1] == pytest.approx((run.track.east_m[-1] / 1e3, run.track.north_m[-1] / 1e3))
     assert np.hypot(*flown.T) == pytest.approx(0.5, abs=2e-3)
-    assert lines["round"].get_color() == figures.COLOURS[2]
+    assert lines["round"].get_color() == figure_style.COLOURS[2]
     assert "clairvoyant optimum" not in lines
     row = run.planned.tightest
     assert row is not None
@@ -499,10 +499,10 @@ def test_figures_are_the_same_bytes_every_time(
         "planner_figure": lambda: figures.planner_figure(scene, run, 0),
         "profiles": lambda: figures.profiles(scene, [(0, run)]),
     }
-    content = figures.svg(draw[kind]())
-    assert content == figures.svg(draw[kind]())
+    content = figure_style.svg(draw[kind]())
+    assert content == figure_style.svg(draw[kind]())
     assert ElementTree.fromstring(content).tag == "{http://www.w3.org/2000/svg}svg"
-    assert figures.png(draw[kind]()).startswith(b"\x89PNG")
+    assert figure_style.png(draw[kind]()).startswith(b"\x89PNG")
 
 
 def test_a_curve_of_many_rows_keeps_its_peaks(

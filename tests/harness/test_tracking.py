@@ -13,7 +13,7 @@ import pytest
 
 from aircraft.airframes import aircraft_names, airframe
 from aircraft.envelope import performance
-from aircraft.guidance import route_point
+from aircraft.route import route_point
 from aircraft.start import Atmosphere
 from harness.terminal import print_grid, tracking_rows
 from harness.tracking import (

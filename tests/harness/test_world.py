@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from harness import scenario_obstacles
 from harness import scenario_sections as sections
 from harness.world import Circle, Obstacle, Polygon, World
 
@@ -277,13 +278,13 @@ def test_exact_geometry_is_asked_only_of_obstacles_that_may_be_nearest(
 
 
 def test_from_scenario_takes_shape_motion_and_window() -> None:
-    circle = sections.Circle(center_m=(1.0, 2.0), radius_m=3.0)
-    polygon = sections.Polygon(vertices_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    circle = scenario_obstacles.Circle(center_m=(1.0, 2.0), radius_m=3.0)
+    polygon = scenario_obstacles.Polygon(vertices_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
     scenario: Any = SimpleNamespace(
         area=sections.Area(bounds_m=BOUNDS),
         obstacles=(
-            sections.Obstacle(circle=circle, velocity_mps=(4.0, 5.0), active_s=(6.0, 7.0)),
-            sections.Obstacle(polygon=polygon),
+            scenario_obstacles.Obstacle(circle=circle, velocity_mps=(4.0, 5.0), active_s=(6.0, 7.0)),
+            scenario_obstacles.Obstacle(polygon=polygon),
         ),
     )
     world = World.from_scenario(scenario)

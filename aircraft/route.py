@@ -1,0 +1,63 @@
+"""Points of a route: where it is, and where it heads, so far along it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from aircraft.interface import Route
+
+SegmentRow = tuple[float, float, float, float, float, float]
+"""One row of `Route.segments`."""
+
+
+def arc_point(row: SegmentRow, along_m: float) -> tuple[float, float, float, float]:
+    """Point and unit tangent on a segment of constant curvature.
+
+    Args:
+        row: start east, start north, tangent east, tangent north, curvature (1/m, positive left), length (m).
+        along_m: distance from the segment's start.
+
+    Returns:
+        East, north (m), tangent east, tangent north.
+    """
+    east, north, tangent_east, tangent_north, curvature, _ = row
+    half = 0.5 * curvature * along_m
+    sine, cosine = math.sin(half), math.cos(half)
+    chord = along_m * (sine / half if abs(half) > 1e-9 else 1.0)
+    chord_east = tangent_east * cosine - tangent_north * sine
+    chord_north = tangent_east * sine + tangent_north * cosine
+    return (
+        east + chord * chord_east,
+        north + chord * chord_north,
+        chord_east * cosine - chord_north * sine,
+        chord_east * sine + chord_north * cosine,
+    )
+
+
+def route_length(route: Route) -> float:
+    """Length of a route (m), one turn of a closing loiter included."""
+    return float(route.segments[:, 5].sum())
+
+
+def route_point(route: Route, station_m: float) -> tuple[float, float, float, float]:
+    """Point and unit tangent of a route at a station.
+
+    Args:
+        route: any route.
+        station_m: distance from its start; beyond the end a loiter goes round, any other route straight on.
+
+    Returns:
+        East, north (m), tangent east, tangent north.
+    """
+    starts = np.concatenate(([0.0], np.cumsum(route.segments[:-1, 5])))
+    index = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
+    east, north, tangent_east, tangent_north, curvature, length = route.segments[index].tolist()
+    along = station_m - float(starts[index])
+    over = 0.0
+    if index == len(starts) - 1 and not route.loiter:
+        over = max(along - length, 0.0)
+    row = (east, north, tangent_east, tangent_north, curvature, length)
+    east, north, tangent_east, tangent_north = arc_point(row, along - over)
+    return east + over * tangent_east, north + over * tangent_north, tangent_east, tangent_north
