@@ -48,6 +48,10 @@ LATELY_S = 5.0
 """What has been an edge so long is not what has come into view of something that moves."""
 NEAR = 1.5
 """In standard deviations of ranges: returns so near to an outline may be its."""
+NARROW = 4.0
+"""In standard deviations of ranges: what is narrower tells nothing of an outline; all about it is taken as well."""
+MEDIANS = 0.5
+"""In standard deviations of ranges: neighbouring medians, which have returns in common, differ by less."""
 FACES = 1.5
 """What comes into view so many times as near as that is another face of what moves."""
 
@@ -183,6 +187,8 @@ class MovingObstacles:
         for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), closed):
             if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
                 whole = self._whole(come[run], hits, places, scan)
+                if extent_m(places[whole]) < NARROW * self._noise:
+                    whole = self._about(come[run], hits, places, scan)
                 self._tracks.append(
                     FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
                 )
@@ -305,9 +311,15 @@ class MovingObstacles:
             may = ~self._stands(_pairs(places), LATELY_S)
             may[mine] = True
         some = may.nonzero()[0]
-        return some[
-            grown(np.searchsorted(some, mine), hits[some], places[some], NO_STEP * self._clearance, scan)
-        ]
+        step_m = NO_STEP * self._clearance + MEDIANS * self._noise
+        return some[grown(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
+
+    def _about(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+        """All returns about some, clockwise."""
+        near = (np.abs(places - places[mine].mean()) < self._gate).nonzero()[0]
+        half = len(scan.ranges_m) // 2
+        about: IntArray = near[np.argsort((hits[near] - hits[mine[0]] + half) % len(scan.ranges_m))]
+        return about
 
 
 def _face(places: ComplexArray, some: slice, along: complex, within_m: float) -> slice:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.free_space import FreeSpace
-from harness.obstacle import Circle, Obstacle
+from harness.obstacle import Circle, Obstacle, Polygon
 from harness.range_sensor import RangeScan
 from harness.sensed_world import SensedWorld
 from harness.world import World
@@ -207,6 +207,23 @@ def test_with_much_noise_what_moves_is_followed(
                 assert math.dist(each.velocity_mps, velocity) < (4.0 if scan.time_s < 30.0 else 2.0)
     assert known_s[0] < 25.0
     assert known_s[-1] > 40.0
+
+
+@pytest.mark.parametrize("seed", [3, 5, 6])
+def test_with_much_noise_what_comes_out_of_something_is_followed_though_little_of_it_is_new(
+    seed: int,
+) -> None:
+    corners = ((2811.0, 2300.0), (2677.0, 2169.0), (2857.0, 2118.0))
+    body = Obstacle(Polygon(corners), velocity_mps=(3.4, -3.2))
+    world = world_of(body, Circle((2809.0, 2170.0), 90.0), Circle((3117.0, 2049.0), 42.0))
+    mover, seen, told = World(world.obstacles[:1], BOUNDS), empty_world(noise_m=12.0), 0
+    for scan in flight(sensor(world, seed, range_noise_m=12.0), 45.0, (3000.0, 1500.0), speed=12.0):
+        seen.update(scan)
+        if scan.time_s > 25.0:
+            told += any(
+                np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 24.0 for each in seen.moving
+            )
+    assert told > 25  # of 39 scans
 
 
 @pytest.mark.parametrize("east", [2785.0, 2790.0, 2795.0])
