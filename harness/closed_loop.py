@@ -12,11 +12,12 @@ from typing import Protocol
 
 from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.interface import AircraftState, Command, FlightModel, Route
+from aircraft.route import route_length
 from harness.crash import in_a_line, sentence, trace
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
 from harness.sensed_world import SensedWorld
-from harness.world import World
+from harness.world import Fix, World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
 PROGRESS_EVERY_S = 5.0
@@ -151,6 +152,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         sim_s=state.time_s,
         wall_s=time.perf_counter() - begun,
         error=plans.error,
+        contact_m=judge.contact_m,
     )
 
 
@@ -179,7 +181,7 @@ class _Plans:
 
     def __init__(self, loop: Loop, observers: Sequence[Observer]) -> None:
         self._loop, self._observers = loop, observers
-        self._coming: tuple[float, Plan] | None = None
+        self._coming: tuple[float, Plan, Route] | None = None
         self.due_s = math.inf
         """When the plan on its way takes effect."""
         self.index = -1
@@ -234,25 +236,28 @@ class _Plans:
         if plan.status is PlanStatus.NO_PATH and plan.reason != told:
             for observer in self._observers:
                 observer.on_event(state.time_s, plan.reason)
-        if plan.status is PlanStatus.FOUND:
-            self._coming = (compute_ms, plan)
+        if plan.path is not None and plan.status is PlanStatus.FOUND:
+            try:
+                route = Route(plan.path.segments, plan.path.loiter)
+            except ValueError as error:
+                self.error = trace(error)
+                return Outcome.PLANNER_FAILED, f"the planner gave a path that cannot be flown: {error}"
+            self._coming = (compute_ms, plan, route)
             self.due_s = state.time_s + self._loop.mission.compute_latency_s - 1e-9
         return None
 
     def take_effect(self, state: AircraftState, station_m: float) -> None:
         """Hands the coming plan, now due, to the guidance."""
         assert self._coming is not None
-        compute_ms, plan = self._coming
-        assert plan.path is not None
+        compute_ms, plan, route = self._coming
         late = state.time_s - (self.due_s - self._loop.mission.compute_latency_s)
         self._coming, self.due_s = None, math.inf
-        route = Route(plan.path.segments, plan.path.loiter)
         self._loop.follower.follow(route, station_m=late * state.groundspeed_mps)
         accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
         self.accepted.append(accepted)
         self.index = accepted.plan_index
-        turn = float(plan.path.segments[-1, 5]) if plan.path.loiter else -math.inf
-        self._station, self._turns_at = 0.0, plan.path.length_m - turn
+        turn = float(route.segments[-1, 5]) if route.loiter else -math.inf
+        self._station, self._turns_at = 0.0, route_length(route) - turn
         for observer in self._observers:
             observer.on_plan(accepted, state)
 
@@ -266,6 +271,9 @@ class _Judge:
         self._appears_s = -math.inf
         # At the last look at the obstacles: where, when, and how much clearance.
         self._measured = (0.0, 0.0, 0.0, 0.0)
+        self._looked: tuple[Fix, float] | None = None  # at the last look of all: surely so much clearance
+        self.contact_m = math.inf
+        """Clearance at a contact since the look before the last; +inf without."""
 
     def to_go_m(self, state: AircraftState) -> float:
         """Straight distance to the goal."""
@@ -284,6 +292,8 @@ class _Judge:
         clearance = self._surely_clear_m(east, north, state.time_s)
         if clearance < 0.0:
             return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
+        if self.contact_m < 0.0:
+            return Outcome.COLLISION, "went through an obstacle that is thinner than the step was long"
         if not world.inside_bounds(east, north):
             return Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m"
         to_go = self.to_go_m(state)
@@ -303,12 +313,15 @@ class _Judge:
 
     def _surely_clear_m(self, east: float, north: float, time_s: float) -> float:
         """The true clearance; or what is surely left of that of the last look, while more than a quarter is."""
-        world = self._loop.world
+        world, here = self._loop.world, (east, north, time_s)
         there_east, there_north, then_s, clearance = self._measured
         lost = math.hypot(east - there_east, north - there_north)
         lost += world.max_obstacle_speed_mps * (time_s - then_s)
         if lost < 0.75 * clearance and time_s < self._appears_s:
+            self._looked = here, clearance - lost
             return clearance - lost
         clearance = world.clearance_at(east, north, time_s)
-        self._measured = (east, north, time_s, clearance)
+        if self._looked is not None:
+            self.contact_m = world.contact_between(*self._looked, here, clearance)
+        self._measured, self._looked = (*here, clearance), (here, clearance)
         return clearance

@@ -53,6 +53,7 @@ class EarlierScans:
 
     def __init__(self, clearance_m: float, sure_m: float, *, exact: bool, flawed: bool) -> None:
         self.compared_s = COMPARED_S + sure_m / SLOW_MPS
+        self.own_m = max(OWN * clearance_m, sure_m)
         self._clearance, self._sure, self._exact = clearance_m, sure_m, exact
         # A scan that errs may be wrong about a place; two are not.
         self._many = 2 if flawed else 1
@@ -95,7 +96,7 @@ class EarlierScans:
 
     def met(self, places: ComplexArray) -> BoolArray:
         """(k,) whether something was met at places by the first of the scans."""
-        return near_line(places, self._looks[0].places, OWN * self._clearance, self._clearance)
+        return near_line(places, self._looks[0].places, self.own_m, self._clearance)
 
     def of_it(self, track: FollowedOutline, places: ComplexArray, time_s: float) -> IntArray:
         """Which places may be of something that moves.
@@ -103,15 +104,20 @@ class EarlierScans:
         Those where the first of the scans met nothing else; and, where its outline tells all of its velocity, which
         none of the scans looked through where they would have been then, if they were its.
         """
-        first = self._looks[0]
-        own = near_any(first.places, track.shown_at(first.scan.time_s), OWN * self._clearance)
-        may = ~near_any(places, first.places[~own], NO_STEP * self._clearance)
-        if track.outline.is_definite:
-            for before in self._looks:
-                past_s = time_s - before.scan.time_s
-                off_m = max(self._sure, NO_STEP * self._clearance) + OFF * track.error_mps * past_s
-                may &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
-        return may.nonzero()[0]
+        first, near_m = self._looks[0], NO_STEP * self._clearance
+        own = near_line(first.places, track.shown_at(first.scan.time_s), self.own_m, self._clearance)
+        may = ~near_any(places, first.places[~own], near_m)
+        if not track.outline.is_definite:
+            return may.nonzero()[0]
+        was = may.copy()
+        for before in self._looks:
+            past_s = time_s - before.scan.time_s
+            off_m = max(self._sure, near_m) + OFF * track.error_mps * past_s
+            was &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
+        near = may & near_any(places, track.at(time_s).points, near_m)
+        # Where it would lose most of what is near it, its velocity is wrong, or it has only appeared.
+        some = was if 2 * np.count_nonzero(was & near) >= np.count_nonzero(near) else may
+        return some.nonzero()[0]
 
     def _may_differ(self, now: Look) -> bool:
         """Whether anything at all has come since a scan before, or drawn back: in a still world mostly nothing."""

@@ -87,7 +87,7 @@ class FollowedOutline:
         tells the velocity.
         """
         if outline.is_definite and not self.outline.is_definite:
-            self.shifts = deque([self.shifts[-1]])
+            self.shifts, self.error_mps = deque([self.shifts[-1]]), math.inf
         self.outline, self.outline_s, self.base = outline, time_s, self.shifts[-1][1]
 
     @property

@@ -22,7 +22,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from harness.earlier_scans import NO_STEP, OWN, EarlierScans, Look
+from harness.earlier_scans import NO_STEP, EarlierScans, Look
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline, bow, extent_m
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
@@ -48,6 +48,9 @@ LATELY_S = 5.0
 """What has been an edge so long is not what has come into view of something that moves."""
 NEAR = 1.5
 """In standard deviations of ranges: returns so near to an outline may be its."""
+BENT = 14.0
+"""Means of so many points, to the power of two thirds of this times noise over spacing, are on a straight face straight
+enough not to be taken for a bend (`registration.FLAT`)."""
 NARROW = 4.0
 """In standard deviations of ranges: what is narrower tells nothing of an outline; all about it is taken as well."""
 MEDIANS = 0.5
@@ -161,7 +164,7 @@ class MovingObstacles:
                 continue
             outline = self._outline(scan, hits[some], places[some])
             if not outline.is_definite:
-                some = _face(places, some, outline.along, OWN * self._clearance)
+                some = _face(places, some, outline.along, self._earlier.own_m)
                 outline = self._outline(scan, hits[some], places[some])
             self._tracks.append(FollowedOutline(outline, scan.time_s))
 
@@ -214,13 +217,18 @@ class MovingObstacles:
                 ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
             )
         away = np.abs(places - complex(scan.east_m, scan.north_m)).mean()
-        several = math.ceil(2.0 * self._noise / max(scan.spacing_rad * float(away), 1e-9))
+        apart_m = max(scan.spacing_rad * float(away), 1e-9)
+        several = max(math.ceil(2.0 * self._noise / apart_m), 1)
         points = places
         if several > 1:
             first = np.arange(0, len(places), several)
             means = np.add.reduceat(places, first) / np.diff(np.append(first, len(places)))
             points = np.concatenate((places[:1], means, places[-1:]))
-        return Outline(points, ends_of(scan, int(hits[0]), int(hits[-1]), self._apart))
+        return Outline(
+            points,
+            ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
+            math.ceil((BENT * self._noise / apart_m) ** (2.0 / 3.0) / several),
+        )
 
     def _is_followed(self, places: ComplexArray, time_s: float) -> bool:
         """Whether a run of returns is of something that is followed: its middle, or any of it where that moves."""
@@ -274,7 +282,7 @@ class MovingObstacles:
     ) -> IntArray:
         """Finds an outline in a scan; which of the places belong to it."""
         unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
-        gate = self._gate + unknown_mps * (scan.time_s - track.seen_s)
+        gate = self._gate + unknown_mps * (scan.time_s - track.outline_s)
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
         some = np.arange(len(places))
         if track.moves and not self._is_free:

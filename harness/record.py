@@ -7,6 +7,7 @@ x = east, y = north, z = up above mean sea level; course and heading clockwise f
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 import struct
 from collections.abc import Callable, Iterable, Sequence
@@ -271,6 +272,7 @@ class Flight:
         sim_s: simulated time flown.
         wall_s: wall-clock time that took.
         error: the traceback of what the planner raised; None where it did not.
+        contact_m: clearance at a contact between the last two rows; +inf without.
     """
 
     track: Track
@@ -281,6 +283,7 @@ class Flight:
     sim_s: float
     wall_s: float
     error: str | None = None
+    contact_m: float = math.inf
 
 
 def polyline(segments: FloatArray, chord_error_m: float = CHORD_ERROR_M) -> FloatArray:

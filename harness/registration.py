@@ -49,10 +49,12 @@ class Outline(NamedTuple):
     Attributes:
         points: (m,) places, clockwise as the sensor saw them.
         ends: whether the first and the last of them are where the thing ends.
+        several: of so many points each the mean tells whether it is straight: the others err too much.
     """
 
     points: ComplexArray
     ends: Ends
+    several: int = 1
 
     @property
     def is_definite(self) -> bool:
@@ -64,21 +66,25 @@ class Outline(NamedTuple):
     @property
     def along(self) -> complex:
         """Unit vector along a straight one, either way."""
-        along = self._turned**0.5
-        return along / max(abs(along), 1e-9)
+        return (self._turned / abs(self._turned)) ** 0.5
 
     @property
     def _turned(self) -> complex:
         """Mean of its tangents, each turned by twice its angle; of its chord where it is straight nowhere."""
-        along, straight = _tangents(self.points)
+        points = self.points
+        if self.several > 1 and len(points) >= FEWEST * self.several:
+            first = np.arange(0, len(points), self.several)
+            counts = np.diff(np.append(first, len(points)))
+            points = (np.add.reduceat(points, first) / counts).astype(np.complex128)
+        along, straight = _tangents(points)
         if straight.any():
             return complex((along[straight] ** 2).mean())
         chord = complex(self.points[-1] - self.points[0])
-        return (chord / max(abs(chord), 1e-9)) ** 2
+        return (chord / abs(chord)) ** 2 if chord else 1.0 + 0j
 
     def moved(self, by: complex) -> Outline:
         """The outline elsewhere."""
-        return Outline(self.points + by, self.ends)
+        return Outline(self.points + by, self.ends, self.several)
 
 
 class Laid(NamedTuple):
@@ -144,8 +150,8 @@ def register(
         members = near[inside]
         seen_ends = ends_of(scan, int(hits[members[0]]), int(hits[members[-1]]), apart_m)
         ends = [
-            places[members[i]] - outline.points[i] - shift
-            for i, was, still in zip((0, -1), outline.ends, seen_ends, strict=True)
+            places[members[end]] - outline.points[end] - shift
+            for end, was, still in zip((0, -1), outline.ends, seen_ends, strict=True)
             if was and still
         ]
         # An end that is far off is another one: faces come into view and go out of it.

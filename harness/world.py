@@ -23,8 +23,13 @@ if TYPE_CHECKING:
 
     from harness.scenario import Scenario
 
-__all__ = ["Circle", "Faces", "Obstacle", "Polygon", "Surroundings", "World"]
+__all__ = ["Circle", "Faces", "Fix", "Obstacle", "Polygon", "Surroundings", "World"]
 
+Fix = tuple[float, float, float]
+"""East and north (m), and when (s)."""
+
+TOUCH_M = 1e-3
+"""What is thinner along a way is no contact."""
 
 # A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
 _BLOCK_ROWS = 256
@@ -185,6 +190,30 @@ class World:
             for index in self._changing[gaps <= best].tolist():
                 best = min(best, float(self.obstacles[index].distance(point, time)[0]))
         return best
+
+    def contact_between(self, begin: Fix, before_m: float, end: Fix, after_m: float) -> float:
+        """Clearance at a contact on the straight way between two fixes; +inf if there surely is none.
+
+        Clearance changes no faster than the way is long: parts of it that are too short for a contact are left out,
+        down to `TOUCH_M` (Piyavskii 1972, doi:10.1016/0041-5553(72)90115-2).
+
+        Args:
+            begin: where and when the way begins.
+            before_m: clearance there, or less.
+            end: where it ends.
+            after_m: clearance there, or less.
+        """
+        ways = [(begin, before_m, end, after_m)]
+        while ways:
+            begin, before_m, end, after_m = ways.pop()
+            way_m = math.dist(begin[:2], end[:2]) + self.max_obstacle_speed_mps * (end[2] - begin[2])
+            if before_m + after_m <= way_m and way_m > TOUCH_M:
+                middle = (0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1]), 0.5 * (begin[2] + end[2]))
+                between_m = self.clearance_at(*middle)
+                if between_m < 0.0:
+                    return between_m
+                ways += [(middle, between_m, end, after_m), (begin, before_m, middle, between_m)]
+        return math.inf
 
     def clearance(self, points_m: FloatArray, times_s: FloatArray) -> FloatArray:
         """True distance from points to the nearest obstacle edge, each at its own time.

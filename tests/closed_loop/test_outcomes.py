@@ -93,6 +93,23 @@ def test_collision_ends_the_flight_at_the_edge(
     assert -25.0 / UPDATE_RATE_HZ - 0.1 <= track.clearance_m[-1] < 0.0
 
 
+@pytest.mark.parametrize("east_m", [3000.0, 3000.4, 3000.8, 3001.2, 3001.6])
+@pytest.mark.parametrize("velocity_mps", [None, [-20.0, 0.0]])
+def test_a_wall_thinner_than_a_step_is_not_flown_through_unnoticed(
+    fly: Fly,
+    answering: Install,
+    small_world: SmallWorld,
+    east_m: float,
+    velocity_mps: list[float] | None,
+) -> None:
+    answering(straight_on)
+    corners = [[east_m, 900.0], [east_m + 0.3, 900.0], [east_m + 0.3, 5900.0], [east_m, 5900.0]]
+    wall = {"polygon": {"vertices_m": corners}} | ({"velocity_mps": velocity_mps} if velocity_mps else {})
+    status, metrics = fly(small_world(wall, planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (1, "collision")
+    assert -0.15 <= metrics["min_clearance_m"] < 0.0
+
+
 def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(
     answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
 ) -> None:
@@ -127,6 +144,19 @@ def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWor
     assert metrics["flight_time_s"] == 5.0
     assert metrics["error"].startswith("Traceback")
     assert "ZeroDivisionError" in metrics["error"]
+
+
+def test_planner_whose_path_cannot_be_flown(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+    def backwards(mission: Mission, request: PlanRequest) -> Plan:
+        row = (*request.position_m, *request.direction, 0.0, -500.0)
+        return Plan(PlanStatus.FOUND, "back", np.array([row[:2]]), Path(np.array([row])))
+
+    answering(backwards)
+    status, metrics = fly(small_world(planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (1, "planner_failed")
+    assert metrics["reason"] == (
+        "the planner gave a path that cannot be flown: route segments must be finite and longer than zero"
+    )
 
 
 @pytest.mark.parametrize("status", [0, 3, "bye\n\udcff bye"])

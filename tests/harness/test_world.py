@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -124,6 +124,29 @@ def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(
         east, north = points[row].tolist()
         truth = min((true_distance(o, east, north, times[row]) for o in obstacles), default=math.inf)
         assert clearance[row] == pytest.approx(truth, abs=1e-9)
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), moves=st.booleans())
+def test_a_contact_on_the_way_is_found_where_shapely_finds_one(seed: int, moves: bool) -> None:
+    """Thin bodies, met between two fixes: seen from the body, the way is another straight line."""
+    rng = np.random.default_rng(seed)
+    velocity = tuple(rng.uniform(-60.0, 60.0, 2).tolist()) if moves else (0.0, 0.0)
+    turn, thick, at = rng.uniform(0.0, math.pi), rng.uniform(0.05, 1.0), rng.uniform(-4.0, 4.0, 2)
+    along, across = (np.array([math.cos(a), math.sin(a)]) for a in (turn, turn + math.pi / 2))
+    corners = [at + along * i + across * j * thick for i, j in ((-5, -1), (5, -1), (5, 1), (-5, 1))]
+    wall = Obstacle(Polygon(tuple((float(x), float(y)) for x, y in corners)), velocity)
+    world = World([wall], BOUNDS)
+    begin, end = ((*rng.uniform(-4.0, 4.0, 2).tolist(), time_s) for time_s in (0.0, 0.1))
+    before_m, after_m = world.clearance_at(*begin), world.clearance_at(*end)
+    assume(min(before_m, after_m) > 0.0)
+    last = np.array(end[:2]) - 0.1 * np.array(velocity)
+    inside = shapely.LineString([begin[:2], tuple(last)]).intersection(shapely.Polygon(corners)).length
+    assume(inside == 0.0 or inside > 0.01)
+    contact_m = world.contact_between(begin, before_m, end, after_m)
+    assert (contact_m < 0.0) == (inside > 0.0)
+    assert contact_m == math.inf or contact_m >= -thick
+    assert world.contact_between(begin, 0.5 * before_m, end, after_m) < 0.0 or inside == 0.0
 
 
 @settings(deadline=None, max_examples=25)
