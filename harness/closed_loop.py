@@ -236,8 +236,10 @@ class _Plans:
         if plan.status is PlanStatus.NO_PATH and plan.reason != told:
             for observer in self._observers:
                 observer.on_event(state.time_s, plan.reason)
-        if plan.path is not None and plan.status is PlanStatus.FOUND:
+        if plan.status is PlanStatus.FOUND:
             try:
+                if plan.path is None:
+                    raise ValueError("it is none")
                 route = Route(plan.path.segments, plan.path.loiter)
             except ValueError as error:
                 self.error = trace(error)

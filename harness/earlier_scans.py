@@ -105,7 +105,7 @@ class EarlierScans:
         none of the scans looked through where they would have been then, if they were its.
         """
         first, near_m = self._looks[0], NO_STEP * self._clearance
-        own = near_line(first.places, track.shown_at(first.scan.time_s), self.own_m, self._clearance)
+        own = near_any(first.places, track.shown_at(first.scan.time_s), self.own_m)
         may = ~near_any(places, first.places[~own], near_m)
         if not track.outline.is_definite:
             return may.nonzero()[0]
