@@ -146,6 +146,44 @@ def test_what_comes_out_between_still_things_that_it_overlaps_is_followed_withou
     )
 
 
+def test_what_appears_in_sight_and_moves_loses_no_returns() -> None:
+    """All scans before looked through where it would have been."""
+    body = Obstacle(Circle((2800.0, 2500.0), 80.0), velocity_mps=(6.0, -3.0), active_s=(20.0, 500.0))
+    seen, taken, met = MovingObstacles(CLEARANCE, 0.0), 0, 0
+    for scan in flight(sensor(world_of(body)), 45.0, START, speed=5.0):
+        moving = seen.update(scan)
+        if scan.time_s >= 27.0:
+            met += int((scan.ranges_m < math.inf).sum())
+            taken += 0 if moving is None else int(moving.sum())
+    assert taken > 0.9 * met > 500
+
+
+@pytest.mark.parametrize("speed", [20.0, 25.0, 30.0])
+@pytest.mark.parametrize("period_s", [0.5, 1.0])
+def test_what_is_fast_is_found(speed: float, period_s: float) -> None:
+    """Until its velocity is known it may be anywhere that it can have come to since it was seen first."""
+    body = Obstacle(Circle((2550.0, 2300.0), 80.0), velocity_mps=(speed, 0.0))
+    eye = sensor(world_of(body))
+    scans = [eye.scan(3000.0, 1500.0, 0.0, time_s) for time_s in np.arange(0.0, 30.0, period_s)]
+    found = [each for _, all_found in watched(iter(scans)) for each in all_found]
+    assert found
+    assert abs(complex(*found[-1].velocity_mps) - speed) < 0.5
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_long_walls_that_appear_are_not_told_to_move_where_ranges_err_a_little(seed: int) -> None:
+    """Neighbouring returns bend about: that is no outline that tells of motion along it."""
+    rng = np.random.default_rng(seed)
+    turn, north = rng.uniform(-0.6, 0.6), rng.uniform(1900.0, 2300.0)
+    along, across = (np.array([math.cos(a), math.sin(a)]) for a in (turn, turn + math.pi / 2))
+    ends = [
+        (3000.0, north) + along * i + across * j for i, j in ((-1500, 0), (1500, 0), (1500, 40), (-1500, 40))
+    ]
+    wall = Obstacle(Polygon(tuple((float(x), float(y)) for x, y in ends)), active_s=(15.0, 500.0))
+    found = watched(flight(sensor(world_of(wall), seed, range_noise_m=3.0), 60.0, START), noise_m=3.0)
+    assert not any(any(each.velocity_mps) for _, all_found in found for each in all_found)
+
+
 def test_what_moves_has_an_outline_though_no_two_returns_of_it_are_near_each_other(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
