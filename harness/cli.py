@@ -6,6 +6,8 @@ not reached safely, 2 bad input or usage, 3 the goal is proved unreachable, 130 
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -73,9 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: Sequence[str], debug: bool) -> int:
     try:
-        status = app(words, prog_name="wayproof", standalone_mode=False)
-        _flush()
-        return int(status or 0)
+        status = int(app(words, prog_name="wayproof", standalone_mode=False) or 0)
+        with contextlib.suppress(BrokenPipeError):  # nobody reads it: what was asked for is done all the same
+            _flush()
+        return status
     except BrokenPipeError:
         return FAILED
     except KeyboardInterrupt:
@@ -114,7 +117,7 @@ def _report(error: Exception) -> int:
         return FAILED
     if isinstance(error, OSError):
         typer.echo(f"wayproof: {error}", err=True)
-        return BAD_INPUT
+        return FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
     kind, text = type(error).__name__, " ".join(str(error).split())
     typer.echo(f"wayproof: internal error, {kind}: {text}; --debug shows where", err=True)
     return FAILED

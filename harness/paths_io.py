@@ -28,6 +28,7 @@ SAME_PLACE_M: Final = 0.01
 SAME_ALTITUDE_M: Final = 1.0
 LOCAL_COLUMNS: Final = (("x_m", "y_m"), ("east_m", "north_m"))
 DEGREE_COLUMNS: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))
+ALTITUDE_COLUMNS: Final = ("altitude_m", "up_m", "z_m")
 WPL: Final = "QGC WPL"
 
 
@@ -110,19 +111,21 @@ def _csv(text: str, source: str) -> Waypoints:
             f"{source}:1: has the columns {_shown(', '.join(header)) or 'none'}; must have x_m,y_m or "
             "latitude_deg,longitude_deg"
         )
-    columns = [header.index(name) for name in names]
-    positions = []
+    heights = [name for name in header if name in ALTITUDE_COLUMNS][:1]
+    columns = [header.index(name) for name in (*names, *heights)]
+    positions, altitudes = [], []
     for row in _rows(rows, source):
         if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(header):
             raise InputError(f"{source}:{rows.line_num}: has {len(row)} cells, the header {len(header)}")
-        first, second = (
+        first, second, *altitude = (
             _number(row[column].strip(), f"{source}:{rows.line_num}: {name}")
-            for name, column in zip(names, columns, strict=True)
+            for name, column in zip((*names, *heights), columns, strict=True)
         )
         positions.append((first, second))
-    return Waypoints(names in LOCAL_COLUMNS, tuple(positions), ())
+        altitudes += altitude
+    return Waypoints(names in LOCAL_COLUMNS, tuple(positions), tuple(altitudes))
 
 
 def _rows(rows: Iterator[list[str]], source: str) -> Iterator[list[str]]:

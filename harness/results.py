@@ -154,11 +154,14 @@ def campaign_of(results: Path) -> dict[str, Any]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    if not results.exists():
+        raise InputError(f"{results}: there is no such file")
     try:
-        found = json.loads((pq.read_schema(results).metadata or {})[b"wayproof"])
+        schema = pq.read_schema(results)
+        found = json.loads((schema.metadata or {})[b"wayproof"])
     except (OSError, pa.ArrowException, KeyError, ValueError) as error:
         raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one") from error
-    if not isinstance(found, dict) or found.get("schema") != SCHEMA:
+    if not isinstance(found, dict) or found.get("schema") != SCHEMA or "digest" not in schema.names:
         raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one")
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -39,12 +40,18 @@ def report(
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
     """
+    from harness.campaign_folder import INDEX
+    from harness.input_file import InputError
     from harness.record import RunFolderError
     from harness.results import RESULTS
     from harness.run_report import write_report
 
     if (run / RESULTS).is_file():
         return _summary(run, by)
+    if (run / INDEX).is_file():
+        raise InputError(
+            f"{run}: its campaign was stopped before the tables were written; `wayproof sweep` with --resume makes them"
+        )
     if by:
         raise typer.BadParameter(
             f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
@@ -62,7 +69,12 @@ def _summary(folder: Path, by: Sequence[str] | None) -> int:
     from harness.campaign_summary import summarise
     from harness.campaign_terminal import print_summary
 
-    chosen = [[key.strip() for key in each.split(",")] for each in by] if by else None
+    # Columns are named as `obstacles[0].velocity_mps`; campaign files and --set take `obstacles.0.velocity_mps` too.
+    chosen = (
+        [[re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", key.strip()) for key in each.split(",")] for each in by]
+        if by
+        else None
+    )
     summary = summarise(folder, by=chosen)
     page = write_summary(summary, folder)
     print_summary(summary, all_tables=by is not None)

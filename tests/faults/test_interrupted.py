@@ -134,10 +134,25 @@ def test_output_that_nobody_takes(tmp_path: Path) -> None:
     assert load_run(tmp_path / "run").manifest["complete"] is True
 
 
+@pytest.mark.parametrize("words", [("list", "planners"), ("fly", "my.yaml", "--no-recording")])
+def test_the_status_is_that_of_what_was_done_though_nobody_reads_of_it(
+    words: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "my.yaml").write_text(
+        "{schema: wayproof/scenario/1, name: my, area: {bounds_m: [0, 0, 3000, 3000]}, "
+        "mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 200}}"
+    )
+    reader, writer = os.pipe()
+    os.close(reader)
+    status, _, err = run(tmp_path, *words, stdout=writer)
+    os.close(writer)
+    assert (status, err) == (0, "")
+
+
 def test_output_onto_a_full_disk(tmp_path: Path) -> None:
     with open("/dev/full", "w") as full:
         status, _, err = run(tmp_path, "schema", stdout=full)
-    assert (status, err) == (2, "wayproof: [Errno 28] No space left on device\n")
+    assert (status, err) == (1, "wayproof: [Errno 28] No space left on device\n")
 
 
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
