@@ -408,6 +408,7 @@ def test_the_command_makes_the_summary_again_by_other_keys(
     ("by", "sentence"),
     [
         ("planner,wind", f"no column 'wind'; varied there: planner, {WIND}, sensor.rays"),
+        ("obstacles.0.velocity_mps.1", "no column 'obstacles[0].velocity_mps[1]'"),
         ("planner,planner", "must be one key, or two different ones"),
         ("planner,world,aircraft", "must be one key, or two different ones"),
     ],
@@ -426,6 +427,9 @@ def test_a_run_folder_has_no_keys_and_damage_is_told(
 ) -> None:
     assert main(["report", str(tmp_path), "--by", "planner"]) == 2
     assert "only a campaign has tables by keys" in capsys.readouterr().err
+    (tmp_path / "campaign.json").write_text("{}")
+    assert main(["report", str(tmp_path)]) == 2
+    assert "stopped before the tables were written; `wayproof sweep` with --resume" in capsys.readouterr().err
     (tmp_path / "results.parquet").write_bytes(b"PAR1 torn")
     assert main(["report", str(tmp_path)]) == 2
     assert f"the campaign in {tmp_path} is damaged" in capsys.readouterr().err

@@ -102,6 +102,19 @@ def test_mission_in_local_metres(frame: int, place: tuple[float, float, float], 
     assert (given.origin_deg, given.altitude_m) == (None, 450.0)
 
 
+@pytest.mark.parametrize("column", ["altitude_m", "z_m", "up_m"])
+@pytest.mark.parametrize("names", ["x_m,y_m", "latitude_deg,longitude_deg"])
+def test_csv_with_altitudes(names: str, column: str, tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text(f"{names},{column}\n1,2,300\n2,3,300.5\n")
+    assert read_path(path).altitude_m == 300.0
+    path.write_text(f"{names},{column}\n1,2,300\n2,3,500\n")
+    with pytest.raises(
+        InputError, match="point 1 is at 500 m, point 0 at 300 m; a checked path has one altitude"
+    ):
+        read_path(path)
+
+
 def test_different_altitudes_can_be_overridden(tmp_path: Path) -> None:
     path = tmp_path / "stairs.plan"
     path.write_text(plan(item(47.0, 8.0, 100.0), item(47.1, 8.0, 150.0)))

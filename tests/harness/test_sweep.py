@@ -191,6 +191,7 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
     elsewhere = place / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "r.parquet").write_bytes(results(unbroken))
+    (elsewhere / "times").write_bytes((unbroken / "timings.parquet").read_bytes())
     monkeypatch.chdir(elsewhere)
     assert (
         main(["fly", "--from", "r.parquet", "--run", "6", "--out", "run", "--no-recording", "--quiet"]) == 0
@@ -205,7 +206,8 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
         (["--from", "r.parquet"], "--from and --run go together"),
         (["paper_circles", "--from", "r.parquet", "--run", "1"], "either a SCENARIO or --from"),
         (["--from", "run/track.parquet", "--run", "1"], "is not the results.parquet of a campaign"),
-        (["--from", "nowhere", "--run", "1"], "is not the results.parquet of a campaign"),
+        (["--from", "nowhere", "--run", "1"], "nowhere: there is no such file"),
+        (["--from", "times", "--run", "1"], "is not the results.parquet of a campaign"),
     ):
         assert main(["fly", *arguments]) == 2
         assert said in capsys.readouterr().err
