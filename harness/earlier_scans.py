@@ -102,7 +102,8 @@ class EarlierScans:
         """Which places may be of something that moves.
 
         Those where the first of the scans met nothing else; and, where its outline tells all of its velocity, which
-        none of the scans looked through where they would have been then, if they were its.
+        none of the scans looked through where they would have been then, if they were its. If that were few of those
+        near it, its velocity would be wrong, or it has only appeared: then that is not asked.
         """
         first, near_m = self._looks[0], NO_STEP * self._clearance
         own = near_any(first.places, track.shown_at(first.scan.time_s), self.own_m)
@@ -115,7 +116,6 @@ class EarlierScans:
             off_m = max(self._sure, near_m) + OFF * track.error_mps * past_s
             was &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
         near = may & near_any(places, track.at(time_s).points, near_m)
-        # Where it would lose most of what is near it, its velocity is wrong, or it has only appeared.
         some = was if 2 * np.count_nonzero(was & near) >= np.count_nonzero(near) else may
         return some.nonzero()[0]
 

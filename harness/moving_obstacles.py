@@ -3,7 +3,8 @@
 A return from a place that scans of some seconds before looked through tells of something that moves there, or that
 has just appeared; one from behind a place where something was, of something that draws back, or of what has gone
 (`harness.scan_comparison`). Scans of shortly before tell of what has just come out from behind something, those of long
-before of what is slow. The run of returns about it, up to the next step in range, is followed from scan to scan: the
+before of what is slow. The run of returns about it, up to the next step in range and without what stood there before
+beside it, is followed from scan to scan: the
 translation that lays the outline seen first upon the one seen now (`harness.registration`) grows in proportion to time
 where it moves, and not at all where it only appeared. Assumed: obstacles that move do so without turning, no faster
 than `MOST_MPS`.
@@ -49,8 +50,8 @@ LATELY_S = 5.0
 NEAR = 1.5
 """In standard deviations of ranges: returns so near to an outline may be its."""
 BENT = 14.0
-"""Means of so many points, to the power of two thirds of this times noise over spacing, are on a straight face straight
-enough not to be taken for a bend (`registration.FLAT`)."""
+"""This times noise over spacing, to the power of two thirds, is how many points of a straight face a mean has to be of
+for the face not to look bent (`registration.FLAT`)."""
 NARROW = 4.0
 """In standard deviations of ranges: what is narrower tells nothing of an outline; all about it is taken as well."""
 MEDIANS = 0.5
