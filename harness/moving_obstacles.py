@@ -4,10 +4,9 @@ A return from a place that scans of some seconds before looked through tells of 
 has just appeared; one from behind a place where something was, of something that draws back, or of what has gone
 (`harness.scan_comparison`). Scans of shortly before tell of what has just come out from behind something, those of long
 before of what is slow. The run of returns about it, up to the next step in range and without what stood there before
-beside it, is followed from scan to scan: the
-translation that lays the outline seen first upon the one seen now (`harness.registration`) grows in proportion to time
-where it moves, and not at all where it only appeared. Assumed: obstacles that move do so without turning, no faster
-than `MOST_MPS`.
+beside it, is followed from scan to scan: the translation that lays the outline seen first upon the one seen now
+(`harness.registration`) grows in proportion to time where it moves, and not at all where it only appeared. Assumed:
+obstacles that move do so without turning, no faster than `MOST_MPS`.
 
 Where ranges err much (`is_free`), what comes to a place that was ever seen to be free is told at once, as the map
 takes long to. A parabola is laid through its returns before it is followed; it is followed from more of them
