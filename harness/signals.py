@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
 ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
+AGAIN_S: Final = 2.0
 
 
 @contextmanager
@@ -17,11 +20,17 @@ def taken_as_interrupt() -> Iterator[list[int]]:
     """Lets SIGTERM and SIGHUP raise KeyboardInterrupt in the block; gives the list of those that came.
 
     A signal that somebody has made to be ignored (`nohup`) or handles already is left as it is; outside the
-    main thread, where Python takes no signals, all are.
+    main thread, where Python takes no signals, all are. One that comes again within `AGAIN_S` (`timeout` sends to the
+    process and to its group) is the same: it does not end the cleaning up.
     """
     came: list[int] = []
+    first_s = -math.inf
 
     def end(number: int, frame: FrameType | None) -> None:
+        nonlocal first_s
+        if time.monotonic() - first_s < AGAIN_S:
+            return
+        first_s = time.monotonic()
         came.append(number)
         raise KeyboardInterrupt
 
