@@ -98,24 +98,26 @@ class EarlierScans:
         """(k,) whether something was met at places by the first of the scans."""
         return near_line(places, self._looks[0].places, self.own_m, self._clearance)
 
-    def of_it(self, track: FollowedOutline, places: ComplexArray, time_s: float) -> IntArray:
+    def of_it(self, track: FollowedOutline, places: ComplexArray, now: RangeScan) -> IntArray:
         """Which places may be of something that moves.
 
-        Those where the first of the scans met nothing else; and, where its outline tells all of its velocity, which
-        none of the scans looked through where they would have been then, if they were its. If that were few of those
-        near it, its velocity would be wrong, or it has only appeared: then that is not asked.
+        Those where the first of the scans met nothing else that has not gone since, or looked through; and, where its
+        outline tells all of its velocity, which none of the scans looked through where they would have been then, if
+        they were its. If that were few of those near it, its velocity would be wrong, or it has only appeared: then
+        that is not asked.
         """
         first, near_m = self._looks[0], NO_STEP * self._clearance
         own = near_any(first.places, track.shown_at(first.scan.time_s), self.own_m)
-        may = ~near_any(places, first.places[~own], near_m)
+        stood = first.places[~own & ~looked_through(now, first.places, self._sure)]
+        may = ~near_any(places, stood, near_m) | come(first.scan, places, self._sure)
         if not track.outline.is_definite:
             return may.nonzero()[0]
         was = may.copy()
         for before in self._looks:
-            past_s = time_s - before.scan.time_s
+            past_s = now.time_s - before.scan.time_s
             off_m = max(self._sure, near_m) + OFF * track.error_mps * past_s
             was &= ~looked_through(before.scan, places - track.velocity * past_s, off_m)
-        near = may & near_any(places, track.at(time_s).points, near_m)
+        near = may & near_any(places, track.at(now.time_s).points, near_m)
         some = was if 2 * np.count_nonzero(was & near) >= np.count_nonzero(near) else may
         return some.nonzero()[0]
 

@@ -286,7 +286,7 @@ class MovingObstacles:
         stiff = STIFF_IN_NOISE if self._is_free else STIFF
         some = np.arange(len(places))
         if track.moves and not self._is_free:
-            some = self._earlier.of_it(track, places, scan.time_s)
+            some = self._earlier.of_it(track, places, scan)
         own_hits, own = hits[some], places[some]
         laid = register(
             track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR * self._noise
