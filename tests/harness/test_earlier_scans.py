@@ -13,7 +13,7 @@ from harness.range_sensor import RangeScan
 from harness.registration import Outline
 from tests.harness.sensing import CLEARANCE, sensor, world_of
 
-PLACE, VELOCITY = (3000.0, 1500.0), complex(2.0, -7.0)
+PLACE, VELOCITY = (3000.0, 1500.0), complex(0.2, -0.7)
 
 
 def look(scan: RangeScan) -> Look:
@@ -22,7 +22,7 @@ def look(scan: RangeScan) -> Look:
 
 
 def test_the_rest_of_what_is_known_by_a_piece_is_not_taken_for_something_that_stands() -> None:
-    """It comes nearer: its face is where nothing was before; beside it stands something."""
+    """It comes nearer, slowly: its face is close to where it was, but where nothing was; beside it stands something."""
     body = Obstacle(Circle((2950.0, 2400.0), 200.0), velocity_mps=(VELOCITY.real, VELOCITY.imag))
     still = Circle((3420.0, 2300.0), 120.0)
     eye = sensor(world_of(body, still))
@@ -36,6 +36,6 @@ def test_the_rest_of_what_is_known_by_a_piece_is_not_taken_for_something_that_st
     track = FollowedOutline(Outline(piece, (True, False)), 12.0, velocity=VELOCITY, error_mps=0.1, moves=True)
     may = np.zeros(len(places), dtype=np.bool_)
     may[earlier.of_it(track, places, now)] = True
-    assert may[mine].mean() > 0.8
+    assert may[mine].mean() > 0.5
     assert not may[~mine].any()
     assert len(hits) == len(places)
