@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -69,17 +68,22 @@ def _summary(folder: Path, by: Sequence[str] | None) -> int:
     from harness.campaign_summary import summarise
     from harness.campaign_terminal import print_summary
 
-    # Columns are named as `obstacles[0].velocity_mps`; campaign files and --set take `obstacles.0.velocity_mps` too.
-    chosen = (
-        [[re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", key.strip()) for key in each.split(",")] for each in by]
-        if by
-        else None
-    )
+    chosen = [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
     summary = summarise(folder, by=chosen)
     page = write_summary(summary, folder)
     print_summary(summary, all_tables=by is not None)
     typer.echo(f"summary: {page}")
     return 0
+
+
+def _column(key: str) -> str:
+    """The column of a key, which may be spelled as `--set` takes it: `obstacles.0.velocity_mps`."""
+    from harness.strict_yaml import InputError, key_path, loc_of
+
+    try:
+        return key_path(loc_of(key))
+    except ValueError as error:
+        raise InputError(f"command line: --by: {error}") from error
 
 
 def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
