@@ -101,6 +101,7 @@ class WorstRun:
         varied: the varied keys with their values.
         folder: its run folder relative to the campaign's, empty where none was kept.
         recording: whether there is a recording in it.
+        view: the command that shows the recording, empty without one.
         command: flies it again.
     """
 
@@ -114,6 +115,7 @@ class WorstRun:
     varied: Mapping[str, Any]
     folder: str
     recording: bool
+    view: str
     command: str
 
 
@@ -286,6 +288,7 @@ def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[
     world, scenario = names["world"][row], names["scenario"][row]
     crossed = world and _are_crossed(names["world"], names["scenario"])
     place = (scenario, world) if crossed else (world or scenario,)
+    recording = (folder / kept / RECORDING).is_file()
     return WorstRun(
         run=number,
         name=", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row]))),
@@ -296,6 +299,7 @@ def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[
         clearance_ratio=ratio if np.isfinite(ratio) else None,
         varied={key: runs.varied[key][row] for key in keys if key not in NAMED},
         folder=str(kept) if (folder / kept).is_dir() else "",
-        recording=(folder / kept / RECORDING).is_file(),
+        recording=recording,
+        view=shlex.join(["wayproof", "view", str(folder / kept)]) if recording else "",
         command=shlex.join(["wayproof", "fly", "--from", str(folder / RESULTS), "--run", str(number)]),
     )

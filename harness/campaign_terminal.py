@@ -63,6 +63,9 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         )
     if failed:
         console.print(escape(f"again: {failed[0].command}"), highlight=False, soft_wrap=True)
+    kept = next((run for run in summary.worst if run.view), None)
+    if kept is not None:
+        console.print(escape(f"view: {kept.view}"), highlight=False, soft_wrap=True)
 
 
 def _columns(title: str) -> Grid:

@@ -38,8 +38,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     for corner in _listed(check["corners"], "corners cut", rows):
         side = "left" if corner["turn_deg"] > 0 else "right"
         rows[f"  waypoint {corner['waypoint']}"] = (
-            f"{abs(corner['turn_deg']):.0f} deg {side}, radius {corner['radius_m']:.0f} m, "
-            f"cut by {corner['flown_cut_m']:.0f} of {corner['allowed_cut_m']:.0f} m"
+            f"{abs(corner['turn_deg']):.0f} deg {side}, {_rounded(corner)}"
         )
     for name, figures in (("as given", check["given"]), ("as flown", metrics["smoothness"]["flown"])):
         rows[f"smoothness {name}"] = (
@@ -55,6 +54,18 @@ def _listed(entries: list[Any], title: str, rows: dict[str, str]) -> list[Any]:
         more = f", the first {SHOWN}:" if len(entries) > SHOWN else ""
         rows[title] = f"{len(entries)}{more}"
     return entries[:SHOWN]
+
+
+def _rounded(corner: dict[str, Any]) -> str:
+    """How a corner was rounded."""
+    if not corner["radius_m"]:
+        return "no arc leads straight back"
+    if corner["flown_cut_m"] is None:
+        return f"radius {corner['radius_m']:.0f} m, not reached"
+    return (
+        f"radius {corner['radius_m']:.0f} m, "
+        f"cut by {corner['flown_cut_m']:.0f} of {corner['allowed_cut_m']:.0f} m"
+    )
 
 
 def _radius(curvature_1pm: float) -> str:

@@ -60,7 +60,7 @@ def print_comparison(rows: Sequence[Row]) -> None:
         table = Table(
             title=escape(name), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False
         )
-        table.add_column("planner", max_width=NAME_WIDTH, overflow="fold")
+        table.add_column("planner", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
         for figure in shown:
             table.add_column(
                 figure.short, justify="left" if figure.short == "outcome" else "right", no_wrap=True

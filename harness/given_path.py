@@ -37,7 +37,7 @@ class CutCorner:
         north_m: where it is.
         turn_deg: the turn asked for, positive to the left.
         radius_m: of the arc that is flown instead; 0 where the path leads back and there is none.
-        cut_m: how far from the corner that arc passes; the shorter leg where there is none.
+        cut_m: how far from the corner that arc passes; 0 where there is none.
         station_m: distance along the flown path to the middle of the arc.
     """
 
@@ -57,7 +57,7 @@ class FlyBy:
     Attributes:
         waypoints_m: (k, 2) those of the points given that are needed.
         segments: (n, 6) as in `planner.interface.Path`.
-        corners: those that are cut by more than was left free, in order.
+        corners: those that are cut by more than was left free, or have no arc, in order.
     """
 
     waypoints_m: FloatArray
@@ -91,7 +91,7 @@ def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
     fits = np.divide(room, tangent, out=np.zeros_like(room), where=tangent > 0.0)
     radius = np.minimum(fits, np.maximum(radius_m, free_cut_m / beyond))
     trim = radius * tangent
-    cut = np.where(back, np.minimum(length[:-1], length[1:]), radius * beyond)
+    cut = np.where(back, 0.0, radius * beyond)
 
     ends = np.concatenate(([0.0], trim, [0.0]))
     rows: list[tuple[float, float, float, float, float, float]] = []
@@ -122,7 +122,7 @@ def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
             cut_m=float(cut[i]),
             station_m=middles[i],
         )
-        for i in np.flatnonzero(cut > free_cut_m * (1.0 + 1e-9)).tolist()
+        for i in np.flatnonzero(back | (cut > free_cut_m * (1.0 + 1e-9))).tolist()
     )
     return FlyBy(points, np.array(rows), corners)
 

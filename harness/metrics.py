@@ -104,8 +104,13 @@ def clearance_violation_s(track: Track, clearance_m: float) -> float:
 
 
 def planned_length_m(flight: Flight) -> float:
-    """Length of the planned curve that was in effect: progress along each plan while it was flown."""
-    return sum(end - start for _, start, end in stations_in_effect(flight.track))
+    """Length of the planned curve that was in effect: progress along each plan while it was flown, up to its end."""
+    flown_m = 0.0
+    for index, start, end in stations_in_effect(flight.track):
+        plan = flight.plans[index]
+        length = math.inf if plan.loiter else float(plan.segments[:, 5].sum())
+        flown_m += max(min(end, length) - start, 0.0)
+    return flown_m
 
 
 def _finite(value: np.float64) -> float | None:

@@ -199,10 +199,13 @@ def _measured(points_m: FloatArray, way: FlyBy, flight: Flight, limits: FlightLi
 
 
 def _passed(corner: CutCorner, flight: Flight, limits: FlightLimits) -> dict[str, Any]:
-    track = flight.track
-    nearest = np.hypot(track.east_m - corner.east_m, track.north_m - corner.north_m).min()
+    """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there."""
+    track, room_m = flight.track, limits.clearance_m
+    arc_m = corner.radius_m * math.radians(abs(corner.turn_deg))
+    about = np.abs(track.station_m - corner.station_m) <= 0.5 * arc_m + room_m
+    away_m = np.hypot(track.east_m - corner.east_m, track.north_m - corner.north_m)[about]
     return {
         **dataclasses.asdict(corner),
-        "flown_cut_m": float(nearest),
-        "allowed_cut_m": limits.clearance_m,
+        "flown_cut_m": float(away_m.min()) if len(away_m) else None,
+        "allowed_cut_m": room_m,
     }

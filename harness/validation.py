@@ -116,6 +116,8 @@ def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
         return unknown_key(str(details["loc"][-1]), known)
     if kind == "finite_number" or (isinstance(value, float) and not math.isfinite(value)):
         return f"is {value}; must be a finite number"
+    if kind == "int_type" and isinstance(value, float):
+        return f"is {value!r}; must be a whole number, without a point"
     if kind in _WANTED:
         return f"is {shown(value)}; must be {_WANTED[kind]}"
     if kind in _BOUNDS:

@@ -72,9 +72,18 @@ def falsify(
     overrides = [("planner.kind", planner), ("aircraft.model", aircraft), ("seed", seed)]
     given = [(name, str(value)) for name, value in overrides if value is not None]
     fixed = [*given, *map(setting, settings or ())]
+    _set_or_varied(fixed, ranges)
     return _search(
         scenario, fixed, ranges, until, runs or RUNS_A_KEY * len(ranges), seeds, tolerance, out, as_json
     )
+
+
+def _set_or_varied(fixed: list[tuple[str, str]], ranges: list[tuple[str, float, float]]) -> None:
+    """Refuses a key that is to be varied and has a value as well."""
+    varied = [key for key, _, _ in ranges]
+    for name, _ in fixed:
+        if name in varied:
+            raise bad_input(ValueError(f"{name} is given a value, and a range with --vary; give one of them"))
 
 
 def _search(

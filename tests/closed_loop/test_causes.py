@@ -95,6 +95,21 @@ def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_there_is_room(check
     }
 
 
+def test_a_path_that_leads_back_and_by_where_it_began(check: Check) -> None:
+    """What is told of a corner is told of when the aircraft came to it, and as its leg has it."""
+    flown = check(np.array([(0.0, 0.0), (0.0, 2000.0), (0.0, 0.0), (3000.0, 0.0)]))
+    assert causes(flown) == {"turn radius too tight"}
+    back, square = flown["check"]["corners"]
+    assert (back["radius_m"], back["cut_m"], flown["trackability"][0]["corner_cut_m"]) == (0.0, 0.0, 0.0)
+    assert back["flown_cut_m"] < 5.0
+    assert square["flown_cut_m"] == pytest.approx(flown["trackability"][1]["corner_cut_m"], abs=1.0)
+    assert flown["planned_length_m"] == pytest.approx(7000.0 - 2.0 * 110.0 + math.pi / 2.0 * 110.0, abs=2.0)
+
+
+def test_a_straight_path_is_as_long_as_it_is(check: Check) -> None:
+    assert check(np.array([(0.0, 0.0), (0.0, 3000.0)]))["planned_length_m"] == pytest.approx(3000.0, abs=0.01)
+
+
 def test_bank_limit(check: Check) -> None:
     """66 m takes 44 of the 45 degrees: none are left to get back onto the path with."""
     assert causes(check(turn(66.0), trackability__cross_track_m=1)) == {"bank limit"}

@@ -304,10 +304,10 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     (folder / "runs" / "5").mkdir()
     worst = summarise(folder).worst
     assert [run.run for run in worst] == [6, 5, 4, 3, 0, 7, 2, 1, 9, 10]
-    assert [(run.folder, run.recording) for run in worst[:3]] == [
-        ("runs/6", True),
-        ("runs/5", False),
-        ("", False),
+    assert [(run.folder, run.recording, run.view) for run in worst[:3]] == [
+        ("runs/6", True, f"wayproof view '{folder}/runs/6'"),
+        ("runs/5", False, ""),
+        ("", False, ""),
     ]
     assert worst[0].clearance_ratio == pytest.approx(-0.18)
     assert worst[0].command == f"wayproof fly --from '{folder}/results.parquet' --run 6"
@@ -377,6 +377,16 @@ def test_the_rarest_of_many_names_share_a_group() -> None:
     assert (index == MOST_NAMES - 1).sum() == sum(30 - number for number in range(11, 30))
     assert grouped("sensor", [[1, 2], [1, 2], [3]])[0].labels == ("[1, 2]", "[3]")
     assert grouped("flag", [True, False])[0].labels == ("true", "false")
+
+
+def test_a_terminal_shows_how_to_look_at_the_worst_run_that_was_recorded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = by_two(tmp_path / "c")
+    (folder / "runs" / "21").mkdir(parents=True)
+    (folder / "runs" / "21" / "flight.rrd").touch()
+    print_summary(summarise(folder))
+    assert capsys.readouterr().out.splitlines()[-1] == f"view: wayproof view {folder}/runs/21"
 
 
 def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

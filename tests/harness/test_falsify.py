@@ -227,7 +227,7 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     assert metrics_again["outcome"] == found["found"]["outcome"] == "timeout"
     assert metrics_again["digest"] == found["found"]["digest"]
 
-    assert main(["falsify", *given, "--runs", "2", "--json", "--set", "mission.time_limit_s=7"]) == 0
+    assert main(["falsify", *given, "--runs", "2", "--json", "--set", "mission.goal_radius_m=60"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert (printed["verdict"], printed["flights"], printed["settled"]) == ("found", 2, False)
 
@@ -239,6 +239,10 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
         (["--vary", "mission.time_limit_s"], "'mission.time_limit_s' is not KEY.PATH=LO:HI with two numbers"),
         (["--vary", "mission.time_limit_s=1:x"], "is not KEY.PATH=LO:HI with two numbers"),
         (["--vary", "mission.time_limit_s=1:inf"], "is not KEY.PATH=LO:HI with two numbers"),
+        (
+            ["--vary", "sensor.dropout=0:1", "--set", "sensor.dropout=0.5"],
+            "sensor.dropout is given a value, and a range with --vary; give one of them",
+        ),
         (["--vary", "seed=1:5"], "a seed is no condition; --seeds flies several"),
         (["--vary", "sensor.dropout=0:0"], "both ends are 0; give two, as sensor.dropout=0:1"),
         (["--vary", "sensor.dropout=0:1", "--vary", "sensor.dropout=0:1"], "is given twice"),
