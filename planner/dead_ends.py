@@ -7,15 +7,13 @@ import math
 from planner.curves import Point, Pose
 from planner.interface import Mission, SeenWorld
 from planner.memory import ObstacleMemory
+from planner.unrest import Unrest
 
 ENOUGH = 2
 """So many turns before a place show what can be seen of it."""
 
 RETRY_S = 60.0
 """So long after something last moved or appeared, what was given up is tried again: it may have been in the way."""
-
-SETTLED_S = 600.0
-"""So long after that no goal is called unreachable: what closes the way may go again."""
 
 
 class DeadEnds:
@@ -30,7 +28,8 @@ class DeadEnds:
         self._mission, self._memory = mission, memory
         self._reach = 2.0 * mission.clearance_m  # places nearer to each other are one
         self._places: list[Point] = []
-        self._changed_s = -math.inf  # when something last moved or appeared
+        self.unrest = Unrest()
+        """When something last moved or appeared."""
         self._retry_s = math.inf
 
     def turned_before(self, place: Point) -> bool:
@@ -42,20 +41,10 @@ class DeadEnds:
         self._places = [each for each in self._places if each not in near]
         return True
 
-    @property
-    def changed(self) -> bool:
-        """Whether anything has moved or appeared so far."""
-        return math.isfinite(self._changed_s)
-
-    def settled(self, time_s: float) -> bool:
-        """Whether nothing has moved or appeared for so long that what closes the way is taken to stay."""
-        return time_s - self._changed_s > SETTLED_S
-
     def note_change(self, time_s: float, seen: SeenWorld) -> None:
         """Has what was given up tried again when what moved or appeared may have left the way."""
-        changed_s = time_s if seen.moving else seen.surprised_s
-        if changed_s > self._changed_s:
-            self._changed_s, self._retry_s = changed_s, changed_s + RETRY_S
+        if self.unrest.note(time_s, seen):
+            self._retry_s = self.unrest.changed_s + RETRY_S
         if time_s > self._retry_s:
             self._retry_s, self._places = math.inf, []
             self._memory.forgive()

@@ -282,7 +282,7 @@ class RollingWindow:
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn", goes_on=True)
         stuck = None if thinking is None else thinking.stuck
-        settled = self._dead_ends.settled(request.time_s)
+        settled = self._dead_ends.unrest.settled(request.time_s)
         if stuck is None and settled and self._proof.closed(request.position_m):
             gap = 2.0 * self._local.least_keeps_m
             return Plan(PlanStatus.UNREACHABLE, no_way_through(f"no gap in it is wider than {gap:.0f} m"))
@@ -314,7 +314,7 @@ class RollingWindow:
 
     def _certain(self) -> bool:
         """Whether all that was seen still stands, and nothing has come to what was free."""
-        return not (self._memory.taken_back or self._dead_ends.changed)
+        return not (self._memory.taken_back or math.isfinite(self._dead_ends.unrest.changed_s))
 
     def _note_turn(self, effect: Effect, seen: SeenWorld) -> None:
         """Gives up the place that a course could not be seen to enter, if it is the same again."""

@@ -4,7 +4,8 @@ A walk is what the algorithm would do from here on if nothing but what has been 
 and stretches of boundary, each with the state of the algorithm on it. It stays right until a new edge point
 comes too near to what is left of it, because a boundary changes only where a new disc covers it. So it is
 taken up again, from the state reached by then, when the aircraft has come to such a place: a BUG knows an
-obstacle only on contact.
+obstacle only on contact. While something moves, and for some minutes after (`planner.unrest`), the algorithm
+begins anew where it would say that the goal is enclosed.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from planner.boundary_path import Contact
 from planner.clearance import distances, first_breach
 from planner.curves import SHORTEST_M, Point, Segment, along, between, end_of, pose_at
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.unrest import Unrest
 
 OFF_PATH = 4.0
 """Further off the path than this many times the tracking error, a walk begins at the aircraft itself."""
@@ -134,6 +136,7 @@ class Walker(ABC, Generic[State]):
         self.keep_m = self.known.keep_m
         self._near_m = 2.0 * self.keep_m + mission.speed_mps * (2.0 + mission.compute_latency_s)
         self._breach_keep_m = self.keep_m - BREACH_SHARE * config.margin_m
+        self._unrest = Unrest()
         self._plan: Plan | None = None
         self.legs: tuple[Leg[State], ...] = ()
         self.breach_m = math.inf
@@ -166,12 +169,15 @@ class Walker(ABC, Generic[State]):
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the walk while it serves; takes it up anew where it does not."""
         fresh, taken_back = self.known.take_in(request.seen)
+        self._unrest.note(request.time_s, request.seen)
         path = request.flown.path if request.flown and request.flown is self._plan else None
         if path is None:
-            return self._found(tuple(self.walk(request.position_m, self.begin(request.position_m))), request)
+            return self._begun(request)
         station, end = request.station_m, self.legs[-1].state
         left = path.length_m - station
         if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
+            if not self._unrest.settled(request.time_s):
+                return self._begun(request)
             return Plan(PlanStatus.UNREACHABLE, end.sentence)
         if len(fresh):
             breach = first_breach(path, fresh, self._breach_keep_m, station)
@@ -193,6 +199,11 @@ class Walker(ABC, Generic[State]):
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._found(legs, request, place)
 
+    def _begun(self, request: PlanRequest) -> Plan:
+        """A walk from the beginning of the algorithm."""
+        place = request.position_m
+        return self._found(tuple(self.walk(place, self.begin(place))), request)
+
     def _state_at(self, path: Path, station_m: float) -> State:
         """The state of the algorithm at a station of the path in effect."""
         begin = 0.0
@@ -208,8 +219,8 @@ class Walker(ABC, Generic[State]):
         end = legs[-1].state
         if not segments:
             reason = end.sentence if isinstance(end, Enclosed) else "there is no room to move"
-            status = PlanStatus.UNREACHABLE if isinstance(end, Enclosed) else PlanStatus.NO_PATH
-            return Plan(status, reason)
+            proven = isinstance(end, Enclosed) and self._unrest.settled(request.time_s)
+            return Plan(PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PATH, reason)
         here = place or request.position_m
         last = along(segments[-1], segments[-1][5])[:2]
         self.legs, self.breach_m, self._look_at_m = legs, math.inf, self.look_again_m()

@@ -30,6 +30,7 @@ from planner.interface import (
     PlanStatus,
 )
 from planner.tangent_bug import TangentBug, TangentBugConfig
+from planner.unrest import SETTLED_S
 
 MakePoints = Callable[..., FloatArray]
 
@@ -88,6 +89,12 @@ class Range:
         return np.zeros(len(points_m), dtype=np.bool_)
 
 
+class Unsettled(Range):
+    """The same, but something appeared in space seen to be free."""
+
+    surprised_s = 2000.0
+
+
 class Walk(NamedTuple):
     status: PlanStatus
     reason: str
@@ -103,9 +110,10 @@ def walk(
     mission: Mission = MISSION,
     step_m: float = 50.0,
     most_m: float = 400_000.0,
+    world: type[Range] = Range,
 ) -> Walk:
     """Flies a planner's path without error until it is at the goal or says that it never will be."""
-    planner, seen = MAKE[kind](mission), Range(points, mission.sensor_range_m)
+    planner, seen = MAKE[kind](mission), world(points, mission.sensor_range_m)
     place, direction, station, length = start, (1.0, 0.0), 0.0, 0.0
     flown: Plan | None = None
     track, plans = [start], list[Plan]()
@@ -211,6 +219,19 @@ def test_an_enclosure_is_proved_by_going_round_it(kind: str, enclosed: str, ring
     round_m = math.tau * (2000.0 + KEEP if enclosed == "goal" else 2000.0 - KEEP)
     # From within a hollow boundary all of it is in sight: TangentBug goes round on chords.
     assert flight.length_m > (0.8 if enclosed == "start" and kind == "tangent_bug" else 0.98) * round_m
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("enclosed", ["goal", "start"])
+def test_no_enclosure_is_proved_soon_after_something_appeared(
+    kind: str, enclosed: str, ring: MakePoints
+) -> None:
+    """It is gone round again meanwhile: what closes the way may go again."""
+    closed = ring(*(MISSION.goal_m if enclosed == "goal" else START), 2000.0, SPACING)
+    at_once, later = walk(kind, closed), walk(kind, closed, world=Unsettled)
+    assert at_once.status is later.status is PlanStatus.UNREACHABLE
+    assert at_once.length_m / MISSION.speed_mps < Unsettled.surprised_s + SETTLED_S
+    assert later.length_m / MISSION.speed_mps > Unsettled.surprised_s + SETTLED_S
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -9,9 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planner.dead_ends import RETRY_S, SETTLED_S
+from planner.dead_ends import RETRY_S
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
 from planner.rolling_window import MOST_EFFORT, RollingWindow
+from planner.unrest import SETTLED_S
 from tests.planner.test_rolling_window import (
     MISSION,
     SPACING,
