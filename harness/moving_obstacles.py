@@ -25,7 +25,7 @@ import numpy as np
 from harness.earlier_scans import NO_STEP, EarlierScans, Look
 from harness.followed_outline import FEWEST_SHIFTS, LEAST_MPS, MOST_MPS, FollowedOutline, bow, extent_m
 from harness.range_sensor import RangeScan, all_round, supported
-from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, register
+from harness.registration import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
 from harness.scan_comparison import grown, in_a_row, joined, looked_through, near_any, runs_of
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
 
@@ -221,9 +221,7 @@ class MovingObstacles:
         several = max(math.ceil(2.0 * self._noise / apart_m), 1)
         points = places
         if several > 1:
-            first = np.arange(0, len(places), several)
-            means = np.add.reduceat(places, first) / np.diff(np.append(first, len(places)))
-            points = np.concatenate((places[:1], means, places[-1:]))
+            points = np.concatenate((places[:1], means(places, several), places[-1:]))
         return Outline(
             points,
             ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),

@@ -73,9 +73,7 @@ class Outline(NamedTuple):
         """Mean of its tangents, each turned by twice its angle; of its chord where it is straight nowhere."""
         points = self.points
         if self.several > 1 and len(points) >= FEWEST * self.several:
-            first = np.arange(0, len(points), self.several)
-            counts = np.diff(np.append(first, len(points)))
-            points = (np.add.reduceat(points, first) / counts).astype(np.complex128)
+            points = means(points, self.several)
         along, straight = _tangents(points)
         if straight.any():
             return complex((along[straight] ** 2).mean())
@@ -85,6 +83,13 @@ class Outline(NamedTuple):
     def moved(self, by: complex) -> Outline:
         """The outline elsewhere."""
         return Outline(self.points + by, self.ends, self.several)
+
+
+def means(points: ComplexArray, several: int) -> ComplexArray:
+    """The mean of every so many points, in order; of what is left of them at the end."""
+    first = np.arange(0, len(points), several)
+    counts = np.diff(np.append(first, len(points)))
+    return (np.add.reduceat(points, first) / counts).astype(np.complex128)
 
 
 class Laid(NamedTuple):
