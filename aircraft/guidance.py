@@ -24,8 +24,10 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from aircraft.interface import AircraftState, Route
-from aircraft.route import SegmentRow, arc_point
+import numpy as np
+
+from aircraft.interface import AircraftState, FloatArray, Route
+from aircraft.route import arc_point
 
 GRAVITY_MPS2 = 9.80665
 UPDATE_RATE_HZ = 10
@@ -39,6 +41,13 @@ INTERCEPT_SINE = 0.7
 
 TYPICAL_BANK_RAD = math.radians(30.0)
 """A step of curvature is blended over the time that rolling this far takes."""
+
+SPLIT = 2.0**27 + 1.0
+"""Times this, a number is parted into two of half its digits."""
+
+START, STOP, TURNED = 6, 7, 8
+"""Columns of the route's rows after those of `Route.segments`: the stations of begin and end, m, and by how much the
+route has turned up to there, rad, positive to the left."""
 
 
 @dataclass(frozen=True)
@@ -87,24 +96,17 @@ class PathFollower:
             limits: what may be asked of the aircraft.
             update_rate_hz: how often `update` will be called.
         """
-        self._roll_step = limits.roll_rate_radps / update_rate_hz
-        # The held command acts on average half an update late.
-        self._lead_s = limits.roll_delay_s + 0.5 / update_rate_hz
-        self._lead_updates = limits.roll_lag_s * update_rate_hz
-        self._blend_s = max(TYPICAL_BANK_RAD / limits.roll_rate_radps, 1.0 / update_rate_hz)
-        self._bank_limit = limits.bank_limit_rad
-        self._bandwidth = limits.bandwidth_radps
-        self._two_zeta_omega = 2.0 * DAMPING * limits.bandwidth_radps
-        self._pull_per_s = limits.bandwidth_radps / (2.0 * DAMPING)
-        self._roll = 0.0
-        self._rows: list[SegmentRow] = []
-        self._starts: list[float] = []
-        self._stops: list[float] = []
-        self._turned: list[float] = []
-        self._loiter = False
-        self._length = 0.0
-        self._index = self._last = 0
-        self._along = 0.0
+        self._law = (
+            limits.roll_rate_radps / update_rate_hz,
+            # The held command acts on average half an update late.
+            limits.roll_delay_s + 0.5 / update_rate_hz,
+            limits.roll_lag_s * update_rate_hz,
+            max(TYPICAL_BANK_RAD / limits.roll_rate_radps, 1.0 / update_rate_hz),
+            limits.bank_limit_rad,
+            limits.bandwidth_radps,
+        )
+        self._rows: FloatArray | None = None
+        self._at = (0, 0.0, 0.0)
 
     def follow(self, route: Route, station_m: float = 0.0) -> None:
         """Takes a new route; the roll command goes on from where it is.
@@ -113,22 +115,10 @@ class PathFollower:
             route: what to fly.
             station_m: where on it to begin looking for the nearest point, m from its start.
         """
-        self._rows = [(e, n, te, tn, k, length) for e, n, te, tn, k, length in route.segments.tolist()]
-        self._loiter = route.loiter
-        self._starts, self._turned = [], []
-        start = turned = 0.0
-        for row in self._rows:
-            self._starts.append(start)
-            self._turned.append(turned)
-            start += row[5]
-            turned += row[4] * row[5]
-        self._length = start
-        self._stops = [*self._starts[1:], math.inf if route.loiter else start]
-        self._last = len(self._rows) - 1
-        self._index = 0
-        while self._index < self._last and self._starts[self._index + 1] <= station_m:
-            self._index += 1
-        self._along = station_m - self._starts[self._index]
+        self._rows = _rows(route)
+        starts = self._rows[:, START]
+        row = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
+        self._at = (row, station_m - float(starts[row]), self._at[2])
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval.
@@ -142,126 +132,185 @@ class PathFollower:
         Raises:
             RuntimeError: if there is no route yet.
         """
-        if not self._rows:
+        if self._rows is None:
             raise RuntimeError("follow() a route before update()")
-        _, here_east, here_north, _, velocity_east, velocity_north, _, heading, _, _, airspeed, _, _ = state
-        cross, tangent_east, tangent_north = self._project(here_east, here_north)
-        index = self._index
-        station = self._starts[index] + self._along
-        speed = math.sqrt(velocity_east * velocity_east + velocity_north * velocity_north)
-        if speed < 1.0:
-            speed = 1.0
-        along_mps = velocity_east * tangent_east + velocity_north * tangent_north
-        cross_mps = velocity_east * tangent_north - velocity_north * tangent_east
-
-        bank_limit = self._bank_limit
-        heading_east, heading_north = math.sin(heading), math.cos(heading)
-        ahead_mps = velocity_east * heading_east + velocity_north * heading_north
-        # The wind, the ground velocity less the air velocity, is not weaker than the airspeed.
-        if speed * speed >= 2.0 * airspeed * ahead_mps:
-            wind_east = velocity_east - airspeed * heading_east
-            wind_north = velocity_north - airspeed * heading_north
-            # Left of the path by this sine, as far as it can be made good.
-            left = INTERCEPT_SINE * _within(1.0, cross * self._pull_per_s / airspeed)
-            ahead = math.sqrt(1.0 - left * left)
-            bearing_east = ahead * tangent_east - left * tangent_north
-            bearing_north = ahead * tangent_north + left * tangent_east
-            east, north = air_direction(wind_east, wind_north, airspeed, bearing_east, bearing_north)
-            turn = math.atan2(
-                east * heading_north - north * heading_east, east * heading_east + north * heading_north
-            )
-            wanted = math.atan(airspeed * self._bandwidth * turn / GRAVITY_MPS2)
-        elif along_mps <= 0.0:
-            wanted = -bank_limit if cross_mps > 0.0 else bank_limit
-        else:
-            pull = _within(INTERCEPT_SINE * speed, cross * self._pull_per_s)
-            least = 0.3 * speed
-            # Lift acts across the course, the correction across the path.
-            across = -self._two_zeta_omega * (cross_mps + pull) * speed
-            across /= along_mps if along_mps > least else least
-            # The curvature where the aircraft will be when it has rolled, averaged over the way that takes.
-            blend = speed * self._blend_s
-            low = station + speed * self._lead_s - 0.5 * blend
-            if self._starts[index] <= low and low + blend <= self._stops[index]:
-                curvature = self._rows[index][4]
-            else:
-                curvature = (self._turn_at(low + blend) - self._turn_at(low)) / blend
-            acceleration = across - curvature * (speed * speed)
-            cosine = ahead_mps / speed
-            wanted = math.atan(acceleration / (GRAVITY_MPS2 * (cosine if cosine > 0.2 else 0.2)))
-        allowed = _within(bank_limit, wanted)
-        step = _within(self._roll_step, allowed - self._roll)
-        self._roll += step
-        # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
-        command = _within(bank_limit, self._roll + self._lead_updates * step)
-        past_end = not self._loiter and station > self._length
+        _, east, north, _, velocity_east, velocity_north, _, heading, _, _, airspeed, _, _ = state
+        self._at, output = decide(
+            self._rows, self._law, self._at, east, north, velocity_east, velocity_north, heading, airspeed
+        )
         # At once: the constructor of a NamedTuple takes twice as long.
-        return tuple.__new__(GuidanceOutput, (command, cross, station, allowed != wanted, past_end))
+        return tuple.__new__(GuidanceOutput, output)
 
-    def _project(self, east: float, north: float) -> tuple[float, float, float]:
-        """Moves to the nearest point; cross-track error and the unit tangent there."""
-        while True:
-            row = self._rows[self._index]
-            east0, north0, tangent_east, tangent_north, curvature, length = row
-            begun = 0.0
-            if curvature and self._along > length and self._index == self._last and not self._loiter:
-                east0, north0, tangent_east, tangent_north = arc_point(row, length)
-                curvature, begun = 0.0, length
-            if curvature:
-                along, cross, tangent_east, tangent_north = _on_arc(row, east, north, self._along)
-            else:
-                to_east, to_north = east - east0, north - north0
-                along = begun + to_east * tangent_east + to_north * tangent_north
-                cross = to_east * tangent_north - to_north * tangent_east
-            if along <= length or self._index == self._last:
-                self._along = along if along > 0.0 else 0.0
-                return cross, tangent_east, tangent_north
-            self._index += 1
-            self._along = 0.0
 
-    def _turn_at(self, station: float) -> float:
-        """Direction change of the route from its start to a station, rad, positive to the left."""
-        index = self._index
-        while index > 0 and station < self._starts[index]:
-            index -= 1
-        last = self._last
-        while index < last and station >= self._starts[index + 1]:
-            index += 1
-        along = station - self._starts[index]
-        if index == last and not self._loiter:
-            along = min(along, self._rows[index][5])
-        return self._turned[index] + self._rows[index][4] * along
+def _rows(route: Route) -> FloatArray:
+    """(n, 9) the segments of a route, with stations and turns; one without a loiter goes on straight for ever."""
+    segments = route.segments
+    if not route.loiter:
+        end = arc_point(tuple(segments[-1].tolist()), float(segments[-1, 5]))
+        segments = np.vstack((segments, (*end, 0.0, math.inf)))
+    stations = np.append(0.0, np.cumsum(segments[:, 5]))
+    stations[-1] = math.inf
+    turned = np.append(0.0, np.cumsum(segments[:-1, 4] * segments[:-1, 5]))
+    rows = np.column_stack((segments, stations[:-1], stations[1:], turned))
+    rows.setflags(write=False)
+    return rows
+
+
+def decide(
+    rows: FloatArray,
+    law: tuple[float, float, float, float, float, float],
+    at: tuple[int, float, float],
+    east_m: float,
+    north_m: float,
+    velocity_east_mps: float,
+    velocity_north_mps: float,
+    heading_rad: float,
+    airspeed_mps: float,
+) -> tuple[tuple[int, float, float], tuple[float, float, float, bool, bool]]:
+    """The law, from one update to the next.
+
+    Args:
+        rows: (n, 9) the route, see `START`.
+        law: largest change of the reference roll in an update, rad; what the command is held and delayed for, s;
+            by how many updates it leads; over how long a step of curvature is blended, s; the largest roll
+            command, rad; omega, rad/s.
+        at: the row that was followed last, how far along it, m, and the reference roll so far, rad.
+        east_m: position of the aircraft.
+        north_m: position of the aircraft.
+        velocity_east_mps: ground velocity.
+        velocity_north_mps: ground velocity.
+        heading_rad: of the nose.
+        airspeed_mps: true airspeed.
+
+    Returns:
+        `at` now, and what `GuidanceOutput` consists of.
+    """
+    roll_step, lead_s, lead_updates, blend_s, bank_limit, omega = law
+    index, along_m, cross, tangent_east, tangent_north = _nearest(rows, at[0], at[1], east_m, north_m)
+    station = rows[index, START] + along_m
+    speed = max(
+        math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps), 1.0
+    )
+    along_mps = velocity_east_mps * tangent_east + velocity_north_mps * tangent_north
+    cross_mps = velocity_east_mps * tangent_north - velocity_north_mps * tangent_east
+    heading_east, heading_north = math.sin(heading_rad), math.cos(heading_rad)
+    ahead_mps = velocity_east_mps * heading_east + velocity_north_mps * heading_north
+    pull_per_s = omega / (2.0 * DAMPING)
+    # The wind, the ground velocity less the air velocity, is not weaker than the airspeed.
+    if speed * speed >= 2.0 * airspeed_mps * ahead_mps:
+        # Left of the path by this sine, as far as it can be made good.
+        left = INTERCEPT_SINE * _within(1.0, cross * pull_per_s / airspeed_mps)
+        ahead = math.sqrt(1.0 - left * left)
+        to_east, to_north = air_direction(
+            velocity_east_mps - airspeed_mps * heading_east,
+            velocity_north_mps - airspeed_mps * heading_north,
+            airspeed_mps,
+            ahead * tangent_east - left * tangent_north,
+            ahead * tangent_north + left * tangent_east,
+        )
+        turn = math.atan2(
+            to_east * heading_north - to_north * heading_east,
+            to_east * heading_east + to_north * heading_north,
+        )
+        wanted = math.atan(airspeed_mps * omega * turn / GRAVITY_MPS2)
+    elif along_mps <= 0.0:
+        wanted = -bank_limit if cross_mps > 0.0 else bank_limit
+    else:
+        pull = _within(INTERCEPT_SINE * speed, cross * pull_per_s)
+        # Lift acts across the course, the correction across the path.
+        across = -2.0 * DAMPING * omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
+        # The curvature where the aircraft will be when it has rolled, averaged over the way that takes.
+        blend = speed * blend_s
+        low = station + speed * lead_s - 0.5 * blend
+        if rows[index, START] <= low and low + blend <= rows[index, STOP]:
+            curvature = rows[index, 4]
+        else:
+            curvature = (_turned(rows, index, low + blend) - _turned(rows, index, low)) / blend
+        acceleration = across - curvature * (speed * speed)
+        wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
+    allowed = _within(bank_limit, wanted)
+    step = _within(roll_step, allowed - at[2])
+    roll = at[2] + step
+    # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
+    command = _within(bank_limit, roll + lead_updates * step)
+    past_end = rows[index, 5] == math.inf and along_m > 0.0
+    return (index, along_m, roll), (command, cross, station, allowed != wanted, past_end)
+
+
+def _nearest(
+    rows: FloatArray, index: int, along_m: float, east_m: float, north_m: float
+) -> tuple[int, float, float, float, float]:
+    """Row and distance along it of the nearest point from the last one on; cross-track error and tangent there."""
+    while True:
+        east = east_m - rows[index, 0]
+        north = north_m - rows[index, 1]
+        tangent_east, tangent_north, curvature = rows[index, 2], rows[index, 3], rows[index, 4]
+        if curvature == 0.0:
+            along = east * tangent_east + north * tangent_north
+            cross = east * tangent_north - north * tangent_east
+        else:
+            # The centre lies 1/curvature to the left of the start; angles are counted along the flight.
+            radius = 1.0 / curvature
+            east, north = east + radius * tangent_north, north - radius * tangent_east
+            outward_east, outward_north = tangent_north * radius, -tangent_east * radius
+            angle = math.atan2(
+                outward_east * north - outward_north * east, outward_east * east + outward_north * north
+            )
+            # Within half a turn of the last one.
+            expected = along_m * curvature
+            since = np.fmod(angle - expected, math.tau)
+            if abs(since) > math.pi:
+                since -= math.copysign(math.tau, since)
+            angle = expected + since
+            away = _length(east, north)
+            cross = away - radius if radius > 0.0 else -radius - away
+            along = angle * radius
+            sine, cosine = math.sin(angle), math.cos(angle)
+            tangent_east, tangent_north = (
+                tangent_east * cosine - tangent_north * sine,
+                tangent_east * sine + tangent_north * cosine,
+            )
+        if along <= rows[index, 5] or index == len(rows) - 1:
+            return index, max(along, 0.0), cross, tangent_east, tangent_north
+        index, along_m = index + 1, 0.0
+
+
+def _length(x: float, y: float) -> float:
+    """sqrt(x^2 + y^2) to half a unit in the last place, as CPython's `math.hypot` has it and that of C has not.
+
+    Squares are taken in two parts, and one step of Newton's makes up for the error of the root (T. J. Dekker, A
+    floating-point technique for extending the available precision, Numerische Mathematik 18, 1971).
+    """
+    large, small = max(abs(x), abs(y)), min(abs(x), abs(y))
+    if large == 0.0:
+        return 0.0
+    square = large * large + small * small
+    root = math.sqrt(square)
+    lost = large * large - square + small * small
+    lost += _rounded_off(large) + _rounded_off(small) - _rounded_off(root)
+    return root + (square - root * root + lost) / (2.0 * root)
+
+
+def _rounded_off(x: float) -> float:
+    """What x * x lacks of the exact square."""
+    high = x * SPLIT - (x * SPLIT - x)
+    low = x - high
+    return (high * high - x * x) + 2.0 * high * low + low * low
+
+
+def _turned(rows: FloatArray, index: int, station_m: float) -> float:
+    """Direction change of the route from its start to a station near a row, rad, positive to the left."""
+    while index > 0 and station_m < rows[index, START]:
+        index -= 1
+    while station_m >= rows[index, STOP]:
+        index += 1
+    turned: float = rows[index, TURNED] + rows[index, 4] * (station_m - rows[index, START])
+    return turned
 
 
 def _within(limit: float, value: float) -> float:
     """The value between minus and plus a limit that is nearest to it."""
     return value if -limit <= value <= limit else math.copysign(limit, value)
-
-
-def _on_arc(row: SegmentRow, east: float, north: float, near_m: float) -> tuple[float, float, float, float]:
-    """Where a point is along and to the right of an arc, and the unit tangent there.
-
-    The point is within half a turn of a place along the arc.
-    """
-    east0, north0, tangent_east, tangent_north, curvature, _ = row
-    # The centre lies 1/curvature to the left of the start; angles are counted along the flight.
-    radius = 1.0 / curvature
-    east, north = east - east0 + radius * tangent_north, north - north0 - radius * tangent_east
-    outward_east, outward_north = tangent_north * radius, -tangent_east * radius
-    angle = math.atan2(
-        outward_east * north - outward_north * east, outward_east * east + outward_north * north
-    )
-    expected = near_m * curvature
-    angle = expected + math.remainder(angle - expected, math.tau)
-    distance = math.hypot(east, north)
-    cross = distance - radius if radius > 0.0 else -radius - distance
-    sine, cosine = math.sin(angle), math.cos(angle)
-    return (
-        angle * radius,
-        cross,
-        tangent_east * cosine - tangent_north * sine,
-        tangent_east * sine + tangent_north * cosine,
-    )
 
 
 def air_direction(
@@ -295,5 +344,18 @@ def air_direction(
     ground = along + math.sqrt(reach) if along > 0.0 and reach > 0.0 else math.sqrt(max(excess, 0.0))
     east = ground * bearing_east - wind_east_mps
     north = ground * bearing_north - wind_north_mps
-    length = max(math.hypot(east, north), 1e-9)
+    length = max(_length(east, north), 1e-9)
     return east / length, north / length
+
+
+FLOAT, INDEX, ROUTE = "float64", "intp", "Array(float64, 2, 'C', readonly=True)"
+COMPILED = (
+    (_within, (FLOAT,) * 2),
+    (_rounded_off, (FLOAT,)),
+    (_length, (FLOAT,) * 2),
+    (air_direction, (FLOAT,) * 5),
+    (_turned, (ROUTE, INDEX, FLOAT)),
+    (_nearest, (ROUTE, INDEX, FLOAT, FLOAT, FLOAT)),
+    (decide, (ROUTE, "UniTuple(float64, 6)", "Tuple((intp, float64, float64))", *(FLOAT,) * 6)),
+)
+"""What whoever has a compiler (numba) may put machine code in the place of, in this order: types of arguments."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
+from aircraft.guidance import COMPILED as GUIDANCE
 from aircraft.guidance import GRAVITY_MPS2, PathFollower
 from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
@@ -30,6 +31,7 @@ from harness.scenario_sections import Environment
 from harness.sensed_world import SensedWorld
 from harness.trackability import FlightLimits
 from harness.world import World
+from planner.compiled import compiled
 
 if TYPE_CHECKING:
     from aircraft.interface import AircraftState
@@ -38,6 +40,9 @@ if TYPE_CHECKING:
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
 
+
+for _function, _arguments in GUIDANCE:
+    compiled(*_arguments)(_function)
 
 Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
 
