@@ -52,7 +52,7 @@ class Campaign(Section):
     """
 
     schema_: Literal["wayproof/campaign/1"] = key("Format and version.", alias="schema")
-    name: str = key("Names the folder.", pattern=r"^[a-z0-9._-]*[a-z0-9][a-z0-9._-]*$", max_length=100)
+    name: str = key("Names the folder.", pattern=r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$", max_length=100)
     seed: int = key("Root seed; every case's seed and draws derive from it.", unit="1", ge=0, le=2**53)
     scenarios: Annotated[tuple[str, ...], Strict(False)] = key(
         "What is flown: scenario files or folders of them, from the campaign file on, or names that `wayproof "

@@ -10,6 +10,7 @@ import contextlib
 import errno
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from typing import Annotated, Final
 
@@ -85,7 +86,7 @@ def _run(words: Sequence[str], debug: bool) -> int:
         return INTERRUPTED
     except Exception as error:
         if debug:
-            raise
+            traceback.print_exc()
         return _report(error)
 
 

@@ -139,6 +139,8 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         model.advance(steps)
     log.add(state, roll_command, cross_track, station, plans.index)
     outcome, reason = verdict
+    if plans.never and outcome not in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
+        reason += f"; no plan was ever found: {in_a_line(plans.never)}"
     if progress is not None:
         progress(state.time_s, judge.to_go_m(state), outcome.value)
     for observer in observers:
@@ -201,6 +203,11 @@ class _Plans:
         return (
             "waiting" if not self.accepted else "holding" if self._station > self._turns_at else "following"
         )
+
+    @property
+    def never(self) -> str:
+        """Why the planner found nothing so far; empty where it found something, or says so itself."""
+        return "" if self.accepted or self._coming else self._told
 
     def ask(self, state: AircraftState, station_m: float, scanned: bool) -> tuple[Outcome, str] | None:
         """Asks the planner, unless it is still at work; returns how the flight ends if that is its answer."""

@@ -13,7 +13,11 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
     from pydantic_core import ErrorDetails
 
-MAX_FAULTS: Final = 5
+MAX_FAULTS: Final = 2
+"""Lines of an error."""
+
+MOST_WHOLE: Final = 2**53
+"""Beyond this a number is not read as a whole one."""
 
 _WANTED: Final = {
     "int_type": "a whole number",
@@ -117,7 +121,8 @@ def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
     if kind == "finite_number" or (isinstance(value, float) and not math.isfinite(value)):
         return f"is {value}; must be a finite number"
     if kind == "int_type" and isinstance(value, float):
-        return f"is {value!r}; must be a whole number, without a point"
+        wanted = "without a point" if abs(value) < MOST_WHOLE else f"of at most {MOST_WHOLE}"
+        return f"is {value!r}; must be a whole number {wanted}"
     if kind in _WANTED:
         return f"is {shown(value)}; must be {_WANTED[kind]}"
     if kind in _BOUNDS:

@@ -16,6 +16,7 @@ from harness.commands.options import (
     SeedOption,
     SettingsOption,
     bad_input,
+    chosen,
     load,
     print_json,
     setting,
@@ -69,9 +70,7 @@ def falsify(
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
     ranges = [range_of(text) for text in vary]
-    overrides = [("planner.kind", planner), ("aircraft.model", aircraft), ("seed", seed)]
-    given = [(name, str(value)) for name, value in overrides if value is not None]
-    fixed = [*given, *map(setting, settings or ())]
+    fixed = [*chosen(planner, aircraft, seed), *map(setting, settings or ())]
     _set_or_varied(fixed, ranges)
     return _search(
         scenario, fixed, ranges, until, runs or RUNS_A_KEY * len(ranges), seeds, tolerance, out, as_json

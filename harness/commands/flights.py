@@ -17,6 +17,7 @@ from harness.commands.options import (
     SeedOption,
     SettingsOption,
     bad_input,
+    chosen,
     flag,
     load,
     print_json,
@@ -67,9 +68,7 @@ def fly(
     """
     if view and no_recording:
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
-    overrides = [("planner.kind", planner), ("aircraft.model", aircraft), ("seed", seed)]
-    given = [(name, str(value)) for name, value in overrides if value is not None]
-    given += map(setting, settings or ())
+    given = [*chosen(planner, aircraft, seed), *map(setting, settings or ())]
     loaded, digest = _asked(scenario, results, run, given)
     folder = out or _default_folder(loaded)
     metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
@@ -137,7 +136,7 @@ def compare(
     2 bad input or usage, nothing flown
     """
     kinds = [kind.strip() for kind in planners.split(",")]
-    loaded = [load(scenario, [("planner.kind", kind)]) for scenario in scenarios for kind in kinds]
+    loaded = [load(scenario, chosen(kind)) for scenario in scenarios for kind in kinds]
 
     from aircraft.airframes import AircraftError
     from harness.compare import compare as fly_and_compare

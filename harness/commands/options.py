@@ -93,6 +93,16 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     return load_scenario(scenario_path(scenario), overrides)
 
 
+def chosen(
+    planner: str | None, aircraft: str | None = None, seed: int | None = None
+) -> list[tuple[str, str]]:
+    """What --planner, --aircraft and --seed replace; a name is text, whatever YAML takes it for."""
+    import json
+
+    given = {"planner.kind": planner, "aircraft.model": aircraft, "seed": seed}
+    return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
+
+
 def setting(text: str) -> tuple[str, str]:
     """KEY.PATH=VALUE as its two parts."""
     name, equals, value = text.partition("=")

@@ -292,13 +292,15 @@ def test_names_what_is_not_a_scenario_at_all(
     assert faults[0].startswith(f"{path}{sentence}")
 
 
-def test_lists_the_first_few_of_many_faults(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tells_the_first_of_many_faults_and_how_many_more_there_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = tmp_path / "broken.yaml"
     path.write_text(GOOD.replace("m: ", "metre: "))
     faults = faults_of(path, capsys)
-    assert len(faults) == 5
+    assert len(faults) == 2
     assert all(fault.startswith(f"{path}:") for fault in faults)
-    assert "more" in faults[-1]
+    assert faults[-1].endswith("more")
 
 
 @pytest.mark.parametrize("name", ["missing.yaml", "."])
