@@ -19,6 +19,9 @@ from planner.curves import Point, Segment
 from planner.interface import BoolArray, FloatArray, IntArray, Mission, SeenWorld
 from planner.memory import ObstacleMemory
 
+GRAZED_M = 1e-3
+"""A line that goes less deep into a disc passes it."""
+
 TOUCH_SHARE = 0.05
 """A place this share of the kept distance off a disc still touches it: a path cuts across the dents between."""
 
@@ -103,12 +106,22 @@ class GrownObstacles:
         return first_entry(a, b, self.points_m, self.radii_m)
 
     def turned_back(self, place: Point, target: Point) -> bool:
+        """Whether an obstacle that a place on the boundary touches lies ahead on the way to a target."""
+        return len(self._passed_m(place, target)) > 0
+
+    def leads_inside(self, place: Point, target: Point) -> bool:
         """Whether the line from a place on the boundary to a target begins inside the obstacle."""
+        return bool((self._passed_m(place, target) < -GRAZED_M).any())
+
+    def _passed_m(self, place: Point, target: Point) -> FloatArray:
+        """(k,) how far the line from a place to a target passes from the rims of the discs ahead that it touches."""
         near = self._near(place)
         dx, dy = self.points_m[near, 0] - place[0], self.points_m[near, 1] - place[1]
-        distance = np.hypot(dx, dy)
-        inward = dx * (target[0] - place[0]) + dy * (target[1] - place[1])
-        return bool(((distance < self.radii_m[near] + TOUCH_SHARE * self.keep_m) & (inward > 0.0)).any())
+        whole = max(math.dist(place, target), 1e-9)
+        ux, uy = (target[0] - place[0]) / whole, (target[1] - place[1]) / whole
+        touches = np.hypot(dx, dy) < self.radii_m[near] + TOUCH_SHARE * self.keep_m
+        passed: FloatArray = np.abs(dx * uy - dy * ux) - self.radii_m[near]
+        return passed[touches & (dx * ux + dy * uy > 0.0)]
 
     def seat(self, place: Point) -> tuple[int, Point]:
         """The boundary place nearest to a place on or in an obstacle, and a disc it lies on."""

@@ -127,7 +127,7 @@ class Bug1(Walker[State]):
             place = mark_at(segments, stop).place
             if isinstance(state, Circling):
                 state = self._returning(self._circled(state, flown))
-            elif self.known.turned_back(place, self.goal):
+            elif self.known.leads_inside(place, self.goal):
                 state = Enclosed(
                     f"{self.enclosed()}: gone round, and the way from its nearest point leads inside"
                 )

@@ -105,7 +105,7 @@ class Bug2(Walker[State]):
             for at in crossings(segment, self._start, (-dy / length, dx / length)) if length else ():
                 place = along(segment, at)[:2]
                 nearer = math.dist(place, self.goal) < hit_m - PROGRESS_SHARE * self.keep_m
-                if nearer and not self.known.turned_back(place, self.goal):
+                if nearer and not self.known.leads_inside(place, self.goal):
                     return begin + at
             begin += segment[5]
         return math.inf

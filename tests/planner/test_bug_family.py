@@ -282,6 +282,17 @@ def test_an_obstacle_is_known_only_on_contact(kind: str, ring: MakePoints) -> No
     np.testing.assert_allclose(north, 5000.0, atol=1e-6)
 
 
+@pytest.mark.parametrize("depth_m", [0.5, 2.0, 6.0, 12.0, 20.0, 30.0, 100.0])
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_obstacle_that_the_line_grazes_encloses_nothing(
+    kind: str, depth_m: float, ring: MakePoints
+) -> None:
+    """The line leaves the boundary at so small an angle that the next points of it still lie ahead."""
+    (start_x, y), (goal_x, _) = START, MISSION.goal_m
+    middle = 0.5 * (start_x + goal_x)
+    assert walk(kind, ring(middle, y - 1500.0 - KEEP + depth_m, 1500.0, SPACING)).reason == "reached"
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_plan_begins_at_the_aircraft_and_is_in_one_piece(kind: str, ring: MakePoints) -> None:
     flight = walk(
