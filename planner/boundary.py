@@ -120,8 +120,9 @@ class GrownObstacles:
         whole = max(math.dist(place, target), 1e-9)
         ux, uy = (target[0] - place[0]) / whole, (target[1] - place[1]) / whole
         touches = np.hypot(dx, dy) < self.radii_m[near] + TOUCH_SHARE * self.keep_m
-        passed: FloatArray = np.abs(dx * uy - dy * ux) - self.radii_m[near]
-        return passed[touches & (dx * ux + dy * uy > 0.0)]
+        passed = np.abs(dx * uy - dy * ux) - self.radii_m[near]
+        ahead: FloatArray = passed[touches & (dx * ux + dy * uy > 0.0)]
+        return ahead
 
     def seat(self, place: Point) -> tuple[int, Point]:
         """The boundary place nearest to a place on or in an obstacle, and a disc it lies on."""

@@ -249,9 +249,12 @@ class TangentBug(Walker[State]):
         segments = self.boundary(state.anchor, state.side, self.horizon_m)
         off = math.dist(place, state.anchor) > self._progress_m or not state.on_boundary
         least_m = 0.0 if off else 2.0 * self.look_again_m()
-        station = self._beyond_a_dent(place, segments, state.side, least_m)
+        # From off it, more than half of what is left of the round is seen past the other side of the obstacle.
+        left_m = self.passes(segments, state.hit, self.keep_m - state.walked_m)
+        ahead = cut(segments, 0.5 * left_m if off else left_m)
+        station = self._beyond_a_dent(place, ahead, state.side, least_m)
         if off and not station and not self._sees(place, state.anchor):
-            station = self._seen_from(place, segments)
+            station = self._seen_from(place, ahead)
         if off or station > 0.0:
             onto = mark_at(segments, station).place
             way, _ = self.straight(place, onto)

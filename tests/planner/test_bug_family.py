@@ -29,8 +29,9 @@ from planner.interface import (
     PlanRequest,
     PlanStatus,
 )
-from planner.tangent_bug import TangentBug, TangentBugConfig
+from planner.tangent_bug import Following, TangentBug, TangentBugConfig
 from planner.unrest import SETTLED_S
+from planner.walk import Enclosed, mark_at
 
 MakePoints = Callable[..., FloatArray]
 
@@ -280,6 +281,25 @@ def test_an_obstacle_is_known_only_on_contact(kind: str, ring: MakePoints) -> No
     east, north = flight.track_m[flight.track_m[:, 0] < 10_000.0 - 1500.0 - KEEP - 50.0].T
     assert len(east) > 100
     np.testing.assert_allclose(north, 5000.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("bearing_deg", [0.0, 30.0, 60.0, 90.0, -30.0, -60.0, -90.0])
+@pytest.mark.parametrize("away_m", [400.0, 700.0, 1000.0])
+def test_a_boundary_that_is_seen_past_the_other_side_has_not_been_followed(
+    side: float, bearing_deg: float, away_m: float, ring: MakePoints
+) -> None:
+    """What is followed lies behind a small obstacle, and the horizon reaches round it more than once."""
+    planner, radius = TangentBug(TangentBugConfig(), MISSION), 30.0 + KEEP
+    seen = Range(ring(10_000.0, 5000.0, 30.0, SPACING), MISSION.sensor_range_m)
+    place, turn = (10_000.0 - radius - away_m, 5000.0), math.radians(bearing_deg)
+    seen.look(place)
+    planner.known.take_in(seen)
+    anchor = (10_000.0 + radius * math.cos(turn), 5000.0 + radius * math.sin(turn))
+    hit = mark_at(planner.boundary(anchor, side, KEEP), 0.0)
+    legs = list(planner._follow(place, Following(hit, side, anchor, 0.0, False, 7000.0)))
+    assert math.tau * radius < planner.horizon_m
+    assert not isinstance(legs[1].state, Enclosed)
 
 
 @pytest.mark.parametrize("depth_m", [0.5, 2.0, 6.0, 12.0, 20.0, 30.0, 100.0])
