@@ -233,6 +233,7 @@ class _Free:
         xmin, ymin, xmax, ymax = mission.bounds_m
         self.cell_m = 0.25 * keep
         self._x, self._y, self._pose, self._goal = xmin, ymin, pose, mission.goal_m
+        self._xmax, self._ymax = xmax, ymax
         shape = math.ceil((xmax - xmin) / self.cell_m) + 1, math.ceil((ymax - ymin) / self.cell_m) + 1
         self._blocked: BoolArray = np.zeros(shape, dtype=np.bool_)
         steps = np.arange(-6, 7)
@@ -245,7 +246,9 @@ class _Free:
         self._blocked[x[near], y[near]] = True
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a place is free; about the start and the goal all is."""
+        """Whether a place is in the area and free; about the start and the goal all is."""
+        if not (self._x <= x <= self._xmax and self._y <= y <= self._ymax):
+            return False
         blocked = self._blocked[int((x - self._x) / self.cell_m), int((y - self._y) / self.cell_m)]
         ends: tuple[Point, Point] = (self._pose[:2], self._goal)
         return not blocked or any(abs(x - a) + abs(y - b) < 2.0 * self.cell_m for a, b in ends)

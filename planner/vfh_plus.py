@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from planner.boundary import margin_of
 from planner.clearance import first_breach, inside_bounds
-from planner.curves import Limits, Point, Pose, Segment, turn_onto
+from planner.curves import SHORTEST_M, Limits, Point, Pose, Segment, turn_onto
 from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.joining import departure, stuck
 from planner.memory import ObstacleMemory
@@ -221,9 +221,12 @@ class VfhPlus:
         turn = turn_onto(pose, target, self._limits.radius_m)
         if turn is None:
             return Plan(PlanStatus.NO_PATH, "the goal is nearer than a turn")
-        path = Path(np.array([*prefix, *turn]))
-        if not inside_bounds(Path(np.array(turn[:1])), self._mission.bounds_m):
+        arcs, last = [row for row in turn if row[4]], turn[-1]
+        room_m = last[5] if last[4] else _to_border_m(last, self._mission.bounds_m)
+        if room_m < SHORTEST_M or (arcs and not inside_bounds(Path(np.array(arcs)), self._mission.bounds_m)):
             return stuck("no turn stays inside the area", request, self._mission, self._memory.points_m)
+        turn[-1] = (*last[:5], min(last[5], room_m))
+        path = Path(np.array([*prefix, *turn]))
         free = self._bearings[~masked]
         half = 0.5 * self._width_rad
         return Plan(
@@ -240,6 +243,19 @@ class VfhPlus:
                 ),
             ),
         )
+
+
+def _to_border_m(straight: Segment, bounds_m: tuple[float, float, float, float]) -> float:
+    """How far a straight line stays inside the area; negative where it begins outside."""
+    x, y, ux, uy, _, _ = straight
+    xmin, ymin, xmax, ymax = bounds_m
+    room = [math.inf]
+    for low, high, place, pace in ((xmin, xmax, x, ux), (ymin, ymax, y, uy)):
+        if not low <= place <= high:
+            return -math.inf
+        if pace:
+            room.append(((high if pace > 0.0 else low) - place) / pace)
+    return min(room)
 
 
 def _off(a: ArrayLike, b: ArrayLike) -> FloatArray:

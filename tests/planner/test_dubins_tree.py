@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from planner import dubins_tree
 from planner.curves import Pose, along
-from planner.dubins_tree import DubinsTree, DubinsTreeConfig, dubins
+from planner.dubins_tree import DubinsTree, DubinsTreeConfig, _Free, dubins
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
 
 MakePoints = Callable[..., FloatArray]
@@ -118,3 +118,18 @@ def keeps(path: Path, points: FloatArray) -> float:
         [along(row, s)[:2] for row in path.segments.tolist() for s in np.arange(0.0, row[5], 20.0)]
     )
     return float(np.hypot(*(places[:, None] - points).transpose(2, 0, 1)).min())
+
+
+def test_what_lies_outside_the_area_is_not_free() -> None:
+    """Curves between two places inside may leave it."""
+    free = _Free(np.zeros((0, 2)), MISSION, 20.0, Pose(*START, 1.0, 0.0))
+    xmin, ymin, xmax, ymax = MISSION.bounds_m
+    assert free.holds(xmin, ymin)
+    assert free.holds(xmax, ymax)
+    for x, y in (
+        (xmin - 1.0, 5000.0),
+        (xmax + 500.0, 5000.0),
+        (9000.0, ymin - 500.0),
+        (9000.0, ymax + 500.0),
+    ):
+        assert not free.holds(x, y)

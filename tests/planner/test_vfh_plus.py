@@ -155,3 +155,32 @@ def test_thresholds_the_wrong_way_round_are_refused() -> None:
         VfhPlusConfig(free_below=0.3).resolved(MISSION)
     with pytest.raises(ValueError, match=r"window_m is 7000, more than sensor\.range_m 6000"):
         VfhPlusConfig(window_m=7000.0).resolved(MISSION)
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it(
+    part: int, ring: MakePoints
+) -> None:
+    """Three times from one place, each time in the direction that was chosen before."""
+    xmin, ymin, xmax, ymax = MISSION.bounds_m
+    for seed in range(50 * part, 50 * part + 50):
+        rng = np.random.default_rng(seed)
+        place = (float(rng.uniform(12_000.0, 19_700.0)), float(rng.uniform(500.0, 8000.0)))
+        discs = rng.uniform((13_000.0, 3500.0, 300.0), (19_800.0, 11_000.0, 900.0), (6, 3)).tolist()
+        if min(math.dist(place, (x, y)) - radius for x, y, radius in discs) < 400.0:
+            continue
+        seen = Seen(np.concatenate([ring(*disc, 50.0) for disc in discs]))
+        heading = float(rng.uniform(0.0, math.tau))
+        direction = (math.cos(heading), math.sin(heading))
+        far = min(place[0] - xmin, xmax - place[0], place[1] - ymin, ymax - place[1]) > 2000.0
+        for _ in range(3):
+            plan = VfhPlus(VfhPlusConfig(), MISSION).plan(PlanRequest(0.0, place, direction, seen))
+            assert not (far and "no turn stays inside" in plan.reason)
+            if plan.path is None or plan.path.loiter:
+                break
+            stations = np.linspace(0.0, plan.path.length_m, 100).tolist()
+            x, y = np.array([pose_at(plan.path, station)[:2] for station in stations]).T
+            assert xmin - 1e-6 <= x.min() <= x.max() <= xmax + 1e-6
+            assert ymin - 1e-6 <= y.min() <= y.max() <= ymax + 1e-6
+            ux, uy = plan.path.segments[-1, 2:4].tolist()
+            direction = (ux, uy)
