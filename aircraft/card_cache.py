@@ -30,7 +30,7 @@ def cached(title: str, digest: str, measure: Callable[[], dict[str, Any]]) -> di
         measure: measures; its result consists of what JSON has.
     """
     file = cache_folder() / f"{title}-{digest[:16]}.json"
-    with suppress(OSError, ValueError, KeyError, TypeError):
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         kept = json.loads(file.read_text("utf-8"))
         if kept["digest"] == digest and isinstance(kept["result"], dict):
             return dict(kept["result"])

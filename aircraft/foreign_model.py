@@ -25,7 +25,10 @@ def faults(folder: Path) -> Iterator[str]:
         folder: of a model, of engines or of systems. Only regular files count; other things are never opened.
     """
     files = 0
-    for home, _, names in os.walk(folder):
+    for home, inner, names in os.walk(folder):
+        for path in (Path(home, name) for name in inner):
+            if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+                yield f"{path}: is a link that leads out of the folder; must be a folder itself"
         for name in sorted(names):
             path = Path(home, name)
             files += 1

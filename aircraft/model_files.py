@@ -46,11 +46,13 @@ class ModelFiles:
     def digest(self) -> str:
         """SHA-256 over the model, what it is flown with and what flies it.
 
-        These are all files of its folder, JSBSim's version (it stands for the files of its wheel) and this
-        package, with autopilot, airframe table and guidance.
+        These are all files of its folder and of those of its engines and systems, JSBSim's version (it stands for
+        the files of its wheel) and this package, with autopilot, airframe table and guidance.
         """
         sha = hashlib.sha256(version("jsbsim").encode())
-        for folder in (self.model.parent, OWN):
+        known = (self.model.parent, OWN, _wheel())
+        shared = {each for each in (self.engines, self.systems) if not any(map(each.is_relative_to, known))}
+        for folder in (self.model.parent, OWN, *sorted(shared)):
             for path in sorted(_content(folder)):
                 sha.update(f"\0{path.relative_to(folder).as_posix()}\0".encode())
                 sha.update(path.read_bytes())

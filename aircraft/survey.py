@@ -200,6 +200,8 @@ def _edge(frame: Airframe, factor: float) -> float:
         good = bad if not_held(frame, bad) is None else good
     while abs(good - bad) > max(SPEED_TOLERANCE * good, 10.0**-SPEED_DIGITS):
         middle = round(0.5 * (good + bad), SPEED_DIGITS)
+        if middle in (good, bad):  # a step apart: floats tell 8.3 - 8.2 from 0.1
+            break
         good, bad = (middle, bad) if not_held(frame, middle) is None else (good, middle)
     return good
 

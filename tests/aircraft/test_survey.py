@@ -7,9 +7,11 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import aircraft
+import aircraft.survey
 from aircraft.airframes import AircraftError, Entry, aircraft_names, airframe
 from aircraft.autopilot import gains
 from aircraft.interface import AircraftState
@@ -115,6 +117,38 @@ def test_a_folder_without_a_sound_model_is_refused(
         (home / name).write_text(text, "utf-8")
     with pytest.raises(AircraftError, match=message):
         airframe(str(home))
+
+
+def test_the_slowest_speed_is_found_wherever_it_lies(monkeypatch: pytest.MonkeyPatch) -> None:
+    frame, stall_mps = airframe("aerosonde"), 0.0
+
+    def stalls(_: object, speed: float) -> str | None:
+        return "stalled" if speed < stall_mps else None
+
+    monkeypatch.setattr(aircraft.survey, "not_held", stalls)
+    for stall_mps in np.arange(8.0, 12.0, 0.01).tolist():
+        found = aircraft.survey._edge(frame, 0.8)
+        assert stall_mps <= found <= stall_mps + max(0.01 * found, 0.1) + 1e-9
+
+
+def test_a_link_that_leads_out_of_the_folder_is_refused(tmp_path: Path) -> None:
+    """JSBSim follows it, to files that nobody has looked at."""
+    (tmp_path / "elsewhere").mkdir()
+    home = own_model(tmp_path, "mine")
+    (home / "sub").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(AircraftError, match=r"sub: is a link that leads out of the folder"):
+        airframe(str(home))
+
+
+def test_the_digest_changes_with_engines_that_lie_beside_the_model(tmp_path: Path) -> None:
+    (tmp_path / "engine").mkdir()
+    engine = tmp_path / "engine" / "motor.xml"
+    engine.write_text("<electric_engine/>")
+    home = own_model(tmp_path, "mine")
+    files = replace(model_files(str(home)), engines=tmp_path / "engine")
+    before = files.digest()
+    engine.write_text("<electric_engine />")
+    assert files.digest() != before
 
 
 def test_the_digest_changes_with_every_file_of_the_model(tmp_path: Path) -> None:
