@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from aircraft.airframes import AircraftError, Airframe
-from aircraft.guidance import GRAVITY_MPS2
+from aircraft.guidance_law import GRAVITY_MPS2
 from aircraft.interface import Performance
 
 BANK_RESERVE_DEG = {None: 15.0, "light": 17.0, "moderate": 20.0, "severe": 25.0}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aircraft.guidance import GRAVITY_MPS2
+from aircraft.guidance_law import GRAVITY_MPS2
 from aircraft.interface import AircraftState, Command
 from aircraft.start import Atmosphere, StartConditions
 

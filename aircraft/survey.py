@@ -16,7 +16,8 @@ from aircraft.airframes import FIGURES, AircraftError, Airframe, Entry
 from aircraft.autopilot import Derivatives, Gains, gains
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import GRAVITY_MPS2, UPDATE_RATE_HZ, PathFollower
+from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
+from aircraft.guidance_law import GRAVITY_MPS2
 from aircraft.interface import AircraftState, Command, Route
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,

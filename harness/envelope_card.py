@@ -14,7 +14,8 @@ from typing import Any, Final
 from aircraft.airframes import AircraftError, Airframe, airframe
 from aircraft.card_cache import cached
 from aircraft.envelope import performance
-from aircraft.guidance import GRAVITY_MPS2, UPDATE_RATE_HZ
+from aircraft.guidance import UPDATE_RATE_HZ
+from aircraft.guidance_law import GRAVITY_MPS2
 from aircraft.interface import Command
 from aircraft.start import Atmosphere
 from harness.tracking import ALTITUDE_M, course, fly_course

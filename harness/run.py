@@ -15,8 +15,9 @@ import numpy as np
 
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
-from aircraft.guidance import COMPILED as GUIDANCE
-from aircraft.guidance import GRAVITY_MPS2, PathFollower
+from aircraft.guidance import PathFollower
+from aircraft.guidance_law import COMPILED as GUIDANCE
+from aircraft.guidance_law import GRAVITY_MPS2
 from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions

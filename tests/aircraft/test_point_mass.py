@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.guidance import GRAVITY_MPS2
+from aircraft.guidance_law import GRAVITY_MPS2
 from aircraft.interface import Command, FlightModel
 from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import UPDATE_RATE_HZ, PathFollower, air_direction
+from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
+from aircraft.guidance_law import air_direction
 from aircraft.interface import AircraftState, Command, FlightModel, Route
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.point_mass import PointMass

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import harness.run  # noqa: F401  has it compiled
-from aircraft import guidance
+from aircraft import guidance_law
 from aircraft.airframes import airframe
 from aircraft.guidance import GuidanceOutput, PathFollower
 from aircraft.interface import AircraftState, Route
@@ -23,8 +23,8 @@ CIRCLE = (1.0 / 120.0, math.tau * 120.0)
 
 def source() -> dict[str, FunctionType]:
     """Its functions as they are written, which call each other and nothing that was compiled."""
-    names = dict(vars(guidance))
-    for function, _ in guidance.COMPILED:
+    names = dict(vars(guidance_law))
+    for function, _ in guidance_law.COMPILED:
         names[function.__name__] = FunctionType(function.__code__, names)
     return names
 
@@ -57,7 +57,7 @@ def near(route: Route, station_m: float, rng: np.random.Generator) -> AircraftSt
 @pytest.mark.parametrize("seed", range(40))
 def test_it_decides_as_its_source_to_the_last_bit(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     compile_all()
-    assert not isinstance(guidance.decide, FunctionType)
+    assert not isinstance(guidance_law.decide, FunctionType)
     rng = np.random.default_rng(seed)
     route = drawn(rng)
     states = [near(route, float(share) * route_length(route), rng) for share in np.linspace(0.0, 1.5, 60)]
@@ -68,13 +68,13 @@ def test_it_decides_as_its_source_to_the_last_bit(seed: int, monkeypatch: pytest
         return [follower.update(state) for state in states]
 
     compiled = decided()
-    monkeypatch.setattr(guidance, "decide", source()["decide"])
+    monkeypatch.setattr(guidance_law, "decide", source()["decide"])
     assert decided() == compiled
 
 
 def test_a_length_is_rounded_once() -> None:
     """As CPython's own, which C's is not."""
-    lengths = guidance._length, source()["_length"]
+    lengths = guidance_law._length, source()["_length"]
     numbers = random.Random(1)
     for _ in range(20_000):
         x, y = (numbers.uniform(-1.0, 1.0) * 10.0 ** numbers.uniform(-3.0, 5.0) for _ in range(2))
