@@ -88,6 +88,10 @@ class Bug1(Walker[State]):
             return replace(state, walked_m=state.walked_m + length_of(flown))
         return state
 
+    def follows(self, place: Point, state: State) -> Point | None:
+        """The boundary here, on the way round and back."""
+        return place if isinstance(state, Circling | Returning) else None
+
     def says(self, state: State) -> str:
         """What the planner does."""
         if isinstance(state, Circling):

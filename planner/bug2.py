@@ -64,6 +64,10 @@ class Bug2(Walker[State]):
             return replace(state, walked_m=state.walked_m + length_of(flown))
         return state
 
+    def follows(self, place: Point, state: State) -> Point | None:
+        """The boundary here, on the way round."""
+        return place if isinstance(state, Following) else None
+
     def says(self, state: State) -> str:
         """What the planner does."""
         if isinstance(state, Following):

@@ -155,6 +155,10 @@ class Walker(ABC, Generic[State]):
         """What the algorithm does from a place on, in what is known, leg by leg to the goal or the horizon."""
 
     @abstractmethod
+    def follows(self, place: Point, state: State) -> Point | None:
+        """Where the boundary lies that is followed in a state at a place; None where none is."""
+
+    @abstractmethod
     def says(self, state: State) -> str:
         """What the algorithm does in a state, a sentence for the event log."""
 
@@ -193,7 +197,10 @@ class Walker(ABC, Generic[State]):
         place = pose_at(path, station)[:2]
         if math.dist(place, request.position_m) > max(1.0, OFF_PATH * self.mission.tracking_error_m):
             place = request.position_m
-        legs = tuple(self.walk(place, self._state_at(path, station)))
+        state = self._state_at(path, station)
+        if taken_back and self._has_gone(self.follows(place, state)):
+            state = self.begin(place)
+        legs = tuple(self.walk(place, state))
         if not must and not self.prefers(legs, left):
             self._look_at_m = station + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
@@ -203,6 +210,10 @@ class Walker(ABC, Generic[State]):
         """A walk from the beginning of the algorithm."""
         place = request.position_m
         return self._found(tuple(self.walk(place, self.begin(place))), request)
+
+    def _has_gone(self, followed: Point | None) -> bool:
+        """Whether there is no boundary any more where one was followed."""
+        return followed is not None and math.dist(followed, self.known.seat(followed)[1]) > self.keep_m
 
     def _state_at(self, path: Path, station_m: float) -> State:
         """The state of the algorithm at a station of the path in effect."""

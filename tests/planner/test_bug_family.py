@@ -96,6 +96,27 @@ class Unsettled(Range):
     surprised_s = 2000.0
 
 
+class Vanishing(Range):
+    """The same, until all that has been seen has gone."""
+
+    looks, gone, before = 260, False, 0
+
+    @property
+    def revision(self) -> int:
+        return self.before + len(self._order)
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return super().edges_since(revision - self.before)
+
+    def look(self, place: Point) -> None:
+        self.looks -= 1
+        if self.looks:
+            super().look(place) if self.looks > 0 else None
+            return
+        self.before = self.taken_back_at = self.revision + 1
+        self._order.clear()
+
+
 class Walk(NamedTuple):
     status: PlanStatus
     reason: str
@@ -300,6 +321,14 @@ def test_a_boundary_that_is_seen_past_the_other_side_has_not_been_followed(
     legs = list(planner._follow(place, Following(hit, side, anchor, 0.0, False, 7000.0)))
     assert math.tau * radius < planner.horizon_m
     assert not isinstance(legs[1].state, Enclosed)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_obstacle_that_has_gone_is_not_followed_on(kind: str, wall: MakePoints) -> None:
+    """What is left of the way is flown straight: neither along the border nor back to where it was."""
+    flight = walk(kind, wall((10_000.0, 500.0), (10_000.0, 9500.0), SPACING), world=Vanishing)
+    assert flight.reason == "reached"
+    assert flight.length_m < 50.0 * 260 + math.dist(flight.track_m[260], MISSION.goal_m) + 500.0
 
 
 @pytest.mark.parametrize("depth_m", [0.5, 2.0, 6.0, 12.0, 20.0, 30.0, 100.0])
