@@ -49,6 +49,10 @@ def breaks(mission: Mission, request: PlanRequest) -> Plan:
     raise ZeroDivisionError("no room between\ntwo walls")
 
 
+def finds_nothing(mission: Mission, request: PlanRequest) -> Plan:
+    return Plan(PlanStatus.NO_PATH, "there is no room\nfor a turn")
+
+
 class Failing(PointMass):
     """Loses control after three seconds."""
 
@@ -118,6 +122,13 @@ def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(
     flight = flown_by_point_mass(small_world(pops_up, planner={"kind": "stand_in"}))
     assert flight.outcome.value == "collision"
     assert 84.0 <= flight.sim_s <= 84.05
+
+
+def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+    answering(finds_nothing)
+    status, metrics = fly(small_world(IN_THE_WAY, planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (1, "collision")
+    assert metrics["reason"].endswith("; no plan was ever found: there is no room for a turn")
 
 
 def test_leaving_the_area(fly: Fly, answering: Install, small_world: SmallWorld) -> None:

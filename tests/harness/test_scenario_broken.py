@@ -55,6 +55,13 @@ BROKEN = {
     "name is a path": ("name: good", "name: a/b", "2: name", "must match"),
     "negative seed": ("seed: 1", "seed: -1", "3: seed", "must be at least 0"),
     "fractional seed": ("seed: 1", "seed: 1.5", "3: seed", "must be a whole number"),
+    "seed with a point": (
+        "seed: 1",
+        "seed: 7.0",
+        "3: seed",
+        "is 7.0; must be a whole number without a point",
+    ),
+    "seed beyond floats": ("seed: 1", "seed: 1%s" % (20 * "0"), "3: seed", "of at most 9007199254740992"),
     "seed is true": ("seed: 1", "seed: true", "3: seed", "is true; must be a whole number"),
     "three bounds": ("[0, 0, 20000, 10000]", "[0, 0, 20000]", "5: area.bounds_m", "must have more numbers"),
     "five bounds": ("20000, 10000]", "20000, 10000, 1]", "5: area.bounds_m", "has 5 items; must have 4"),
