@@ -102,7 +102,7 @@ class RollingWindow:
         self._nearer: Effect | None = None  # certified, but would come too near to that
         self._least_room_m = BROKEN_SHARE * mission.clearance_m
         self._effort = 0  # grows with every search that was in vain
-        self._forgiven_s = -math.inf  # when what was given up was last tried again
+        self._forgiven = False  # what was given up is, or was, tried again
         self._refused_at_m = 0.0
         self._watch = Watch(
             mission,
@@ -176,7 +176,7 @@ class RollingWindow:
                     known,
                     self._effort,
                     lambda: self._proof.closed(request.position_m),
-                    roomy=math.isfinite(self._forgiven_s),
+                    roomy=self._forgiven,
                 )
             hurried = self._pressed(effect, here) or len(request.seen.moving) > 0
             work = PRESSED if hurried else SERVED if serves else CUT
@@ -277,7 +277,7 @@ class RollingWindow:
         # Where edges come and go meanwhile, what was given up may yet be entered.
         in_vain = 1 if self._memory.gone == self._gone else MOST_EFFORT
         only_given_up = len(self._memory.refused_m) > 0 and self._given_up.closed(request.position_m)
-        tried = self._effort >= in_vain or (only_given_up and math.isfinite(self._forgiven_s))
+        tried = self._effort >= in_vain or (only_given_up and self._forgiven)
         no_room = tried and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
             return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn", goes_on=True)
@@ -296,25 +296,25 @@ class RollingWindow:
             self._refused_at_m = request.station_m
             self._dead_ends.give_up(self._unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
-            retried = self._certain() or self._forgiven_s > self._dead_ends.unrest.changed_s
-            if no_room and settled and (retried or not len(self._memory.refused_m)):
-                gap = 2.0 * self._turns_keep_m
-                return Plan(
-                    PlanStatus.UNREACHABLE,
-                    no_way_through(f"no gap in it has room to turn ({gap:.0f} m) or is seen to lead on"),
+            # What moved may have closed it; where edges were only taken back, to try it again once tells.
+            doubtful = self._dead_ends.unrest.ever or (self._memory.taken_back and not self._forgiven)
+            if no_room and settled and not (doubtful and len(self._memory.refused_m)):
+                told = (
+                    f"no gap in it has room to turn ({2.0 * self._turns_keep_m:.0f} m) or is seen to lead on"
                 )
+                return Plan(PlanStatus.UNREACHABLE, no_way_through(told))
             # No way is left but those given up, or one that takes more looking for. Or none that can be flown
             # from here: elsewhere on the turn there may be one.
             if (only_given_up or self._effort == MOST_EFFORT) and (turned or not thinking.tracks):
                 self._refused_at_m = request.station_m
                 self._memory.forgive()
-                self._forgiven_s = request.time_s
+                self._forgiven = True
             self._effort = min(self._effort + 1, MOST_EFFORT)
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
 
     def _certain(self) -> bool:
         """Whether all that was seen still stands, and nothing has come to what was free."""
-        return not (self._memory.taken_back or math.isfinite(self._dead_ends.unrest.changed_s))
+        return not (self._memory.taken_back or self._dead_ends.unrest.ever)
 
     def _note_turn(self, effect: Effect, seen: SeenWorld) -> None:
         """Gives up the place that a course could not be seen to enter, if it is the same again."""

@@ -17,6 +17,11 @@ class Unrest:
         self.changed_s = -math.inf
         """When that was; -inf for never."""
 
+    @property
+    def ever(self) -> bool:
+        """Whether anything has moved or appeared so far."""
+        return math.isfinite(self.changed_s)
+
     def note(self, time_s: float, seen: SeenWorld) -> bool:
         """Takes in what is seen; returns whether something has moved or appeared since the last call."""
         changed_s = time_s if seen.moving else seen.surprised_s
