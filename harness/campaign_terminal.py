@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from rich import box
+from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as Grid
 
 from harness.campaign_questions import QUESTIONS, difference, ratio
 from harness.campaign_summary import Cell, Summary, Table
 from harness.compare_rows import number
-from harness.terminal import Output
 
 WIDTH = 80
 NAME_WIDTH = 16
@@ -26,7 +26,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         summary: the answers.
         all_tables: every table, not the first alone.
     """
-    console = Output()
+    console = Console()
     width = min(WIDTH, console.width)
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
     runs = (

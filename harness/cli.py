@@ -6,9 +6,7 @@ not reached safely, 2 bad input or usage, 3 the goal is proved unreachable, 130 
 
 from __future__ import annotations
 
-import contextlib
 import errno
-import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -26,6 +24,7 @@ from harness.commands.options import BAD_INPUT, FAILED, Command, Group, flag
 from harness.commands.review import report, view
 from harness.commands.sweep import sweep
 from harness.signals import taken_as_interrupt
+from harness.standard_output import kept_up, to_nowhere
 
 INTERRUPTED: Final = 130
 
@@ -76,12 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(words: Sequence[str], debug: bool) -> int:
     try:
-        status = int(app(words, prog_name="wayproof", standalone_mode=False) or 0)
-        with contextlib.suppress(BrokenPipeError):  # nobody reads it: what was asked for is done all the same
+        with kept_up():
+            status = int(app(words, prog_name="wayproof", standalone_mode=False) or 0)
             _flush()
         return status
-    except BrokenPipeError:
-        return FAILED
     except KeyboardInterrupt:
         return INTERRUPTED
     except Exception as error:
@@ -91,13 +88,13 @@ def _run(words: Sequence[str], debug: bool) -> int:
 
 
 def _flush() -> None:
-    """Writes out what was printed; what nobody takes the interpreter must not try to write again at its end."""
+    """Writes out what was printed."""
     if sys.stdout is None:  # closed by whoever started us
         return
     try:
         sys.stdout.flush()
     except OSError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        to_nowhere(sys.stdout)
         raise
 
 

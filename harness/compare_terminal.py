@@ -15,7 +15,6 @@ from rich.table import Table
 from harness.compare_flights import Progress as Report
 from harness.compare_rows import CRASHED, DASH, FIGURES, ON_TERMINAL, Row
 from harness.scenario import Scenario
-from harness.terminal import Output
 
 WIDTH = 80
 NAME_WIDTH = 14
@@ -54,7 +53,7 @@ def comparison_bar(scenarios: Sequence[Scenario]) -> Iterator[Report | None]:
 
 def print_comparison(rows: Sequence[Row]) -> None:
     """One table a scenario on standard output, and why those that crashed did."""
-    console = Output()
+    console = Console()
     shown = [next(figure for figure in FIGURES if figure.short == short) for short in ON_TERMINAL]
     for name in dict.fromkeys(row.scenario for row in rows):
         table = Table(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias
@@ -70,18 +68,9 @@ def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
         yield report
 
 
-class Output(Console):
-    """Standard output. Where nobody takes it any more, what would be said is lost, and nothing else."""
-
-    def on_broken_pipe(self) -> None:
-        """Called by rich, which would end the process."""
-        self.quiet = True
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def print_grid(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table with a heading over each column, on standard output; figures are right-aligned."""
-    console = Output()
+    console = Console()
     table = Table(title=title, box=box.SIMPLE, title_justify="left", pad_edge=False)
     for index, column in enumerate(columns):
         table.add_column(column, justify="right" if index else "left", overflow="fold")
@@ -92,7 +81,7 @@ def print_grid(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]
 
 def print_table(title: str, rows: Mapping[str, str]) -> None:
     """Two columns, name and value, on standard output and never wider than 80."""
-    console = Output()
+    console = Console()
     table = Table(title=title, box=box.SIMPLE, show_header=False, title_justify="left", pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
@@ -103,7 +92,7 @@ def print_table(title: str, rows: Mapping[str, str]) -> None:
 
 def print_columns(rows: Mapping[str, str]) -> None:
     """Names and what they stand for, one line each where they fit."""
-    console = Output()
+    console = Console()
     width = max((len(name) for name in rows), default=0)
     for name, text in rows.items():
         console.print(f"{name:{width}}  {text}", highlight=False, markup=False, soft_wrap=True)

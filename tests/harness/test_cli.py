@@ -272,6 +272,22 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
     assert run.stderr == ""
 
 
+@pytest.mark.parametrize(
+    ("arguments", "status"), [(["list", "planners"], 0), (["validate", "paper_circles", "{bad}"], 2)]
+)
+def test_a_reader_that_has_gone_changes_no_status(
+    arguments: list[str], status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("name: bad\n")
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w", buffering=1) as nobody_reads:
+        monkeypatch.setattr("sys.stdout", nobody_reads)
+        assert main([each.format(bad=bad) for each in arguments]) == status
+        assert sys.stdout is nobody_reads
+
+
 def test_validate_goes_on_after_a_bad_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bad = tmp_path / "bad.yaml"
     bad.write_text("name: bad\n")
