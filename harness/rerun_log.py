@@ -33,6 +33,7 @@ from harness.rerun_states import (
     send_changes,
     tracking_changes,
 )
+from harness.rerun_strips import strips_2d, strips_3d
 
 if TYPE_CHECKING:
     from harness.range_sensor import RangeScan
@@ -161,7 +162,9 @@ class RerunLog:
             track = lines_2d([whole], look.WHOLE_TRACK, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
             style: dict[str, Any] = {"colors": [look.WHOLE_TRACK], "radii": rr.Radius.ui_points(0.75)}
-            self._rec.log(f"{look.WORLD}/{look.WHOLE}", rr.LineStrips3D([whole], **style), static=True)
+            self._rec.log(
+                f"{look.WORLD}/{look.WHOLE}", rr.LineStrips3D(strips_3d([whole]), **style), static=True
+            )
         if metrics is not None:
             changes = tracking_changes(metrics["trackability"])
             send_changes(self._rec, look.TRACKING_LANE, changes)
@@ -252,7 +255,7 @@ class RerunLog:
         self._rec.send_columns(
             f"{look.WORLD}/{look.SENSED}",
             times,
-            rr.LineStrips3D.columns(strips=list(posts)).partition(counts),
+            rr.LineStrips3D.columns(strips=strips_3d(list(posts))).partition(counts),
         )
 
     def _send_series(self, block: Track, times: rr.TimeColumn) -> None:
@@ -314,8 +317,11 @@ class RerunLog:
         colours = look.error_colours(off / self._scene.limits.cross_track_threshold_m)
         times = [look.time_column(block.time_s[ends])]
         for entity, strips in (
-            (look.PLAN, rr.LineStrips2D.columns(strips=[piece[:, :2] for piece in pieces], colors=colours)),
-            (look.WORLD, rr.LineStrips3D.columns(strips=pieces, colors=colours)),
+            (
+                look.PLAN,
+                rr.LineStrips2D.columns(strips=strips_2d([piece[:, :2] for piece in pieces]), colors=colours),
+            ),
+            (look.WORLD, rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=colours)),
         ):
             self._rec.send_columns(f"{entity}/{look.FLOWN}", times, strips)
 

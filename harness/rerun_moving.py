@@ -8,6 +8,7 @@ import numpy as np
 import rerun as rr
 
 from harness import rerun_blueprint as look
+from harness.rerun_strips import strips_2d
 from planner.interface import MovingEdges
 
 EVERY_S = 1.0
@@ -41,7 +42,9 @@ class Tracked:
         every = [each for _, moving in rows for each in moving]
         outlines = [each.points_m for each in every]
         rec.send_columns(
-            f"{look.PLAN}/{TRACKED}", times, rr.LineStrips2D.columns(strips=outlines).partition(counts)
+            f"{look.PLAN}/{TRACKED}",
+            times,
+            rr.LineStrips2D.columns(strips=strips_2d(outlines)).partition(counts),
         )
         middles = np.array([outline.mean(axis=0) for outline in outlines]).reshape(-1, 2)
         vectors = AHEAD_S * np.array([each.velocity_mps for each in every]).reshape(-1, 2)

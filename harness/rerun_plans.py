@@ -10,6 +10,7 @@ import rerun as rr
 from harness import rerun_blueprint as look
 from harness.record import AcceptedPlan, FloatArray, polyline
 from harness.rerun_scene import circle, fan
+from harness.rerun_strips import strips_2d, strips_3d
 
 MET = "met"
 """Below PLAN: edges of what moves, where the planner expects to meet them."""
@@ -85,7 +86,7 @@ def send_plans(
     }
     for entity, rows in strips.items():
         flat = [strip for row in rows for strip in row]
-        columns = rr.LineStrips2D.columns(strips=flat).partition([len(row) for row in rows])
+        columns = rr.LineStrips2D.columns(strips=strips_2d(flat)).partition([len(row) for row in rows])
         rec.send_columns(f"{look.PLAN}/{entity}", times, columns)
     rec.send_columns(
         f"{look.PLAN}/waypoints",
@@ -106,6 +107,6 @@ def send_plans(
         rr.Points2D.columns(positions=np.concatenate(met)).partition([len(each) for each in met]),
     )
     level = [np.column_stack((path, np.full(len(path), altitude_m))) for path in paths]
-    rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=level))
+    rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(level)))
     searches = np.array([each.compute_ms for each in plans])
     rec.send_columns(f"{look.SERIES}/{look.SEARCH}", times, rr.Scalars.columns(scalars=searches))

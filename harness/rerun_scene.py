@@ -17,6 +17,7 @@ from harness import rerun_blueprint as look
 from harness.obstacle import Circle, Polygon
 from harness.record import FloatArray
 from harness.rerun_blueprint import Colour, Scene
+from harness.rerun_strips import strips_2d, strips_3d
 from harness.rerun_summary import summary
 
 CIRCLE_POINTS = 72
@@ -138,7 +139,7 @@ def lines_2d(
     """Polylines (k, 2) in the plan view, `width` in points of the screen."""
     several = colours if polylines and isinstance(colours[0], tuple) else [colours]
     return rr.LineStrips2D(
-        _strips([points[:, :2] for points in polylines]),
+        strips_2d([points[:, :2] for points in polylines]),
         colors=several,
         radii=rr.Radius.ui_points(0.5 * width),
         draw_order=order,
@@ -192,13 +193,7 @@ def _rims(outlines: Sequence[FloatArray], top_m: float, colour: Colour) -> rr.Li
     rims = [
         np.column_stack((ring, np.full(len(ring), height))) for ring in outlines for height in (0.0, top_m)
     ]
-    return rr.LineStrips3D(_strips(rims), colors=[colour], radii=rr.Radius.ui_points(0.5))
-
-
-def _strips(polylines: list[FloatArray]) -> np.ndarray[Any, np.dtype[np.float32]] | list[FloatArray]:
-    """Polylines as rerun takes them: as one array where all are of one length, for else it makes one of each."""
-    same = len({len(points) for points in polylines}) == 1
-    return np.stack(polylines).astype(np.float32) if same else polylines
+    return rr.LineStrips3D(strips_3d(rims), colors=[colour], radii=rr.Radius.ui_points(0.5))
 
 
 def _outline(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> FloatArray:

@@ -59,7 +59,7 @@ def test_so_is_a_long_list_of_anything(inner: object) -> None:
 
 @given(st.lists(st.integers(3, 6), min_size=1, max_size=6))
 @settings(deadline=None, max_examples=30)
-def test_outlines_of_one_length_are_recorded_like_others(lengths: list[int]) -> None:
+def test_outlines_are_recorded_as_they_are(lengths: list[int]) -> None:
     def recorded(rings: list[FloatArray]) -> list[list[list[float]]]:
         batch = lines_2d(rings, (1, 2, 3), 1.0, 1).strips
         assert batch is not None
