@@ -218,7 +218,7 @@ class RerunLog:
                     [len(each) for each in points]
                 ),
             )
-            self._send_news(scans, self._sensed.take(scans))
+            self._send_news(scans, self._sensed.take(scans, points))
         events, self._events = sorted(self._events, key=lambda event: event[0]), []
         if events:
             times, texts, colours = zip(*events, strict=True)

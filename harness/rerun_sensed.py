@@ -5,6 +5,7 @@ A drawing aid with the truth at hand; nothing here reaches the planner. Frame: l
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -49,9 +50,8 @@ class Sensed:
         self._known = np.zeros(0, dtype=np.int64)
         self._seen: set[int] = set()
 
-    def take(self, scans: Sequence[RangeScan]) -> News:
-        """Takes consecutive scans; returns what none before them had shown."""
-        points = [returns_m(scan) for scan in scans]
+    def take(self, scans: Sequence[RangeScan], points: Sequence[FloatArray]) -> News:
+        """Takes consecutive scans and what they returned (`returns_m`); tells what none before them had shown."""
         scan = np.repeat(np.arange(len(points)), [len(each) for each in points])
         where = np.concatenate([np.zeros((0, 2)), *points])
         cells = np.round(where / self._cell_m).astype(np.int64) @ (1 << 32, 1)
@@ -77,6 +77,8 @@ class Sensed:
 
 def returns_m(scan: RangeScan) -> FloatArray:
     """(k, 2) places from which something came back."""
+    if scan.nearest_m == math.inf:
+        return np.zeros((0, 2))
     places = scan.from_sensor_m(np.flatnonzero(scan.ranges_m < np.inf))
     places += complex(scan.east_m, scan.north_m)
     return places.view(np.float64).reshape(-1, 2)
