@@ -141,6 +141,8 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     outcome, reason = verdict
     if plans.never and outcome not in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
         reason += f"; no plan was ever found: {in_a_line(plans.never)}"
+    elif plans.stuck and outcome is Outcome.TIMEOUT:
+        reason += f"; the planner's last word: {in_a_line(plans.stuck)}"
     if progress is not None:
         progress(state.time_s, judge.to_go_m(state), outcome.value)
     for observer in observers:
@@ -191,6 +193,9 @@ class _Plans:
         self.go_on = False
         """The planner is to be asked again before the next scan."""
         self._told, self._scanned = "", False
+        self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
+        self.stuck = ""
+        """The last of it; empty where there is none."""
         self._station, self._turns_at = 0.0, math.inf
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
@@ -234,16 +239,20 @@ class _Plans:
             self.error = trace(error)
             return Outcome.PLANNER_FAILED, f"the planner raised {sentence(error)}"
         compute_ms = 1e3 * (time.perf_counter() - begun)
-        told, self._told = self._told, plan.reason
+        self._told = plan.reason
         self.go_on = plan.goes_on
         if plan.status is not PlanStatus.KEPT:
             self.compute_ms.append(compute_ms)
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
             return Outcome.UNREACHABLE, in_a_line(plan.reason)
-        if plan.status is PlanStatus.NO_PATH and plan.reason != told:
-            for observer in self._observers:
-                observer.on_event(state.time_s, plan.reason)
+        if plan.status is PlanStatus.NO_PATH:
+            self.stuck = plan.reason
+            if plan.reason not in self._in_vain:
+                self._in_vain.add(plan.reason)
+                for observer in self._observers:
+                    observer.on_event(state.time_s, plan.reason)
         if plan.status is PlanStatus.FOUND:
+            self.stuck, self._in_vain = "", set()
             try:
                 if plan.path is None:
                     raise ValueError("it is none")

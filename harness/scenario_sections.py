@@ -139,7 +139,14 @@ class Sensor(Section):
         le=MAX_COORDINATE_M,
     )
     field_of_view_deg: float = key("Centred on the nose.", unit="deg", default=360.0, gt=0, le=360)
-    rays: int = key("Rays, spread evenly over the field of view.", unit="1", default=720, ge=3, le=100_000)
+    rays: int = key(
+        "Rays, spread evenly over the field of view. Where they are further apart than planner.clearance_m, nothing is "
+        "taken to be seen free: with few rays, no turn may be.",
+        unit="1",
+        default=720,
+        ge=3,
+        le=100_000,
+    )
     rate_hz: float = key(
         f"Scans per simulated second; must divide {SIMULATION_RATE_HZ} Hz.",
         unit="Hz",

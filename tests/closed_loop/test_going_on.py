@@ -91,3 +91,26 @@ def test_a_plan_that_is_on_its_way_is_waited_for(
     flight, asked, _ = thinking(2.0, 3.25, latency_s=1.0)
     assert [each.time_s for each in flight.plans] == pytest.approx([1.0, 4.3])
     assert not [time_s for time_s in asked if 3.25 < time_s < 4.3]
+
+
+def test_why_nothing_is_found_is_told_once_and_ends_the_reason_of_a_timeout(
+    answering: Install, small_world: SmallWorld
+) -> None:
+    said = ["nothing is seen\nto be free", "looks for a way"]
+
+    def answer(mission: Mission, request: PlanRequest) -> Plan:
+        second = round(request.time_s)
+        if request.flown is None or second == 30:
+            row = (*request.position_m, *request.direction, 0.0, 5000.0)
+            return Plan(PlanStatus.FOUND, "found", np.array([row[:2]]), Path(np.array([row])))
+        if second % 2:
+            return Plan(PlanStatus.KEPT, "serves")
+        return Plan(PlanStatus.NO_PATH, said[second // 2 % 2])
+
+    answering(answer)
+    events = Events()
+    keys = {"planner": {"kind": "stand_in"}, "sensor": {"rate_hz": 1}, "mission": {"time_limit_s": 56.5}}
+    flight = fly(make_loop(small_world(**keys), PointMass), [events])
+    # Once for each plan that is in effect meanwhile.
+    assert [text for _, text in events.told[:-1]] == [said[1], said[0], said[0], said[1]]
+    assert flight.reason.endswith(" m from the goal; the planner's last word: nothing is seen to be free")
