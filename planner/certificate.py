@@ -1,11 +1,12 @@
 """Safety by construction: how far a path may be committed to.
 
-Invariant: the path in effect ends in a full turn at the minimum radius, and path and turn lie in space that has
-been seen to be free, with the clearance kept from every edge seen. Whatever the unseen part of the world holds,
-the aircraft can fly the path it has into that turn and go on planning from there, for ever. (Schouwenaars et
-al., "Receding horizon path planning with implicit safety guarantees", ACC 2004.) The turn is certified as a
-disc, not as a circle: a circle can enclose the tip of a wall. The disc is larger than the turn by a share of the
-clearance, for beside what is seen to its edge the hidden flank of something may begin.
+Invariant: the path in effect ends in a full turn at the minimum radius, and path and turn lie in space that has been
+seen to be free, with the clearance kept from every edge seen. Whatever the unseen part of the world holds, the
+aircraft can fly the path it has into that turn and go on planning from there, for ever. Where no such turn leads on,
+the path may end in the goal circle instead, if it can be flown up to there: then the flight is over, and needs no
+turn. (Schouwenaars et al., "Receding horizon path planning with implicit safety guarantees", ACC 2004.) The turn is
+certified as a disc, not as a circle: a circle can enclose the tip of a wall. The disc is larger than the turn by a
+share of the clearance, for beside what is seen to its edge the hidden flank of something may begin.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from planner.clearance import inside_bounds
 from planner.curves import Limits, Segment, along, between, curvature_at, full_turn, place_on, poses_at
 from planner.interface import BoolArray, FloatArray, Path, SeenWorld
 from planner.route_optimisation import Terrain
@@ -53,8 +55,8 @@ class Certified:
     """The part of a path that may be flown.
 
     Attributes:
-        path: up to the turn, and the turn.
-        leaves_m: station at which the turn begins.
+        path: up to the turn, and the turn; or all of it, to the goal.
+        leaves_m: station at which the turn begins, or the flight is over.
     """
 
     path: Path
@@ -73,6 +75,7 @@ class Certifier:
 
     def __init__(self, limits: Limits, clearance_m: float, horizon_m: float, spacing_m: float) -> None:
         self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
+        self._beside = BEYOND * clearance_m
         self._disc = _disc(disc_radius_m(limits.radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: SeenWorld) -> float:
@@ -106,6 +109,30 @@ class Certifier:
                             way = between(path, 0.0, station)
                             return Certified(Path(np.array([*way, *turn]), loiter=True), station)
         return None
+
+    def certify_up_to(
+        self, over_m: float, path: Path, seen: SeenWorld, bounds_m: tuple[float, float, float, float]
+    ) -> Certified | None:
+        """All of a path, where it is seen to be free and stays within bounds until the flight is over.
+
+        There is no turn to leave it for: what lies beside it has to be seen to be free as well, as beyond a turn.
+
+        Args:
+            over_m: station from which on nothing is flown.
+            path: a path that keeps its distance from all edges seen, up to there.
+            seen: what has been seen to be free.
+            bounds_m: xmin, ymin, xmax, ymax.
+        """
+        flown = between(path, 0.0, over_m)
+        if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
+            return None
+        stations: FloatArray = np.linspace(0.0, over_m, max(math.ceil(over_m / self._spacing), 1) + 1)
+        poses = poses_at(path, stations)
+        aside = self._beside * np.column_stack((-poses[:, 3], poses[:, 2]))
+        places = np.concatenate([poses[:, :2] + side * aside for side in (0.0, *SIDES)])
+        if not seen.seen_free(np.clip(places, bounds_m[:2], bounds_m[2:])).all():
+            return None
+        return Certified(path, over_m)
 
     def _discs_free(self, path: Path, stations: FloatArray, seen: SeenWorld) -> BoolArray:
         """(k, 2) whether the disc of a turn to each side, at each of (k,) stations, has been seen to be free."""

@@ -55,7 +55,7 @@ class DeadEnds:
         clearance_m, radius_m = self._mission.clearance_m, self._mission.turn_radius_m
         beside = int(radius_m / clearance_m)
         if math.dist((east, north), self._mission.goal_m) < radius_m:
-            # The goal is in view, and no turn: it is to be approached another way.
+            # The goal is in view, and cannot be flown into from here: it is to be approached another way.
             east, north, beside = east - radius_m * along_east, north - radius_m * along_north, 0
         for i in range(-beside, beside + 1):
             aside_m = i * clearance_m

@@ -31,9 +31,9 @@ class Effect:
 
     Attributes:
         plan: as it was given to the loop.
-        path: its path: along the course, then into the turn.
+        path: its path: along the course, then into the turn; or the course, where that is flown to the goal.
         course: the whole way.
-        leaves_m: station at which the path leaves the course for the turn.
+        leaves_m: station at which the path leaves the course for the turn, or the flight is over.
     """
 
     plan: Plan
@@ -43,12 +43,16 @@ class Effect:
 
     @cached_property
     def turn(self) -> Path:
-        """The turn that the path ends with."""
-        return Path(self.path.segments[-1:])
+        """The turn that the path ends with; nothing where it ends at the goal."""
+        return Path(self.path.segments[-1:] if self.path.loiter else self.path.segments[:0])
 
     def holds(self, station_m: float) -> bool:
-        """Whether an aircraft there is in the turn."""
+        """Whether an aircraft there is in the turn, or at the goal."""
         return station_m >= self.leaves_m
+
+    def over(self, station_m: float) -> bool:
+        """Whether an aircraft there has nothing left to fly: it missed the goal."""
+        return not (self.path.loiter or between(self.path, station_m, self.path.length_m))
 
     def onward_from(self, pose: Pose, station_m: float, length_m: float, near_m: float) -> list[Segment]:
         """What of it is flown next. An aircraft that is not near it bends as that does until it is told otherwise."""
@@ -59,7 +63,7 @@ class Effect:
     def left(self, station_m: float) -> Path:
         """What is left of it: the way to its turn, with the straight to roll on before that, and the turn."""
         turn_at_m = self.path.length_m - self.turn.length_m
-        return Path(np.array([*between(self.path, station_m, turn_at_m), *self.path.segments[-1:].tolist()]))
+        return Path(np.array([*between(self.path, station_m, turn_at_m), *self.turn.segments.tolist()]))
 
 
 class Watch:

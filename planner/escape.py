@@ -30,7 +30,7 @@ EVADING_S = 60.0
 """The certificate holds for a world that stands still: so long after something appeared it may be broken."""
 
 
-GOES_ON = "the plan in effect goes on into its turn, nearer to something than wanted"
+GOES_ON = "the plan in effect goes on to its end, nearer to something than wanted"
 IN_THE_WAY = "something is in the way; turning away"
 
 

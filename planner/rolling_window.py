@@ -1,11 +1,11 @@
 """The rolling-window planner of the paper, made safe and convergent.
 
-In every rolling step: take the planning window about the track point where the new plan begins; search N
-steps deep among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum
-turn radius (`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that
-part is put into effect which ends in a turn seen to be free (`certificate`), and flown until the window rolls
-on. A search that takes long goes on while the plan in effect is flown (`deliberation`). Where something moves or has
-just appeared, no plan is flown that would meet it, and one that would is left (`escape`, `evasion`).
+In every rolling step: take the planning window about the track point where the new plan begins; search N steps deep
+among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum turn radius
+(`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that part is put into
+effect (`commitment`) which ends in a turn seen to be free, or in the goal circle (`certificate`), and flown until the
+window rolls on. A search that takes long goes on while the plan in effect is flown (`deliberation`). Where something
+moves or has just appeared, no plan is flown that would meet it, and one that would is left (`escape`, `evasion`).
 
 Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
 way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.
@@ -24,14 +24,11 @@ radius can be moved at the clearance, within the area.
 from __future__ import annotations
 
 import math
-from functools import partial
-
-import numpy as np
 
 from planner.barrier import Proof
-from planner.certificate import Certifier
+from planner.commitment import Commitment
 from planner.course import Course
-from planner.curves import Pose, Segment, along, on_loiter, place_on
+from planner.curves import Pose, Segment, along, on_loiter
 from planner.dead_ends import DeadEnds
 from planner.deliberation import Deliberation
 from planner.effect import Effect, Watch
@@ -41,9 +38,8 @@ from planner.evasion import Threats
 from planner.interface import FloatArray, Mission, Plan, PlanRequest, PlanStatus, SeenWorld
 from planner.local_planning import LocalPlanning, Start
 from planner.memory import ObstacleMemory
-from planner.multi_step_search import Track
 from planner.rolling_window_config import LEAD_S, RollingWindowConfig
-from planner.telling import no_way_through, picture, sentence
+from planner.telling import no_way_through
 
 OFF_PATH = 4.0
 """Further off the path than this many times the tracking error, a plan begins at the aircraft itself."""
@@ -84,6 +80,7 @@ class RollingWindow:
         )
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
         self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
+        self._commitment = Commitment(mission, self._memory, self._local, self._least_m)
         self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps
         self._proof = Proof(mission, self._memory, self._local.least_keeps_m)
         self._turns_keep_m = mission.clearance_m + mission.turn_radius_m
@@ -124,6 +121,8 @@ class RollingWindow:
         self._threats = self._escapes.threats(request)
         if self._proposed is not None:
             self._take_effect(request, self._proposed)
+        if self._effect is not None and self._effect.over(request.station_m):
+            self._effect = None
         effect = self._effect
         if effect is None:
             self._proof_for_turns.closed(request.position_m)
@@ -187,8 +186,8 @@ class RollingWindow:
                 if serves and course.path.length_m > worth_m:
                     thinking.done = True
                     break
-                found = self._certified(request, start, course, thinking.tracks)
-                if found is not None and self._leads_on(found):
+                found = self._commitment.effect(request, start, course, thinking.tracks, self._cut_m(course))
+                if found is not None and self._commitment.leads_on(found):
                     keeps_m = room_m(found.path, self._threats)
                     if keeps_m >= self._mission.clearance_m:
                         self._thinking, self._searched_with, self._effort = None, thinking.known, 0
@@ -206,7 +205,9 @@ class RollingWindow:
         assert ahead is not None
         assert effect is not None
         goes_on = self._thinking is not None
-        longer = self._certified(request, start, ahead, [], goes_on) if request.scanned else None
+        longer = None
+        if request.scanned:
+            longer = self._commitment.effect(request, start, ahead, [], self._cut_m(ahead), goes_on)
         if (
             longer is not None
             and longer.leaves_m > effect.leaves_m - here + 0.5 * self._lead_m
@@ -221,37 +222,9 @@ class RollingWindow:
         near_m = 0.0 if effect is None else min(self._watch.cut_m, effect.leaves_m) - here
         return effect is None or (self._watch.broken and near_m < self._urgent_m)
 
-    def _certified(
-        self, request: PlanRequest, start: Start, course: Course, tracks: list[Track], goes_on: bool = False
-    ) -> Effect | None:
-        """The part of a course that ends in a turn seen to be free."""
-        certifier = self._certifier(1.5 * request.seen.spacing_m)
-        turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        cut_m = self._watch.cut_at(course, self._memory.standing_m, self._memory.gone - self._gone)
-        certified = certifier.certify(course.path, request.seen, self._local.terrain(turn_keeps), cut_m)
-        if certified is None:
-            return None
-        goal, nodes, keep_m = self._mission.goal_m, course.nodes, self._mission.clearance_m
-        points, met = self._memory.points_m, self._memory.met_m
-        plan = Plan(
-            PlanStatus.FOUND,
-            sentence(request.position_m, goal, nodes),
-            waypoints_m=np.array([start.position, *nodes]),
-            path=certified.path,
-            picture=partial(
-                picture, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
-            ),
-            goes_on=goes_on,
-        )
-        return Effect(plan, certified.path, course, certified.leaves_m)
-
-    def _certifier(self, spacing_m: float) -> Certifier:
-        mission = self._mission
-        return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)
-
-    def _leads_on(self, found: Effect) -> bool:
-        """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
-        return found.leaves_m >= min(self._least_m, found.course.path.length_m - self._mission.goal_radius_m)
+    def _cut_m(self, course: Course) -> float:
+        """Station at which a course comes too near to an edge that it was not found with."""
+        return self._watch.cut_at(course, self._memory.standing_m, self._memory.gone - self._gone)
 
     def _start(self, request: PlanRequest, effect: Effect | None, here: float) -> Start:
         """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
@@ -280,7 +253,7 @@ class RollingWindow:
         tried = self._effort >= in_vain or (only_given_up and self._forgiven)
         no_room = tried and self._proof_for_turns.closed(request.position_m)
         if thinking is not None and not thinking.done and effect is not None:
-            return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect ends in a turn", goes_on=True)
+            return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect goes on", goes_on=True)
         stuck = None if thinking is None else thinking.stuck
         settled = self._dead_ends.unrest.settled(request.time_s)
         if stuck is None and settled and self._proof.closed(request.position_m):
@@ -294,7 +267,7 @@ class RollingWindow:
         if stuck is not None and turned:
             # The whole turn has shown nothing more: what lies ahead there cannot be entered.
             self._refused_at_m = request.station_m
-            self._dead_ends.give_up(self._unseen(stuck, request.seen))
+            self._dead_ends.give_up(self._commitment.unseen(stuck, request.seen))
         if stuck is None and thinking is not None:
             # What moved may have closed it; where edges were only taken back, to try it again once tells.
             doubtful = self._dead_ends.unrest.ever or (self._memory.taken_back and not self._forgiven)
@@ -310,7 +283,7 @@ class RollingWindow:
                 self._memory.forgive()
                 self._forgiven = True
             self._effort = min(self._effort + 1, MOST_EFFORT)
-        return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect ends in a turn")
+        return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect goes on")
 
     def _certain(self) -> bool:
         """Whether all that was seen still stands, and nothing has come to what was free."""
@@ -321,14 +294,9 @@ class RollingWindow:
         if effect is self._turning or not effect.course.to_goal:
             return
         self._turning = effect
-        place = self._unseen(effect.course, seen)
+        place = self._commitment.unseen(effect.course, seen)
         if self._dead_ends.turned_before(place[:2]):
             self._dead_ends.give_up(place)
-
-    def _unseen(self, course: Course, seen: SeenWorld) -> Pose:
-        """The first place of a course that has not been seen to be free."""
-        free_to_m = self._certifier(seen.spacing_m).seen_free_to_m(course.path, seen)
-        return place_on(course.path, free_to_m)[0]
 
     def _turn_away(self, request: PlanRequest, effect: Effect | None, here: float) -> Plan:
         """An answer where nothing is certified."""

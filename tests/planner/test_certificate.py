@@ -241,3 +241,50 @@ def test_nothing_is_certified_beyond_where_a_path_is_cut() -> None:
     assert cut is not None
     assert whole.leaves_m > 1400.0
     assert 500.0 < cut.leaves_m <= 600.0
+
+
+OVER_M, AREA = 1400.0, (-10.0, -30.0, 1450.0, 500.0)
+
+
+class FreeBox(FreeDiscs):
+    """Free are all places of a rectangle."""
+
+    def __init__(self, low: tuple[float, float], high: tuple[float, float]) -> None:
+        self._low, self._high = low, high
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        free: BoolArray = np.all((points_m >= self._low) & (points_m <= self._high), axis=1)
+        return free
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "free"),
+    [
+        ((0.0, -30.0), (OVER_M, 20.0), True),
+        ((0.0, -30.0), (OVER_M - 1.0, 20.0), False),
+        ((0.0, -30.0), (OVER_M, 19.0), False),
+        ((0.0, -19.0), (OVER_M, 20.0), False),
+    ],
+)
+def test_a_path_is_certified_until_the_flight_is_over_where_it_and_its_sides_are_free(
+    low: tuple[float, float], high: tuple[float, float], free: bool
+) -> None:
+    found = CERTIFIER.certify_up_to(OVER_M, STRAIGHT, FreeBox(low, high), AREA)
+    assert (found is not None) is free
+    if found is not None:
+        assert found.path is STRAIGHT
+        assert found.leaves_m == OVER_M
+
+
+def test_outside_of_the_area_nothing_has_to_be_free() -> None:
+    seen = FreeBox((0.0, -5.0), (OVER_M, 20.0))
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, -5.0, 1450.0, 500.0)) is not None
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, 1.0, 1450.0, 500.0)) is None
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, -5.0, OVER_M - 1.0, 500.0)) is None
+
+
+def test_no_path_is_certified_to_its_end_beyond_the_horizon() -> None:
+    near = Certifier(LIMITS, KEEP, OVER_M - 1.0, SPACING)
+    seen = FreeBox((-1e4, -1e4), (1e4, 1e4))
+    assert near.certify_up_to(OVER_M, STRAIGHT, seen, WIDE) is None
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, WIDE) is not None

@@ -64,6 +64,21 @@ def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
             assert pose_at(Path(before[None]), before[5])[:2] == pytest.approx(after[:2])
 
 
+def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
+    course = effect(3).course
+    flown = Effect(Plan(PlanStatus.FOUND, "", path=STRAIGHT), STRAIGHT, course, 8953.0)
+    assert flown.left(400.0).length_m == pytest.approx(8600.0)
+    assert flown.turn.length_m == 0.0
+    assert [flown.over(station) for station in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
+    assert not effect(3).over(1e6)
+    watch = watching()
+    watch.begin(flown, EDGES[:0])
+    assert not watch.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 301.0)]))
+    assert not watch.broken
+    watch.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 299.0)]))
+    assert watch.broken
+
+
 def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
     watch = watching()
     course = effect(4).course  # one of the four is gone; the last of the edges is new

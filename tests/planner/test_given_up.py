@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from planner.curves import end_of
 from planner.dead_ends import RETRY_S
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
 from planner.rolling_window import MOST_EFFORT, RollingWindow
@@ -70,8 +71,27 @@ def test_what_cannot_be_entered_is_given_up_with_room_for_a_turn_though_noise_ta
     assert {*map(tuple, refused.tolist())} <= {*map(tuple, given_up(pilot).tolist())}
 
 
-def test_a_goal_in_view_without_room_for_a_turn_is_approached_another_way() -> None:
-    mission = replace(MISSION, turn_radius_m=500.0, goal_m=(4000.0, 0.0), goal_radius_m=100.0)
+NEAR_GOAL = replace(MISSION, turn_radius_m=500.0, goal_m=(4000.0, 0.0), goal_radius_m=100.0)
+
+
+def test_a_goal_in_view_without_room_for_a_turn_is_flown_to() -> None:
+    seen, pilot = HalfOpen(nothing()), planner(NEAR_GOAL)
+    seen.to_m = 4050.0
+    plan = pilot.plan(first_request(seen))
+    for step in range(160):
+        answer = pilot.plan(request_on(plan, 25.0 * step, seen))
+        if answer.status is PlanStatus.FOUND:
+            break
+    assert plan.path is not None
+    assert plan.path.loiter
+    assert answer.path is not None
+    assert not answer.path.loiter
+    assert math.dist(end_of(answer.path)[:2], NEAR_GOAL.goal_m) < 1e-6
+    assert len(given_up(pilot)) == 0
+
+
+def test_a_goal_in_view_that_cannot_be_hit_is_approached_another_way() -> None:
+    mission = replace(NEAR_GOAL, goal_radius_m=0.9 * NEAR_GOAL.tracking_error_m)
     pilot, _, _, _ = circling(mission, 4050.0)
     refused = given_up(pilot)
     assert len(refused) == 1

@@ -1,0 +1,96 @@
+"""A goal beside the border, where the area ends before there is room for a turn: it is flown to all the same."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from aircraft.interface import AircraftState
+from aircraft.point_mass import PointMass
+from harness.closed_loop import fly
+from harness.range_sensor import RangeScan
+from harness.record import AcceptedPlan, Outcome, Track
+from harness.run import make_loop
+from harness.scenario import Scenario, mission_of
+from harness.smoothness import flown_lengths
+from planner.clearance import inside_bounds
+from planner.curves import end_of
+from planner.interface import Path
+
+SmallWorld = Callable[..., Scenario]
+
+SIDE_M, START = 4000.0, (600.0, 600.0)
+BLUR = 0.25
+"""What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
+
+
+class Paths:
+    """Keeps the paths that take effect."""
+
+    def __init__(self) -> None:
+        self.paths: list[Path] = []
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        assert accepted.plan.path is not None
+        self.paths.append(accepted.plan.path)
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        pass
+
+    def on_block(self, block: Track) -> None:
+        pass
+
+    def on_event(self, time_s: float, text: str) -> None:
+        pass
+
+
+def circle(x: float, y: float, radius: float) -> dict[str, Any]:
+    return {"circle": {"center_m": [x, y], "radius_m": radius}}
+
+
+CORNER, IN_IT, EAST = (3990.0, 3990.0), (4000.0, 4000.0), (3990.0, 2000.0)
+WIND = {"wind": {"from_deg": 225.0, "speed_mps": 8.0}}
+
+
+@pytest.mark.parametrize(
+    ("goal_m", "radius_m", "clearance_m", "obstacles", "air"),
+    [
+        (CORNER, 40.0, 150.0, [], {}),
+        (CORNER, 15.0, 40.0, [], {}),
+        (IN_IT, 40.0, 150.0, [], {}),
+        (CORNER, 40.0, 150.0, [], WIND),
+        (CORNER, 40.0, 150.0, [circle(3500.0, 3500.0, 100.0)], {}),
+        (CORNER, 40.0, 40.0, [circle(3600.0, 3600.0, 100.0)], {}),
+        (EAST, 15.0, 150.0, [], {}),
+    ],
+)
+def test_it_is_reached_by_the_shortest_way(
+    goal_m: tuple[float, float],
+    radius_m: float,
+    clearance_m: float,
+    obstacles: list[dict[str, Any]],
+    air: dict[str, Any],
+    small_world: SmallWorld,
+) -> None:
+    scenario = small_world(
+        *obstacles,
+        area={"bounds_m": [0.0, 0.0, SIDE_M, SIDE_M]},
+        mission={"start_m": list(START), "goal_m": list(goal_m), "goal_radius_m": radius_m},
+        sensor={"range_m": 1000.0, "rays": 360, "rate_hz": 1.0},
+        planner={"clearance_m": clearance_m},
+        environment=air,
+    )
+    seen, mission = Paths(), mission_of(scenario)
+    flight = fly(make_loop(scenario, lambda start, wind: PointMass(start, wind, step_rate_hz=20)), [seen])
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    assert flown_lengths(flight.track).sum() < 1.05 * math.dist(START, goal_m)
+    assert flight.track.clearance_m.min() >= (1.0 - BLUR) * clearance_m
+    for path in seen.paths:
+        assert inside_bounds(path, mission.bounds_m)
+    assert seen.paths[0].loiter
+    last = seen.paths[-1]
+    assert not last.loiter
+    assert end_of(last)[:2] == pytest.approx(goal_m)
