@@ -26,6 +26,7 @@ from harness.strict_yaml import (
     InputError,
     Loc,
     Node,
+    as_spelt,
     fault_line,
     key_path,
     loc_of,
@@ -124,9 +125,13 @@ class CampaignRuns:
     def varied(self) -> dict[str, str]:
         """Columns of `results.parquet` for the varied keys: number, int, bool or text by key path."""
         entries = {name: kind_of(values) for name, values in self._of_entries.items()}
-        grid = {_path(name): kind_of(values) for name, values in self.campaign.grid.items()}
+        grid = {as_spelt(name): kind_of(values) for name, values in self.campaign.grid.items()}
         drawn = {
-            _path(name): kind_of(each.choice) if each.choice else "int" if name in self._whole else "number"
+            as_spelt(name): kind_of(each.choice)
+            if each.choice
+            else "int"
+            if name in self._whole
+            else "number"
             for name, each in self.campaign.random.items()
         }
         return grid | drawn | entries
@@ -333,7 +338,3 @@ def _without_course(root: Node) -> Node:
         return root
     kept = {name: node for name, node in mission.value.items() if name != "course_deg"}
     return replaced(root, ("mission",), Node(kept, mission.line))
-
-
-def _path(name: str) -> str:
-    return key_path(loc_of(name))

@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 
 from harness.falsify_search import STEPS, Point
 from harness.scenario import Scenario
-from harness.strict_yaml import InputError, loc_of
+from harness.strict_yaml import InputError, as_spelt, loc_of
 
 MOST_KEYS: Final = 6
 
@@ -45,27 +45,34 @@ class Vary:
         )
 
 
-def vary_of(load: Load, given: Sequence[tuple[str, float, float]]) -> tuple[Vary, ...]:
+def vary_of(
+    load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = ()
+) -> tuple[Vary, ...]:
     """The keys to vary, once every combination of their ends has been found to be a scenario.
 
     Args:
         load: makes the scenario.
         given: key path, mild end and hard end of each.
+        fixed: paths of keys that have been given a value.
 
     Raises:
-        InputError: too many keys, one twice or without a range, or an end that makes no scenario.
+        InputError: too many keys, one twice, with a value or without a range, or an end that makes no scenario.
     """
     if len(given) > MOST_KEYS:
         raise InputError(
             f"command line: --vary is given {len(given)} times; at most {MOST_KEYS} keys are varied"
         )
+    given = [(_spelt("--vary", key), mild, hard) for key, mild, hard in given]
+    valued = {_spelt("--set", key) for key in fixed}
     for number, (key, mild, hard) in enumerate(given):
-        try:
-            loc_of(key)
-        except ValueError as error:
-            raise InputError(f"command line: --vary: {error}") from error
+        if key == "seed":
+            raise InputError("command line: --vary seed: a seed is no condition; --seeds flies several")
         if key in [other for other, _, _ in given[:number]]:
             raise InputError(f"command line: --vary {key}: is given twice; give one range")
+        if key in valued:
+            raise InputError(
+                f"command line: {key} is given a value, and a range with --vary; give one of them"
+            )
         if mild == hard:
             raise InputError(
                 f"command line: --vary {key}: both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}"
@@ -87,10 +94,17 @@ def scenario_at(load: Load, vary: Sequence[Vary], point: Point) -> Scenario:
     return load([(each.key, _text(each.value(place))) for each, place in zip(vary, point, strict=True)])
 
 
+def _spelt(option: str, key: str) -> str:
+    try:
+        return as_spelt(key)
+    except ValueError as error:
+        raise InputError(f"command line: {option}: {error}") from error
+
+
 def _is_whole(scenario: Scenario, key: str) -> bool:
     value: Any = scenario.model_dump(by_alias=True)
-    for step in key.replace("[", ".").replace("]", "").split("."):
-        value = value[int(step)] if isinstance(value, list | tuple) else value[step]
+    for step in loc_of(key):
+        value = value[step]
     return isinstance(value, int)
 
 

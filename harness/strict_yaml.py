@@ -121,6 +121,15 @@ def loc_of(path: str) -> Loc:
     return tuple(int(step) if step.isdecimal() else step for step in steps)
 
 
+def as_spelt(path: str) -> str:
+    """A key path as messages and tables spell it, however it was given: `obstacles.2.circle` as `obstacles[2].circle`.
+
+    Raises:
+        ValueError: as `loc_of`.
+    """
+    return key_path(loc_of(path))
+
+
 def fault_line(source: str, line: int, loc: Loc, sentence: str) -> str:
     """One fault as a person reads it: `file:line: key.path: sentence`."""
     where = "command line" if line == COMMAND_LINE else f"{source}:{line}"

@@ -71,18 +71,9 @@ def falsify(
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
     ranges = [range_of(text) for text in vary]
     fixed = [*chosen(planner, aircraft, seed), *map(setting, settings or ())]
-    _set_or_varied(fixed, ranges)
     return _search(
         scenario, fixed, ranges, until, runs or RUNS_A_KEY * len(ranges), seeds, tolerance, out, as_json
     )
-
-
-def _set_or_varied(fixed: list[tuple[str, str]], ranges: list[tuple[str, float, float]]) -> None:
-    """Refuses a key that is to be varied and has a value as well."""
-    varied = [key for key, _, _ in ranges]
-    for name, _ in fixed:
-        if name in varied:
-            raise bad_input(ValueError(f"{name} is given a value, and a range with --vary; give one of them"))
 
 
 def _search(
@@ -106,7 +97,7 @@ def _search(
     def loaded(replaced: Any) -> Scenario:
         return load(scenario, [*fixed, *replaced])
 
-    varied = vary_of(loaded, ranges)
+    varied = vary_of(loaded, ranges, [name for name, _ in fixed])
     folder = out or Path("runs") / loaded(()).name / "falsify"
     try:
         with step_bar() as report:
@@ -158,6 +149,4 @@ def range_of(text: str) -> tuple[str, float, float]:
         mild = hard = math.nan
     if not (key.strip() and equals and colon and math.isfinite(mild) and math.isfinite(hard)):
         raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=LO:HI with two numbers", param_hint="--vary")
-    if key.strip() == "seed":
-        raise typer.BadParameter("a seed is no condition; --seeds flies several", param_hint="--vary")
     return key.strip(), mild, hard

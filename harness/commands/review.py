@@ -78,10 +78,10 @@ def _summary(folder: Path, by: Sequence[str] | None) -> int:
 
 def _column(key: str) -> str:
     """The column of a key, which may be spelled as `--set` takes it: `obstacles.0.velocity_mps`."""
-    from harness.strict_yaml import InputError, key_path, loc_of
+    from harness.strict_yaml import InputError, as_spelt
 
     try:
-        return key_path(loc_of(key))
+        return as_spelt(key)
     except ValueError as error:
         raise InputError(f"command line: --by: {error}") from error
 

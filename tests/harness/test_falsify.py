@@ -192,7 +192,8 @@ def test_a_key_inside_a_list_can_be_varied(file: Path) -> None:
     def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
         return load_scenario(file, replaced)
 
-    vary = vary_of(load, [("obstacles[0].circle.radius_m", 100.0, 500.0)])
+    vary = vary_of(load, [("obstacles.0.circle.radius_m", 100.0, 500.0)])
+    assert vary[0].key == "obstacles[0].circle.radius_m"
     assert not vary[0].whole
     circle = scenario_at(load, vary, (0.5,)).obstacles[0].circle
     assert circle is not None
@@ -243,6 +244,15 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
             ["--vary", "sensor.dropout=0:1", "--set", "sensor.dropout=0.5"],
             "sensor.dropout is given a value, and a range with --vary; give one of them",
         ),
+        (
+            ["--vary", "mission[goal_m].0=0:1", "--set", "mission.goal_m[0]=5"],
+            "mission.goal_m[0] is given a value, and a range with --vary; give one of them",
+        ),
+        (
+            ["--vary", "mission.goal_m[0]=0:1", "--vary", "mission.goal_m.0=0:1"],
+            "--vary mission.goal_m[0]: is given twice",
+        ),
+        (["--vary", "sensor..rays=0:1"], "--vary: 'sensor..rays' is not a key path"),
         (["--vary", "seed=1:5"], "a seed is no condition; --seeds flies several"),
         (["--vary", "sensor.dropout=0:0"], "both ends are 0; give two, as sensor.dropout=0:1"),
         (["--vary", "sensor.dropout=0:1", "--vary", "sensor.dropout=0:1"], "is given twice"),
