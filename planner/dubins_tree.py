@@ -14,6 +14,7 @@ that keep the distance. OMPL is an optional dependency: `pip install wayproof[om
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
@@ -22,8 +23,9 @@ import numpy as np
 
 from planner.boundary import margin_of
 from planner.clearance import first_breach
+from planner.compiled import COUNTS, FLOAT, ROWS, compiled
 from planner.curves import SHORTEST_M, Point, Pose, Segment, along
-from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import FloatArray, IntArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.joining import departure, stuck
 from planner.memory import ObstacleMemory
 from planner.route_optimisation import Terrain
@@ -32,10 +34,19 @@ GOAL_COURSES = 8
 """The goal may be reached on this many courses."""
 
 ROLLS = 16.0
-"""A plan that is blocked further ahead is dropped after this share of the sensing range."""
+"""A plan that is blocked further ahead, or holds, is dropped after this share of the sensing range."""
 
-PATH_SHARE = 0.25
-"""Share of the margin that a path keeps; the tree keeps all of it."""
+PATH_SHARE = 0.125
+"""Share of the margin that a path keeps."""
+
+ATTEMPTS = ((1.0, 1), (0.5, 4))
+"""Share of the margin that a tree keeps, and how many times as often it is grown."""
+
+NEAR = 1.5
+"""Within so many of the distances that the tree keeps about start and goal it keeps no more than the path."""
+
+LOOK_SHARE = 0.5
+"""A branch of the tree is looked at every so many of the distances that it keeps."""
 
 WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
 
@@ -84,6 +95,7 @@ class DubinsTree:
         self._memory = ObstacleMemory(mission.clearance_m)
         self._urgent_m = 8.0 * mission.turn_radius_m + mission.speed_mps * (4.0 + mission.compute_latency_s)
         self._searches = 0
+        self._gone = 0
         self._flown: Plan | None = None
         self._searched_at_m = 0.0
         self._breach_m = (
@@ -92,26 +104,27 @@ class DubinsTree:
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while nothing seen blocks it; grows a tree where something does."""
-        fresh = self._memory.take_in(request.seen)
+        fresh, gone = self._memory.take_in(request.seen), self._memory.gone
+        changed = len(fresh) > 0 or gone != self._gone
+        self._gone = gone
         path = request.flown.path if request.flown else None
-        keep = self._mission.clearance_m + 0.5 * PATH_SHARE * self._margin_m
+        keep = self._mission.clearance_m + PATH_SHARE * self._margin_m
         if request.flown is not self._flown:
             self._flown, self._breach_m, self._searched_at_m = request.flown, math.inf, 0.0
         station = request.station_m
+        rolled = station - self._searched_at_m >= self._mission.sensor_range_m / ROLLS
+        if path is not None and path.loiter and not (changed or rolled):
+            return Plan(PlanStatus.KEPT, "holding; nothing new is known")
         if path is not None and not path.loiter and path.length_m > station:
             room = self._room(fresh, Pose(*path.segments[0, :4].tolist()), keep)
             self._breach_m = min(self._breach_m, first_breach(path, fresh, room, station))
-            rolled = station - self._searched_at_m >= self._mission.sensor_range_m / ROLLS
             if math.isinf(self._breach_m) or not (rolled or self._breach_m - station < self._urgent_m):
                 return Plan(PlanStatus.KEPT, "nothing near blocks the plan in effect")
         self._searched_at_m = station
         pose, prefix = departure(request, self._mission)
-        points = self._memory.points_m
-        terrain = Terrain(points, self._room(points, pose, keep), self._mission.bounds_m)
-        poses = self._poses(pose, terrain)
-        if poses is None:
-            return stuck("the tree found no way", request, self._mission, points)
-        ways = _shortened(poses, self._mission.turn_radius_m, terrain)
+        poses, ways = self._ways(pose, self._terrain(pose, keep))
+        if not ways:
+            return stuck("the tree found no way", request, self._mission, self._memory.points_m)
         segments = [segment for way in ways for segment in way]
         nodes = [way[-1] for way in ways]
         return Plan(
@@ -136,33 +149,51 @@ class DubinsTree:
         ]
         return np.minimum(keep, np.minimum(*room))
 
-    def _poses(self, pose: Pose, terrain: Terrain) -> list[Pose] | None:
-        """Poses from the start to the goal, to be joined by Dubins curves; None where none were found."""
-        goals = self._goals(pose, self._mission.goal_m)
-        radius = self._mission.turn_radius_m
-        direct = [(dubins(pose, goal, radius), goal) for goal in goals]
-        direct.sort(key=lambda each: sum(segment[5] for segment in each[0]))
-        for way, goal in direct:
-            if way and terrain.admits(Path(np.array(way))):
-                return [pose, goal]
-        free = _Free(terrain.points_m, self._mission, self._margin_m, pose)
-        beyond = self._beyond(pose, free)
-        ends = goals if beyond == self._mission.goal_m else self._goals(pose, beyond)
-        for attempt in (1, 4):
-            self._searches += 1
-            found = self._grown(pose, ends, free, attempt * self._config.iterations)
-            if found is not None:
-                return found if ends is goals else [*found, goals[0]]
-        return None
+    def _terrain(self, pose: Pose, keep: float) -> Terrain:
+        points = self._memory.points_m
+        return Terrain(points, self._room(points, pose, keep), self._mission.bounds_m)
 
-    def _beyond(self, pose: Pose, free: _Free) -> Point:
+    def _free(self, pose: Pose, terrain: Terrain, share: float) -> Terrain:
+        """Where a tree may grow that keeps a share of the margin."""
+        keep_m = self._mission.clearance_m + share * self._margin_m
+        away_m = self._room(terrain.points_m, pose, math.inf)
+        return replace(terrain, keep_m=np.where(away_m < NEAR * keep_m, terrain.keep_m, keep_m))
+
+    def _ways(self, pose: Pose, terrain: Terrain) -> tuple[list[Pose], list[list[Segment]]]:
+        """The poses of a way to the goal, and Dubins curves that lead along it; none where there is none.
+
+        The tree is grown to where the line to the goal is free beyond the sensing range; where no curve leads on from
+        there past all that is known, to the goal itself.
+        """
+        goals, radius = self._goals(pose, self._mission.goal_m), self._mission.turn_radius_m
+        direct = [([pose, goal], joined([pose, goal], radius, terrain)) for goal in goals]
+        found = [(poses, ways) for poses, ways in direct if ways]
+        if found:
+            return min(found, key=lambda each: sum(segment[5] for segment in each[1][0]))
+        frees = [(self._free(pose, terrain, share), times) for share, times in ATTEMPTS]
+        beyond = self._beyond(pose, frees[0][0])
+        nearer = [] if beyond == self._mission.goal_m else [self._goals(pose, beyond)]
+        for ends in (*nearer, goals):
+            for free, times in frees:
+                self._searches += 1
+                grown = self._grown(pose, ends, free, times * self._config.iterations)
+                if grown is None:
+                    continue
+                for onward in [[]] if ends is goals else [[goal] for goal in goals]:
+                    ways = joined([*grown, *onward], radius, terrain)
+                    if ways:
+                        return [*grown, *onward], ways
+                break
+        return [], []
+
+    def _beyond(self, pose: Pose, free: Terrain) -> Point:
         """The first free place on the line to the goal that lies beyond the sensing range; else the goal."""
         (x, y), (to_x, to_y) = pose[:2], self._mission.goal_m
         whole, step = math.dist((x, y), (to_x, to_y)), self._mission.turn_radius_m
         for i in range(math.ceil(self._mission.sensor_range_m / step), math.floor(whole / step) - 2):
             share = i * step / whole
             place = x + share * (to_x - x), y + share * (to_y - y)
-            if free.holds(*place):
+            if is_free(free, *place):
                 return place
         return self._mission.goal_m
 
@@ -173,7 +204,7 @@ class DubinsTree:
         courses = [straight + math.tau * i / GOAL_COURSES for i in range(GOAL_COURSES)]
         return [Pose(x, y, math.cos(course), math.sin(course)) for course in courses]
 
-    def _grown(self, pose: Pose, goals: list[Pose], free: _Free, iterations: int) -> list[Pose] | None:
+    def _grown(self, pose: Pose, goals: list[Pose], free: Terrain, iterations: int) -> list[Pose] | None:
         """The best path of a tree grown for some iterations."""
         from ompl import base, geometric, util
 
@@ -190,8 +221,9 @@ class DubinsTree:
         space.setBounds(box)
         space.setup()
         setup = base.SpaceInformation(space)
-        setup.setStateValidityChecker(lambda state: free.holds(state.getX(), state.getY()))
-        setup.setStateValidityCheckingResolution(2.0 * free.cell_m / space.getMaximumExtent())
+        setup.setStateValidityChecker(lambda state: is_free(free, state.getX(), state.getY()))
+        keep = self._mission.clearance_m + self._margin_m
+        setup.setStateValidityCheckingResolution(LOOK_SHARE * keep / space.getMaximumExtent())
         setup.setup()
 
         def state(place: Pose) -> object:
@@ -225,48 +257,40 @@ class DubinsTree:
         ]
 
 
-class _Free:
-    """A grid of what keeps its distance from everything seen."""
-
-    def __init__(self, points: FloatArray, mission: Mission, margin_m: float, pose: Pose) -> None:
-        keep = mission.clearance_m + margin_m
-        xmin, ymin, xmax, ymax = mission.bounds_m
-        self.cell_m = 0.25 * keep
-        self._x, self._y, self._pose, self._goal = xmin, ymin, pose, mission.goal_m
-        self._xmax, self._ymax = xmax, ymax
-        shape = math.ceil((xmax - xmin) / self.cell_m) + 1, math.ceil((ymax - ymin) / self.cell_m) + 1
-        self._blocked: BoolArray = np.zeros(shape, dtype=np.bool_)
-        steps = np.arange(-6, 7)
-        dx, dy = (each.ravel() for each in np.meshgrid(steps, steps))
-        cells = np.floor((points - (xmin, ymin)) / self.cell_m).astype(np.int64)
-        x, y = cells[:, :1] + dx, cells[:, 1:] + dy
-        center_x, center_y = xmin + (x + 0.5) * self.cell_m, ymin + (y + 0.5) * self.cell_m
-        near = np.hypot(center_x - points[:, :1], center_y - points[:, 1:]) < keep
-        near &= (x >= 0) & (y >= 0) & (x < shape[0]) & (y < shape[1])
-        self._blocked[x[near], y[near]] = True
-
-    def holds(self, x: float, y: float) -> bool:
-        """Whether a place is in the area and free; about the start and the goal all is."""
-        if not (self._x <= x <= self._xmax and self._y <= y <= self._ymax):
-            return False
-        blocked = self._blocked[int((x - self._x) / self.cell_m), int((y - self._y) / self.cell_m)]
-        ends: tuple[Point, Point] = (self._pose[:2], self._goal)
-        return not blocked or any(abs(x - a) + abs(y - b) < 2.0 * self.cell_m for a, b in ends)
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT)
+def _too_near(places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float) -> bool:
+    """Whether a place is nearer to a point, of those by squares, than is to be kept from it."""
+    for block in range(len(first) - 1):
+        dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
+        if dx * dx + dy * dy >= reach * reach:
+            continue
+        for k in range(first[block], first[block + 1]):
+            dx, dy, keep = places[0, k] - east, places[1, k] - north, places[2, k]
+            if dx * dx + dy * dy < keep * keep:
+                return True
+    return False
 
 
-def _shortened(poses: list[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]]:
-    """Dubins curves from pose to pose, each on to the furthest that one reaches."""
+def is_free(terrain: Terrain, east_m: float, north_m: float) -> bool:
+    """Whether a place is in the area and keeps its distance from all that is known."""
+    xmin, ymin, xmax, ymax = terrain.bounds_m
+    inside = xmin <= east_m <= xmax and ymin <= north_m <= ymax
+    return inside and not _too_near(*terrain.squares, east_m, north_m)
+
+
+def joined(poses: Sequence[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]] | None:
+    """Dubins curves from pose to pose, each on to the furthest that one leads to; None where none leads on."""
     ways: list[list[Segment]] = []
     i = 0
     while i < len(poses) - 1:
         for k in range(len(poses) - 1, i, -1):
             way = dubins(poses[i], poses[k], radius_m)
-            if way and (k == i + 1 or terrain.admits(Path(np.array(way)))):
+            if way and terrain.admits(Path(np.array(way))):
                 ways.append(way)
                 i = k
                 break
         else:
-            i += 1
+            return None
     return ways
 
 

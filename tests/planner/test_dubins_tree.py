@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 
 from planner import dubins_tree
 from planner.curves import Pose, along
-from planner.dubins_tree import DubinsTree, DubinsTreeConfig, _Free, dubins
+from planner.dubins_tree import ROLLS, DubinsTree, DubinsTreeConfig, dubins, is_free
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
+from planner.route_optimisation import Terrain
 
 MakePoints = Callable[..., FloatArray]
 
@@ -45,10 +47,10 @@ class Seen:
     surprised_s = -math.inf
 
     def __init__(self, points: FloatArray) -> None:
-        self._points = points
+        self._points = self.fresh = points
 
     def edges_since(self, revision: int) -> FloatArray:
-        return self._points if revision < 1 else np.zeros((0, 2))
+        return self._points if revision < 1 else self.fresh if revision < self.revision else self._points[:0]
 
     def seen_free(self, points_m: FloatArray) -> BoolArray:
         return np.zeros(len(points_m), dtype=np.bool_)
@@ -92,8 +94,8 @@ def test_without_ompl_the_error_says_what_to_install(monkeypatch: pytest.MonkeyP
 
 if find_spec("ompl") is not None:
 
-    def first(points: FloatArray) -> Plan:
-        planner = DubinsTree(DubinsTreeConfig(), MISSION)
+    def first(points: FloatArray, mission: Mission = MISSION) -> Plan:
+        planner = DubinsTree(DubinsTreeConfig(), mission)
         return planner.plan(PlanRequest(0.0, START, (1.0, 0.0), Seen(points)))
 
     def test_a_tree_finds_a_way_round_twice_the_same(ring: MakePoints) -> None:
@@ -106,6 +108,40 @@ if find_spec("ompl") is not None:
         assert plan.path.max_curvature_1pm <= 1.0 / MISSION.turn_radius_m + 1e-9
         assert keeps(plan.path, points) > MISSION.clearance_m
         assert plan.path.length_m < 1.3 * 13_000.0
+
+    @pytest.mark.parametrize("north_m", [4000.0, 4600.0, 5000.0, 5400.0])
+    def test_it_keeps_away_from_what_is_known_beyond_the_sensing_range(
+        ring: MakePoints, north_m: float
+    ) -> None:
+        points = np.concatenate((ring(5000.0, 5200.0, 1200.0, 50.0), ring(11_500.0, north_m, 1500.0, 50.0)))
+        path = first(points).path
+        assert path is not None
+        assert keeps(path, points) > MISSION.clearance_m
+
+    def test_the_area_may_be_as_large_as_a_continent(ring: MakePoints) -> None:
+        wide = replace(MISSION, bounds_m=(-3e6, -3e6, 3e6, 3e6), clearance_m=20.0)
+        plan = first(ring(5000.0, 5200.0, 1200.0, 50.0), wide)
+        assert plan.status is PlanStatus.FOUND
+
+    def test_holding_it_searches_anew_when_something_changes_or_it_has_flown_on(ring: MakePoints) -> None:
+        planner, around = DubinsTree(DubinsTreeConfig(), MISSION), ring(*START, 1500.0, 50.0)
+        seen = Seen(around)
+        hold = planner.plan(PlanRequest(0.0, START, (1.0, 0.0), seen))
+        assert hold.path is not None
+
+        def asked(station_m: float) -> PlanStatus:
+            return planner.plan(PlanRequest(1.0, START, (1.0, 0.0), seen, hold, station_m)).status
+
+        on_m = MISSION.sensor_range_m / ROLLS
+        assert [asked(station_m) for station_m in (10.0, on_m - 1.0)] == [PlanStatus.KEPT] * 2
+        assert asked(on_m) is PlanStatus.NO_PATH
+        assert asked(on_m + 10.0) is PlanStatus.KEPT
+        seen.revision, seen.fresh = 2, ring(12_000.0, 5000.0, 500.0, 50.0)
+        assert asked(on_m + 20.0) is PlanStatus.NO_PATH
+        assert asked(on_m + 30.0) is PlanStatus.KEPT
+        seen.revision, seen.taken_back_at, seen.fresh = 3, 3, around[:0]
+        assert asked(on_m + 40.0) is PlanStatus.NO_PATH
+        assert asked(on_m + 50.0) is PlanStatus.KEPT
 
     def test_an_enclosed_start_holds(ring: MakePoints) -> None:
         plan = first(ring(*START, 1500.0, 50.0))
@@ -122,14 +158,21 @@ def keeps(path: Path, points: FloatArray) -> float:
 
 def test_what_lies_outside_the_area_is_not_free() -> None:
     """Curves between two places inside may leave it."""
-    free = _Free(np.zeros((0, 2)), MISSION, 20.0, Pose(*START, 1.0, 0.0))
+    free = Terrain(np.zeros((0, 2)), np.zeros(0), MISSION.bounds_m)
     xmin, ymin, xmax, ymax = MISSION.bounds_m
-    assert free.holds(xmin, ymin)
-    assert free.holds(xmax, ymax)
+    assert is_free(free, xmin, ymin)
+    assert is_free(free, xmax, ymax)
     for x, y in (
         (xmin - 1.0, 5000.0),
         (xmax + 500.0, 5000.0),
         (9000.0, ymin - 500.0),
         (9000.0, ymax + 500.0),
     ):
-        assert not free.holds(x, y)
+        assert not is_free(free, x, y)
+
+
+def test_what_is_too_near_is_not_free(ring: MakePoints) -> None:
+    points = ring(5000.0, 5000.0, 1000.0, 50.0)
+    free = Terrain(points, np.full(len(points), 220.0), MISSION.bounds_m)
+    for x, y in np.random.default_rng(1).uniform(3500.0, 6500.0, (300, 2)).tolist():
+        assert is_free(free, x, y) == (np.hypot(*(points - (x, y)).T).min() >= 220.0)
