@@ -16,12 +16,12 @@ import numpy as np
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
 from aircraft.guidance import PathFollower
-from aircraft.guidance_law import COMPILED as GUIDANCE
 from aircraft.guidance_law import GRAVITY_MPS2
 from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.closed_loop import Loop, Observer, Progress, fly
+from harness.compiled_guidance import path_follower
 from harness.metrics import metrics
 from harness.planner_keys import planner_of
 from harness.range_sensor import RangeSensor
@@ -32,7 +32,6 @@ from harness.scenario_sections import Environment
 from harness.sensed_world import SensedWorld
 from harness.trackability import FlightLimits
 from harness.world import World
-from planner.compiled import compiled
 
 if TYPE_CHECKING:
     from aircraft.interface import AircraftState
@@ -41,9 +40,6 @@ if TYPE_CHECKING:
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
 
-
-for _function, _arguments in GUIDANCE:
-    compiled(*_arguments)(_function)
 
 Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
 
@@ -75,7 +71,7 @@ def make_loop(
         ),
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
-        follower=PathFollower(airframe(scenario.aircraft.model).guidance_limits),
+        follower=path_follower(airframe(scenario.aircraft.model).guidance_limits),
         mission=mission,
         altitude_m=scenario.mission.altitude_m,
         time_limit_s=_given(scenario.mission.time_limit_s),

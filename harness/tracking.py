@@ -16,10 +16,11 @@ import numpy as np
 from aircraft.airframes import Airframe, airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
+from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.interface import Command, Route
 from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
+from harness.compiled_guidance import path_follower
 
 ALTITUDE_M: Final = 300.0
 COURSE_RAD: Final = 0.3
@@ -124,7 +125,7 @@ def fly_course(frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Rou
         LocalPlane(47.0, 8.0),
         air,
     )
-    follower = PathFollower(frame.guidance_limits)
+    follower = path_follower(frame.guidance_limits)
     follower.follow(route)
     steps = model.step_rate_hz // UPDATE_RATE_HZ
     cross, altitude, saturated = [], [], 0

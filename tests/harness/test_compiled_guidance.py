@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import random
+import subprocess
+import sys
 from types import FunctionType
 
 import numpy as np
 import pytest
 
-import harness.run  # noqa: F401  has it compiled
+import harness.compiled_guidance  # noqa: F401
 from aircraft import guidance_law
 from aircraft.airframes import airframe
 from aircraft.guidance import GuidanceOutput, PathFollower
@@ -80,3 +82,14 @@ def test_a_length_is_rounded_once() -> None:
         x, y = (numbers.uniform(-1.0, 1.0) * 10.0 ** numbers.uniform(-3.0, 5.0) for _ in range(2))
         assert {length(x, y) for length in lengths} == {math.hypot(x, y)}
     assert [length(0.0, 0.0) for length in lengths] == [0.0, 0.0]
+
+
+def test_courses_are_flown_with_it() -> None:
+    code = (
+        "from types import FunctionType; from aircraft import guidance_law\n"
+        "from aircraft.airframes import airframe; from aircraft.start import Atmosphere\n"
+        "from harness.tracking import course, fly_course\n"
+        "fly_course(airframe('aerosonde'), 25.0, Atmosphere(), course(1, 200.0, 1))\n"
+        "assert not isinstance(guidance_law.decide, FunctionType)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
