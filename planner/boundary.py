@@ -80,6 +80,11 @@ class GrownObstacles:
         return fresh, taken_back
 
     @property
+    def taken_back(self) -> bool:
+        """Whether any edge that was seen has been taken back so far."""
+        return self._memory.taken_back
+
+    @property
     def labels(self) -> IntArray:
         """(m,) the obstacle that each disc belongs to."""
         return np.concatenate((np.full(len(self._fence), FENCE, dtype=np.intp), self._memory.labels))

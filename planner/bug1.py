@@ -88,9 +88,11 @@ class Bug1(Walker[State]):
             return replace(state, walked_m=state.walked_m + length_of(flown))
         return state
 
-    def follows(self, place: Point, state: State) -> Point | None:
-        """The boundary here, on the way round and back."""
-        return place if isinstance(state, Circling | Returning) else None
+    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+        """The boundary here, and where the way round or back ends."""
+        if isinstance(state, Circling | Returning):
+            return place, (state.hit if isinstance(state, Circling) else state.q).place
+        return ()
 
     def says(self, state: State) -> str:
         """What the planner does."""

@@ -64,9 +64,9 @@ class Bug2(Walker[State]):
             return replace(state, walked_m=state.walked_m + length_of(flown))
         return state
 
-    def follows(self, place: Point, state: State) -> Point | None:
-        """The boundary here, on the way round."""
-        return place if isinstance(state, Following) else None
+    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+        """The boundary here, and the hit point."""
+        return (place, state.hit.place) if isinstance(state, Following) else ()
 
     def says(self, state: State) -> str:
         """What the planner does."""

@@ -112,9 +112,9 @@ class TangentBug(Walker[State]):
         place, walked = mark_at(flown, math.inf).place, state.walked_m + length_of(flown)
         return replace(state, anchor=place, walked_m=walked, followed_m=followed)
 
-    def follows(self, place: Point, state: State) -> Point | None:
-        """The boundary where it is followed on."""
-        return state.anchor if isinstance(state, Following) else None
+    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+        """The boundary where it is followed on, and where that began."""
+        return (state.anchor, state.hit.place) if isinstance(state, Following) else ()
 
     def says(self, state: State) -> str:
         """What the planner does."""

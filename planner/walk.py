@@ -5,7 +5,7 @@ and stretches of boundary, each with the state of the algorithm on it. It stays 
 comes too near to what is left of it, because a boundary changes only where a new disc covers it. So it is
 taken up again, from the state reached by then, when the aircraft has come to such a place: a BUG knows an
 obstacle only on contact. While something moves, and for some minutes after (`planner.unrest`), the algorithm
-begins anew where it would say that the goal is enclosed.
+begins anew where it would say that the goal is enclosed; once as well where edges have been taken back.
 """
 
 from __future__ import annotations
@@ -137,6 +137,7 @@ class Walker(ABC, Generic[State]):
         self._near_m = 2.0 * self.keep_m + mission.speed_mps * (2.0 + mission.compute_latency_s)
         self._breach_keep_m = self.keep_m - BREACH_SHARE * config.margin_m
         self._unrest = Unrest()
+        self._tried_again = False
         self._plan: Plan | None = None
         self.legs: tuple[Leg[State], ...] = ()
         self.breach_m = math.inf
@@ -155,8 +156,8 @@ class Walker(ABC, Generic[State]):
         """What the algorithm does from a place on, in what is known, leg by leg to the goal or the horizon."""
 
     @abstractmethod
-    def follows(self, place: Point, state: State) -> Point | None:
-        """Where the boundary lies that is followed in a state at a place; None where none is."""
+    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+        """Where the boundary lies that is followed in a state at a place, and a mark on it; none where none is."""
 
     @abstractmethod
     def says(self, state: State) -> str:
@@ -180,7 +181,9 @@ class Walker(ABC, Generic[State]):
         station, end = request.station_m, self.legs[-1].state
         left = path.length_m - station
         if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
-            if not self._unrest.settled(request.time_s):
+            doubtful = taken_back or (self.known.taken_back and not self._tried_again)
+            if doubtful or not self._unrest.settled(request.time_s):
+                self._tried_again |= doubtful
                 return self._begun(request)
             return Plan(PlanStatus.UNREACHABLE, end.sentence)
         if len(fresh):
@@ -198,7 +201,7 @@ class Walker(ABC, Generic[State]):
         if math.dist(place, request.position_m) > max(1.0, OFF_PATH * self.mission.tracking_error_m):
             place = request.position_m
         state = self._state_at(path, station)
-        if taken_back and self._has_gone(self.follows(place, state)):
+        if taken_back and any(map(self._has_gone, self.follows(place, state))):
             state = self.begin(place)
         legs = tuple(self.walk(place, state))
         if not must and not self.prefers(legs, left):
@@ -211,9 +214,9 @@ class Walker(ABC, Generic[State]):
         place = request.position_m
         return self._found(tuple(self.walk(place, self.begin(place))), request)
 
-    def _has_gone(self, followed: Point | None) -> bool:
-        """Whether there is no boundary any more where one was followed."""
-        return followed is not None and math.dist(followed, self.known.seat(followed)[1]) > self.keep_m
+    def _has_gone(self, followed: Point) -> bool:
+        """Whether there is no boundary any more where one was."""
+        return math.dist(followed, self.known.seat(followed)[1]) > self.keep_m
 
     def _state_at(self, path: Path, station_m: float) -> State:
         """The state of the algorithm at a station of the path in effect."""

@@ -117,6 +117,32 @@ class Vanishing(Range):
         self._order.clear()
 
 
+class Opening(Range):
+    """The same, until a part of the wall in the west of the goal is taken back."""
+
+    looks, before = 0, 0
+
+    @property
+    def revision(self) -> int:
+        return self.before + len(self._order)
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return super().edges_since(revision - self.before)
+
+    def look(self, place: Point) -> None:
+        super().look(place)
+        self.looks -= 1
+        if not self.looks:
+            self._order = [each[~self._opens(each)] for each in self._order]
+            self._unseen &= ~self._opens(self._points)
+            self.before = 1
+            self.taken_back_at = self.revision
+
+    def _opens(self, points: FloatArray) -> BoolArray:
+        east, north = MISSION.goal_m
+        return (points[:, 0] < east) & (np.abs(points[:, 1] - north) < 4.0 * KEEP)
+
+
 class Walk(NamedTuple):
     status: PlanStatus
     reason: str
@@ -254,6 +280,19 @@ def test_no_enclosure_is_proved_soon_after_something_appeared(
     assert at_once.status is later.status is PlanStatus.UNREACHABLE
     assert at_once.length_m / MISSION.speed_mps < Unsettled.surprised_s + SETTLED_S
     assert later.length_m / MISSION.speed_mps > Unsettled.surprised_s + SETTLED_S
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("share", [0.8, 0.95, 1.0])
+def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: float, ring: MakePoints) -> None:
+    """At the end of the round as well as where it has been passed by."""
+    closed = ring(*MISSION.goal_m, 2000.0, SPACING)
+    flight = walk(kind, closed)
+    looks = round(share * len(flight.track_m))
+    world = type("Opens", (Opening,), {"looks": looks})
+    again = walk(kind, closed, world=world)
+    assert again.reason == "reached"
+    assert looks < len(again.track_m) < 3 * len(flight.track_m)
 
 
 @pytest.mark.parametrize("kind", KINDS)
