@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from tempfile import TemporaryDirectory
 from typing import Any
 
 
@@ -43,6 +43,7 @@ def cached(title: str, digest: str, measure: Callable[[], dict[str, Any]]) -> di
 def _write(file: Path, text: str) -> None:
     """All or nothing, so that processes which measure at the same time do not disturb each other."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    with NamedTemporaryFile("w", encoding="utf-8", dir=file.parent, delete=False) as new:
-        new.write(text)
-    os.replace(new.name, file)
+    with TemporaryDirectory(dir=file.parent) as folder:
+        new = Path(folder) / file.name
+        new.write_text(text, "utf-8")
+        os.replace(new, file)
