@@ -61,7 +61,8 @@ class Airframe:
         cruise_mps: default true airspeed.
         bank_limit_deg: largest bank the guidance may command.
         roll_rate_dps: fastest change of the roll command.
-        roll_in_s: time from level to 90 % of 30 degrees, the command a step.
+        roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less,
+            the command a step, at cruise.
         stall_angle_deg: angle of attack beyond which control counts as lost.
         roll_lag_s: time constant of roll behind its command.
         roll_delay_s: further delay of roll behind its command.

@@ -86,7 +86,7 @@ class Performance:
     Attributes:
         airspeed_mps: true airspeed the figures hold for.
         turn_radius_m: smallest radius a plan may ask for, margins for wind and turbulence included.
-        roll_in_s: time from wings level to 90 % of the bank of that turn.
+        roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less, at cruise.
         tracking_error_m: cross-track error that the guidance stays within on such a plan.
     """
 

@@ -271,7 +271,7 @@ def departure(state: AircraftState, bank_deg: float, speed: float) -> str | None
 
 
 def roll_in_s(frame: Airframe, speed: float) -> float:
-    """Time from level to 90 % of 30 degrees, the command a step; to 0.01 s.
+    """Time from wings level to 90 % of 30 degrees, or of the bank limit if that is less, the command a step; to 0.01 s.
 
     Raises:
         AircraftError: it does not get there.

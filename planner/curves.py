@@ -187,8 +187,7 @@ class Limits(NamedTuple):
 
     Attributes:
         radius_m: smallest radius.
-        roll_m: distance flown while rolling into the tightest turn; kept straight between a left and a right
-            turn.
+        roll_m: distance flown while rolling into a turn; kept straight between a left and a right turn.
     """
 
     radius_m: float

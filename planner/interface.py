@@ -112,7 +112,7 @@ class Mission:
         clearance_m: wanted distance from every obstacle edge.
         turn_radius_m: smallest radius a path may have.
         speed_mps: airspeed.
-        roll_in_s: time to roll into the tightest turn.
+        roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less.
         tracking_error_m: how far off the path the aircraft may be.
         sensor_range_m: radius of the sensing range (the paper's r).
         compute_latency_s: a plan takes effect this much after it was asked for.
