@@ -17,7 +17,7 @@ from aircraft.interface import FloatArray
 
 GRAVITY_FPS2 = 32.174
 ROLL_RATE_LIMIT_RADPS = 1.05
-ROLL_AUTHORITY_SHARE = 0.8
+ROLL_ERROR_SHARE = 0.8
 """Share of the steady roll rate at full aileron that roll errors may ask for."""
 
 
@@ -232,7 +232,7 @@ def gains(at: Derivatives, pace: float = 1.0) -> Gains:
     return Gains(
         qbar_psf=at.qbar_psf,
         roll=roll,
-        roll_rate_limit=min(ROLL_RATE_LIMIT_RADPS, ROLL_AUTHORITY_SHARE / max(aileron_p_forward, 1e-6)),
+        roll_rate_limit=min(ROLL_RATE_LIMIT_RADPS, ROLL_ERROR_SHARE / max(aileron_p_forward, 1e-6)),
         aileron_p=aileron_p,
         aileron_p_integral=2.0 * aileron_p,
         aileron_p_forward=aileron_p_forward,

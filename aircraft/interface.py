@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+STEP_RATE_HZ = 120
+"""Steps of a flight model a second."""
+
 
 class AircraftState(NamedTuple):
     """One instant of flight. SI units; velocities are over the ground, in the local ENU plane."""

@@ -12,13 +12,13 @@ import numpy as np
 from aircraft.autopilot import Derivatives, derivatives
 from aircraft.frames import LocalPlane
 from aircraft.injection import with_autopilot
+from aircraft.interface import STEP_RATE_HZ
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.start import StartConditions
 
 FOOT_M = 0.3048
 SLUG_KG = 14.59390
 REFERENCE_ALTITUDE_M = 300.0
-STEP_RATE_HZ = 120
 FULL_TRIM = 1
 
 

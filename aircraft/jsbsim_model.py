@@ -7,8 +7,8 @@ import math
 
 from aircraft.airframes import AircraftError, Airframe, airframe
 from aircraft.frames import LocalPlane
-from aircraft.interface import AircraftState, Command
-from aircraft.jsbsim_loading import FOOT_M, STEP_RATE_HZ, load, node, trim
+from aircraft.interface import STEP_RATE_HZ, AircraftState, Command
+from aircraft.jsbsim_loading import FOOT_M, load, node, trim
 from aircraft.properties import (
     COMMAND_PROPERTIES,
     CONTROLS,

@@ -7,11 +7,10 @@ import math
 import numpy as np
 
 from aircraft.guidance import GuidanceOutput
-from aircraft.interface import AircraftState, Command, FloatArray, Route
+from aircraft.interface import STEP_RATE_HZ, AircraftState, Command, FloatArray, Route
 from aircraft.route import route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 
-STEP_RATE_HZ = 120
 JOINED_M = 1e-6
 """A route that begins nearer than this begins where the point is."""
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import AircraftState, Command
+from aircraft.interface import STEP_RATE_HZ, AircraftState, Command
 from aircraft.start import Atmosphere, StartConditions
 
-STEP_RATE_HZ = 120
 LONGEST_STEP_S = 0.1
 
 

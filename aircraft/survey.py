@@ -18,10 +18,9 @@ from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import AircraftState, Command, Route
+from aircraft.interface import STEP_RATE_HZ, AircraftState, Command, Route
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,
-    STEP_RATE_HZ,
     angle_of_attack_rad,
     linearised,
     mass_kg,
@@ -43,7 +42,7 @@ GAIN_DIGITS = 5
 
 BANK_LIMIT_DEG = 45.0
 ROLL_RATE_DPS = 60.0
-ROLL_AUTHORITY_SHARE = 0.5
+ROLL_COMMAND_SHARE = 0.5
 """Share of the steady roll rate at full aileron that the roll command may ask for."""
 
 STALL_DEG, STALL_MARGIN_DEG = 15.0, 5.0
@@ -138,7 +137,7 @@ def _held_at_cruise(entry: Entry, files: ModelFiles, cruise: float) -> Airframe:
 
 def _provisional(entry: Entry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains) -> Airframe:
     """The airframe before its limits are known."""
-    roll_rate_dps = ROLL_AUTHORITY_SHARE * math.degrees(1.0 / max(abs(placed.aileron_p_forward), 1e-6))
+    roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(1.0 / max(abs(placed.aileron_p_forward), 1e-6))
     roll_rate_dps = float(math.floor(min(roll_rate_dps, ROLL_RATE_DPS)))
     slow = (GRAVITY_MPS2 * math.radians(roll_rate_dps) / (ROLL_LIMITED_S * cruise)) ** (1.0 / 3.0)
     figures = {

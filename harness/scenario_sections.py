@@ -152,7 +152,7 @@ class Sensor(Section):
         unit="Hz",
         default=2.0,
         ge=0.01,
-        le=120,
+        le=SIMULATION_RATE_HZ,
     )
     range_noise_m: float = key(
         "1 sigma of additive Gaussian noise on every range.", unit="m", default=0.0, ge=0, le=MAX_COORDINATE_M

@@ -35,11 +35,6 @@ FENCE = -1
 """Label of the discs that keep a path inside the area."""
 
 
-def margin_of(mission: Mission) -> float:
-    """Planned distance beyond the clearance where none is given (m)."""
-    return max(0.1 * mission.clearance_m, 2.0 * mission.tracking_error_m)
-
-
 class GrownObstacles:
     """The discs about all edge points seen so far.
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.compiled import FLOATS, ROWS, compiled
-from planner.interface import FloatArray, Path
+from planner.interface import FloatArray, Mission, Path
 
 Point = tuple[float, float]
 Segment = tuple[float, float, float, float, float, float]
@@ -192,6 +192,11 @@ class Limits(NamedTuple):
 
     radius_m: float
     roll_m: float
+
+    @classmethod
+    def of(cls, mission: Mission) -> Limits:
+        """Those of a mission."""
+        return cls(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
 
 
 def fillet(

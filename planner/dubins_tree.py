@@ -21,12 +21,12 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from planner.boundary import margin_of
 from planner.clearance import first_breach
 from planner.compiled import COUNTS, FLOAT, ROWS, compiled
 from planner.curves import SHORTEST_M, Point, Pose, Segment, along
 from planner.interface import FloatArray, IntArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.joining import departure, stuck
+from planner.margin import MARGIN_KEY, margin_of
 from planner.memory import ObstacleMemory
 from planner.route_optimisation import Terrain
 
@@ -62,15 +62,7 @@ class DubinsTreeConfig:
     tree_seed: int = field(
         default=1, metadata={"doc": "seed of the samples", "unit": "1", "minimum": 1, "maximum": 1_000_000}
     )
-    margin_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "planned distance beyond the clearance; "
-            "default: 0.1 of the clearance, at least twice the tracking error",
-            "unit": "m",
-            "minimum": 0.0,
-        },
-    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
 
     def resolved(self, mission: Mission) -> DubinsTreeConfig:
         """This config with every None replaced by its default for the mission.

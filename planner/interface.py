@@ -21,6 +21,9 @@ IntArray = NDArray[np.intp]
 ComplexArray = NDArray[np.complex128]
 
 
+OFF_PATH = 4.0
+"""So many times the tracking error off a path the aircraft has left it."""
+
 NOT_UNIT = 1e-6
 """A tangent is no unit vector where its length is off by more."""
 
@@ -132,6 +135,11 @@ class Mission:
     compute_latency_s: float = 0.0
     sensor_latency_s: float = 0.0
     wind_mps: float = 0.0
+
+    @property
+    def off_path_m(self) -> float:
+        """Further off the path in effect than this, a new one begins at the aircraft itself."""
+        return max(1.0, OFF_PATH * self.tracking_error_m)
 
     @property
     def ground_speed_mps(self) -> float:

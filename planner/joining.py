@@ -17,9 +17,6 @@ SHARES = (1.0, 0.5, 0.1)
 LEAD_S = 1.0
 """A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
 
-OFF_PATH = 4.0
-"""Further off the path than this many times the tracking error, a plan begins at the aircraft itself."""
-
 AHEAD_RADII = 4.0
 """The turn begins within so many turn radii."""
 
@@ -36,7 +33,7 @@ def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray
     path = request.flown.path if request.flown else None
     if path is not None and path.loiter:
         return Plan(PlanStatus.NO_PATH, f"{why}; holding")
-    limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
+    limits = Limits.of(mission)
     station = request.station_m
     if path is None or path.length_m - station < limits.roll_m:
         path = Path(np.array([(*request.position_m, *request.direction, 0.0, max(limits.roll_m, 1.0))]))
@@ -60,7 +57,7 @@ def departure(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segmen
     here = Pose(*request.position_m, *request.direction)
     if path is None or path.loiter or station >= path.length_m:
         return here, []
-    if math.dist(pose_at(path, station)[:2], here[:2]) > max(1.0, OFF_PATH * mission.tracking_error_m):
+    if math.dist(pose_at(path, station)[:2], here[:2]) > mission.off_path_m:
         return here, []
     leave = station + mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
     return pose_at(path, leave), between(path, station, leave)

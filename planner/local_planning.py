@@ -114,7 +114,7 @@ class LocalPlanning:
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
         self._hug_m = LEAST_HUG * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
-        self.limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
+        self.limits = Limits.of(mission)
 
     @property
     def path_keeps_m(self) -> float:

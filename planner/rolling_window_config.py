@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from planner.certificate import least_sensor_range_m
 from planner.interface import Mission
+from planner.margin import MARGIN_KEY, margin_of
 
 LEAD_S = 1.0
 """A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
@@ -44,15 +45,7 @@ class RollingWindowConfig:
             "maximum": 100,
         },
     )
-    margin_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "planned distance beyond the clearance; "
-            "default: 0.1 of the clearance, at least twice the tracking error",
-            "unit": "m",
-            "minimum": 0.0,
-        },
-    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
     rolling_step_m: float | None = field(
         default=None,
         metadata={
@@ -86,10 +79,9 @@ class RollingWindowConfig:
                 f"planning_window_m is {window:g}, more than sensor.range_m {mission.sensor_range_m:g}; "
                 "the planner cannot plan beyond what is sensed"
             )
-        margin = max(0.1 * mission.clearance_m, 2.0 * mission.tracking_error_m)
         return replace(
             self,
             planning_window_m=window,
-            margin_m=margin if self.margin_m is None else self.margin_m,
+            margin_m=margin_of(mission) if self.margin_m is None else self.margin_m,
             rolling_step_m=window / 16.0 if self.rolling_step_m is None else self.rolling_step_m,
         )

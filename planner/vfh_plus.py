@@ -23,11 +23,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.boundary import margin_of
 from planner.clearance import first_breach, inside_bounds
 from planner.curves import SHORTEST_M, Limits, Point, Pose, Segment, turn_onto
 from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.joining import departure, stuck
+from planner.margin import MARGIN_KEY, margin_of
 from planner.memory import ObstacleMemory
 
 WIDE_RAD = math.radians(80.0)
@@ -66,15 +66,7 @@ class VfhPlusConfig:
         default=0.10,
         metadata={"doc": "a sector is blocked above this magnitude", "unit": "1", "minimum": 0.0},
     )
-    margin_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "planned distance beyond the clearance; "
-            "default: 0.1 of the clearance, at least twice the tracking error",
-            "unit": "m",
-            "minimum": 0.0,
-        },
-    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
 
     def resolved(self, mission: Mission) -> VfhPlusConfig:
         """This config with every None replaced by its default for the mission.
@@ -103,7 +95,7 @@ class VfhPlus:
         assert config.margin_m is not None
         self._config, self._mission, self._window_m = config, mission, config.window_m
         self._keep_m = mission.clearance_m + config.margin_m
-        self._limits = Limits(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
+        self._limits = Limits.of(mission)
         self._memory = ObstacleMemory(mission.clearance_m)
         self._width_rad = math.tau / config.sectors
         self._bearings = self._width_rad * np.arange(config.sectors)

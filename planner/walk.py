@@ -19,15 +19,13 @@ from typing import Generic, Literal, Self, TypeVar
 
 import numpy as np
 
-from planner.boundary import GrownObstacles, margin_of
+from planner.boundary import GrownObstacles
 from planner.boundary_path import Contact
 from planner.clearance import distances, first_breach
 from planner.curves import SHORTEST_M, Point, Segment, along, between, end_of, pose_at
 from planner.interface import Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.margin import MARGIN_KEY, margin_of
 from planner.unrest import Unrest
-
-OFF_PATH = 4.0
-"""Further off the path than this many times the tracking error, a walk begins at the aircraft itself."""
 
 BREACH_SHARE = 0.25
 """A new edge point counts when it comes nearer than the kept distance by this share of the margin."""
@@ -46,15 +44,7 @@ class PointConfig:
     turn: Literal["left", "right"] = field(
         default="left", metadata={"doc": "the way a point turns when it meets an obstacle"}
     )
-    margin_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "planned distance beyond the clearance; "
-            "default: 0.1 of the clearance, at least twice the tracking error",
-            "unit": "m",
-            "minimum": 0.0,
-        },
-    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
     horizon_m: float | None = field(
         default=None,
         metadata={
@@ -198,7 +188,7 @@ class Walker(ABC, Generic[State]):
         if not must and station < self._look_at_m:
             return Plan(PlanStatus.KEPT, "the walk goes on")
         place = pose_at(path, station)[:2]
-        if math.dist(place, request.position_m) > max(1.0, OFF_PATH * self.mission.tracking_error_m):
+        if math.dist(place, request.position_m) > self.mission.off_path_m:
             place = request.position_m
         state = self._state_at(path, station)
         if taken_back and any(map(self._has_gone, self.follows(place, state))):

@@ -17,8 +17,8 @@ from aircraft.guidance import (
     GuidanceOutput,
     PathFollower,
 )
-from aircraft.interface import AircraftState, Command, Route
-from aircraft.point_mass import STEP_RATE_HZ, PointMass
+from aircraft.interface import STEP_RATE_HZ, AircraftState, Command, Route
+from aircraft.point_mass import PointMass
 from aircraft.route import arc_point, route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 

@@ -15,7 +15,6 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from planner import contract
-from planner.boundary import margin_of
 from planner.bug1 import Bug1, Bug1Config
 from planner.bug2 import Bug2, Bug2Config, crossings
 from planner.curves import Point, pose_at
@@ -29,6 +28,7 @@ from planner.interface import (
     PlanRequest,
     PlanStatus,
 )
+from planner.margin import margin_of
 from planner.tangent_bug import Following, TangentBug, TangentBugConfig
 from planner.unrest import SETTLED_S
 from planner.walk import Enclosed, mark_at
