@@ -155,6 +155,7 @@ def bow(places: ComplexArray, apart_m: float) -> ComplexArray:
     if end - start < 1e-3 * apart_m:
         return places  # all at one distance along the chord: no curve lies through them
     along = np.linspace(start, end, max(math.ceil((end - start) / apart_m), FEWEST + 1) + 1)
-    across = np.polyval(np.polyfit(turned.real, turned.imag, 2), along)
+    # With `full`, nothing is said where they are too few for one parabola: the flattest is taken.
+    across = np.polyval(np.polyfit(turned.real, turned.imag, 2, full=True)[0], along)
     bow: ComplexArray = places[0] + chord * (along + 1j * across)
     return bow

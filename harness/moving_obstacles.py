@@ -321,8 +321,10 @@ class MovingObstacles:
         return some[grown(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
 
     def _about(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
-        """All returns about some, clockwise."""
+        """All returns about some, clockwise; these where they lie too far apart for any to be about their mean."""
         near = (np.abs(places - places[mine].mean()) < self._gate).nonzero()[0]
+        if not len(near):
+            return mine
         half = len(scan.ranges_m) // 2
         about: IntArray = near[np.argsort((hits[near] - hits[mine[0]] + half) % len(scan.ranges_m))]
         return about

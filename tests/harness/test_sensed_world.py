@@ -318,3 +318,24 @@ def test_free_space_beyond_the_range_of_the_scan_stays() -> None:
     assert free.take_back(here, np.array([(3000.0, 1200.0)]))
     assert free.contains(behind).tolist() == [False, False, False, True, True]
     assert free.contains(np.array([(3000.0, 1100.0), (3300.0, 1300.0), (3000.0, 700.0)])).all()
+
+
+@pytest.mark.parametrize("noise_m", [15.0, 30.0, 60.0])
+@pytest.mark.parametrize("false_return", [0.1, 0.4])
+@pytest.mark.parametrize("clearance_m", [10.0, CLEARANCE])
+def test_whatever_a_bad_sensor_returns_is_taken_in(
+    noise_m: float, false_return: float, clearance_m: float
+) -> None:
+    world = world_of(
+        Obstacle(Circle((2700.0, 2400.0), 60.0), velocity_mps=(8.0, -2.0)),
+        block(2000.0, 2600.0, 4000.0, 2700.0),
+        *(Circle((300.0 + 700.0 * i, 1700.0 + 170.0 * (i % 3)), 50.0) for i in range(8)),
+    )
+    eye = sensor(world, range_noise_m=noise_m, false_return=false_return, dropout=0.1, rays=360)
+    seen = SensedWorld(BOUNDS, clearance_m, RANGE, noise_m=noise_m, false_returns=True)
+    for scan in flight(eye, 60.0, START, turn_rad_s=0.02):
+        seen.update(scan)
+        for each in seen.moving:
+            assert np.isfinite(each.points_m).all()
+            assert math.hypot(*each.velocity_mps) <= 30.0 + 1e-9
+    assert np.isfinite(seen.edges_since(-1)).all()
