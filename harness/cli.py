@@ -100,9 +100,13 @@ def _flush() -> None:
 
 def _report(error: Exception) -> int:
     """Says on standard error what went wrong and returns the exit status."""
+    from harness.crash import PlannerError, sentence
     from harness.input_file import InputError
     from harness.record import WriteError
 
+    if isinstance(error, PlannerError):
+        typer.echo(f"wayproof: {error}", err=True)
+        return BAD_INPUT
     if isinstance(error, InputError):
         typer.echo(str(error), err=True)
         return BAD_INPUT
@@ -116,6 +120,5 @@ def _report(error: Exception) -> int:
     if isinstance(error, OSError):
         typer.echo(f"wayproof: {error}", err=True)
         return FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
-    kind, text = type(error).__name__, " ".join(str(error).split())
-    typer.echo(f"wayproof: internal error, {kind}: {text}; --debug shows where", err=True)
+    typer.echo(f"wayproof: internal error, {sentence(error)}; --debug shows where", err=True)
     return FAILED

@@ -235,7 +235,9 @@ class _Plans:
         begun = time.perf_counter()
         try:
             plan = self._loop.planner.plan(request)
-        except (Exception, SystemExit) as error:
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever it is, it is no more than a plan that failed
             self.error = trace(error)
             return Outcome.PLANNER_FAILED, f"the planner raised {sentence(error)}"
         compute_ms = 1e3 * (time.perf_counter() - begun)

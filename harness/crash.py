@@ -6,9 +6,17 @@ import re
 import traceback
 
 
+class PlannerError(RuntimeError):
+    """A planner cannot be made; the message is one sentence that says why."""
+
+
 def sentence(error: BaseException) -> str:
     """Its type and what it says, in one line."""
-    return in_a_line(f"{type(error).__name__}: {error}")
+    try:
+        said = str(error)
+    except Exception:
+        said = "it cannot be told what"
+    return in_a_line(f"{type(error).__name__}: {said}")
 
 
 def trace(error: BaseException) -> str:

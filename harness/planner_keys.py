@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 from pydantic import ValidationError, create_model
 
+from harness.crash import PlannerError, sentence
 from harness.scenario_sections import PlannerSpec, Section, key
 from harness.validation import KeyFault, first_fault, unknown_key
 from planner.compiled import compile_all
@@ -48,14 +49,16 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
     """The planner for one flight, from a section that `resolved` returned; nothing is left to compile in it.
 
     Raises:
-        RuntimeError: making it would have ended the process.
+        PlannerError: whatever its constructor raised.
     """
     compile_all()
     kind = planner_kinds()[spec.kind]
     try:
         return kind.make(kind.config(**spec.own), mission)
-    except SystemExit as error:
-        raise RuntimeError(f"the planner {spec.kind} would have ended the process") from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise PlannerError(f"the planner {spec.kind} cannot be made: {sentence(error)}") from error
 
 
 def json_schema(common: dict[str, Any]) -> dict[str, Any]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from harness.crash import sentence, trace
-from harness.record import RunFolderError
+from harness.crash import PlannerError, sentence, trace
+from harness.record import RunFolderError, WriteError
 from harness.results import ERROR, metric_cells, time_cells
 from harness.scenario import Scenario, unpacked
 
@@ -54,21 +54,29 @@ def fly_job(job: Job) -> Answer:
     """Flies a job. What goes wrong in the flight is an answer too.
 
     Raises:
-        OSError: the run folder cannot be written, or the disk is full.
-        RunFolderError: the same.
+        OSError: the run folder cannot be written (`WriteError`), or the disk is full.
+        RunFolderError: it cannot be made.
     """
     try:
         scenario = unpacked(job.packed)
         metrics = _flown(job, scenario)
         optimum_m = _optimum_m(scenario) if job.optimum else None
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
-    except (OSError, RunFolderError):
+    except (WriteError, RunFolderError):
         raise
+    except PlannerError as error:
+        return failed(job.run, str(error), trace(error))
     except Exception as error:
-        if isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL:
-            raise error.__cause__ from error
+        if (full := _full(error)) is not None:
+            raise full from None
         return failed(job.run, sentence(error), trace(error))
     return Answer(job.run, cells, time_cells(metrics))
+
+
+def _full(error: Exception) -> OSError | None:
+    """What the disk said, if it takes no more."""
+    cause = error if isinstance(error, OSError) else error.__cause__
+    return cause if isinstance(cause, OSError) and cause.errno in FULL else None
 
 
 def failed(run: int, reason: str, error: str) -> Answer:

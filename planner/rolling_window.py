@@ -41,9 +41,6 @@ from planner.memory import ObstacleMemory
 from planner.rolling_window_config import LEAD_S, RollingWindowConfig
 from planner.telling import no_way_through
 
-OFF_PATH = 4.0
-"""Further off the path than this many times the tracking error, a plan begins at the aircraft itself."""
-
 BETTER = 0.005
 """A course that still serves is dropped only for one that is shorter by this share of what is left to fly."""
 
@@ -231,7 +228,7 @@ class RollingWindow:
         prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
         if effect is not None:
             uncut_m = math.inf if effect.holds(here) else max(0.0, self._watch.cut_m - here)
-            near_m = max(1.0, OFF_PATH * self._mission.tracking_error_m)
+            near_m = self._mission.off_path_m
             pose = Pose(*request.position_m, *request.direction)
             prefix = effect.onward_from(pose, here, min(self._lead_m, uncut_m), near_m) or prefix
         last = prefix[-1]

@@ -184,6 +184,39 @@ def test_planner_that_would_end_the_process(
     assert metrics["reason"] == f"the planner raised SystemExit: {told}"
 
 
+class Unspeakable(BaseException):
+    """As a panic of compiled code or a cancelled task: no Exception; and it cannot say what it is."""
+
+    def __str__(self) -> str:
+        raise RuntimeError("no words")
+
+
+@pytest.mark.parametrize("error", [Unspeakable(), GeneratorExit(), BaseExceptionGroup("g", [Unspeakable()])])
+def test_whatever_a_planner_raises_is_its_failure(
+    fly: Fly, answering: Install, small_world: SmallWorld, error: BaseException
+) -> None:
+    def panics(mission: Mission, request: PlanRequest) -> Plan:
+        raise error
+
+    answering(panics)
+    status, metrics = fly(small_world(planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (1, "planner_failed")
+    assert metrics["reason"].startswith(f"the planner raised {type(error).__name__}")
+    assert metrics["error"].rstrip().splitlines()
+
+
+def test_an_interrupt_while_it_plans_is_none(
+    fly: Fly, answering: Install, small_world: SmallWorld, tmp_path: FilePath
+) -> None:
+    def is_interrupted(mission: Mission, request: PlanRequest) -> Plan:
+        raise KeyboardInterrupt
+
+    answering(is_interrupted)
+    with pytest.raises(FileNotFoundError):
+        fly(small_world(planner={"kind": "stand_in"}))
+    assert not (tmp_path / "run" / "metrics.json").exists()
+
+
 def test_planner_whose_tangents_are_no_unit_vectors(
     fly: Fly, answering: Install, small_world: SmallWorld
 ) -> None:

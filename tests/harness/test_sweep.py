@@ -74,18 +74,36 @@ class Raises(RollingWindow):
 
 
 class Leaves(RollingWindow):
+    error = SystemExit(0)
+
     def __init__(self, config, mission):
-        raise SystemExit(0)
+        raise self.error
 
 
-DIES, RAISES, LEAVES = (
-    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Dies, Raises, Leaves)
+class Lacks(Leaves):
+    error = FileNotFoundError(2, "no such file", "model.bin")
+
+
+class Full(Leaves):
+    error = OSError(28, "no space left on device")
+
+
+class Panics(Leaves):
+    error = GeneratorExit("a panic")
+
+
+DIES, RAISES, LEAVES, LACKS, FULL, PANICS = (
+    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind)
+    for kind in (Dies, Raises, Leaves, Lacks, Full, Panics)
 )
 """
 ENTRY_POINTS = "".join(
     [
         "[wayproof.planners]\n",
-        *(f"{name.lower()} = campaign_plugin:{name}\n" for name in ("DIES", "RAISES", "LEAVES")),
+        *(
+            f"{name.lower()} = campaign_plugin:{name}\n"
+            for name in ("DIES", "RAISES", "LEAVES", "LACKS", "FULL", "PANICS")
+        ),
     ]
 )
 
@@ -259,7 +277,9 @@ def test_crashes_are_rows_with_their_tracebacks_and_end_nothing(
     assert died["reason"] == "the process that flew it died, each time that it was tried"
     assert raised["error"].startswith("Traceback")
     assert "campaign_plugin.py" in raised["error"]
-    assert raised["reason"] == "ValueError: not *to* be made: <object object at 0x...>"
+    assert raised["reason"] == (
+        "the planner raises cannot be made: ValueError: not *to* be made: <object object at 0x...>"
+    )
     assert raised["digest"] is None
     out = capfd.readouterr().out
     assert json.loads(out[: len(out) // 2])["outcomes"] == {"error": 4, "reached": 2}, (
@@ -393,19 +413,22 @@ def test_resume_refuses_another_aircraft_or_planner_of_the_same_name(
     assert 'planners.leaves was "campaign_plugin 1.0", is "campaign_plugin 2.0"' in capsys.readouterr().err
 
 
-def test_a_planner_that_ends_the_process_is_a_row(
+def test_a_planner_that_cannot_be_made_is_a_row_whatever_it_raises(
     place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     with_plugin(place, monkeypatch)
-    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[leaves, rolling_window]").replace(
-        "draws: 2", "draws: 1"
-    )
-    (place / "campaign.yaml").write_text(text)
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[leaves, lacks, full, panics, rolling_window]")
+    (place / "campaign.yaml").write_text(text.replace("draws: 2", "draws: 1"))
     assert sweep(place, "--workers", "1", "--quiet") == 1
     rows = rows_of(place / "out")
-    assert [row["outcome"] for row in rows] == ["error", "reached"] * 2
-    assert "would have ended the process" in rows[0]["reason"]
-    assert "SystemExit" in rows[0]["error"]
+    assert [row["outcome"] for row in rows] == [*["error"] * 4, "reached"] * 2
+    why = ("SystemExit: 0", "FileNotFoundError: [Errno 2]", "OSError: [Errno 28]", "GeneratorExit: a panic")
+    for row, told in zip(rows[:4], why, strict=True):
+        assert f"cannot be made: {told}" in row["reason"]
+        assert told.split(":")[0] in row["error"]
+    assert main(["fly", str(place / "short.yaml"), "--planner", "lacks", "--out", str(place / "run")]) == 2
+    assert "wayproof: the planner lacks cannot be made: FileNotFoundError" in capfd.readouterr().err
+    assert not (place / "run").exists()
 
 
 def test_resume_refuses_other_versions(
