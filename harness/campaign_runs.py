@@ -138,8 +138,14 @@ class CampaignRuns:
 
     @cached_property
     def _whole(self) -> set[str]:
-        """Keys drawn at random that take whole numbers alone."""
-        return {name for name in self.campaign.random if takes_whole_numbers(loc_of(name))}
+        """Keys drawn at random that take whole numbers alone; an InputError where a range of theirs ends elsewhere."""
+        whole = [name for name in self.campaign.random if takes_whole_numbers(loc_of(name))]
+        for name in whole:
+            for within, end in self.campaign.random[name].ends():
+                if not end.is_integer():
+                    sentence = f"is {end:g}; must be a whole number, as {name} is"
+                    raise InputError(self._line(("random", name, *within), sentence))
+        return set(whole)
 
     @cached_property
     def _of_entries(self) -> dict[str, tuple[Any, ...]]:
@@ -286,9 +292,8 @@ class CampaignRuns:
             if each.choice:
                 node = self._at((*origin, "choice", each.chosen(share)))
             else:
-                number = each.number(share)
-                whole = name in self._whole
-                node = Node(round(number) if whole else number, self.file.root.line_of(origin))
+                number = each.whole_number(share) if name in self._whole else each.number(share)
+                node = Node(number, self.file.root.line_of(origin))
             changes.append(_Change(loc_of(name), node, origin))
         return changes
 

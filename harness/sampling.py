@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, Strict, field_validator, model_validator
 
 from harness.scenario_sections import Section, key
+from harness.strict_yaml import Loc
 
 if TYPE_CHECKING:
     from scipy.stats import qmc
@@ -58,7 +59,8 @@ class Distribution(Section):
     )
 
     uniform: Annotated[tuple[Number, Number], Strict(False)] | None = key(
-        "Evenly between two numbers.", default=None
+        "Evenly between two numbers; of a key that takes whole ones alone, both ends are drawn as often as the others.",
+        default=None,
     )
     normal: Normal | None = key("A Gaussian.", default=None)
     choice: Annotated[tuple[Any, ...], Strict(False)] | None = key(
@@ -91,6 +93,20 @@ class Distribution(Section):
         drawn = NormalDist(self.normal.mean, self.normal.sigma).inv_cdf(reached)
         least = drawn if self.normal.least is None else max(drawn, self.normal.least)
         return least if self.normal.most is None else min(least, self.normal.most)
+
+    def whole_number(self, share: float) -> int:
+        """The same for a key that takes whole numbers alone."""
+        if not self.uniform:
+            return round(self.number(share))
+        low, high = map(int, self.uniform)
+        return low + min(int((high - low + 1) * share), high - low)
+
+    def ends(self) -> list[tuple[Loc, float]]:
+        """Where it begins and ends, as far as that is given, and where in it that is said."""
+        if self.uniform:
+            return [(("uniform", index), end) for index, end in enumerate(self.uniform)]
+        limits = {"least": self.normal.least, "most": self.normal.most} if self.normal else {}
+        return [(("normal", name), end) for name, end in limits.items() if end is not None]
 
     def chosen(self, share: float) -> int:
         """Index of the choice that a number in [0, 1) stands for."""

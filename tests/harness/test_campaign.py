@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -138,6 +139,21 @@ def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> Non
     drawn = {run.varied["sensor.rays"] for run in all_of(runs)}
     assert all(isinstance(each, int) and 100 <= each <= 700 for each in drawn)
     assert len(drawn) > 6
+
+
+@pytest.mark.parametrize(
+    ("drawn", "where"),
+    [
+        ("{uniform: [3.5, 9]}", "uniform[0]: is 3.5"),
+        ("{normal: {mean: 9, sigma: 3, most: 9.2}}", "normal.most: is 9.2"),
+    ],
+)
+def test_ranges_of_whole_numbers_end_at_whole_numbers(place: Path, drawn: str, where: str) -> None:
+    text = CAMPAIGN.replace("random:\n", f"random:\n  sensor.rays: {drawn}\n").replace(
+        "sensor.rays: {choice", "trackability.altitude_m: {choice"
+    )
+    with pytest.raises(InputError, match=re.escape(f"random.sensor.rays.{where}; must be a whole number")):
+        runs_of(place, text).check()
 
 
 def test_scenarios_of_a_folder_may_end_in_yml(place: Path) -> None:
