@@ -222,11 +222,9 @@ def u_traps(config: UTraps, rng: np.random.Generator) -> GeneratedWorld:
 
 def _placed(config: _Scattered, radii: FloatArray, rng: np.random.Generator) -> list[Place | None]:
     """A middle for each disc of these radii, None for one without a place."""
-    largest = float(radii.max(initial=0.0))
-    cell_m = max(2 * largest + config.gap_m, largest + config.room_m, max(config.size_m) / MOST_COLUMNS)
-    taken, ends = _Taken(cell_m), config.world(())
-    for end in (ends.start_m, ends.goal_m):
-        taken.add(end, config.room_m)
+    largest, ends = float(radii.max(initial=0.0)), config.world(())
+    cell_m = max(2 * largest + config.gap_m, max(config.size_m) / MOST_COLUMNS)
+    taken = _Taken(cell_m, [(*end, config.room_m) for end in (ends.start_m, ends.goal_m)])
     found: list[Place | None] = []
     in_vain = 0
     for radius in radii.tolist():
@@ -246,10 +244,15 @@ def _tries(config: _Scattered, rng: np.random.Generator) -> Iterator[list[Place]
 
 
 class _Taken:
-    """Discs, by square cells so large that those which can matter to another lie in its cell or the next."""
+    """Discs, by square cells so large that those which can matter to another lie in its cell or the next.
 
-    def __init__(self, cell_m: float) -> None:
-        self._cell_m = cell_m
+    Args:
+        cell_m: side of a cell.
+        large: east, north and what is kept of those that are too large for that.
+    """
+
+    def __init__(self, cell_m: float, large: list[tuple[float, float, float]]) -> None:
+        self._cell_m, self._large = cell_m, large
         # East, north and what is kept of all that can matter to a cell.
         self._near: defaultdict[tuple[int, int], list[tuple[float, float, float]]] = defaultdict(list)
 
@@ -263,7 +266,8 @@ class _Taken:
         """The first place where a disc keeps from every other one what that asks for; None where there is none."""
         near, cell_m = self._near, self._cell_m
         for east, north in places:
-            for x, y, kept_m in near.get((int(east // cell_m), int(north // cell_m)), ()):
+            cell = int(east // cell_m), int(north // cell_m)
+            for x, y, kept_m in itertools.chain(self._large, near.get(cell, ())):
                 apart_m = kept_m + radius_m
                 if (east - x) * (east - x) + (north - y) * (north - y) < apart_m * apart_m:
                     break

@@ -13,6 +13,7 @@ import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from harness import worlds_scattered
 from harness.generated_world import GeneratedWorld
 from harness.scenario import parse_scenario
 from harness.strict_yaml import dump
@@ -216,3 +217,20 @@ def test_the_defaults_make_a_scenario(name: str) -> None:
     )
     assert len(scenario.obstacles) == len(made.obstacles) > 0
     assert math.dist(made.start_m, made.goal_m) > 1000
+
+
+def test_small_obstacles_are_looked_for_among_those_near_by_however_much_room_start_and_goal_have(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made: list[Any] = []
+    taken = worlds_scattered._Taken
+
+    def kept(*arguments: Any) -> Any:
+        made.append(taken(*arguments))
+        return made[-1]
+
+    monkeypatch.setattr(worlds_scattered, "_Taken", kept)
+    keys = {"size_m": [1600, 1600], "density_1pkm2": 1500, "radius_m": [1, 2], "gap_m": 0, "room_m": 400}
+    world = worlds_scattered.circles(worlds_scattered.Circles.model_validate(keys), np.random.default_rng(1))
+    assert len(world.obstacles) > 3000
+    assert max(map(len, made[0]._near.values())) < 100
