@@ -136,7 +136,7 @@ class Base:
     """A scenario that a campaign starts from.
 
     Attributes:
-        file: name of its file; of the campaign's, if it names no scenarios.
+        file: name of its file; of the campaign itself, if that names no scenarios.
         source: what its faults name it.
         root: its keys.
     """
@@ -206,7 +206,7 @@ def load_campaign(path: Path) -> CampaignFile:
     if not campaign.scenarios:
         line = root.line_of(("worlds",))
         node = Node({"schema": Node("wayproof/scenario/1", line), "name": Node(campaign.name, line)}, line)
-        return CampaignFile(campaign, source, root, (Base(path.name, source, node),))
+        return CampaignFile(campaign, source, root, (Base(campaign.name, source, node),))
     bases: dict[str, Base] = {}
     for index, entry in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)

@@ -254,6 +254,13 @@ def test_worlds_need_no_scenario(place: Path) -> None:
     assert (runs.scenario(0).planner.kind, runs.scenario(0).aircraft.model) == ("rolling_window", "aerosonde")
 
 
+def test_results_of_a_campaign_of_worlds_do_not_depend_on_its_files_name(place: Path) -> None:
+    text = "schema: wayproof/campaign/1\nname: c\nseed: 1\nworlds: [{forest: {}}]\n"
+    for name in ("one.yaml", "other.yaml"):
+        (place / name).write_text(text)
+    assert load_campaign(place / "one.yaml").plain() == load_campaign(place / "other.yaml").plain()
+
+
 def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
     text = "schema: wayproof/campaign/1\nname: small\nseed: 5\nscenarios: [ring.yaml, more, paper_circles]\n"
     runs = runs_of(place, text)
