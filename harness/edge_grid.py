@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-MOST_CELLS = 4_000_000
+MOST_CELLS = 16_000_000
 
 
 @dataclass(frozen=True)

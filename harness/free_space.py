@@ -12,7 +12,7 @@ from planner.interface import BoolArray, FloatArray
 
 CELLS, CELLS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]"
 """Parts of grids."""
-MOST_CELLS = 1_000_000
+MOST_CELLS = 16_000_000
 NARROWEST_RAD = 1e-3
 """What something hides is told by bearings no finer than this."""
 

@@ -134,3 +134,12 @@ def test_plans_can_be_flown_and_are_what_was_flown(flown: Flown) -> None:
     assert run.metrics["bank_saturation_fraction"] <= 1e-3
     for row, time_s in zip(run.track.plan_index, run.track.time_s, strict=True):
         assert row < 0 or run.plans[row].time_s <= time_s + 1e-9
+
+
+@pytest.mark.parametrize("side_m", [100_000, 200_000])
+def test_a_forest_is_flown_through_as_well_where_it_lies_in_a_large_area(flown: Flown, side_m: int) -> None:
+    own = flown("aerosonde_forest").metrics
+    large = flown("aerosonde_forest", ("area.bounds_m", f"[0, 0, {side_m}, {side_m}]")).metrics
+    assert large["outcome"] == "reached"
+    assert large["clearance_violation_s"] == 0.0
+    assert large["flown_length_m"] < 1.02 * own["flown_length_m"]
