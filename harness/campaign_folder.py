@@ -7,7 +7,6 @@ Whoever writes holds a lock on the file `lock` (flock), which ends with the proc
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 from collections import Counter
@@ -19,6 +18,7 @@ from typing import IO, Any, Final
 
 from aircraft.airframes import airframe
 from harness.campaign_runs import CampaignRuns
+from harness.folder_lock import FolderLock
 from harness.record import RunFolderError
 from harness.results import METRICS, RESULTS, RUN, SCHEMA, TIMES, TIMINGS, table
 from harness.versions import versions
@@ -123,7 +123,7 @@ class CampaignFolder:
             raise RunFolderError(
                 f"{path} is not empty and not a campaign's folder: choose another one or empty it first"
             )
-        _lock(self._stack.enter_context((path / LOCK).open("w")), path)
+        self._stack.callback(FolderLock(path, LOCK).release)
         now, before = self._about(), _index(path)
         done, kept_bytes = set(), 0
         for line, end in _lines(path / JOURNAL):
@@ -164,15 +164,6 @@ def _index(path: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     return index if isinstance(index, dict) and index.get("schema") == FOLDER_SCHEMA else None
-
-
-def _lock(file: IO[str], path: Path) -> None:
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise RunFolderError(
-            f"{path} is being flown into by another process: wait for it or choose another folder"
-        ) from error
 
 
 def _lines(journal: Path) -> Iterator[tuple[dict[str, Any], int]]:

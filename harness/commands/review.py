@@ -39,7 +39,8 @@ def report(
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
     """
-    from harness.campaign_folder import INDEX
+    from harness.campaign_folder import INDEX, LOCK
+    from harness.folder_lock import is_held
     from harness.input_file import InputError
     from harness.record import RunFolderError
     from harness.results import RESULTS
@@ -47,6 +48,10 @@ def report(
 
     if (run / RESULTS).is_file():
         return _summary(run, by)
+    if (run / INDEX).is_file() and is_held(run / LOCK):
+        raise InputError(
+            f"{run}: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended"
+        )
     if (run / INDEX).is_file():
         raise InputError(
             f"{run}: its campaign was stopped before the tables were written; `wayproof sweep` with --resume makes them"

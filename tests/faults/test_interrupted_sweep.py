@@ -87,8 +87,12 @@ def test_two_sweeps_into_one_folder(place: Path, unbroken: bytes) -> None:
         status, out, err = run(place, *SWEEP, *resume)
         assert (status, out) == (2, "")
         assert err == (
-            "wayproof: out is being flown into by another process: wait for it or choose another folder\n"
+            "wayproof: another wayproof is writing to out: wait until it has ended or choose another folder\n"
         )
+    assert run(place, "report", "out") == (
+        *(2, ""),
+        "out: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended\n",
+    )
     first.send_signal(signal.SIGCONT)
     assert first.communicate(timeout=60) == ("", "")
     assert first.returncode == 0

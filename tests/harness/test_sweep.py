@@ -461,7 +461,7 @@ def test_two_sweeps_into_one_folder_are_one_too_many(place: Path) -> None:
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
     with (
         CampaignFolder(place / "out", runs, resume=False),
-        pytest.raises(RunFolderError, match="is being flown into by another process"),
+        pytest.raises(RunFolderError, match="another wayproof is writing to"),
     ):
         CampaignFolder(place / "out", runs, resume=True)
     with CampaignFolder(place / "out", runs, resume=True) as folder:
