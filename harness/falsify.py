@@ -1,7 +1,7 @@
 """The breaking point: flies a scenario under ever other conditions until the mildest is known that makes it fail.
 
-The folder holds `falsify.csv`, a line for every flight, written as it ends; `falsify.json`, the result, which
-says whether it is complete; and, where something failed, `falsified.yaml`, the whole scenario that does.
+The folder holds `falsify.csv`, a line for every flight; `falsify.json`, the result, which says whether it is
+complete; and, where something failed, `falsified.yaml`, the whole scenario that does.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from harness.crash import sentence
-from harness.falsify_folder import FALSIFIED, PICTURES, SCHEMA, Trial, trials_folder, write_index
+from harness.falsify_folder import FALSIFIED, PICTURES, SCHEMA, SearchFolder, Trial, write_index
 from harness.falsify_keys import Load, Vary, scenario_at
 from harness.falsify_search import Judge, Point, Searched, Verdict, search
 from harness.scenario import Scenario, dump_scenario
@@ -106,8 +106,8 @@ def falsify(
         progress: told after each flight how many conditions have begun, of how many, and what became of it.
 
     Raises:
-        InputError: a condition is no scenario.
-        RunFolderError: the folder holds something else or cannot be written.
+        InputError: a condition is no scenario, or cannot be flown; the folder is as it was.
+        RunFolderError: the folder holds something else, another process writes to it, or it cannot be written.
     """
     base = scenario_at(load, vary, (0.0,) * len(vary))
     trials: list[Trial] = []
@@ -123,7 +123,7 @@ def falsify(
             margin = 0.0 if failed else _margin(scenario, figures, until)
             trial = Trial(len(trials), condition, point, values, seed, failed, margin, **_columns(figures))
             trials.append(trial)
-            write(trial)
+            folder.write(trial)
             if progress is not None:
                 told = ", ".join(f"{value:.4g}" for value in values)
                 progress(condition + 1, conditions, f"{told}: {trial.outcome}")
@@ -132,19 +132,20 @@ def falsify(
             margins.append(margin)
         return Verdict(False, min(margins))
 
-    with trials_folder(out, vary) as write:
+    with SearchFolder(out, vary) as folder:
         searched = _searched(judge, vary, conditions, tolerance, base.seed)
-    result = _breaking(base, vary, until, tolerance, searched, trials)
-    if result.found is not None:
-        failing = scenario_at(load, vary, result.found.displacement)
-        (out / FALSIFIED).write_text(
-            dump_scenario(failing.model_copy(update={"seed": result.found.seed})), encoding="utf-8"
-        )
-    if len(vary) == 2:
-        from harness.falsify_figure import write_figure
+        folder.take_over()
+        result = _breaking(base, vary, until, tolerance, searched, trials)
+        if result.found is not None:
+            failing = scenario_at(load, vary, result.found.displacement)
+            (out / FALSIFIED).write_text(
+                dump_scenario(failing.model_copy(update={"seed": result.found.seed})), encoding="utf-8"
+            )
+        if len(vary) == 2:
+            from harness.falsify_figure import write_figure
 
-        write_figure(result, [out / name for name in PICTURES])
-    write_index(out, result.plain())
+            write_figure(result, [out / name for name in PICTURES])
+        write_index(out, result.plain())
     return result
 
 

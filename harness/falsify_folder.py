@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
+from types import TracebackType
 from typing import Any, Final
 
 from harness.falsify_keys import Vary
 from harness.falsify_search import Point
+from harness.folder_lock import FolderLock
 from harness.record import RunFolderError
-from harness.whole_file import replace_text
+from harness.strict_yaml import InputError
+from harness.whole_file import PARTIAL, replace_text
 
 SCHEMA: Final = "wayproof/falsify/1"
 INDEX: Final = "falsify.json"
@@ -63,39 +66,79 @@ class Trial:
     digest: str = ""
 
 
-@contextmanager
-def trials_folder(out: Path, vary: Sequence[Vary]) -> Iterator[Callable[[Trial], None]]:
-    """Makes the folder ours and gives what writes a line of `falsify.csv`; on leaving it is not yet complete.
+class SearchFolder:
+    """The folder of a search that is under way. Use as a context manager; this process alone writes to it.
 
-    Raises:
-        RunFolderError: the folder holds something else or cannot be written.
+    Flights go into `falsify.csv.partial`. An earlier search stays until `take_over`, which Ctrl-C calls where a
+    flight has ended; an InputError leaves everything as it was found.
     """
-    if out.exists() and not out.is_dir():
-        raise RunFolderError(f"{out} is a file, not a folder for a search")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if any(out.iterdir()) and not _is_ours(out):
-            raise RunFolderError(
-                f"{out} is not empty and not a search: choose another folder or empty it first"
+
+    def __init__(self, out: Path, vary: Sequence[Vary]) -> None:
+        """Claims the folder, made with its parents where missing.
+
+        Raises:
+            RunFolderError: the folder holds something else, another process writes to it, or it cannot be written.
+        """
+        if out.exists() and not out.is_dir():
+            raise RunFolderError(f"{out} is a file, not a folder for a search")
+        self._out, self._vary, self.flights = out, vary, 0
+        self._made = [each for each in (out, *out.parents) if not each.exists()]
+        with ExitStack() as stack, _told(out):
+            out.mkdir(parents=True, exist_ok=True)
+            stack.callback(FolderLock(out).release)
+            others = {each.name for each in out.iterdir()} - {TRIALS + PARTIAL, INDEX + PARTIAL}
+            if others and not _is_ours(out):
+                raise RunFolderError(
+                    f"{out} is not empty and not a search: choose another folder or empty it first"
+                )
+            self._file = stack.enter_context(
+                (out / (TRIALS + PARTIAL)).open("w", encoding="utf-8", newline="")
             )
-        write_index(out, {"schema": SCHEMA, "complete": False})
-        for name in (TRIALS, FALSIFIED, *PICTURES):
-            (out / name).unlink(missing_ok=True)
-        file = (out / TRIALS).open("w", encoding="utf-8", newline="")
+            self._plain = [each.name for each in fields(Trial) if each.name not in ("displacement", "values")]
+            names = [*self._plain[:2], *(each.key for each in vary), *self._plain[2:]]
+            self._writer = csv.DictWriter(self._file, names, lineterminator="\n")
+            self._writer.writeheader()
+            self._file.flush()
+            self._held = stack.pop_all()
+
+    def write(self, trial: Trial) -> None:
+        """Puts a flight that has ended into the table."""
+        keys = {each.key: value for each, value in zip(self._vary, trial.values, strict=True)}
+        self._writer.writerow({name: getattr(trial, name) for name in self._plain} | keys)
+        self._file.flush()
+        self.flights += 1
+
+    def take_over(self) -> None:
+        """Puts these flights in the place of an earlier search, all of which goes; not yet complete."""
+        with _told(self._out):
+            self._file.close()
+            write_index(self._out, {"schema": SCHEMA, "complete": False})
+            for name in (FALSIFIED, *PICTURES):
+                (self._out / name).unlink(missing_ok=True)
+            (self._out / (TRIALS + PARTIAL)).replace(self._out / TRIALS)
+
+    def __enter__(self) -> SearchFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        with self._held:
+            if isinstance(error, KeyboardInterrupt) and self.flights and not self._file.closed:
+                self.take_over()
+            elif isinstance(error, InputError | KeyboardInterrupt):
+                (self._out / (TRIALS + PARTIAL)).unlink(missing_ok=True)
+                with suppress(OSError):  # what holds anything else stays
+                    for each in self._made:
+                        each.rmdir()
+
+
+@contextmanager
+def _told(out: Path) -> Iterator[None]:
+    try:
+        yield
     except OSError as error:
         raise RunFolderError(f"cannot write the search in {out}: {error.strerror or error}") from error
-    with file:
-        plain = [field.name for field in fields(Trial) if field.name not in ("displacement", "values")]
-        names = [*plain[:2], *(each.key for each in vary), *plain[2:]]
-        writer = csv.DictWriter(file, names, lineterminator="\n")
-        writer.writeheader()
-
-        def write(trial: Trial) -> None:
-            keys = {each.key: value for each, value in zip(vary, trial.values, strict=True)}
-            writer.writerow({name: getattr(trial, name) for name in plain} | keys)
-            file.flush()
-
-        yield write
 
 
 def _is_ours(out: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -24,6 +25,7 @@ from harness.commands.options import (
 
 if TYPE_CHECKING:
     from harness.falsify import Until
+    from harness.falsify_keys import Vary
     from harness.scenario import Scenario
 
 RUNS_A_KEY: Final = 40
@@ -51,7 +53,9 @@ def falsify(
     tolerance: Annotated[
         float, typer.Option(metavar="SHARE", help="Narrow down to this share of each range.")
     ] = 0.01,
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/falsify.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/falsify-KEYS.")
+    ] = None,
     as_json: JsonOption = False,
 ) -> int:
     """The mildest condition that makes the run fail, and the scenario that does.
@@ -98,7 +102,15 @@ def _search(
         return load(scenario, [*fixed, *replaced])
 
     varied = vary_of(loaded, ranges, [name for name, _ in fixed])
-    folder = out or Path("runs") / loaded(()).name / "falsify"
+    folder = out or Path("runs") / loaded(()).name / _folder_name(varied)
+    flights = 0
+
+    def ended(*step: Any) -> None:
+        nonlocal flights
+        flights += 1
+        if report is not None:
+            report(*step)
+
     try:
         with step_bar() as report:
             found = search(
@@ -110,12 +122,13 @@ def _search(
                 conditions=runs,
                 seeds=seeds,
                 tolerance=tolerance,
-                progress=report,
+                progress=ended,
             )
     except RunFolderError as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
-        typer.echo(f"wayproof: interrupted; the flights so far are in {folder / TRIALS}", err=True)
+        told = f"the flights so far are in {folder / TRIALS}" if flights else "no flight had ended yet"
+        typer.echo(f"wayproof: interrupted; {told}", err=True)
         raise
     if as_json:
         print_json(found.plain())
@@ -125,6 +138,11 @@ def _search(
         typer.echo(f"again: wayproof fly {folder / FALSIFIED}")
     typer.echo(last_line(found))
     return 0
+
+
+def _folder_name(vary: Sequence[Vary]) -> str:
+    """Of the keys, their indices as `--set` takes them, which no shell takes for a pattern."""
+    return "-".join(["falsify", *(each.key.replace("[", ".").replace("]", "") for each in vary)])
 
 
 def _flown(scenario: Scenario) -> dict[str, Any]:

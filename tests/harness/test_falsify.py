@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -54,7 +55,8 @@ def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Break
     def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
         return load_scenario(file, replaced)
 
-    return falsify(load, vary_of(load, ranges), file.parent / "out", **({"flown": flown} | other))
+    out = other.pop("out", file.parent / "out")
+    return falsify(load, vary_of(load, ranges), out, **({"flown": flown} | other))
 
 
 def test_the_time_that_is_too_short_is_found(file: Path) -> None:
@@ -163,7 +165,7 @@ def test_a_crash_is_a_failure_and_a_model_that_cannot_begin_is_not(file: Path) -
     assert (result.found.outcome, result.found.reason) == ("error", "ZeroDivisionError: in the planner")
     with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
         broken(file, noise, flown=refuses)
-    assert json.loads((file.parent / "out" / INDEX).read_text())["complete"] is False
+    assert json.loads((file.parent / "out" / INDEX).read_text())["complete"] is True, "the earlier search"
 
 
 def test_what_is_not_monotone_is_reported(file: Path) -> None:
@@ -216,13 +218,20 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     assert main(["falsify", *given, "--seed", "9", "--tolerance", "0.1", "--runs", "9"]) == 0
     said = capsys.readouterr()
     assert said.err == ""
-    assert "again: wayproof fly runs/straight/falsify/falsified.yaml" in said.out
+    assert "again: wayproof fly runs/straight/falsify-mission.time_limit_s/falsified.yaml" in said.out
     assert max(map(len, said.out.splitlines())) <= 80
-    found = json.loads(Path("runs/straight/falsify/falsify.json").read_text())
+    found = json.loads(Path("runs/straight/falsify-mission.time_limit_s/falsify.json").read_text())
     (value,) = found["found"]["values"]
     assert said.out.splitlines()[-1] == f"falsified: mission.time_limit_s={value:.6g}"
     assert WAY_M / 25.0 - 10.0 < value < WAY_M / 25.0 + 3.0
-    again = ["fly", "runs/straight/falsify/falsified.yaml", "--no-recording", "--json", "--out", "again"]
+    again = [
+        "fly",
+        "runs/straight/falsify-mission.time_limit_s/falsified.yaml",
+        "--no-recording",
+        "--json",
+        "--out",
+        "again",
+    ]
     assert main(again) == 1
     metrics_again = json.loads(capsys.readouterr().out)
     assert metrics_again["outcome"] == found["found"]["outcome"] == "timeout"
@@ -231,6 +240,85 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     assert main(["falsify", *given, "--runs", "2", "--json", "--set", "mission.goal_radius_m=60"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert (printed["verdict"], printed["flights"], printed["settled"]) == ("found", 2, False)
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in folder.iterdir()}
+
+
+@pytest.mark.parametrize("flights", [0, 1, 6])
+def test_a_condition_that_cannot_be_flown_leaves_everything_as_it_was(file: Path, flights: int) -> None:
+    def refuses(scenario: Scenario) -> dict[str, Any]:
+        if next(begun) >= flights:
+            raise AircraftError("cannot be trimmed")
+        return stand_in()
+
+    begun = itertools.count()
+    with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
+        broken(file, ("sensor.dropout", 0.0, 1.0), flown=refuses, out=file.parent / "new" / "out")
+    assert [each.name for each in file.parent.iterdir()] == ["straight.yaml"]
+
+    broken(file, ("mission.time_limit_s", 300.0, 20.0), ("aircraft.airspeed_mps", 28.0, 18.0), conditions=3)
+    earlier = content(file.parent / "out")
+    assert {FALSIFIED, INDEX, TRIALS, *PICTURES} == earlier.keys()
+    begun = itertools.count()
+    with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
+        broken(file, ("sensor.dropout", 0.0, 1.0), flown=refuses)
+    assert content(file.parent / "out") == earlier
+
+
+def test_an_earlier_search_stays_until_the_new_one_has_ended(file: Path) -> None:
+    def looks(scenario: Scenario) -> dict[str, Any]:
+        found = content(file.parent / "out")
+        during.append({name: found[name] for name in earlier})
+        flights.append(found[f"{TRIALS}.partial"].count(b"\n") - 1)
+        return stand_in()
+
+    during: list[dict[str, bytes]] = []
+    flights: list[int] = []
+    broken(file, ("mission.time_limit_s", 300.0, 20.0))
+    earlier = content(file.parent / "out")
+    result = broken(file, ("sensor.dropout", 0.0, 1.0), flown=looks)
+    assert during == [earlier] * result.conditions
+    assert flights == list(range(result.conditions))
+    assert sorted(content(file.parent / "out")) == [TRIALS, INDEX]
+
+
+def test_what_a_killed_search_has_left_is_in_no_way(file: Path) -> None:
+    (file.parent / "out").mkdir()
+    (file.parent / "out" / f"{TRIALS}.partial").write_text("a killed process")
+    assert broken(file, ("mission.time_limit_s", 300.0, 20.0)).settled
+    assert f"{TRIALS}.partial" not in content(file.parent / "out")
+
+
+def test_two_searches_into_one_folder(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def second(scenario: Scenario) -> dict[str, Any]:
+        vary = "mission.time_limit_s=300:20"
+        assert main(["falsify", str(file), "--vary", vary, "--out", str(file.parent / "out")]) == 2
+        said.append(capsys.readouterr().err)
+        return stand_in()
+
+    said: list[str] = []
+    broken(file, ("sensor.dropout", 0.0, 1.0), flown=second, conditions=2)
+    out = file.parent / "out"
+    sentence = f"another wayproof is writing to {out}: wait until it has ended or choose another folder"
+    assert said == [f"wayproof: {sentence}\n"] * 2
+    assert json.loads((out / INDEX).read_text())["vary"][0]["key"] == "sensor.dropout"
+    assert broken(file, ("mission.time_limit_s", 300.0, 20.0)).settled, "the lock ends with its holder"
+
+
+def test_searches_over_other_keys_are_kept_apart(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(file.parent)
+    for vary in (
+        ("sensor.dropout=0:0.1",),
+        ("sensor.dropout=0:0.1", "obstacles[0].circle.radius_m=100:101"),
+    ):
+        given = [item for each in vary for item in ("--vary", each)]
+        assert main(["falsify", "straight.yaml", *given, "--runs", "2", "--json"]) == 0
+    assert sorted(each.name for each in Path("runs/straight").iterdir()) == [
+        "falsify-sensor.dropout",
+        "falsify-sensor.dropout-obstacles.0.circle.radius_m",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -304,3 +392,8 @@ def test_an_interrupt_leaves_the_flights_so_far(
     assert f"interrupted; the flights so far are in {out / TRIALS}" in capsys.readouterr().err
     assert len((out / TRIALS).read_text().splitlines()) == 3
     assert json.loads((out / INDEX).read_text())["complete"] is False
+
+    flights = iter([])
+    assert main(["falsify", str(file), "--vary", "sensor.dropout=0:0.5", "--out", str(out)]) == 130
+    assert "interrupted; no flight had ended yet" in capsys.readouterr().err
+    assert len((out / TRIALS).read_text().splitlines()) == 3, "those of the search before"
