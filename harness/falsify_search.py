@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -126,7 +126,7 @@ def search(
             before = len(tries.verdicts)
             edge = 1.0 if math.isinf(reached) else reached - tolerance
             tries.off_the_diagonal = True
-            _anywhere_below(keys, tries, edge, tolerance, seed)
+            settled = _anywhere_below(keys, tries, edge, tolerance, seed)
             evolved = len(tries.verdicts) - before
             _taken_back(tries, tolerance)
     except _SpentError:
@@ -151,6 +151,10 @@ class _Tries:
 
     def snapped(self, point: Point) -> Point:
         return self._snap(point)
+
+    def untried(self, points: Iterable[Point]) -> set[Point]:
+        """The new conditions among some points."""
+        return {self._snap(point) for point in points} - self.verdicts.keys()
 
     def verdict(self, point: Point) -> Verdict:
         """Raises _SpentError where a new condition is one too many."""
@@ -183,13 +187,25 @@ def _along_the_diagonal(keys: int, tries: _Tries, tolerance: float) -> float:
 
     if fails(0.0):
         return 0.0
-    hard = fails(1.0)
-    steps = min(STEPS, 2 ** max(1, int(math.log2(tries.left)))) if tries.left else 1
-    inner = [step / steps for step in range(1, steps)]
-    failed = [along for along in inner if fails(along)] + [1.0] * hard
-    if not failed:
-        return math.inf
-    return _bisected(tries, (0.0,) * keys, failed[0] - 1.0 / steps, failed[0], tolerance, range(keys))
+    hard, reached = fails(1.0), math.inf
+    # Where the conditions are too few for eighths, coarser steps leave some to bisect with; what is left after
+    # that goes into the eighths.
+    for steps in dict.fromkeys((_affordable(keys, tries), STEPS)):
+        inner = [step / steps for step in range(1, steps)]
+        failed = [along for along in inner if fails(along)] + [1.0] * hard
+        if failed:
+            reached = _bisected(
+                tries, (0.0,) * keys, failed[0] - 1.0 / steps, failed[0], tolerance, range(keys)
+            )
+    return reached
+
+
+def _affordable(keys: int, tries: _Tries) -> int:
+    """The most steps, halved from STEPS down, for which there are conditions enough."""
+    steps = STEPS
+    while len(tries.untried((step / steps,) * keys for step in range(1, steps))) > tries.left:
+        steps //= 2
+    return steps
 
 
 def _bisected(
@@ -211,12 +227,18 @@ def _bisected(
     return fails
 
 
-def _anywhere_below(keys: int, tries: _Tries, edge: float, tolerance: float, seed: int) -> None:
-    """Differential evolution in the cube from 0 to `edge`; leaves enough conditions for the last step."""
+def _anywhere_below(keys: int, tries: _Tries, edge: float, tolerance: float, seed: int) -> bool:
+    """Differential evolution in the cube from 0 to `edge`; leaves enough conditions for the last step.
+
+    Returns:
+        Whether there were conditions enough for it.
+    """
     reserve = min(tries.left // 2, keys * (2 + math.ceil(math.log2(1.0 / tolerance))))
     generations = (tries.left - reserve) // POPULATION
-    if generations < 1 or edge <= 0.0:
-        return
+    if edge <= 0.0:
+        return True
+    if generations < 1:
+        return False
     from scipy.optimize import Bounds, differential_evolution
     from scipy.stats import qmc
 
@@ -235,6 +257,7 @@ def _anywhere_below(keys: int, tries: _Tries, edge: float, tolerance: float, see
         tol=0.0,
         updating="deferred",
     )
+    return True
 
 
 def _taken_back(tries: _Tries, tolerance: float) -> None:

@@ -72,6 +72,39 @@ def test_the_conditions_are_counted() -> None:
         found(lambda point: True, tolerance=1.0)
 
 
+@pytest.mark.parametrize("conditions", range(2, 14))
+def test_settled_is_a_scan_in_eighths_and_nothing_less(conditions: int) -> None:
+    result, asked = found(lambda point: False, conditions=conditions)
+    assert len(asked) == min(conditions, STEPS + 1), "none is left over"
+    assert result.settled == (conditions >= STEPS + 1)
+
+
+def test_a_coarse_scan_leaves_conditions_to_bisect_with() -> None:
+    _, asked = found(lambda point: point[0] >= 0.47, conditions=8)
+    assert [point[0] for point in asked] == [0, 1, 0.25, 0.5, 0.75, 0.375, 0.4375, 0.46875]
+    result, _ = found(lambda point: point[0] >= 0.47, conditions=9, tolerance=0.2)
+    assert result.settled, "what bisection left over made the scan whole"
+    assert result.mildest == (0.5,)
+    result, _ = found(lambda point: point[0] == 0.125 or point[0] >= 0.97, conditions=8, tolerance=0.2)
+    assert (result.settled, result.mildest) == (False, (0.125,)), "what was left over found it"
+
+
+@pytest.mark.parametrize("whole", [1, 4])
+def test_whole_numbers_need_no_more_conditions_than_there_are_of_them(whole: int) -> None:
+    def judge(point: Point) -> Verdict:
+        return Verdict(point[0] >= 0.8)
+
+    result = search(1, judge, whole + 1, 0.01, 1, snap=lambda point: (round(point[0] * whole) / whole,))
+    assert (result.settled, len(result.verdicts), result.mildest) == (True, whole + 1, (1.0,))
+
+
+def test_without_conditions_for_the_evolution_it_is_not_settled() -> None:
+    result, _ = found(lambda point: False, keys=2, conditions=STEPS + 1 + POPULATION)
+    assert (result.evolved, result.settled) == (0, False)
+    result, _ = found(lambda point: False, keys=2, conditions=80)
+    assert (result.evolved >= POPULATION, result.settled) == (True, True)
+
+
 @given(st.lists(st.floats(0.05, 0.95), min_size=2, max_size=3), st.integers(0, 3))
 @settings(max_examples=25, deadline=None)
 def test_where_every_key_makes_it_harder_the_mildest_is_found(edges: list[float], seed: int) -> None:
