@@ -167,8 +167,17 @@ def campaign_of(results: Path) -> dict[str, Any]:
 
 
 def row_of(results: Path, run: int) -> dict[str, Any] | None:
-    """The row of a run; None if it is not there."""
+    """The row of a run; None if it is not there.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    rows = pq.read_table(results, filters=[("run", "=", run)]).to_pylist()
+    try:
+        rows = pq.read_table(results, filters=[("run", "=", run)]).to_pylist()
+    except (OSError, pa.ArrowException, ValueError) as error:
+        text = str(error).splitlines()[0]
+        raise InputError(f"{results}: is damaged: {text}") from error
     return dict(rows[0]) if rows else None

@@ -229,6 +229,13 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
     ):
         assert main(["fly", *arguments]) == 2
         assert said in capsys.readouterr().err
+    damaged = bytearray(results(unbroken))
+    damaged[300:308] = b"XXXXXXXX"
+    (elsewhere / "r.parquet").write_bytes(damaged)
+    assert main(["fly", "--from", "r.parquet", "--run", "1"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("r.parquet: is damaged: ")
+    assert len(said.splitlines()) == 1
 
 
 def test_a_row_that_was_flown_otherwise_is_told(
