@@ -10,6 +10,7 @@ from rich.table import Table as Grid
 from harness.campaign_questions import QUESTIONS, difference, ratio
 from harness.campaign_summary import Cell, Summary, Table
 from harness.compare_rows import number
+from harness.wording import counted
 
 WIDTH = 80
 NAME_WIDTH = 16
@@ -30,11 +31,14 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     width = min(WIDTH, console.width)
     ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
     runs = (
-        f"{summary.total.runs} of {summary.planned} runs" if summary.missing else f"{summary.total.runs} runs"
+        f"{summary.total.runs} of {counted(summary.planned or 0, 'run')}"
+        if summary.missing
+        else counted(summary.total.runs, "run")
     )
     console.print(f"{escape(summary.name)}: {runs}" + (f": {ended}" if ended else ""))
     if summary.missing:
-        console.print(f"[bold yellow]not complete[/]: {summary.missing} are missing, --resume flies them")
+        are, them = ("is missing", "it") if summary.missing == 1 else ("are missing", "them")
+        console.print(f"[bold yellow]not complete[/]: {summary.missing} {are}, --resume flies {them}")
     if not summary.total.runs:
         return
     shown = summary.tables if all_tables else summary.tables[:1]

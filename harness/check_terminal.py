@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from harness.terminal import causes, plain
+from harness.wording import counted
 
 SHOWN = 6
 """So many corners and legs are listed; the others are counted."""
@@ -25,7 +26,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "trackable": f"[{style}]{word}[/]" + (f": {causes(bad)}" if bad else ""),
         "flown": plain(f"{metrics['outcome']}: {metrics['reason']}"),
         "path": f"{check['points']} points, {metrics['planned_length_m']:,.0f} m, "
-        f"{len(legs)} {'legs' if len(legs) > 1 else 'leg'}",
+        f"{counted(len(legs), 'leg')}",
         "cross-track error": f"rms {cross['rms']:.3g} / p95 {cross['p95']:.3g} / max {cross['max']:.3g} m, "
         f"allowed {legs[0]['threshold_m']:.3g} m",
     }

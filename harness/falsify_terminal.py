@@ -6,13 +6,15 @@ from collections.abc import Sequence
 
 from harness.falsify import Breaking
 from harness.terminal import plain
+from harness.wording import counted
 
 
 def breaking_rows(breaking: Breaking) -> dict[str, str]:
     """Name and value of each row."""
     found, wanted = breaking.found, "trackable" if breaking.until == "untrackable" else "reached"
-    flights = f"{len(breaking.trials)} flights" if len(breaking.trials) != breaking.conditions else "flights"
-    rows = {"tried": f"{breaking.conditions} conditions, {flights}".replace(", flights", "")}
+    flights = len(breaking.trials)
+    told = f", {counted(flights, 'flight')}" if flights != breaking.conditions else ""
+    rows = {"tried": counted(breaking.conditions, "condition") + told}
     for each in breaking.vary:
         rows[plain(each.key)] = f"{_number(each.mild)} (mild) to {_number(each.hard)} (hard)"
     if found is None:
@@ -40,7 +42,7 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
 def last_line(breaking: Breaking) -> str:
     """What came of it, in a sentence."""
     if breaking.found is None:
-        return f"not falsified: nothing failed in {len(breaking.trials)} flights"
+        return f"not falsified: nothing failed in {counted(len(breaking.trials), 'flight')}"
     if breaking.verdict == "fails_at_the_mild_end":
         return "falsified: it fails already at the mild end"
     keys = ", ".join(

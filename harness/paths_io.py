@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from aircraft.frames import LocalPlane
 from harness.input_file import InputError, read_text
 from harness.mission_items import Item, Waypoints, waypoints
+from harness.wording import counted
 
 FloatArray = NDArray[np.float64]
 
@@ -62,7 +63,7 @@ def read_path(path: Path, any_altitude: bool = False) -> GivenPath:
         raise InputError(f"{path}: is none of {', '.join(READERS)}; save the path as one of them")
     found = reader(read_text(path, MAX_BYTES, "a path"), str(path))
     if len(found.positions) < 2:
-        raise InputError(f"{path}: has {len(found.positions)} points; a path has at least 2")
+        raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
     origin = None if found.local else found.positions[0]
     points = np.array(found.positions if found.local else _in_plane(found.positions, str(path)))
     apart = np.hypot(*np.diff(points, axis=0).T) > SAME_PLACE_M

@@ -25,6 +25,7 @@ from harness.campaign_cells import Run
 from harness.campaign_runs import CampaignRuns
 from harness.strict_yaml import Scalar
 from harness.sweep_flight import Answer
+from harness.wording import counted
 
 FIRST, LAST = 15, 5
 """Of more runs than both, so many are shown."""
@@ -101,8 +102,8 @@ def print_runs(runs: CampaignRuns) -> None:
     """What would be flown, a line a run, those in the middle left out where there are many."""
     campaign, console = runs.campaign, Console(width=WIDTH)
     console.print(
-        f"{campaign.name}: {len(runs)} runs of {runs.cases} cases, root seed {campaign.seed}, recordings: "
-        f"{campaign.recordings}",
+        f"{campaign.name}: {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}, "
+        f"root seed {campaign.seed}, recordings: {campaign.recordings}",
         highlight=False,
         markup=False,
     )

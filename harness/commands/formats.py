@@ -38,14 +38,15 @@ def _found(file: str) -> str:
     """What a valid file holds, in a few words."""
     from harness.campaign import is_campaign
     from harness.shipped import campaign_path, shipped_campaigns
+    from harness.wording import counted
 
     if file in shipped_campaigns() or (os.path.isfile(file) and is_campaign(Path(file))):
         from harness.commands.sweep import checked
 
         runs = checked(campaign_path(file))
-        return f"{runs.campaign.name}, {len(runs)} runs of {runs.cases} cases"
+        return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}"
     loaded = load(file)
-    return f"{loaded.name}, {len(loaded.obstacles)} obstacles"
+    return f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
 
 
 def schema(

@@ -395,7 +395,7 @@ def test_validate_and_schema_know_campaigns(place: Path, capsys: pytest.CaptureF
     assert main(["validate", str(place / "campaign.yaml"), str(place / "ring.yaml")]) == 0
     first, second = capsys.readouterr().out.splitlines()
     assert first.endswith("campaign.yaml: small, 48 runs of 12 cases: valid")
-    assert second.endswith("ring.yaml: ring, 1 obstacles: valid")
+    assert second.endswith("ring.yaml: ring, 1 obstacle: valid")
     assert main(["schema", "campaign"]) == 0
     assert json.loads(capsys.readouterr().out) == campaign_schema()
 

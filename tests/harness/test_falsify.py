@@ -111,6 +111,7 @@ def test_it_fails_already_at_the_mild_end(file: Path) -> None:
     assert (result.verdict, result.conditions) == ("fails_at_the_mild_end", 1)
     assert load_scenario(file.parent / "out" / FALSIFIED).mission.time_limit_s == 30.0
     assert "already at the mild end" in last_line(result)
+    assert breaking_rows(result)["tried"] == "1 condition"
 
 
 def test_a_condition_fails_when_one_of_its_seeds_does(file: Path) -> None:
@@ -122,6 +123,7 @@ def test_a_condition_fails_when_one_of_its_seeds_does(file: Path) -> None:
     assert result.found is not None
     assert (result.found.values, result.found.seed) == ((4.0,), 6)
     assert [trial.seed for trial in result.trials if trial.condition == 0] == [4, 5, 6, 7]
+    assert breaking_rows(result)["tried"] == f"{result.conditions} conditions, {len(result.trials)} flights"
     assert [trial.seed for trial in result.trials if trial.condition == 1] == [4, 5, 6]
     assert load_scenario(file.parent / "out" / FALSIFIED).seed == 6
 

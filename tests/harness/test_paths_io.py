@@ -132,7 +132,7 @@ BROKEN = {
     "text in csv": ("a.csv", "x_m,y_m\n0,0\n1,far\n", ":3: y_m: is 'far'; must be a finite number"),
     "nan in csv": ("a.csv", "x_m,y_m\n0,0\n1,nan\n", ":3: y_m: is 'nan'; must be a finite number"),
     "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cells, the header 2"),
-    "one point": ("a.csv", "x_m,y_m\n0,0\n", ": has 1 points; a path has at least 2"),
+    "one point": ("a.csv", "x_m,y_m\n0,0\n", ": has 1 point; a path has at least 2"),
     "one place": ("a.csv", "x_m,y_m\n5,5\n5,5\n", ": all its points are in one place"),
     "too far": ("a.csv", "x_m,y_m\n0,0\n9e5,0\n", ": reaches 900 km; must stay within 500 km"),
     "not degrees": ("a.geojson", geojson([[0, 0], [3000, 2000]]), "latitude 2000, longitude 3000"),
