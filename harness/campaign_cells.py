@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from harness.campaign import CampaignFile
@@ -34,6 +34,12 @@ class Run:
     aircraft: str
     seed: int
     varied: dict[str, Scalar]
+
+    def cells(self) -> dict[str, Scalar]:
+        """Its first columns in `results.parquet`."""
+        about = asdict(self)
+        del about["varied"]
+        return {**about, **self.varied}
 
 
 def kind_of(values: Sequence[Any]) -> str:

@@ -1,8 +1,7 @@
 """The folder of a campaign: `campaign.json` says what is flown, the journal what has been, two tables the results.
 
-Each run that is over is one line of the journal, flushed to the disk before the next; a process killed in the
-middle of a line leaves a torn one, which is dropped. The tables are made from the journal, and replaced whole.
-Whoever writes holds a lock on the file `lock` (flock), which ends with the process.
+The tables are made from the journal, and replaced whole. Whoever writes holds a lock on the file `lock` (flock),
+which ends with the process.
 """
 
 from __future__ import annotations
@@ -14,19 +13,23 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Final
+from typing import IO, TYPE_CHECKING, Any, Final
 
 from aircraft.airframes import airframe
+from harness.campaign_journal import JOURNAL, columns, read_journal, rows, time_rows
 from harness.campaign_runs import CampaignRuns
 from harness.folder_lock import FolderLock
 from harness.record import RunFolderError
-from harness.results import METRICS, RESULTS, RUN, SCHEMA, TIMES, TIMINGS, table
+from harness.results import RESULTS, SCHEMA, TIMES, TIMINGS, table
 from harness.versions import versions
 from harness.whole_file import PARTIAL, replace_text
+from harness.wording import counted
 from planner.registry import distribution_of
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 INDEX: Final = "campaign.json"
-JOURNAL: Final = "journal.jsonl"
 LOCK: Final = "lock"
 RUNS: Final = "runs"
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
@@ -55,7 +58,7 @@ class CampaignFolder:
 
         Raises:
             RunFolderError: the folder holds something else, results without `resume` or those of another
-                campaign, another process is flying into it, or it cannot be written.
+                campaign, a damaged journal, another process is flying into it, or it cannot be written.
         """
         self.path, self._runs = path, runs
         self._stack = ExitStack()
@@ -79,19 +82,16 @@ class CampaignFolder:
 
     def write_tables(self) -> None:
         """Makes `results.parquet` and `timings.parquet` from the journal."""
-        lines = {line["run"]: line for line, _ in _lines(self.path / JOURNAL)}
-        columns = RUN | self._runs.varied | METRICS
+        over = read_journal(self.path).runs
         about = {"schema": SCHEMA, "runs": len(self._runs), **self._runs.file.plain()}
         metadata = json.dumps(about, allow_nan=False)
-        for name, part, kinds in ((RESULTS, "row", columns), (TIMINGS, "times", TIMES)):
-            self._write_table(
-                name, [{"run": run, **line[part]} for run, line in lines.items()], kinds, metadata
-            )
+        self._write_table(RESULTS, table(rows(over), columns(self._runs), metadata))
+        self._write_table(TIMINGS, table(time_rows(over), TIMES, metadata))
 
     def outcomes(self) -> dict[str, int]:
         """How many of the runs that are over ended how, the most frequent first."""
-        lines = {line["run"]: line["row"]["outcome"] for line, _ in _lines(self.path / JOURNAL)}
-        return dict(Counter(lines.values()).most_common())
+        over = read_journal(self.path).runs.values()
+        return dict(Counter(each.row["outcome"] for each in over).most_common())
 
     def __enter__(self) -> CampaignFolder:
         return self
@@ -101,14 +101,12 @@ class CampaignFolder:
     ) -> None:
         self._stack.close()
 
-    def _write_table(
-        self, name: str, rows: list[dict[str, Any]], columns: Mapping[str, str], metadata: str
-    ) -> None:
+    def _write_table(self, name: str, content: pa.Table) -> None:
         import pyarrow.parquet as pq
 
         partial = self.path / (name + PARTIAL)
         with partial.open("wb") as file:
-            pq.write_table(table(rows, columns, metadata), file, compression="zstd")
+            pq.write_table(content, file, compression="zstd")
             file.flush()
             os.fsync(file.fileno())
         partial.replace(self.path / name)
@@ -125,24 +123,22 @@ class CampaignFolder:
             )
         self._stack.callback(FolderLock(path, LOCK).release)
         now, before = self._about(), _index(path)
-        done, kept_bytes = set(), 0
-        for line, end in _lines(path / JOURNAL):
-            done.add(line["run"])
-            kept_bytes = end
-        if done and not resume:
-            raise RunFolderError(
-                f"{path} holds {len(done)} runs: go on with --resume, or choose another folder"
-            )
-        if done and before is not None and (changes := list(_changes(before, now))):
+        journal = read_journal(path)
+        has_any = bool(journal.runs) or _has_rows(path / RESULTS)
+        if has_any and not resume:
+            held = counted(len(journal.runs), "run") if journal.runs else RESULTS
+            raise RunFolderError(f"{path} holds {held}: go on with --resume, or choose another folder")
+        if has_any and before is not None and (changes := list(_changes(before, now))):
             told = "; ".join(changes[:MAX_TOLD]) + ("; and more" if len(changes) > MAX_TOLD else "")
             raise RunFolderError(
                 f"{path} is of another campaign: {told}; change it back or choose another folder"
             )
+        journal.check(self._runs)
         if before != now:
             replace_text(path / INDEX, json.dumps(now, indent=1, allow_nan=False) + "\n")
-        if (path / JOURNAL).exists():
-            os.truncate(path / JOURNAL, kept_bytes)
-        return done
+        if journal.path.exists():
+            os.truncate(journal.path, journal.end)
+        return set(journal.runs)
 
     def _about(self) -> dict[str, Any]:
         """The content of `campaign.json`, as it is read back."""
@@ -166,21 +162,17 @@ def _index(path: Path) -> dict[str, Any] | None:
     return index if isinstance(index, dict) and index.get("schema") == FOLDER_SCHEMA else None
 
 
-def _lines(journal: Path) -> Iterator[tuple[dict[str, Any], int]]:
-    """Whole lines of a journal, and the byte at which each ends; a torn one ends it."""
-    if not journal.exists():
-        return
-    end = 0
-    with journal.open("rb") as file:
-        for text in file:
-            try:
-                line = json.loads(text) if text.endswith(b"\n") else None
-            except ValueError:
-                line = None
-            if not (isinstance(line, dict) and line.keys() >= {"run", "row", "times"}):
-                return
-            end += len(text)
-            yield line, end
+def _has_rows(results: Path) -> bool:
+    """Whether a table holds runs; one that cannot be read may."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return bool(pq.read_metadata(results).num_rows > 0)
+    except FileNotFoundError:
+        return False
+    except (OSError, pa.ArrowException):
+        return True
 
 
 def _changes(before: Any, now: Any, where: str = "") -> Iterator[str]:

@@ -6,7 +6,6 @@ import shutil
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from dataclasses import asdict
 from typing import Any, Final
 
 from harness.campaign_folder import RUNS, CampaignFolder
@@ -93,6 +92,4 @@ def _answer(future: Future[Answer], run: int) -> Answer:
 
 
 def _row(runs: CampaignRuns, answer: Answer) -> dict[str, Any]:
-    about = asdict(runs.run(answer.run))
-    varied = about.pop("varied")
-    return {**about, **varied, **answer.row}
+    return {**runs.run(answer.run).cells(), **answer.row}
