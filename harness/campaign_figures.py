@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -13,15 +14,19 @@ from harness.figure_style import DASHES, colour, styled
 HEIGHT_IN = 2.9
 LEGEND_LETTERS, KEY_LETTERS = 66, 6
 """Letters that a row of the legend has room for, and as many as the key before each name takes."""
+LEGEND_ROWS, ROW_IN = 3, 0.17
+"""Rows of the legend that a figure has room for, and how much higher each other one makes it."""
 ROTATED_FROM = 5
 """From so many groups on, their labels stand slanted."""
+LABEL_LETTERS = 32
+"""A longer label of a group loses its middle, for it takes room from what is drawn."""
 
 
 def success(table: Table) -> Figure:
     """Share of goals reached against the groups of a key, with Wilson intervals, a line for each planner."""
-    labels = table.rows.labels
+    labels = [_short(label) for label in table.rows.labels]
     planners = table.columns.labels if table.columns else ("",)
-    with styled(HEIGHT_IN) as figure:
+    with styled(_height_in(planners)) as figure:
         axes = figure.add_subplot()
         for index, planner in enumerate(planners):
             own = [(place, cells[index]) for place, cells in enumerate(table.cells) if cells[index].runs]
@@ -55,7 +60,7 @@ def success(table: Table) -> Figure:
 def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
     """Share of the goals reached with at most a length over the optimum, a line for each planner."""
     shares = np.linspace(0.0, 100.0, CURVE_POINTS)
-    with styled(HEIGHT_IN) as figure:
+    with styled(_height_in(tuple(curves))) as figure:
         axes = figure.add_subplot()
         for index, (planner, ratios) in enumerate(curves.items()):
             axes.plot(
@@ -67,7 +72,22 @@ def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
     return figure
 
 
+def _short(label: str) -> str:
+    end = (LABEL_LETTERS - len("...")) // 2
+    return label if len(label) <= LABEL_LETTERS else f"{label[:end]}...{label[-end:]}"
+
+
+def _height_in(planners: Sequence[str]) -> float:
+    """Of a figure with these planners in its legend."""
+    return HEIGHT_IN + ROW_IN * max(math.ceil(len(planners) / _columns(planners)) - LEGEND_ROWS, 0)
+
+
+def _columns(planners: Sequence[str]) -> int:
+    """How many names a row of the legend has."""
+    columns = LEGEND_LETTERS // (KEY_LETTERS + max(map(len, planners), default=0))
+    return min(max(columns, 1), 3)
+
+
 def _legend(figure: Figure, planners: Sequence[str]) -> None:
     if len(planners) > 1:
-        columns = LEGEND_LETTERS // (KEY_LETTERS + max(map(len, planners)))
-        figure.legend(loc="outside lower center", ncols=min(max(columns, 1), 3), frameon=False)
+        figure.legend(loc="outside lower center", ncols=_columns(planners), frameon=False)
