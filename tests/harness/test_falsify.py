@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import itertools
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,30 +12,12 @@ import pytest
 
 from aircraft.airframes import AircraftError
 from harness.cli import main
-from harness.closed_loop import fly
-from harness.falsify import Breaking, falsify
 from harness.falsify_folder import FALSIFIED, INDEX, PICTURES, TRIALS
 from harness.falsify_keys import scenario_at, vary_of
 from harness.falsify_terminal import breaking_rows, last_line
-from harness.metrics import metrics
-from harness.record import RunFolderError
-from harness.run import flight_limits, kinematic_loop
 from harness.scenario import Scenario, load_scenario
 from harness.strict_yaml import InputError
-
-SCENARIO = """
-schema: wayproof/scenario/1
-name: straight
-seed: 4
-area: {bounds_m: [0, 0, 3000, 3000]}
-obstacles: [{circle: {center_m: [1500, 2700], radius_m: 100}}]
-mission: {start_m: [500, 1500], goal_m: [2000, 1500], goal_radius_m: 100, time_limit_s: 300}
-aircraft: {model: aerosonde, airspeed_mps: 25}
-sensor: {range_m: 1500, rays: 90}
-planner: {kind: bug2, clearance_m: 100}
-"""
-WAY_M = 1400.0
-"""From the start to the goal circle."""
+from tests.harness.breaking import SCENARIO, WAY_M, broken, flown, stand_in
 
 
 @pytest.fixture
@@ -44,19 +25,6 @@ def file(tmp_path: Path) -> Path:
     path = tmp_path / "straight.yaml"
     path.write_text(SCENARIO)
     return path
-
-
-def flown(scenario: Scenario) -> dict[str, Any]:
-    """A point flies: straight to the goal at the airspeed."""
-    return metrics(fly(kinematic_loop(scenario)), flight_limits(scenario))
-
-
-def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Breaking:
-    def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
-        return load_scenario(file, replaced)
-
-    out = other.pop("out", file.parent / "out")
-    return falsify(load, vary_of(load, ranges), out, **({"flown": flown} | other))
 
 
 def test_the_time_that_is_too_short_is_found(file: Path) -> None:
@@ -126,11 +94,6 @@ def test_a_condition_fails_when_one_of_its_seeds_does(file: Path) -> None:
     assert breaking_rows(result)["tried"] == f"{result.conditions} conditions, {len(result.trials)} flights"
     assert [trial.seed for trial in result.trials if trial.condition == 1] == [4, 5, 6]
     assert load_scenario(file.parent / "out" / FALSIFIED).seed == 6
-
-
-def stand_in(outcome: str = "reached", /, **other: Any) -> dict[str, Any]:
-    plain = {"outcome": outcome, "reason": "as told", "trackable": True, "min_clearance_m": 100.0}
-    return plain | {"flight_time_s": 60.0, "cross_track_m": {"max": 0.5}, "digest": "0"} | other
 
 
 def test_untrackable_counts_where_it_is_asked_for(file: Path) -> None:
@@ -204,14 +167,6 @@ def test_a_key_inside_a_list_can_be_varied(file: Path) -> None:
     assert circle.radius_m == 300.0
 
 
-def test_a_folder_with_other_things_is_refused(file: Path) -> None:
-    (file.parent / "out").mkdir()
-    (file.parent / "out" / "mine.txt").touch()
-    with pytest.raises(RunFolderError, match="not empty and not a search"):
-        broken(file, ("mission.time_limit_s", 300.0, 200.0))
-    assert [path.name for path in (file.parent / "out").iterdir()] == ["mine.txt"]
-
-
 def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -242,85 +197,6 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     assert main(["falsify", *given, "--runs", "2", "--json", "--set", "mission.goal_radius_m=60"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert (printed["verdict"], printed["flights"], printed["settled"]) == ("found", 2, False)
-
-
-def content(folder: Path) -> dict[str, bytes]:
-    return {each.name: each.read_bytes() for each in folder.iterdir()}
-
-
-@pytest.mark.parametrize("flights", [0, 1, 6])
-def test_a_condition_that_cannot_be_flown_leaves_everything_as_it_was(file: Path, flights: int) -> None:
-    def refuses(scenario: Scenario) -> dict[str, Any]:
-        if next(begun) >= flights:
-            raise AircraftError("cannot be trimmed")
-        return stand_in()
-
-    begun = itertools.count()
-    with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
-        broken(file, ("sensor.dropout", 0.0, 1.0), flown=refuses, out=file.parent / "new" / "out")
-    assert [each.name for each in file.parent.iterdir()] == ["straight.yaml"]
-
-    broken(file, ("mission.time_limit_s", 300.0, 20.0), ("aircraft.airspeed_mps", 28.0, 18.0), conditions=3)
-    earlier = content(file.parent / "out")
-    assert {FALSIFIED, INDEX, TRIALS, *PICTURES} == earlier.keys()
-    begun = itertools.count()
-    with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
-        broken(file, ("sensor.dropout", 0.0, 1.0), flown=refuses)
-    assert content(file.parent / "out") == earlier
-
-
-def test_an_earlier_search_stays_until_the_new_one_has_ended(file: Path) -> None:
-    def looks(scenario: Scenario) -> dict[str, Any]:
-        found = content(file.parent / "out")
-        during.append({name: found[name] for name in earlier})
-        flights.append(found[f"{TRIALS}.partial"].count(b"\n") - 1)
-        return stand_in()
-
-    during: list[dict[str, bytes]] = []
-    flights: list[int] = []
-    broken(file, ("mission.time_limit_s", 300.0, 20.0))
-    earlier = content(file.parent / "out")
-    result = broken(file, ("sensor.dropout", 0.0, 1.0), flown=looks)
-    assert during == [earlier] * result.conditions
-    assert flights == list(range(result.conditions))
-    assert sorted(content(file.parent / "out")) == [TRIALS, INDEX]
-
-
-def test_what_a_killed_search_has_left_is_in_no_way(file: Path) -> None:
-    (file.parent / "out").mkdir()
-    (file.parent / "out" / f"{TRIALS}.partial").write_text("a killed process")
-    assert broken(file, ("mission.time_limit_s", 300.0, 20.0)).settled
-    assert f"{TRIALS}.partial" not in content(file.parent / "out")
-
-
-def test_two_searches_into_one_folder(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def second(scenario: Scenario) -> dict[str, Any]:
-        vary = "mission.time_limit_s=300:20"
-        assert main(["falsify", str(file), "--vary", vary, "--out", str(file.parent / "out")]) == 2
-        said.append(capsys.readouterr().err)
-        return stand_in()
-
-    said: list[str] = []
-    broken(file, ("sensor.dropout", 0.0, 1.0), flown=second, conditions=2)
-    out = file.parent / "out"
-    sentence = f"another wayproof is writing to {out}: wait until it has ended or choose another folder"
-    assert said == [f"wayproof: {sentence}\n"] * 2
-    assert json.loads((out / INDEX).read_text())["vary"][0]["key"] == "sensor.dropout"
-    assert broken(file, ("mission.time_limit_s", 300.0, 20.0)).settled, "the lock ends with its holder"
-
-
-def test_searches_over_other_keys_are_kept_apart(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(file.parent)
-    for vary in (
-        ("sensor.dropout=0:0.1",),
-        ("sensor.dropout=0:0.1", "obstacles[0].circle.radius_m=100:101"),
-    ):
-        given = [item for each in vary for item in ("--vary", each)]
-        assert main(["falsify", "straight.yaml", *given, "--runs", "2", "--json"]) == 0
-    assert sorted(each.name for each in Path("runs/straight").iterdir()) == [
-        "falsify-sensor.dropout",
-        "falsify-sensor.dropout-obstacles.0.circle.radius_m",
-    ]
 
 
 @pytest.mark.parametrize(
@@ -373,29 +249,3 @@ def test_bad_usage_is_one_line_and_writes_nothing(
     assert sentence in said.err
     assert len(said.err.splitlines()) <= 2
     assert [path.name for path in file.parent.iterdir()] == ["straight.yaml"]
-
-
-def test_an_interrupt_leaves_the_flights_so_far(
-    file: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from harness.commands import falsify as command
-
-    flights = iter([stand_in(), stand_in("collision")])
-
-    def interrupted(_: Scenario) -> dict[str, Any]:
-        try:
-            return next(flights)
-        except StopIteration:
-            raise KeyboardInterrupt from None
-
-    monkeypatch.setattr(command, "_flown", interrupted)
-    out = file.parent / "out"
-    assert main(["falsify", str(file), "--vary", "sensor.dropout=0:1", "--out", str(out)]) == 130
-    assert f"interrupted; the flights so far are in {out / TRIALS}" in capsys.readouterr().err
-    assert len((out / TRIALS).read_text().splitlines()) == 3
-    assert json.loads((out / INDEX).read_text())["complete"] is False
-
-    flights = iter([])
-    assert main(["falsify", str(file), "--vary", "sensor.dropout=0:0.5", "--out", str(out)]) == 130
-    assert "interrupted; no flight had ended yet" in capsys.readouterr().err
-    assert len((out / TRIALS).read_text().splitlines()) == 3, "those of the search before"

@@ -1,0 +1,46 @@
+"""A scenario to be broken, and flights whose end is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from harness.closed_loop import fly
+from harness.falsify import Breaking, falsify
+from harness.falsify_keys import vary_of
+from harness.metrics import metrics
+from harness.run import flight_limits, kinematic_loop
+from harness.scenario import Scenario, load_scenario
+
+SCENARIO = """
+schema: wayproof/scenario/1
+name: straight
+seed: 4
+area: {bounds_m: [0, 0, 3000, 3000]}
+obstacles: [{circle: {center_m: [1500, 2700], radius_m: 100}}]
+mission: {start_m: [500, 1500], goal_m: [2000, 1500], goal_radius_m: 100, time_limit_s: 300}
+aircraft: {model: aerosonde, airspeed_mps: 25}
+sensor: {range_m: 1500, rays: 90}
+planner: {kind: bug2, clearance_m: 100}
+"""
+WAY_M = 1400.0
+"""From the start to the goal circle."""
+
+
+def flown(scenario: Scenario) -> dict[str, Any]:
+    """A point flies: straight to the goal at the airspeed."""
+    return metrics(fly(kinematic_loop(scenario)), flight_limits(scenario))
+
+
+def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Breaking:
+    def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
+        return load_scenario(file, replaced)
+
+    out = other.pop("out", file.parent / "out")
+    return falsify(load, vary_of(load, ranges), out, **({"flown": flown} | other))
+
+
+def stand_in(outcome: str = "reached", /, **other: Any) -> dict[str, Any]:
+    plain = {"outcome": outcome, "reason": "as told", "trackable": True, "min_clearance_m": 100.0}
+    return plain | {"flight_time_s": 60.0, "cross_track_m": {"max": 0.5}, "digest": "0"} | other
