@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
 from rerun.encodings import Vec2DBatch, Vec3DBatch
 
 from harness.record import FloatArray
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 
 def strips_2d(polylines: Sequence[FloatArray]) -> pa.ListArray:
@@ -24,6 +26,8 @@ def strips_3d(polylines: Sequence[FloatArray]) -> pa.ListArray:
 
 
 def _strips(polylines: Sequence[FloatArray], axes: int, points: Any, strip: Any) -> pa.ListArray:
+    import pyarrow as pa
+
     ends = np.cumsum([0, *map(len, polylines)], dtype=np.int32)
     joined = np.concatenate([np.zeros((0, axes)), *polylines])
     return pa.ListArray.from_arrays(ends, points(joined).as_arrow_array(), type=strip.arrow_type())
