@@ -8,43 +8,20 @@ from typing import Any
 
 import pytest
 
-from aircraft.interface import AircraftState
 from aircraft.point_mass import PointMass
 from harness.closed_loop import fly
-from harness.range_sensor import RangeScan
-from harness.record import AcceptedPlan, Outcome, Track
+from harness.record import Outcome
 from harness.run import make_loop
-from harness.scenario import Scenario, mission_of
+from harness.scenario import Scenario
 from harness.smoothness import flown_lengths
 from planner.clearance import inside_bounds
 from planner.curves import end_of
-from planner.interface import Path
 
 SmallWorld = Callable[..., Scenario]
 
 SIDE_M, START = 4000.0, (600.0, 600.0)
 BLUR = 0.25
 """What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
-
-
-class Paths:
-    """Keeps the paths that take effect."""
-
-    def __init__(self) -> None:
-        self.paths: list[Path] = []
-
-    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        assert accepted.plan.path is not None
-        self.paths.append(accepted.plan.path)
-
-    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
-        pass
-
-    def on_block(self, block: Track) -> None:
-        pass
-
-    def on_event(self, time_s: float, text: str) -> None:
-        pass
 
 
 def circle(x: float, y: float, radius: float) -> dict[str, Any]:
@@ -83,14 +60,17 @@ def test_it_is_reached_by_the_shortest_way(
         planner={"clearance_m": clearance_m},
         environment=air,
     )
-    seen, mission = Paths(), mission_of(scenario)
-    flight = fly(make_loop(scenario, lambda start, wind: PointMass(start, wind, step_rate_hz=20)), [seen])
+    flight = fly(make_loop(scenario, lambda start, wind: PointMass(start, wind, step_rate_hz=20)))
     assert flight.outcome is Outcome.REACHED, flight.reason
     assert flown_lengths(flight.track).sum() < 1.05 * math.dist(START, goal_m)
     assert flight.track.clearance_m.min() >= (1.0 - BLUR) * clearance_m
-    for path in seen.paths:
-        assert inside_bounds(path, mission.bounds_m)
-    assert seen.paths[0].loiter
-    last = seen.paths[-1]
+    paths = [each.plan.path for each in flight.plans]
+    for path in paths:
+        assert path is not None
+        assert inside_bounds(path, scenario.area.bounds_m)
+    first, last = paths[0], paths[-1]
+    assert first is not None
+    assert last is not None
+    assert first.loiter
     assert not last.loiter
     assert end_of(last)[:2] == pytest.approx(goal_m)

@@ -96,10 +96,10 @@ class Unsettled(Range):
     surprised_s = 2000.0
 
 
-class Vanishing(Range):
-    """The same, until all that has been seen has gone."""
+class TakingBack(Range):
+    """The same; some of what was seen is taken back."""
 
-    looks, gone, before = 260, False, 0
+    before = 0
 
     @property
     def revision(self) -> int:
@@ -107,6 +107,12 @@ class Vanishing(Range):
 
     def edges_since(self, revision: int) -> FloatArray:
         return super().edges_since(revision - self.before)
+
+
+class Vanishing(TakingBack):
+    """The same, until all that has been seen has gone."""
+
+    looks = 260
 
     def look(self, place: Point) -> None:
         self.looks -= 1
@@ -117,17 +123,10 @@ class Vanishing(Range):
         self._order.clear()
 
 
-class Opening(Range):
+class Opening(TakingBack):
     """The same, until a part of the wall in the west of the goal is taken back."""
 
-    looks, before = 0, 0
-
-    @property
-    def revision(self) -> int:
-        return self.before + len(self._order)
-
-    def edges_since(self, revision: int) -> FloatArray:
-        return super().edges_since(revision - self.before)
+    looks = 0
 
     def look(self, place: Point) -> None:
         super().look(place)
