@@ -13,6 +13,8 @@ from multiprocessing.context import SpawnProcess
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
+from harness.crash import sentence
+
 if TYPE_CHECKING:
     from harness.scenario import Scenario
 
@@ -120,8 +122,7 @@ def _fly(job: Job, theirs: Connection) -> None:
         _write(job, theirs)
         theirs.send(Answer())
     except Exception as error:
-        text = " ".join(str(error).split())
-        theirs.send(Answer(f"{type(error).__name__}: {text}" if text else type(error).__name__))
+        theirs.send(Answer(sentence(error)))
     finally:
         theirs.close()
 

@@ -11,12 +11,15 @@ class PlannerError(RuntimeError):
 
 
 def sentence(error: BaseException) -> str:
-    """Its type and what it says, in one line."""
+    """Its type and what it says, in one line; of a PlannerError what it says alone."""
     try:
         said = str(error)
     except Exception:
         said = "it cannot be told what"
-    return in_a_line(f"{type(error).__name__}: {said}")
+    if isinstance(error, PlannerError):
+        return in_a_line(said)
+    name = type(error).__name__
+    return in_a_line(f"{name}: {said}" if said else name)
 
 
 def trace(error: BaseException) -> str:

@@ -65,7 +65,7 @@ def fly_job(job: Job) -> Answer:
     except (WriteError, RunFolderError):
         raise
     except PlannerError as error:
-        return failed(job.run, str(error), trace(error))
+        return failed(job.run, sentence(error), trace(error))
     except Exception as error:
         if (full := _full(error)) is not None:
             raise full from None

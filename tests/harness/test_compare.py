@@ -157,7 +157,8 @@ def test_a_crash_is_a_row_and_the_others_fly_on(flown: Path) -> None:
     assert [row["planner"] for row in rows] == ["rolling_window", "corner", "dies", "raises"]
     assert [row["outcome"] for row in rows] == ["reached", "reached", "crashed", "crashed"]
     assert rows[2]["reason"] == "its process ended with exit status 7 before the flight did"
-    assert rows[3]["reason"] == "ValueError: <script>alert(1)</script> | *not* to be run"
+    told = "ValueError: <script>alert(1)</script> | *not* to be run"
+    assert rows[3]["reason"] == f"the planner raises cannot be made: {told}"
     assert rows[3]["flown_length_m"] is None
 
 
@@ -253,7 +254,9 @@ def test_the_report_says_how_to_repeat_it(
     monkeypatch.setattr("sys.argv", ["/somewhere/bin/wayproof", *arguments])
     assert main(arguments) == 1
     assert f"wayproof compare {place / 'ring.yaml'} --planners raises" in (out / "report.html").read_text()
-    assert "raises crashed: ValueError: <script>" in capsys.readouterr().out
+    assert (
+        "raises crashed: the planner raises cannot be made: ValueError: <script>" in capsys.readouterr().out
+    )
     assert files(out / "ring") == set()
 
 
