@@ -224,7 +224,9 @@ def _placed(config: _Scattered, radii: FloatArray, rng: np.random.Generator) -> 
     """A middle for each disc of these radii, None for one without a place."""
     largest, ends = float(radii.max(initial=0.0)), config.world(())
     cell_m = max(2 * largest + config.gap_m, max(config.size_m) / MOST_COLUMNS)
-    taken = _Taken(cell_m, [(*end, config.room_m) for end in (ends.start_m, ends.goal_m)])
+    taken = _Taken(cell_m, largest)
+    for end in (ends.start_m, ends.goal_m):
+        taken.add(end, config.room_m)
     found: list[Place | None] = []
     in_vain = 0
     for radius in radii.tolist():
@@ -244,21 +246,24 @@ def _tries(config: _Scattered, rng: np.random.Generator) -> Iterator[list[Place]
 
 
 class _Taken:
-    """Discs, by square cells so large that those which can matter to another lie in its cell or the next.
+    """Discs, each in all square cells where it can matter to another.
 
     Args:
         cell_m: side of a cell.
-        large: east, north and what is kept of those that are too large for that.
+        largest_m: radius of the largest disc that is looked for a place.
     """
 
-    def __init__(self, cell_m: float, large: list[tuple[float, float, float]]) -> None:
-        self._cell_m, self._large = cell_m, large
+    def __init__(self, cell_m: float, largest_m: float) -> None:
+        self._cell_m, self._largest_m = cell_m, largest_m
         # East, north and what is kept of all that can matter to a cell.
         self._near: defaultdict[tuple[int, int], list[tuple[float, float, float]]] = defaultdict(list)
 
     def add(self, place: Place, kept_m: float) -> None:
         column, row = (int(along_m // self._cell_m) for along_m in place)
-        for near in itertools.product((column - 1, column, column + 1), (row - 1, row, row + 1)):
+        reach = max(math.ceil((kept_m + self._largest_m) / self._cell_m), 1)
+        for near in itertools.product(
+            range(column - reach, column + reach + 1), range(row - reach, row + reach + 1)
+        ):
             # The large ones first: they are the most likely to be in the way.
             insort(self._near[near], (*place, kept_m), key=lambda disc: -disc[2])
 
@@ -266,8 +271,7 @@ class _Taken:
         """The first place where a disc keeps from every other one what that asks for; None where there is none."""
         near, cell_m = self._near, self._cell_m
         for east, north in places:
-            cell = int(east // cell_m), int(north // cell_m)
-            for x, y, kept_m in itertools.chain(self._large, near.get(cell, ())):
+            for x, y, kept_m in near.get((int(east // cell_m), int(north // cell_m)), ()):
                 apart_m = kept_m + radius_m
                 if (east - x) * (east - x) + (north - y) * (north - y) < apart_m * apart_m:
                     break
