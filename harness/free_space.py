@@ -6,19 +6,19 @@ import math
 
 import numpy as np
 
+from harness.edge_grid import MOST_CELLS
 from harness.range_sensor import RangeScan, all_round
 from planner.compiled import BOOL, FLOAT, FLOATS, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
 CELLS, CELLS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]"
 """Parts of grids."""
-MOST_CELLS = 16_000_000
 NARROWEST_RAD = 1e-3
 """What something hides is told by bearings no finer than this."""
 
 
 class FreeSpace:
-    """Cells of space that a scan has looked through, on a grid twice as coarse as the edges'."""
+    """Cells of space that a scan has looked through: half a clearance wide, or wider where they would be too many."""
 
     def __init__(
         self,

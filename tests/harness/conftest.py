@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from harness.record import AcceptedPlan, FloatArray, Track
 from planner.interface import Path, Plan, PlanPicture, PlanStatus
+from tests.harness.breaking import SCENARIO
 from tests.page import NoBrowserError, browser
 
 MakeTrack = Callable[..., Track]
@@ -107,3 +109,11 @@ def straight_plan() -> AcceptedPlan:
 @pytest.fixture
 def circle_plan() -> AcceptedPlan:
     return plan([(500.0, 0.0, 0.0, 1.0, 1 / 500.0, math.tau * 500.0)])
+
+
+@pytest.fixture
+def to_break(tmp_path: FilePath) -> FilePath:
+    """A scenario to be broken."""
+    path = tmp_path / "straight.yaml"
+    path.write_text(SCENARIO)
+    return path
