@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
 from rich import box
-from rich.console import Console
+from rich.cells import cell_len
+from rich.console import Console, JustifyMethod
 from rich.markup import escape
 from rich.progress import (
     BarColumn,
@@ -21,7 +23,6 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from harness.campaign_cells import Run
 from harness.campaign_runs import CampaignRuns
 from harness.strict_yaml import Scalar
 from harness.sweep_flight import Answer
@@ -31,7 +32,10 @@ FIRST, LAST = 15, 5
 """Of more runs than both, so many are shown."""
 
 WIDTH: Final = 400
-"""A table of runs may be this wide; a terminal that is not goes on in the next line."""
+"""A table of runs may be this wide where it does not go to a terminal."""
+
+NAMES: Final = ("scenario", "world", "planner", "aircraft")
+"""Columns that begin at the left."""
 
 CELL: Final = 28
 """A longer value is cut short."""
@@ -99,36 +103,56 @@ def _bar(unit: str) -> Iterator[Progress | None]:
 
 
 def print_runs(runs: CampaignRuns) -> None:
-    """What would be flown, a line a run, those in the middle left out where there are many."""
-    campaign, console = runs.campaign, Console(width=WIDTH)
+    """What would be flown, a line a run, those in the middle left out where there are many.
+
+    Where the terminal is too narrow, columns that do not fit go on below, the number of the run before them.
+    """
+    campaign, console = runs.campaign, Console()
+    if not console.is_terminal:
+        console.width = WIDTH
     console.print(
         f"{campaign.name}: {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}, "
         f"root seed {campaign.seed}, recordings: {campaign.recordings}",
         highlight=False,
         markup=False,
     )
-    table = Table(box=box.SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
-    for name in ("run", "case"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for name in ("scenario", "world", "planner", "aircraft"):
-        table.add_column(name, no_wrap=True)
-    for name in runs.varied:
-        table.add_column(escape(name.replace(".", ".\n")), justify="right", no_wrap=True)
-    table.add_column("seed", justify="right", no_wrap=True)
+    number, columns = _columns(runs)
+    room = console.width - _wide(number) - 1
+    while columns:
+        widths = itertools.accumulate(map(_wide, columns))
+        fit = max(sum(wide <= room for wide in widths), 1)
+        table = Table(box=box.SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+        for head, _ in (number, *columns[:fit]):
+            justify: JustifyMethod = "left" if head in NAMES else "right"
+            table.add_column(escape(head), justify=justify, no_wrap=True)
+        for row in zip(number[1], *(cells for _, cells in columns[:fit]), strict=True):
+            table.add_row(*map(escape, row))
+        console.print(table)
+        columns = columns[fit:]
+
+
+Column = tuple[str, list[str]]
+"""Head, and a cell a line."""
+
+
+def _columns(runs: CampaignRuns) -> tuple[Column, list[Column]]:
+    """The numbers of the runs to be shown, and the other columns."""
     many = len(runs) > FIRST + LAST
-    for number in range(FIRST if many else len(runs)):
-        table.add_row(*_cells(runs.run(number)))
+    numbers = [*range(FIRST), *range(len(runs) - LAST, len(runs))] if many else range(len(runs))
+    told = [runs.run(number) for number in numbers]
+    lines = [{name: _shown(value) for name, value in each.cells().items()} for each in told]
+    for cells in lines:
+        cells["seed"] = cells.pop("seed")  # last
     if many:
-        table.add_row(*["..."] * len(table.columns))
-        for number in range(len(runs) - LAST, len(runs)):
-            table.add_row(*_cells(runs.run(number)))
-    console.print(table)
+        lines.insert(FIRST, dict.fromkeys(lines[0], "..."))
+    number, *others = ((name.replace(".", ".\n"), [cells[name] for cells in lines]) for name in lines[0])
+    return number, others
 
 
-def _cells(run: Run) -> list[str]:
-    varied = [_shown(value) for value in run.varied.values()]
-    words = [run.scenario, run.world, run.planner, run.aircraft, *varied]
-    return [str(run.run), str(run.case), *map(escape, words), str(run.seed)]
+def _wide(column: Column) -> int:
+    """Characters of a column and the two spaces after it."""
+    head, cells = column
+    return max(map(cell_len, (*head.split("\n"), *cells))) + 2
 
 
 def _shown(value: Scalar) -> str:

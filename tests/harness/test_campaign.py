@@ -418,6 +418,26 @@ def test_a_dry_run_shows_the_runs_and_writes_nothing(
     assert sorted(place.rglob("*")) == before
 
 
+def test_a_dry_run_fits_a_narrow_terminal(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN)
+    runs = runs_of(place, CAMPAIGN)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["sweep", str(place / "campaign.yaml"), "--dry-run"]) == 0
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+    assert max(map(len, lines)) <= 80
+    words = " ".join(lines).split()
+    for name in runs.varied:
+        assert words.count(name.rpartition(".")[2]) == 1
+    pieces = [line for line in lines if line.split()[:1] == ["47"]]
+    assert len(pieces) > 1, "it did not fit"
+    last = runs.run(47)
+    assert " ".join(pieces).split()[:5] == ["47", "11", last.scenario, last.world, last.planner]
+    assert pieces[-1].split()[-1] == str(last.seed)
+
+
 @pytest.mark.parametrize("name", shipped_campaigns())
 def test_shipped_campaigns_are_valid_and_named_after_their_files(name: str) -> None:
     path = shipped_campaigns()[name]
