@@ -14,15 +14,14 @@ from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.interface import AircraftState, Command, FlightModel, Route
 from aircraft.route import route_length
 from harness.crash import in_a_line, sentence, trace
+from harness.judge import Judge
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
 from harness.sensed_world import SensedWorld
-from harness.world import Fix, World
+from harness.world import World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
 PROGRESS_EVERY_S = 5.0
-LONGEST_UNCHECKED_S = 5.0
-"""Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
 
 Progress = Callable[[float, float, str], None]
 """Called with simulated time (s), distance to go (m) and a word on the state."""
@@ -97,7 +96,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     strides = itertools.cycle(_strides(model.step_rate_hz, loop.scan_rate_hz))
     log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
     plans = _Plans(loop, observers)
-    judge = _Judge(loop)
+    judge = Judge(loop.world, mission, loop.time_limit_s, model.fault)
     late: deque[RangeScan] = deque()
     roll_command, cross_track, station = 0.0, math.nan, math.nan
     next_report = 0.0
@@ -139,10 +138,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         model.advance(steps)
     log.add(state, roll_command, cross_track, station, plans.index)
     outcome, reason = verdict
-    if plans.never and outcome not in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
-        reason += f"; no plan was ever found: {in_a_line(plans.never)}"
-    elif plans.stuck and outcome is Outcome.TIMEOUT:
-        reason += f"; the planner's last word: {in_a_line(plans.stuck)}"
+    reason += plans.last_word(outcome)
     if progress is not None:
         progress(state.time_s, judge.to_go_m(state), outcome.value)
     for observer in observers:
@@ -194,8 +190,7 @@ class _Plans:
         """The planner is to be asked again before the next scan."""
         self._told, self._scanned = "", False
         self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
-        self.stuck = ""
-        """The last of it; empty where there is none."""
+        self._stuck = ""  # the last of it
         self._station, self._turns_at = 0.0, math.inf
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
@@ -209,10 +204,15 @@ class _Plans:
             "waiting" if not self.accepted else "holding" if self._station > self._turns_at else "following"
         )
 
-    @property
-    def never(self) -> str:
-        """Why the planner found nothing so far; empty where it found something, or says so itself."""
-        return "" if self.accepted or self._coming else self._told
+    def last_word(self, outcome: Outcome) -> str:
+        """What the planner has to say of an end that is not its own: why it never, or no longer, found anything."""
+        if outcome in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
+            return ""
+        if not (self.accepted or self._coming) and self._told:
+            return f"; no plan was ever found: {in_a_line(self._told)}"
+        if outcome is Outcome.TIMEOUT and self._stuck:
+            return f"; the planner's last word: {in_a_line(self._stuck)}"
+        return ""
 
     def ask(self, state: AircraftState, station_m: float, scanned: bool) -> tuple[Outcome, str] | None:
         """Asks the planner, unless it is still at work; returns how the flight ends if that is its answer."""
@@ -248,13 +248,13 @@ class _Plans:
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
             return Outcome.UNREACHABLE, in_a_line(plan.reason)
         if plan.status is PlanStatus.NO_PATH:
-            self.stuck = plan.reason
+            self._stuck = plan.reason
             if plan.reason not in self._in_vain:
                 self._in_vain.add(plan.reason)
                 for observer in self._observers:
                     observer.on_event(state.time_s, plan.reason)
         if plan.status is PlanStatus.FOUND:
-            self.stuck, self._in_vain = "", set()
+            self._stuck, self._in_vain = "", set()
             try:
                 if plan.path is None:
                     raise ValueError("it is none")
@@ -280,68 +280,3 @@ class _Plans:
         self._station, self._turns_at = 0.0, route_length(route) - turn
         for observer in self._observers:
             observer.on_plan(accepted, state)
-
-
-class _Judge:
-    """Says when and how a flight is over."""
-
-    def __init__(self, loop: Loop) -> None:
-        self._loop, self._fault = loop, loop.model.fault
-        self._next_look_s = 0.0
-        self._appears_s = -math.inf
-        # At the last look at the obstacles: where, when, and how much clearance.
-        self._measured = (0.0, 0.0, 0.0, 0.0)
-        self._looked: tuple[Fix, float] | None = None  # at the last look of all: surely so much clearance
-        self.contact_m = math.inf
-        """Clearance at a contact since the look before the last; +inf without."""
-
-    def to_go_m(self, state: AircraftState) -> float:
-        """Straight distance to the goal."""
-        east, north = self._loop.mission.goal_m
-        return math.hypot(state.east_m - east, state.north_m - north)
-
-    def verdict(self, state: AircraftState) -> tuple[Outcome, str] | None:
-        """How the flight ends now; None while it goes on."""
-        fault = self._fault()
-        if fault is not None:
-            return Outcome.LOST_CONTROL, fault
-        if state.time_s < self._next_look_s:
-            return None
-        loop, mission = self._loop, self._loop.mission
-        world, east, north = loop.world, state.east_m, state.north_m
-        clearance = self._surely_clear_m(east, north, state.time_s)
-        if clearance < 0.0:
-            return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
-        if self.contact_m < 0.0:
-            return Outcome.COLLISION, "went through an obstacle that is thinner than the step was long"
-        if not world.inside_bounds(east, north):
-            return Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m"
-        to_go = self.to_go_m(state)
-        if to_go <= mission.goal_radius_m:
-            return Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s"
-        if state.time_s >= loop.time_limit_s:
-            return Outcome.TIMEOUT, f"time limit {loop.time_limit_s:g} s, {to_go:.0f} m from the goal"
-        xmin, ymin, xmax, ymax = world.bounds_m
-        room = min(to_go - mission.goal_radius_m, east - xmin, north - ymin, xmax - east, ymax - north)
-        # Whatever it turns to: the wind is no faster than both speeds together.
-        fastest = state.groundspeed_mps + 2.0 * state.airspeed_mps
-        wait = min(clearance / (fastest + world.max_obstacle_speed_mps), room / fastest, LONGEST_UNCHECKED_S)
-        if self._appears_s <= state.time_s:
-            self._appears_s = world.next_appearance(state.time_s)
-        self._next_look_s = min(state.time_s + wait, self._appears_s, loop.time_limit_s)
-        return None
-
-    def _surely_clear_m(self, east: float, north: float, time_s: float) -> float:
-        """The true clearance; or what is surely left of that of the last look, while more than a quarter is."""
-        world, here = self._loop.world, (east, north, time_s)
-        there_east, there_north, then_s, clearance = self._measured
-        lost = math.hypot(east - there_east, north - there_north)
-        lost += world.max_obstacle_speed_mps * (time_s - then_s)
-        if lost < 0.75 * clearance and time_s < self._appears_s:
-            self._looked = here, clearance - lost
-            return clearance - lost
-        clearance = world.clearance_at(east, north, time_s)
-        if self._looked is not None:
-            self.contact_m = world.contact_between(*self._looked, here, clearance)
-        self._measured, self._looked = (*here, clearance), (here, clearance)
-        return clearance
