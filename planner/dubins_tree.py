@@ -85,7 +85,8 @@ class DubinsTree:
         assert config.margin_m is not None
         self._config, self._mission, self._margin_m = config, mission, config.margin_m
         self._memory = ObstacleMemory(mission.clearance_m)
-        self._urgent_m = 8.0 * mission.turn_radius_m + mission.speed_mps * (4.0 + mission.compute_latency_s)
+        late_s = 4.0 + mission.compute_latency_s
+        self._urgent_m = 8.0 * mission.turn_radius_m + mission.ground_speed_mps * late_s
         self._searches = 0
         self._gone = 0
         self._flown: Plan | None = None

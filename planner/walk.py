@@ -124,7 +124,7 @@ class Walker(ABC, Generic[State]):
         )  # turning left, the obstacle comes to be on the right
         self.known = GrownObstacles(mission, config.margin_m)
         self.keep_m = self.known.keep_m
-        self._near_m = 2.0 * self.keep_m + mission.speed_mps * (2.0 + mission.compute_latency_s)
+        self._near_m = 2.0 * self.keep_m + mission.ground_speed_mps * (2.0 + mission.compute_latency_s)
         self._breach_keep_m = self.keep_m - BREACH_SHARE * config.margin_m
         self._unrest = Unrest()
         self._tried_again = False
