@@ -51,14 +51,6 @@ class AircraftState(NamedTuple):
         return math.atan2(self.velocity_east_mps, self.velocity_north_mps) % math.tau
 
 
-class Command(NamedTuple):
-    """What guidance asks of the inner loops."""
-
-    roll_rad: float
-    altitude_m: float
-    airspeed_mps: float
-
-
 @dataclass(frozen=True, eq=False)
 class Route:
     """A path to be flown: joined segments of constant curvature (lines and arcs).
@@ -114,8 +106,8 @@ class FlightModel(Protocol):
         """The state now."""
         ...
 
-    def command(self, command: Command) -> None:
-        """Sets what the inner loops hold until the next call."""
+    def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
+        """Sets what the inner loops hold until the next call: altitude above mean sea level, true airspeed."""
         ...
 
     def advance(self, steps: int) -> None:

@@ -7,7 +7,7 @@ import math
 
 from aircraft.airframes import AircraftError, Airframe, airframe
 from aircraft.frames import LocalPlane
-from aircraft.interface import STEP_RATE_HZ, AircraftState, Command
+from aircraft.interface import STEP_RATE_HZ, AircraftState
 from aircraft.jsbsim_loading import FOOT_M, load, node, trim
 from aircraft.properties import (
     COMMAND_PROPERTIES,
@@ -89,7 +89,7 @@ class JsbsimModel:
             for path in ("attitude/phi-rad", "velocities/vtrue-fps", "position/h-sl-ft")
         )
         self._set_up_autopilot()
-        self.command(Command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps))
+        self.command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
         if self._windy:
             self._move_with_wind()
         self._settle()
@@ -136,15 +136,15 @@ class JsbsimModel:
         east_m, north_m, convergence = self._plane.project(latitude_rad, longitude_rad)
         return complex(east_m, north_m), convergence
 
-    def command(self, command: Command) -> None:
+    def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
         """Sets what the inner loops hold.
 
         Keeps the wind's direction steady in the local plane, with the convergence of the last `state`.
         """
         roll, altitude, airspeed = self._write
-        roll(command.roll_rad)
-        altitude(command.altitude_m / FOOT_M)
-        airspeed(command.airspeed_mps / FOOT_M)
+        roll(roll_rad)
+        altitude(altitude_m / FOOT_M)
+        airspeed(airspeed_mps / FOOT_M)
         if self._windy:
             self._blow()
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from aircraft.guidance import GuidanceOutput
-from aircraft.interface import STEP_RATE_HZ, AircraftState, Command, FloatArray, Route
+from aircraft.interface import STEP_RATE_HZ, AircraftState, FloatArray, Route
 from aircraft.route import route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 
@@ -35,7 +35,7 @@ class KinematicPoint:
             atmosphere: ignored; taken so that a point is made as other flight models are.
         """
         del atmosphere
-        self._command = Command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
+        self.command(0.0, start.altitude_m, start.airspeed_mps)
         self._step = 0
         tangent = math.sin(start.course_rad), math.cos(start.course_rad)
         self._way = Route(np.array([[start.east_m, start.north_m, *tangent, 0.0, 1.0]]))
@@ -51,12 +51,12 @@ class KinematicPoint:
     def state(self) -> AircraftState:
         """The state now; on a corner, in the direction that it leaves it."""
         east, north, tangent_east, tangent_north = route_point(self._way, self._along_m)
-        speed = self._command.airspeed_mps
+        speed = self._airspeed
         return AircraftState(
             time_s=self._step / STEP_RATE_HZ,
             east_m=east,
             north_m=north,
-            up_m=self._command.altitude_m,
+            up_m=self._altitude,
             velocity_east_mps=speed * tangent_east,
             velocity_north_mps=speed * tangent_north,
             velocity_up_mps=0.0,
@@ -67,14 +67,15 @@ class KinematicPoint:
             load_factor=1.0,
         )
 
-    def command(self, command: Command) -> None:
+    def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
         """Sets altitude and airspeed, which hold at once; a point does not roll."""
-        self._command = command
+        del roll_rad
+        self._altitude, self._airspeed = altitude_m, airspeed_mps
 
     def advance(self, steps: int) -> None:
         """Moves on by `steps` steps of 1 / step_rate_hz."""
         self._step += steps
-        self._along_m += self._command.airspeed_mps * steps / STEP_RATE_HZ
+        self._along_m += self._airspeed * steps / STEP_RATE_HZ
 
     def fault(self) -> str | None:
         """None: a point is always under control."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import STEP_RATE_HZ, AircraftState, Command
+from aircraft.interface import STEP_RATE_HZ, AircraftState
 from aircraft.start import Atmosphere, StartConditions
 
 LONGEST_STEP_S = 0.1
@@ -50,7 +50,7 @@ class PointMass:
         self._east, self._north = start.east_m, start.north_m
         self._heading = start.heading_rad(atmosphere)
         self._roll = 0.0
-        self._command = Command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
+        self.command(0.0, start.altitude_m, start.airspeed_mps)
 
     @property
     def step_rate_hz(self) -> int:
@@ -59,12 +59,12 @@ class PointMass:
 
     def state(self) -> AircraftState:
         """The state now."""
-        airspeed = self._command.airspeed_mps
+        airspeed = self._airspeed
         return AircraftState(
             time_s=self._step / self._step_rate_hz,
             east_m=self._east,
             north_m=self._north,
-            up_m=self._command.altitude_m,
+            up_m=self._altitude,
             velocity_east_mps=airspeed * math.sin(self._heading) + self._wind_east,
             velocity_north_mps=airspeed * math.cos(self._heading) + self._wind_north,
             velocity_up_mps=0.0,
@@ -75,16 +75,16 @@ class PointMass:
             load_factor=1.0 / math.cos(self._roll),
         )
 
-    def command(self, command: Command) -> None:
+    def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
         """Sets roll, altitude and airspeed; the last two hold at once."""
-        self._command = command
+        self._roll_command, self._altitude, self._airspeed = roll_rad, altitude_m, airspeed_mps
 
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         duration = steps / self._step_rate_hz
         strides = max(math.ceil(duration / LONGEST_STEP_S - 1e-9), 1)
         dt = duration / strides
-        airspeed, target = self._command.airspeed_mps, self._command.roll_rad
+        airspeed, target = self._airspeed, self._roll_command
         half_decay = math.exp(-0.5 * dt / self._roll_lag_s)
         for _ in range(strides):
             begin = self._roll
@@ -104,6 +104,6 @@ class PointMass:
         """A sentence if the state is not finite or the ground is reached, else None."""
         if not math.isfinite(self._east + self._north + self._heading + self._roll):
             return "the state is not finite"
-        if self._command.altitude_m <= 0.0:
-            return f"the aircraft is at the ground ({self._command.altitude_m:.1f} m above sea level)"
+        if self._altitude <= 0.0:
+            return f"the aircraft is at the ground ({self._altitude:.1f} m above sea level)"
         return None

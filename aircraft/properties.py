@@ -20,7 +20,7 @@ STATE_PROPERTIES = (
 """Read for `AircraftState`, in the order in which `JsbsimModel.state` unpacks them."""
 
 COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
-"""Written for `Command`, in its order."""
+"""Written for a command, in this order."""
 
 WIND_PROPERTIES = ("atmosphere/wind-east-fps", "atmosphere/wind-north-fps")
 

@@ -18,7 +18,7 @@ from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import STEP_RATE_HZ, AircraftState, Command, Route
+from aircraft.interface import STEP_RATE_HZ, AircraftState, Route
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,
     angle_of_attack_rad,
@@ -223,7 +223,7 @@ def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET
         return str(error)
     ticks = round(LEG_S * model.step_rate_hz / UPDATE_STEPS)
     for bank_deg in banks_deg:
-        model.command(Command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed))
+        model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
         for tick in range(ticks):
             model.advance(UPDATE_STEPS)
             if fault := model.fault():
@@ -253,7 +253,7 @@ def weaving_error_m(frame: Airframe, speed: float) -> float:
         if model.fault() or output.past_end:
             return math.inf if model.fault() else worst
         worst = max(worst, abs(output.cross_track_m))
-        model.command(Command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed))
+        model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed)
         model.advance(UPDATE_STEPS)
 
 
@@ -277,7 +277,7 @@ def roll_in_s(frame: Airframe, speed: float) -> float:
     """
     model = in_flight(frame, speed)
     bank = math.radians(min(ROLL_IN_DEG, frame.bank_limit_deg))
-    model.command(Command(bank, REFERENCE_ALTITUDE_M, speed))
+    model.command(bank, REFERENCE_ALTITUDE_M, speed)
     while model.state().roll_rad < 0.9 * bank:
         model.advance(1)
         if model.state().time_s > TURN_S:
@@ -293,7 +293,7 @@ def steepest_level_bank_deg(frame: Airframe, speed: float) -> float:
             model = in_flight(frame, speed)
         except AircraftError:
             return False
-        model.command(Command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed))
+        model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
         for _ in range(round(TURN_S * model.step_rate_hz / UPDATE_STEPS)):
             model.advance(UPDATE_STEPS)
             if model.fault():

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
-from aircraft.interface import AircraftState, Command, FlightModel, Route
+from aircraft.interface import AircraftState, FlightModel, Route
 from aircraft.route import route_length
 from harness.crash import in_a_line, sentence, trace
 from harness.judge import Judge
@@ -123,7 +123,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
                 plans.take_effect(state, station)
             if plans.index >= 0:
                 roll_command, cross_track, station, _, _ = follower.update(state)
-            model.command(Command(roll_command, loop.altitude_m, mission.speed_mps))
+            model.command(roll_command, loop.altitude_m, mission.speed_mps)
             log.add(state, roll_command, cross_track, station, plans.index)
             if progress is not None and state.time_s >= next_report:
                 progress(state.time_s, judge.to_go_m(state), plans.state)

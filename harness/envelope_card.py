@@ -16,7 +16,6 @@ from aircraft.card_cache import cached
 from aircraft.envelope import performance
 from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import Command
 from aircraft.start import Atmosphere
 from harness.tracking import ALTITUDE_M, course, fly_course
 
@@ -105,7 +104,7 @@ def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, floa
 
     model = in_flight(frame, speed)
     steps = model.step_rate_hz // UPDATE_RATE_HZ
-    model.command(Command(math.radians(bank_deg), ALTITUDE_M, speed))
+    model.command(math.radians(bank_deg), ALTITUDE_M, speed)
     length = turned = lost_m = lost_mps = 0.0
     load = 1.0
     before = model.state()

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from aircraft.guidance import UPDATE_RATE_HZ
-from aircraft.interface import Command, Route
+from aircraft.interface import Route
 from harness.closed_loop import Loop, Observer, Progress
 from harness.given_path import CutCorner, FloatArray, FlyBy, fly_by
 from harness.metrics import metrics
@@ -145,7 +145,7 @@ def fly_along(
     while True:
         state = model.state()
         guided = follower.update(state)
-        model.command(Command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps))
+        model.command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps)
         outcome = _outcome(model.fault(), guided.past_end, state.time_s, limit_s)
         log.add(state, guided.roll_command_rad, guided.cross_track_m, guided.station_m, 0)
         if progress is not None and updates % round(PROGRESS_EVERY_S * UPDATE_RATE_HZ) == 0:

@@ -17,7 +17,7 @@ from aircraft.airframes import Airframe, airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance import UPDATE_RATE_HZ
-from aircraft.interface import Command, Route
+from aircraft.interface import Route
 from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
 from harness.compiled_guidance import path_follower
@@ -139,7 +139,7 @@ def fly_course(frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Rou
         cross.append(abs(output.cross_track_m))
         altitude.append(abs(state.up_m - ALTITUDE_M))
         saturated += output.bank_saturated
-        model.command(Command(output.roll_command_rad, ALTITUDE_M, airspeed_mps))
+        model.command(output.roll_command_rad, ALTITUDE_M, airspeed_mps)
         model.advance(steps)
     return Tracking(
         float(np.percentile(cross, 95)),

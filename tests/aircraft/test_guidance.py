@@ -17,7 +17,7 @@ from aircraft.guidance import (
     GuidanceOutput,
     PathFollower,
 )
-from aircraft.interface import STEP_RATE_HZ, AircraftState, Command, Route
+from aircraft.interface import STEP_RATE_HZ, AircraftState, Route
 from aircraft.point_mass import PointMass
 from aircraft.route import arc_point, route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
@@ -53,7 +53,7 @@ def fly(
         state = model.state()
         output = follower.update(state)
         flown.append((state, output))
-        model.command(Command(output.roll_command_rad, ALTITUDE, AIRSPEED))
+        model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)
         model.advance(STEPS)
     return flown
 
@@ -126,7 +126,7 @@ def test_curvature_preview_is_what_keeps_a_joint_smooth() -> None:
         for _ in range(UPDATE_RATE_HZ * 30):
             output = follower.update(model.state())
             errors.append(abs(output.cross_track_m))
-            model.command(Command(output.roll_command_rad, ALTITUDE, AIRSPEED))
+            model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)
             model.advance(STEPS)
         return max(errors)
 
@@ -207,7 +207,7 @@ def test_hand_over_in_a_turn_makes_no_bump() -> None:
         output = follower.update(model.state())
         rolls.append(output.roll_command_rad)
         errors.append(abs(output.cross_track_m))
-        model.command(Command(output.roll_command_rad, ALTITUDE, AIRSPEED))
+        model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)
         model.advance(STEPS)
     assert max(errors) < 0.2
     assert abs(rolls[new_at] - rolls[new_at - 1]) < 0.02

@@ -11,7 +11,7 @@ import pytest
 
 from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
-from aircraft.interface import AircraftState, Command, FlightModel
+from aircraft.interface import AircraftState, FlightModel
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
 
@@ -74,7 +74,7 @@ def test_wind_keeps_its_direction_in_the_plane() -> None:
     model = JsbsimModel("aerosonde", start, LocalPlane(70.0, 8.0), Atmosphere(wind_east_mps=10.0))
     for _ in range(600):
         state = model.state()
-        model.command(Command(0.0, 300.0, 25.0))
+        model.command(0.0, 300.0, 25.0)
         model.advance(120)
     state = model.state()
     horizontal = state.airspeed_mps * math.cos(state.velocity_up_mps / state.airspeed_mps)
@@ -99,7 +99,7 @@ def test_position_is_the_integral_of_velocity() -> None:
 def test_inner_loops_hold_what_they_are_told(name: str) -> None:
     model = model_of(name)
     cruise = airframe(name).cruise_mps
-    model.command(Command(0.5, 310.0, 1.05 * cruise))
+    model.command(0.5, 310.0, 1.05 * cruise)
     model.advance(120 * 40)
     state = model.state()
     assert state.roll_rad == pytest.approx(0.5, abs=0.01)
@@ -112,7 +112,7 @@ def test_inner_loops_hold_what_they_are_told(name: str) -> None:
 def test_roll_in_time_is_the_one_of_the_survey(name: str) -> None:
     model = model_of(name)
     bank = math.radians(30.0)
-    model.command(Command(bank, 300.0, airframe(name).cruise_mps))
+    model.command(bank, 300.0, airframe(name).cruise_mps)
     while model.state().roll_rad < 0.9 * bank:
         model.advance(1)
     assert model.state().time_s == pytest.approx(airframe(name).roll_in_s, rel=0.05)
@@ -121,7 +121,7 @@ def test_roll_in_time_is_the_one_of_the_survey(name: str) -> None:
 def test_disengaged_the_controls_stay_and_the_command_is_not_flown() -> None:
     model = model_of("aerosonde")
     model.engage(False)
-    model.command(Command(0.6, 400.0, 25.0))
+    model.command(0.6, 400.0, 25.0)
     model.advance(240)
     assert abs(model.state().roll_rad) < 0.05
 
@@ -150,7 +150,7 @@ def test_faults_name_the_cause() -> None:
     assert model.fault() is None
 
     sinking = model_of("aerosonde")
-    sinking.command(Command(0.0, -500.0, 25.0))
+    sinking.command(0.0, -500.0, 25.0)
     for _ in range(20 * 400):
         sinking.advance(6)
         if sinking.fault():
@@ -196,7 +196,7 @@ def test_each_limit_is_a_fault_of_its_own(reading: str, good: float, bad: float,
 
 def test_a_state_that_is_not_finite_is_a_fault() -> None:
     model = model_of("aerosonde")
-    model.command(Command(math.nan, 300.0, 25.0))
+    model.command(math.nan, 300.0, 25.0)
     model.advance(12)
     assert model.fault() == "the state is not finite"
 
@@ -224,13 +224,12 @@ def test_what_cannot_fly_is_refused(
 
 FLIGHT = """
 from aircraft.frames import LocalPlane
-from aircraft.interface import Command
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
 air = Atmosphere(5.0, -2.0, "tustin", "moderate", 3)
 model = JsbsimModel({name!r}, StartConditions(1e3, 2e3, 300.0, 0.3, {airspeed}), LocalPlane(47.0, 8.0), air)
 for tick in range(600):
-    model.command(Command(0.4 if tick % 200 < 100 else -0.4, 300.0, {airspeed}))
+    model.command(0.4 if tick % 200 < 100 else -0.4, 300.0, {airspeed})
     model.advance(6)
 state = model.state()
 open({out!r}, "w").write(" ".join(value.hex() for value in state))

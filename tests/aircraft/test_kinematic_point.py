@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.interface import Command, FlightModel, Route
+from aircraft.interface import FlightModel, Route
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.route import route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
@@ -89,7 +89,7 @@ def test_goes_round_a_loiter_for_ever_and_counts_on() -> None:
     one_turn_m = 100.0 * math.pi
     point.advance(5 * SECOND)
     entered = place(point)
-    point.command(Command(roll_rad=0.0, altitude_m=300.0, airspeed_mps=one_turn_m))
+    point.command(roll_rad=0.0, altitude_m=300.0, airspeed_mps=one_turn_m)
     point.advance(3 * SECOND)
     assert place(point) == pytest.approx(entered, abs=1e-6)
     guided = point.update(point.state())

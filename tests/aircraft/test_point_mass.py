@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import Command, FlightModel
+from aircraft.interface import FlightModel
 from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions
 
@@ -36,7 +36,7 @@ def test_straight_flight_makes_the_course_good_in_wind() -> None:
 def test_a_steady_bank_flies_the_circle_of_its_radius() -> None:
     model = PointMass(START, roll_lag_s=1e-3)
     roll = math.radians(30.0)
-    model.command(Command(roll, 300.0, 25.0))
+    model.command(roll, 300.0, 25.0)
     model.advance(12)
     radius = 25.0**2 / (GRAVITY_MPS2 * math.tan(roll))
     state = model.state()
@@ -51,7 +51,7 @@ def test_a_steady_bank_flies_the_circle_of_its_radius() -> None:
 
 def test_roll_is_first_order() -> None:
     model = PointMass(START, roll_lag_s=0.25)
-    model.command(Command(0.5, 300.0, 25.0))
+    model.command(0.5, 300.0, 25.0)
     model.advance(30)
     assert model.state().roll_rad == pytest.approx(0.5 * (1.0 - math.exp(-1.0)))
 
@@ -60,7 +60,7 @@ def test_roll_is_first_order() -> None:
 def test_big_strides_agree_with_single_steps(steps: int, roll: float) -> None:
     whole, single = PointMass(START), PointMass(START)
     for model in (whole, single):
-        model.command(Command(roll, 310.0, 27.0))
+        model.command(roll, 310.0, 27.0)
     whole.advance(steps)
     for _ in range(steps):
         single.advance(1)
@@ -75,9 +75,9 @@ def test_big_strides_agree_with_single_steps(steps: int, roll: float) -> None:
 def test_faults() -> None:
     model = PointMass(START)
     assert model.fault() is None
-    model.command(Command(0.0, -1.0, 25.0))
+    model.command(0.0, -1.0, 25.0)
     assert model.fault() == "the aircraft is at the ground (-1.0 m above sea level)"
-    model.command(Command(math.nan, 300.0, 25.0))
+    model.command(math.nan, 300.0, 25.0)
     model.advance(1)
     assert model.fault() == "the state is not finite"
 

@@ -16,7 +16,7 @@ from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
 from aircraft.guidance_law import air_direction
-from aircraft.interface import AircraftState, Command, FlightModel, Route
+from aircraft.interface import AircraftState, FlightModel, Route
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, Gust, StartConditions
@@ -39,7 +39,7 @@ def flown(model: FlightModel, seconds: float, route: Route = EAST_LINE) -> list[
         state = model.state()
         output = follower.update(state)
         rows.append(Row(state, output.cross_track_m, output.roll_command_rad))
-        model.command(Command(output.roll_command_rad, 300.0, 25.0))
+        model.command(output.roll_command_rad, 300.0, 25.0)
         model.advance(model.step_rate_hz // UPDATE_RATE_HZ)
         assert model.fault() is None
     return rows
