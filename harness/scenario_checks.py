@@ -54,10 +54,11 @@ def check_start_and_goal(
 
 
 def distance_to(obstacle: Obstacle, point: Point) -> float:
-    """Distance in metres from a point to an obstacle where the file puts it; 0 or less inside."""
+    """Distance in metres from a point to the edge of an obstacle where the file puts it; negative inside."""
     if obstacle.circle:
         return math.dist(point, obstacle.circle.center_m) - obstacle.circle.radius_m
     assert obstacle.polygon
     import shapely
 
-    return float(shapely.distance(shapely.Polygon(obstacle.polygon.vertices_m), shapely.Point(point)))
+    polygon, place = shapely.Polygon(obstacle.polygon.vertices_m), shapely.Point(point)
+    return float(shapely.distance(polygon, place) or -shapely.distance(polygon.exterior, place))

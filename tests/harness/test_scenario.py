@@ -129,6 +129,22 @@ def test_only_what_stays_may_not_lie_on_the_goal(own: str) -> None:
         parse_scenario(LEAST + there % "")
 
 
+@pytest.mark.parametrize("key", ["start_m", "goal_m"])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "circle: {center_m: [%d, 1000], radius_m: 300}",
+        "polygon: {vertices_m: [[%d, 0], [0, 9000], [40000, 9000]]}",
+    ],
+)
+def test_nobody_starts_or_ends_inside_an_obstacle_however_little_clearance_is_wanted(
+    key: str, shape: str
+) -> None:
+    east = 1000 if key == "start_m" else 31000
+    with pytest.raises(InputError, match=rf"mission\.{key}: lies inside obstacles\[0\]"):
+        parse_scenario(LEAST + f"obstacles: [{{{shape % east}}}]\nplanner: {{clearance_m: 0}}\n")
+
+
 def test_what_pops_up_later_may_lie_on_the_start() -> None:
     there = "obstacles: [{circle: {center_m: [1000, 1000], radius_m: 300}, active_s: [%d, 120]}]\n"
     assert parse_scenario(LEAST + there % 1).obstacles
