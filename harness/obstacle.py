@@ -17,6 +17,8 @@ FloatArray = NDArray[np.float64]
 
 _PAIRS_AT_ONCE = 1_000_000
 """Points times edges whose distances are worked out together: what keeps memory small."""
+LEAST_M2 = float(np.finfo(np.float64).tiny)
+"""Square of the least length of an edge, for who divides by it: both ends of one may be rounded to one place."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,8 @@ class Polygon:
         start_east, start_north, end_east, end_north = self.edges_m
         along_east, along_north = end_east - start_east, end_north - start_north
         from_east, from_north = east_m[:, None] - start_east, north_m[:, None] - start_north
-        share = (from_east * along_east + from_north * along_north) / (along_east**2 + along_north**2)
+        length_m2 = np.maximum(along_east**2 + along_north**2, LEAST_M2)
+        share = (from_east * along_east + from_north * along_north) / length_m2
         share = np.minimum(np.maximum(share, 0.0), 1.0)
         off_east, off_north = from_east - share * along_east, from_north - share * along_north
         distance = np.sqrt((off_east * off_east + off_north * off_north).min(axis=1))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.obstacle import LEAST_M2
 from harness.ray_casting import Fan
 from harness.world import Faces, Surroundings, World
 from planner.interface import ComplexArray, FloatArray, IntArray
@@ -200,7 +201,8 @@ class RangeSensor:
         if faces.edges_m.shape[1]:
             edges = faces.edges_m[::2] + 1j * faces.edges_m[1::2] - complex(east, north)
             start, along = edges[0], edges[1] - edges[0]
-            share = -(start * along.conj()).real / (along * along.conj()).real
+            length_m2 = np.maximum((along * along.conj()).real, LEAST_M2)
+            share = -(start * along.conj()).real / length_m2
             nearest = min(nearest, float(np.abs(start + np.clip(share, 0.0, 1.0) * along).min()))
         return nearest if nearest <= self._config.range_m else math.inf
 

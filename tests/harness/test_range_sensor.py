@@ -152,6 +152,15 @@ def test_inside_an_obstacle_a_ray_returns_the_way_out() -> None:
     assert ahead(World([Obstacle(square(0.0, 50.0, 100.0))], BOUNDS)) == pytest.approx(150.0)
 
 
+@pytest.mark.parametrize("edge_m", [1e-14, 1e-170])
+def test_an_edge_shorter_than_places_are_told_apart_hides_nothing(edge_m: float) -> None:
+    house = Polygon(((-100.0, 300.0), (0.0, 200.0), (edge_m, 200.0), (100.0, 300.0)))
+    world = World([Obstacle(house), Obstacle(square(0.0, -500.0, 100.0))], BOUNDS)
+    scan = sensor(world, rays=4).scan(30.0, 0.0, math.pi / 4, 0.0)
+    assert scan.nearest_m == pytest.approx(math.hypot(30.0, 200.0))
+    np.testing.assert_allclose(scan.ranges_m, [math.inf, 230.0, math.inf, 400.0])
+
+
 def test_nothing_returns_from_beyond_the_range() -> None:
     assert ahead(World([Obstacle(square(0.0, 1100.0, 100.0))], BOUNDS)) == 1000.0
     assert ahead(World([Obstacle(square(0.0, 1100.001, 100.0))], BOUNDS)) == math.inf

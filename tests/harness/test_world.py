@@ -100,6 +100,14 @@ def test_clearance_of_a_polygon_agrees_with_shapely(seed: int, point: tuple[floa
     )
 
 
+@pytest.mark.parametrize("edge_m", [1e-14, 1e-170])
+def test_clearance_of_a_polygon_with_an_edge_of_hardly_any_length(edge_m: float) -> None:
+    house = Obstacle(Polygon(((-100.0, 300.0), (0.0, 200.0), (edge_m, 200.0), (100.0, 300.0))))
+    nearly = World([house], BOUNDS)
+    assert nearly.clearance_at(0.0, 0.0, 0.0) == pytest.approx(200.0)
+    assert nearly.clearance_at(0.0, 290.0, 0.0) == pytest.approx(-10.0)
+
+
 def test_inside_and_outside_are_told_on_lines_through_corners() -> None:
     arrow = Obstacle(
         Polygon(((0.0, 2.0), (2.0, 2.0), (2.0, 0.0), (5.0, 3.0), (2.0, 6.0), (2.0, 4.0), (0.0, 4.0)))
