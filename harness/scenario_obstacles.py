@@ -30,12 +30,12 @@ class Polygon(Section):
     def _enclose_an_area(cls, vertices_m: tuple[Point, ...]) -> tuple[Point, ...]:
         import shapely
 
-        ring = vertices_m[:-1] if vertices_m[0] == vertices_m[-1] else vertices_m
-        for index, vertex in enumerate(ring):
-            if index and vertex == ring[index - 1]:
+        for index, vertex in enumerate(vertices_m):
+            if index and vertex == vertices_m[index - 1]:
                 raise ValueError(
                     f"vertex {index} repeats vertex {index - 1}, {list(vertex)}; leave one of them out"
                 )
+        ring = vertices_m[:-1] if vertices_m[0] == vertices_m[-1] else vertices_m
         if len(ring) < 3:
             raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
         shape = shapely.Polygon(ring)

@@ -106,6 +106,12 @@ BROKEN = {
         "9: obstacles[1].polygon.vertices_m",
         "has 2 distinct vertices",
     ),
+    "closed twice": (
+        SQUARE,
+        "[[12000, 3000], [14000, 3000], [14000, 5000], [12000, 3000], [12000, 3000]]",
+        "9: obstacles[1].polygon.vertices_m",
+        "vertex 4 repeats vertex 3",
+    ),
     "polygon without area": (
         SQUARE,
         "[[12000, 3000], [13000, 3000], [14000, 3000]]",
