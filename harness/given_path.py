@@ -14,8 +14,14 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+SAME_PLACE_M = 0.01
+"""Points that are not further apart are one."""
+
 SAME_LINE_M = 0.01
 """A point nearer than this to the line of those about it is taken to lie on it."""
+
+AT_ONCE = 10_000
+"""Points that are simplified together: GEOS calls itself once more for each that it keeps."""
 
 SHORTEST_M = 1e-6
 """A shorter segment is left out."""
@@ -74,7 +80,7 @@ def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
     Neighbouring corners share the leg between them in proportion to what they need.
 
     Args:
-        points_m: (m, 2) at least two points, no two neighbours in one place.
+        points_m: (m, 2) points, not all in one place.
         radius_m: smallest radius that the aircraft should fly, > 0.
         free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0.
     """
@@ -131,12 +137,13 @@ def _needed(points_m: FloatArray) -> NDArray[np.int64]:
     """Indices of the points without which the polyline would be another (Douglas and Peucker, 1973)."""
     import shapely
 
-    line = shapely.LineString(points_m)
-    simple = shapely.get_coordinates(shapely.simplify(line, SAME_LINE_M, preserve_topology=False))
-    kept = [0]
-    for point in simple[1:-1]:
-        kept.append(kept[-1] + 1 + int(np.argmax((points_m[kept[-1] + 1 :] == point).all(axis=1))))
-    return np.array([*kept, len(points_m) - 1])
+    # Heights are not looked at: each point carries its number there.
+    numbered = shapely.LineString(np.column_stack((points_m, np.arange(len(points_m)))))
+    apart = shapely.get_coordinates(shapely.remove_repeated_points(numbered, SAME_PLACE_M), include_z=True)
+    pieces = [shapely.LineString(apart[i : i + AT_ONCE + 1]) for i in range(0, len(apart) - 1, AT_ONCE)]
+    simple = [shapely.simplify(piece, SAME_LINE_M, preserve_topology=False) for piece in pieces]
+    kept = [shapely.get_coordinates(piece, include_z=True)[1:, 2] for piece in simple]
+    return np.concatenate(([0], *kept)).astype(np.int64)
 
 
 def _room(length_m: FloatArray, need_m: FloatArray) -> FloatArray:

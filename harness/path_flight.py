@@ -15,7 +15,7 @@ import numpy as np
 from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.interface import Route
 from harness.closed_loop import Loop, Observer, Progress
-from harness.given_path import CutCorner, FloatArray, FlyBy, fly_by
+from harness.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy, fly_by
 from harness.metrics import metrics
 from harness.record import AcceptedPlan, Flight, Outcome, TrackLog
 from harness.run import fly_to_folder
@@ -59,7 +59,7 @@ def scenario_for(
     goal = points_m[-1] if far[-1] > 2.0 * goal_radius else points_m[int(far.argmax())]
     lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
     margin = MARGIN_M + MARGIN_SHARE * float((highest - lowest).max())
-    out = points_m[1] - start
+    out = points_m[int(np.argmax(far > SAME_PLACE_M))] - start
     mission = {
         "start_m": start.tolist(),
         "course_deg": math.degrees(math.atan2(out[0], out[1])) % 360.0,

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
+from harness.given_path import SAME_PLACE_M
 from harness.input_file import InputError, read_text
 from harness.mission_items import Item, Waypoints, waypoints
 from harness.wording import counted
@@ -25,7 +26,6 @@ FloatArray = NDArray[np.float64]
 
 MAX_BYTES: Final = 64_000_000
 MAX_SPAN_M: Final = 500e3
-SAME_PLACE_M: Final = 0.01
 SAME_ALTITUDE_M: Final = 1.0
 LOCAL_COLUMNS: Final = (("x_m", "y_m"), ("east_m", "north_m"))
 DEGREE_COLUMNS: Final = (("latitude_deg", "longitude_deg"), ("latitude", "longitude"), ("lat", "lon"))
@@ -38,7 +38,7 @@ class GivenPath:
     """A path as it was given.
 
     Attributes:
-        points_m: (n, 2) east, north; n >= 2 and no two neighbours in one place.
+        points_m: (n, 2) east, north; every point of the file, not all in one place.
         origin_deg: latitude and longitude of east = north = 0; None where the file does not say.
         altitude_m: above mean sea level; None where the file does not say.
     """
@@ -66,16 +66,14 @@ def read_path(path: Path, any_altitude: bool = False) -> GivenPath:
         raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
     origin = None if found.local else found.positions[0]
     points = np.array(found.positions if found.local else _in_plane(found.positions, str(path)))
-    apart = np.hypot(*np.diff(points, axis=0).T) > SAME_PLACE_M
-    points = points[np.append(True, apart)]
-    span = float(np.ptp(points, axis=0).max())
-    if len(points) < 2:
-        raise InputError(f"{path}: all its points are in one place; a path has at least 2")
-    if span > MAX_SPAN_M or np.abs(points).max() > MAX_SPAN_M:
+    with np.errstate(over="ignore"):
+        reach = max(float(np.ptp(points, axis=0).max()), float(np.abs(points).max()))
+    if reach > MAX_SPAN_M:
         raise InputError(
-            f"{path}: reaches {max(span, float(np.abs(points).max())) / 1e3:.0f} km; "
-            f"must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
+            f"{path}: reaches {reach / 1e3:.0f} km; must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
         )
+    if np.hypot(*(points - points[0]).T).max() <= SAME_PLACE_M:
+        raise InputError(f"{path}: all its points are in one place; a path has at least 2")
     return GivenPath(points, origin, _altitude(found.altitudes_m, any_altitude, str(path)))
 
 

@@ -86,7 +86,7 @@ def test_csv_in_metres(columns: str, tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text(f"\ufeff{columns}\n0,0\n100,5e2\n100,500\n\n-3.5,700\n", encoding="utf-8")
     given = read_path(path)
-    assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 500.0], [-3.5, 700.0]]
+    assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 500.0], [100.0, 500.0], [-3.5, 700.0]]
     assert given.origin_deg is None
     assert given.altitude_m is None
 
@@ -204,6 +204,21 @@ def test_says_where_and_what_is_wrong(name: str, text: str, sentence: str, tmp_p
     assert str(fault.value).startswith(f"{path}:")
     assert sentence in str(fault.value)
     assert len(str(fault.value).splitlines()) == 1
+
+
+def test_no_point_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "dense.csv"
+    path.write_text("x_m,y_m\n" + "".join(f"{i * 0.005:.3f},0\n" for i in range(1001)))
+    points = read_path(path).points_m
+    assert (len(points), points[-1].tolist()) == (1001, [5.0, 0.0])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_number_near_the_largest_is_too_far(tmp_path: Path) -> None:
+    path = tmp_path / "far.csv"
+    path.write_text("x_m,y_m\n1e308,0\n-1e308,1\n")
+    with pytest.raises(InputError, match="must stay within 500 km of its origin"):
+        read_path(path)
 
 
 @pytest.mark.parametrize("name", ["missing.csv", "folder.csv"])
