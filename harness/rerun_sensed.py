@@ -15,7 +15,7 @@ import numpy as np
 if TYPE_CHECKING:
     from harness.obstacle import Obstacle
     from harness.range_sensor import RangeScan
-    from harness.record import FloatArray
+    from harness.record import FloatArray, IntArray
 
 NEAR_CELLS = 2.0
 """A return further than this many cells from every edge shows no obstacle: it is a false one."""
@@ -47,6 +47,7 @@ class Sensed:
     def __init__(self, obstacles: Sequence[Obstacle], cell_m: float) -> None:
         self._obstacles, self._cell_m = obstacles, cell_m
         self._stands = np.array([each.stands_for_ever for each in obstacles], dtype=bool)
+        self._boxes = np.array([each.shape.rounded_box for each in obstacles]).reshape(-1, 5).T.copy()
         self._known = np.zeros(0, dtype=np.int64)
         self._seen: set[int] = set()
 
@@ -60,9 +61,8 @@ class Sensed:
         if not len(self._obstacles) or not len(new):
             return News(np.zeros((0, 2)), np.zeros(0, dtype=np.intp), {})
         times = np.array([each.time_s for each in scans])[scan[new]]
-        away = np.abs([each.distance(where[new], times) for each in self._obstacles])
-        nearest = away.argmin(axis=0)
-        near = away.min(axis=0) <= NEAR_CELLS * self._cell_m
+        nearest, off_m = self._nearest(where[new], times)
+        near = off_m <= NEAR_CELLS * self._cell_m
         kept = new[near & self._stands[nearest]]
         self._known = np.append(self._known, cells[kept])
         first: dict[int, tuple[int, float]] = {}
@@ -73,6 +73,19 @@ class Sensed:
                 away_m = np.hypot(*(where[row] - (seen_by.east_m, seen_by.north_m)))
                 first[index] = int(scan[row]), float(away_m)
         return News(where[kept], scan[kept], first)
+
+    def _nearest(self, places: FloatArray, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
+        """(k,) obstacles whose edges are nearest to places, and how far; only of those near the box of all places."""
+        low, high = places.min(axis=0), places.max(axis=0)
+        beside, above = np.abs(self._boxes[:2] - ((low + high) / 2)[:, None]) - self._boxes[2:4]
+        width, height = (high - low) / 2 + NEAR_CELLS * self._cell_m
+        inside = (beside - self._boxes[4] <= width) & (above - self._boxes[4] <= height)
+        nearest, off_m = np.zeros(len(places), dtype=np.intp), np.full(len(places), math.inf)
+        for index in np.flatnonzero(inside | ~self._stands).tolist():
+            off = np.abs(self._obstacles[index].distance(places, times_s))
+            nearer = off < off_m
+            nearest[nearer], off_m[nearer] = index, off[nearer]
+        return nearest, off_m
 
 
 def returns_m(scan: RangeScan) -> FloatArray:

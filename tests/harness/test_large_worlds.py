@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from harness.obstacle import Circle, Obstacle, Polygon
+from harness.range_sensor import RangeScan
 from harness.rerun_scene import circle, lines_2d
+from harness.rerun_sensed import NEAR_CELLS, Sensed, returns_m
 from harness.strict_yaml import dump
 from harness.yaml_pieces import PIECE, dump_in_pieces
 from planner.interface import FloatArray
@@ -55,6 +60,62 @@ def test_so_is_a_long_list_of_anything(inner: object) -> None:
         text = dump_in_pieces(value)
         assert text == dump(value)
         assert yaml.safe_load(text) == value
+
+
+CELL_M = 20.0
+
+
+def crowd(number: int, side_m: float, seed: int) -> list[Obstacle]:
+    """Small circles and triangles in a square, one in fifty of them moving or timed."""
+    rng = np.random.default_rng(seed)
+    rows = zip(rng.uniform(0.0, side_m, (number, 2)).tolist(), rng.uniform(2.0, 30.0, number), strict=True)
+    shapes = [
+        Circle((x, y), size) if i % 3 else Polygon(((x, y), (x + size, y), (x, y + 2.0 * size)))
+        for i, ((x, y), size) in enumerate(rows)
+    ]
+    return [
+        Obstacle(shape, *(() if i % 50 else ((4.0, -3.0), (10.0, 60.0) if i % 100 else None)))
+        for i, shape in enumerate(shapes)
+    ]
+
+
+def looks(rng: np.random.Generator, low_m: float, high_m: float) -> list[RangeScan]:
+    """Three scans that returned places in a square."""
+    away = rng.uniform(low_m, high_m, (3, 300)) + 1j * rng.uniform(low_m, high_m, (3, 300))
+    return [
+        RangeScan(t, t, 0.0, 0.0, 0.0, 0.0, 0.01, row / np.abs(row), np.abs(row), 1e6)
+        for t, row in zip((0.0, 20.0, 80.0), away, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_a_scan_shows_of_a_crowd_is_told_by_the_nearest_edge(seed: int) -> None:
+    obstacles, scans = crowd(300, 2000.0, seed), looks(np.random.default_rng(seed), 500.0, 1500.0)
+    points = [returns_m(scan) for scan in scans]
+    news = Sensed(obstacles, CELL_M).take(scans, points)
+    where, times = np.concatenate(points), np.repeat([0.0, 20.0, 80.0], 300)
+    away = np.abs([each.distance(where, times) for each in obstacles])
+    near = away.min(axis=0) <= NEAR_CELLS * CELL_M
+    nearest = away.argmin(axis=0)
+    assert set(news.first) <= set(nearest[near].tolist())
+    shown = {
+        tuple(point): index for point, index, so in zip(where.tolist(), nearest, near, strict=True) if so
+    }
+    assert len(news.points_m) > 100
+    for point in news.points_m.tolist():
+        assert obstacles[shown[tuple(point)]].stands_for_ever
+        assert shown[tuple(point)] in news.first
+
+
+def test_what_a_scan_shows_of_a_large_crowd_takes_little_memory() -> None:
+    obstacles, scans = crowd(20_000, 20_000.0, 1), looks(np.random.default_rng(1), 5000.0, 15_000.0)
+    sensed = Sensed(obstacles, CELL_M)
+    tracemalloc.start()
+    news = sensed.take(scans, [returns_m(scan) for scan in scans])
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(news.first) > 100
+    assert peak < 20e6
 
 
 @given(st.lists(st.integers(3, 6), min_size=1, max_size=6))
