@@ -211,8 +211,9 @@ def _plan_item(item: Any, number: int, source: str) -> Item:
     params = item.get("params")
     if not isinstance(params, list) or len(params) != 7:
         raise InputError(f"{source}: {key}.params: must be a list of 7")
-    # QGroundControl writes null where a parameter is left to the autopilot.
-    values = [0.0 if v is None else _number(v, f"{source}: {key}.params[{i}]") for i, v in enumerate(params)]
+    # QGroundControl writes null where one of the first four is left to the autopilot; the others are the place.
+    values = [0.0 if value is None else value for value in params[:4]] + params[4:]
+    values = [_number(value, f"{source}: {key}.params[{i}]") for i, value in enumerate(values)]
     command, frame = (_whole(item.get(name), f"{source}: {key}.{name}") for name in ("command", "frame"))
     jump_id = item.get("doJumpId")
     shown = jump_id if isinstance(jump_id, int) else number + 1

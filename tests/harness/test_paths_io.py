@@ -173,6 +173,11 @@ BROKEN = {
         plan(item(47.0, 8.0, params=[0])),
         "mission.items[0].params: must be a list of 7",
     ),
+    "no place": (
+        "a.plan",
+        plan(item(47.0, 8.0, params=[0, 0, 0, None, 47.0, 8.0, None]), item(47.1, 8.0)),
+        ": mission.items[0].params[6]: is 'None'; must be a finite number",
+    ),
     "text as command": (
         "a.plan",
         plan(item(47.0, 8.0, command="fly")),
