@@ -7,6 +7,7 @@ out.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -77,6 +78,12 @@ class _Motions:
         """First time after `time_s` at which something appears, else +inf."""
         starts = self._rows[3]
         return float(starts[starts > time_s].min(initial=math.inf))
+
+    def changes(self, start_s: float, stop_s: float) -> list[float]:
+        """Times within an interval at which something appears or goes, in order."""
+        times = self._rows[3:]
+        within: list[float] = np.unique(times[(start_s < times) & (times < stop_s)]).tolist()
+        return within
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,8 +201,8 @@ class World:
     def contact_between(self, begin: Fix, before_m: float, end: Fix, after_m: float) -> float:
         """Clearance at a contact on the straight way between two fixes; +inf if there surely is none.
 
-        Clearance changes no faster than the way is long: parts of it that are too short for a contact are left out,
-        down to `TOUCH_M` (Piyavskii 1972, doi:10.1016/0041-5553(72)90115-2).
+        While nothing appears or goes, clearance changes no faster than the way is long: parts of it that are too
+        short for a contact are left out, down to `TOUCH_M` (Piyavskii 1972, doi:10.1016/0041-5553(72)90115-2).
 
         Args:
             begin: where and when the way begins.
@@ -203,7 +210,15 @@ class World:
             end: where it ends.
             after_m: clearance there, or less.
         """
-        ways = [(begin, before_m, end, after_m)]
+        known = [(begin, before_m)]
+        for time_s in self._motions.changes(begin[2], end[2]) if len(self._changing) else ():
+            share = (time_s - begin[2]) / (end[2] - begin[2])
+            there = begin[0] + share * (end[0] - begin[0]), begin[1] + share * (end[1] - begin[1]), time_s
+            known.append((there, self.clearance_at(*there)))
+            if known[-1][1] < 0.0:
+                return known[-1][1]
+        known.append((end, after_m))
+        ways = [(*first, *second) for first, second in itertools.pairwise(known)]
         while ways:
             begin, before_m, end, after_m = ways.pop()
             way_m = math.dist(begin[:2], end[:2]) + self.max_obstacle_speed_mps * (end[2] - begin[2])

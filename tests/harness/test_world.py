@@ -157,6 +157,30 @@ def test_a_contact_on_the_way_is_found_where_shapely_finds_one(seed: int, moves:
     assert world.contact_between(begin, 0.5 * before_m, end, after_m) < 0.0 or inside == 0.0
 
 
+@pytest.mark.parametrize(
+    ("active_s", "met"),
+    [
+        ((0.0, 1.0), True),
+        ((0.03, 1.0), True),
+        ((0.0, 0.07), True),
+        ((0.03, 0.07), True),
+        ((0.05, 0.06), True),
+        ((0.06, 1.0), False),
+        ((0.06, 0.07), False),
+        ((0.0, 0.04), False),
+    ],
+)
+def test_what_appears_or_goes_on_the_way_is_met_while_it_is_there(
+    active_s: tuple[float, float], met: bool
+) -> None:
+    """A wall that the middle of the way lies in, from 0.046 to 0.054 s."""
+    wall = Polygon(((4.6, -9.0), (5.4, -9.0), (5.4, 9.0), (4.6, 9.0)))
+    world = World([Obstacle(wall, active_s=active_s), Obstacle(Circle((0.0, 50.0), 1.0))], BOUNDS)
+    begin, end = (0.0, 0.0, 0.0), (10.0, 0.0, 0.1)
+    clearance = world.clearance_at(*begin), world.clearance_at(*end)
+    assert (world.contact_between(begin, clearance[0], end, clearance[1]) < 0.0) is met
+
+
 @settings(deadline=None, max_examples=25)
 @given(seed=st.integers(0, 2**32), count=st.integers(1, 40), changing=st.booleans())
 def test_clearance_at_a_point_is_the_row_of_the_track(seed: int, count: int, changing: bool) -> None:
