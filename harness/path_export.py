@@ -39,7 +39,8 @@ def exported(run: Run, form: str, what: str, tolerance_m: float = TOLERANCE_M) -
         run: the run.
         form: a name of `FORMATS`, or "acmi".
         what: "flown" or "planned".
-        tolerance_m: how far a point that is left out may be from the path; `acmi` has every row of the track.
+        tolerance_m: how far a point that is left out may be from the path, seen from above; `acmi` has every row of
+            the track.
 
     Raises:
         RunFolderError: the run has no such path.

@@ -45,7 +45,7 @@ def path_of(run: Run, what: str, tolerance_m: float) -> ExportedPath:
     Args:
         run: the run.
         what: "flown": the track; "planned": of every plan the part that was in effect.
-        tolerance_m: how far a point that is left out may be from the path.
+        tolerance_m: how far a point that is left out may be from the path, seen from above.
     """
     scenario = parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"))
     held = scenario.mission.altitude_m

@@ -19,7 +19,8 @@ def export(
         "flown"
     ),
     tolerance_m: Annotated[
-        float, typer.Option(metavar="T", min=0.0, help="Points nearer to the path are left out.")
+        float,
+        typer.Option(metavar="T", min=0.0, help="Points nearer to the path, seen from above, are left out."),
     ] = 0.25,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: standard output.")] = None,
 ) -> int:
