@@ -38,6 +38,7 @@ _INT: Final = re.compile(r"[-+]?[0-9]{1,18}")
 _BASED: Final = re.compile(r"0o[0-7]{1,18}|0x[0-9a-fA-F]{1,15}")
 _FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE: Final = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_TAB_BEFORE: Final = re.compile(r"[ ?:-]*\t")
 _UNPRINTABLE: Final = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -212,7 +213,7 @@ class _Composer:
             mark = error.context_mark if opened and error.context_mark else error.problem_mark
             lines = self.text.split("\n")
             line = min(mark.line + 1, len(lines)) if mark else 1
-            if "\t" in lines[line - 1]:
+            if _TAB_BEFORE.match(lines[line - 1]):
                 sentence = "has a tab; indent with spaces"
             else:
                 sentence = f"is not YAML ({error.problem}); check indentation, colons, brackets and quotes"
