@@ -166,6 +166,8 @@ def _line_strings(node: Any, source: str, key: str) -> list[tuple[str, Any]]:
     kind = node.get("type") if isinstance(node, dict) else None
     if kind == "LineString":
         return [(f"{key}.coordinates".lstrip("."), node.get("coordinates"))]
+    if kind == "Feature" and node.get("geometry") is None:  # it lies nowhere
+        return []
     if kind == "Feature":
         return _line_strings(node.get("geometry"), source, f"{key}.geometry".lstrip("."))
     if kind in ("FeatureCollection", "GeometryCollection"):

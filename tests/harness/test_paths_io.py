@@ -61,6 +61,22 @@ GOOD = {
     "degrees.csv": ("latitude_deg,longitude_deg\n" + "".join(f"{a},{b}\n" for a, b in POINTS), None),
     "short.csv": ("name, LAT, lon\n" + "".join(f"p,{a},{b}\n" for a, b in POINTS), None),
     "collection.geojson": (geojson(LINE), None),
+    "unlocated.geojson": (
+        json.dumps(
+            {
+                "type": "FeatureCollection",
+                "features": [
+                    {"type": "Feature", "properties": {"name": "a note"}, "geometry": None},
+                    {
+                        "type": "Feature",
+                        "properties": {},
+                        "geometry": {"type": "LineString", "coordinates": LINE},
+                    },
+                ],
+            }
+        ),
+        None,
+    ),
     "bare.json": (json.dumps({"type": "LineString", "coordinates": [[*p, 520] for p in LINE]}), 520.0),
     "mission.plan": (plan(*(item(*place) for place in POINTS)), 520.0),
     "above_sea.plan": (plan(*(item(*place, 520.0, frame=0) for place in POINTS)), 520.0),
