@@ -75,6 +75,7 @@ class _Lane:
         self._closed = False
         self._flights_each = self._left = flights_each
         self._pool: ProcessPoolExecutor | None = None
+        self._broken: ProcessPoolExecutor | None = None
 
     def go_on(self, *, over: bool = False) -> None:
         """Takes the next job of the line, unless one is being flown that is not `over`."""
@@ -117,7 +118,8 @@ class _Lane:
             return
         error = flown.exception()
         if isinstance(error, BrokenProcessPool):
-            self._pool = None
+            # It is this pool that calls, and Python 3.13 has locked it for that: nobody may let go of it now.
+            self._broken, self._pool = self._pool, None
             if tries:
                 self._try(job, answer, tries)
                 return
