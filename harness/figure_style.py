@@ -6,6 +6,7 @@ Drawn without a screen. The same values give the same files: SVG carries no date
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -29,6 +30,7 @@ STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "axes.linewidth": 0.7,
     "lines.solid_capstyle": "round",
+    "text.parse_math": False,
     "svg.hashsalt": "wayproof",
     "svg.fonttype": "path",
     "path.simplify": True,
@@ -54,7 +56,9 @@ def png(figure: Figure) -> bytes:
 
 def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
     file = io.BytesIO()
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE), warnings.catch_warnings():
+        # A letter that the font lacks is drawn as a box.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         # A map of fixed shape gives room back only once it has been laid out.
         figure.draw_without_rendering()
         figure.savefig(file, format=kind, **options)

@@ -52,3 +52,11 @@ def test_a_long_label_keeps_both_ends() -> None:
     long = [f"world_of_many_obstacles_and_a_long_name_{number}" for number in (1, 2)]
     shown = labels(fits, *long)
     assert shown == [fits, "world_of_many_..._a_long_name_1", "world_of_many_..._a_long_name_2"]
+
+
+def test_names_are_drawn_as_they_are_and_without_a_word() -> None:
+    """Two dollar signs are no formula, and letters that the font lacks are no warning."""
+    labels = (r"a$\frac$.yaml", "\N{CJK UNIFIED IDEOGRAPH-6797}.yaml")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        svg(success(table(labels, ("bug2",))))
