@@ -25,12 +25,12 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
     """All figures of a flight, ready for JSON: a figure that does not exist is None, never NaN or infinity.
 
     Distances are of the flown track as logged. `planned_length_m` is the curve length of those parts of the
-    plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between two. Cross-track
+    plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two. Cross-track
     figures are of the rows flown under a plan, altitude figures of all rows. `clearance_violation_s` counts the
-    intervals at whose end the distance to an obstacle edge was below the wanted clearance. `replans` counts the
-    plans accepted after the first. `compute_ms` is over all calls in which the planner searched, `smoothness` is
-    defined in `harness.smoothness`, `trackability` in `harness.trackability`; `error` is the traceback of what
-    the planner raised.
+    intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
+    `replans` counts the plans accepted after the first. `compute_ms` is over all calls in which the planner searched,
+    `smoothness` is defined in `harness.smoothness`, `trackability` in `harness.trackability`; `error` is the traceback
+    of what the planner raised.
 
     Args:
         flight: the flight; its track has at least one row.
@@ -43,6 +43,8 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
     track = flight.track
     if not len(track):
         raise ValueError("a flight without a track has no metrics")
+    nearest_m = track.clearance_m.copy()
+    nearest_m[-1] = min(nearest_m[-1], flight.contact_m)
     window = window_m(track)
     planned = planned_profile(track, flight.plans, window)
     lost_control = flight.outcome is Outcome.LOST_CONTROL
@@ -54,8 +56,10 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
         "flown_length_m": float(flown_lengths(track).sum()),
         "planned_length_m": float(planned_length_m(flight)),
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
-        "min_clearance_m": _finite(np.minimum(track.clearance_m.min(), flight.contact_m)),
-        "clearance_violation_s": clearance_violation_s(track, limits.clearance_m),
+        "min_clearance_m": _finite(nearest_m.min()),
+        "clearance_violation_s": clearance_violation_s(
+            dataclasses.replace(track, clearance_m=nearest_m), limits.clearance_m
+        ),
         "cross_track_m": error_figures(followed),
         "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
         "smoothness": {

@@ -122,3 +122,13 @@ def test_error_figures_leave_out_nan() -> None:
 def test_exactly_the_wanted_clearance_is_no_violation(make_track: Callable[..., Track]) -> None:
     assert clearance_violation_s(make_track(50, clearance_m=200.0), 200.0) == 0.0
     assert clearance_violation_s(make_track(50, clearance_m=199.9), 200.0) == pytest.approx(4.9)
+
+
+def test_a_contact_between_two_rows_is_below_the_wanted_clearance(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    """What is thinner than the way from row to row: both rows may be clear of it."""
+    hit = replace(flight(make_track(50, clearance_m=250.0), straight_plan), contact_m=-0.5)
+    figures = metrics(hit, LIMITS)
+    assert figures["min_clearance_m"] == -0.5
+    assert figures["clearance_violation_s"] == pytest.approx(0.1)
