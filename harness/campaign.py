@@ -186,11 +186,14 @@ class CampaignFile:
         Raises:
             InputError: it is something else.
         """
-        root = node_of(plain["campaign"], 1)
-        bases = tuple(
-            Base(each["file"], f"{each['file']} in {source}", node_of(each["keys"], 1))
-            for each in plain["scenarios"]
-        )
+        try:
+            root = node_of(plain["campaign"], 1)
+            given = [(Path(each["file"]).name, dict(each["keys"])) for each in plain["scenarios"]]
+        except (KeyError, TypeError, ValueError):
+            given = []
+        if not given:
+            raise InputError(f"{source}: holds no campaign, or only a part of it; give another copy")
+        bases = tuple(Base(name, f"{name} in {source}", node_of(keys, 1)) for name, keys in given)
         return cls(_validated(root, source), source, root, bases)
 
 

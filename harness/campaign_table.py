@@ -88,15 +88,15 @@ def load_tables(folder: Path) -> tuple[pa.Table, pa.Table | None]:
         for name, entries, first in (("planner", "planners", "kind"), ("aircraft", "aircraft", "model")):
             results = _told_apart(results, name, _campaign(results).get(entries, ()), first)
         return results, pq.read_table(timings) if timings.is_file() else None
-    except (OSError, pa.ArrowException, AttributeError, TypeError, ValueError) as error:
+    except (OSError, pa.ArrowException, AttributeError, RecursionError, TypeError, ValueError) as error:
         text = str(error).splitlines()[0]
         raise InputError(f"wayproof: the campaign in {folder} is damaged: {text}") from error
 
 
 def planned_runs(results: pa.Table) -> int | None:
     """How many runs the campaign has, flown or not; None where the table does not say so."""
-    runs: int | None = _about(results).get("runs")
-    return runs
+    runs = _about(results).get("runs")
+    return runs if isinstance(runs, int) else None
 
 
 def _about(results: pa.Table) -> Mapping[str, Any]:

@@ -159,7 +159,7 @@ def campaign_of(results: Path) -> dict[str, Any]:
     try:
         schema = pq.read_schema(results)
         found = json.loads((schema.metadata or {})[b"wayproof"])
-    except (OSError, pa.ArrowException, KeyError, ValueError) as error:
+    except (OSError, pa.ArrowException, KeyError, ValueError, RecursionError) as error:
         raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one") from error
     if not isinstance(found, dict) or found.get("schema") != SCHEMA or "digest" not in schema.names:
         raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one")

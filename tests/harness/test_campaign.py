@@ -277,6 +277,25 @@ def test_the_plain_form_flies_the_same_without_a_file(place: Path) -> None:
     assert [again.scenario(number) for number in (0, 47)] == [runs.scenario(number) for number in (0, 47)]
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"campaign": None},
+        {"scenarios": 3},
+        {"scenarios": []},
+        {"scenarios": [3]},
+        {"scenarios": [{"file": "a.yaml"}]},
+        {"scenarios": [{"file": "a.yaml", "keys": 3}]},
+        {"scenarios": [{"file": 3, "keys": {}}]},
+    ],
+)
+def test_a_plain_form_that_is_none_is_bad_input(place: Path, changed: dict[str, Any]) -> None:
+    plain = runs_of(place).file.plain() | changed
+    for each in (plain, {name: plain[name] for name in plain if name not in changed}):
+        with pytest.raises(InputError, match=r"^results\S* "):
+            CampaignRuns(CampaignFile.from_plain(each, "results")).check()
+
+
 def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

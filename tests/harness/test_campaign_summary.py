@@ -262,7 +262,7 @@ def test_entries_of_one_kind_are_told_apart_and_paired(
     assert summary.worst[0].name == "forest, rolling_window, clearance_m 40, aerosonde"
 
 
-@pytest.mark.parametrize("about", ["{torn", "[1]", '{"campaign": {"planners": 3}}'])
+@pytest.mark.parametrize("about", ["{torn", "[1]", '{"campaign": {"planners": 3}}', "[" * 100_000])
 def test_a_table_that_says_nonsense_of_its_campaign_is_damaged(tmp_path: Path, about: str) -> None:
     folder = campaign(tmp_path / "c", [row(0)])
     rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": about})
@@ -314,6 +314,7 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     page = write_summary(summarise(folder), folder).read_text()
     assert 'href="runs/6/flight.rrd"' in page
     assert 'href="runs/5/flight.rrd"' not in page
+    assert 'of the wanted. <a href="runs/6">Run folder</a>' in page
 
 
 def test_without_the_wanted_clearance_the_nearest_run_is_the_worst(tmp_path: Path) -> None:

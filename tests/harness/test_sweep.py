@@ -229,6 +229,11 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
     ):
         assert main(["fly", *arguments]) == 2
         assert said in capsys.readouterr().err
+    rows = pq.read_table(unbroken / "results.parquet")
+    deep = rows.replace_schema_metadata({"wayproof": "[" * 100_000})
+    pq.write_table(deep, elsewhere / "deep.parquet")
+    assert main(["fly", "--from", "deep.parquet", "--run", "1"]) == 2
+    assert "is not the results.parquet of a campaign" in capsys.readouterr().err
     damaged = bytearray(results(unbroken))
     damaged[300:308] = b"XXXXXXXX"
     (elsewhere / "r.parquet").write_bytes(damaged)
