@@ -58,19 +58,22 @@ def cell_of(value: Any, kind: str) -> Scalar:
     return float(value) if kind == "number" and value is not None else value
 
 
-def entry_columns(file: CampaignFile) -> dict[str, tuple[Any, ...]]:
+def entry_columns(file: CampaignFile) -> dict[str, tuple[Scalar, ...]]:
     """What each entry of `planners` and of `aircraft` gives for the keys that any of them gives, by key path.
 
     Args:
         file: the campaign.
 
     Returns:
-        One value an entry, in order; None where it does not give the key.
+        One cell an entry, in order; None where it does not give the key.
     """
-    columns: dict[str, tuple[Any, ...]] = {}
+    columns: dict[str, tuple[Scalar, ...]] = {}
     for listed, section, first in (("planners", "planner", "kind"), ("aircraft", "aircraft", "model")):
         entries = file.root.plain().get(listed, ())
         given: list[dict[str, Any]] = [each if isinstance(each, dict) else {} for each in entries]
         for name in dict.fromkeys(name for each in given for name in each if name != first):
-            columns[f"{section}.{name}"] = tuple(each.get(name) for each in given)
+            values = [each.get(name) for each in given]
+            kind = kind_of(values)
+            cells = (None if value is None else cell_of(value, kind) for value in values)
+            columns[f"{section}.{name}"] = tuple(cells)
     return columns

@@ -26,6 +26,7 @@ from harness.strict_yaml import (
     InputError,
     Loc,
     Node,
+    Scalar,
     as_spelt,
     fault_line,
     key_path,
@@ -148,7 +149,7 @@ class CampaignRuns:
         return set(whole)
 
     @cached_property
-    def _of_entries(self) -> dict[str, tuple[Any, ...]]:
+    def _of_entries(self) -> dict[str, tuple[Scalar, ...]]:
         return entry_columns(self.file)
 
     def run(self, number: int) -> Run:

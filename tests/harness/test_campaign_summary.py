@@ -271,6 +271,13 @@ def test_a_table_that_says_nonsense_of_its_campaign_is_damaged(tmp_path: Path, a
         summarise(folder)
 
 
+def test_a_number_of_runs_that_is_none_is_not_known(tmp_path: Path) -> None:
+    folder = campaign(tmp_path / "c", [row(0)])
+    rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": '{"runs": "x"}'})
+    pq.write_table(rows, folder / "results.parquet")
+    assert summarise(folder).missing == 0
+
+
 def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = entries_campaign(tmp_path / "c")
     summary = summarise(folder)
