@@ -85,6 +85,7 @@ class Scene:
         )
         solids = [shapely.orient_polygons(part) for part in shapely.get_parts(merged) if part.area > 0]
         self._tree = shapely.STRtree([each.buffer(-self.slack_m, join_style="mitre") for each in solids])
+        shapely.prepare(self._tree.geometries)
         self._edges = np.vstack([np.zeros((0, 2, 2)), *map(_edges, solids)])
         corners, cone_from, cone_width = _convex_corners(solids)
         whole = np.full(len(circles), math.tau)
@@ -117,7 +118,7 @@ class Scene:
         free &= (gaps >= self.hub_radii - self.slack_m).all(axis=1)
         if not len(self._edges):
             return free
-        free[self._tree.query(shapely.points(points), "dwithin", self.clearance_m)[0]] = False
+        free[self._too_near(shapely.points(points))] = False
         return free
 
     def free_segments(self, begin: FloatArray, end: FloatArray) -> BoolArray:
@@ -131,8 +132,20 @@ class Scene:
             return free
         rows = np.flatnonzero(free)
         lines = shapely.linestrings(np.stack((begin[rows], end[rows]), axis=1))
-        free[rows[self._tree.query(lines, "dwithin", self.clearance_m)[0]]] = False
+        free[rows[self._too_near(lines)]] = False
         return free
+
+    def _too_near(self, shapes: NDArray[np.object_]) -> NDArray[np.intp]:
+        """Which of some points or lines come nearer than the clearance to a polygon."""
+        import shapely
+
+        (west, south, east, north), reach = shapely.bounds(shapes).T, self.clearance_m
+        near = shapely.box(west - reach, south - reach, east + reach, north + reach)
+        rows, solids = self._tree.query(near)
+        # The polygons are prepared: the tree's own query would go through all edges of one every time.
+        within = shapely.dwithin(self._tree.geometries[solids], shapes[rows], reach)
+        found: NDArray[np.intp] = rows[within]
+        return found
 
     def tangents(self, disc: int, side: int) -> Tangents:
         """All free tangents that leave a disc on a side.
@@ -176,8 +189,8 @@ class Scene:
         outside = [(cone_from + cone_width, math.tau - cone_width)] if cone_width < math.tau else []
         if self.radii[disc] == 0.0:
             return np.array(outside).reshape(-1, 2)
-        ends = [cone_from, cone_from + cone_width]
-        angles = np.unique(np.concatenate((ends, self._crossings(disc))) % math.tau)
+        ends, crossings = [cone_from, cone_from + cone_width], self._crossings(disc)
+        angles = np.unique(np.concatenate((ends, crossings[self.in_cone(disc, crossings)])) % math.tau)
         widths = np.diff(np.append(angles, angles[0] + math.tau))
         middles = angles + widths / 2
         free = self.free_points(self.contacts(np.full(len(middles), disc), middles))
