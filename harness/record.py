@@ -184,7 +184,12 @@ class TrackLog:
         station_m: float,
         plan_index: int,
     ) -> None:
-        """Adds one row; without a plan, `cross_track_m` and `station_m` are NaN and `plan_index` is -1."""
+        """Adds one row; without a plan, `cross_track_m` and `station_m` are NaN and `plan_index` is -1.
+
+        A state that is not finite, with which control is lost, is no row.
+        """
+        if not math.isfinite(sum(state[:-1])):  # all but the throttle
+            return
         ROW.pack_into(
             self._rows, self._filled, *state, roll_command_rad, cross_track_m, station_m, plan_index
         )
@@ -264,7 +269,7 @@ class Flight:
     """One flight, over.
 
     Attributes:
-        track: every log tick from the start to the end.
+        track: every log tick from the start to the end, or to the last state that was finite.
         plans: the plans flown, in order; `plans[i].plan_index == i`.
         outcome: how it ended.
         reason: the same as one sentence.

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from aircraft.guidance import UPDATE_RATE_HZ
+from aircraft.interface import AircraftState
 from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions
 from harness import run
@@ -58,6 +59,14 @@ class Failing(PointMass):
 
     def fault(self) -> str | None:
         return "stalled, angle of attack 31 deg" if self.state().time_s >= 3.0 else super().fault()
+
+
+class Diverging(Failing):
+    """Loses control after three seconds, with a state that is not finite."""
+
+    def state(self) -> AircraftState:
+        state = super().state()
+        return state if state.time_s < 3.0 else AircraftState(state.time_s, *[math.nan] * (len(state) - 1))
 
 
 @pytest.fixture
@@ -269,3 +278,15 @@ def test_lost_control(fly: Fly, small_world: SmallWorld, monkeypatch: pytest.Mon
     assert metrics["reason"] == "stalled, angle of attack 31 deg"
     assert metrics["flight_time_s"] == pytest.approx(3.0, abs=1 / 120)
     assert metrics["trackable"] is False
+
+
+def test_a_state_that_is_not_finite_is_no_row(
+    fly: Fly, small_world: SmallWorld, tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "jsbsim_aircraft", lambda _, start, air: Diverging(start, air))
+    status, metrics = fly(small_world())
+    assert (status, metrics["outcome"], metrics["trackable"]) == (1, "lost_control", False)
+    assert metrics["flight_time_s"] == pytest.approx(3.0, abs=0.11)
+    assert metrics["flown_length_m"] > 0.0
+    for command in (["report"], ["export", "--format", "geojson"]):
+        assert main([command[0], str(tmp_path / "run"), *command[1:]]) == 0
