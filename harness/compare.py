@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from harness.report import Chapter
 
 SCHEMA = "wayproof/comparison/1"
-INDEX = "comparison.json"
+INDEX, CSV, MARKDOWN = "comparison.json", "comparison.csv", "comparison.md"
 OVERLAY = "overlay.rrd"
 
 
@@ -83,7 +83,7 @@ def compare(
         progress: told of every flight, by its index, as it goes on.
 
     Raises:
-        InputError: a scenario is there twice with the same planner.
+        InputError: a scenario is there twice with the same planner, or has the name of a file of the comparison.
         RunFolderError: the folder holds something else or cannot be written.
     """
     jobs = [
@@ -121,8 +121,8 @@ def _compared(
         (out / name).mkdir(exist_ok=True)
         _overlay(out / name, flights)
         chapters.append(chapter(out / name, own[0], flights, optima[name]))
-    (out / "comparison.csv").write_text(to_csv(done.rows), encoding="utf-8")
-    (out / "comparison.md").write_text(_markdown(done), encoding="utf-8")
+    (out / CSV).write_text(to_csv(done.rows), encoding="utf-8")
+    (out / MARKDOWN).write_text(_markdown(done), encoding="utf-8")
     (out / REPORT).write_text(_report(done, chapters), encoding="utf-8")
     _write_index(out, done, complete=True)
     return done
@@ -141,6 +141,8 @@ def _distinct(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
         name, kind = flight = each.name, each.planner.kind
         if flight in seen:
             raise InputError(f"wayproof: {kind} is to fly {name} twice; leave one out or rename the scenario")
+        if name in (INDEX, CSV, MARKDOWN, REPORT):
+            raise InputError(f"wayproof: a scenario is called {name}, as a file of the comparison; rename it")
         seen.add(flight)
     return scenarios
 
@@ -158,7 +160,7 @@ def _claim(out: Path, begun: Comparison) -> FolderLock:
                 f"{out} is not empty and not a comparison: choose another folder or empty it first"
             )
         _write_index(out, begun, complete=False)
-        for name in ("comparison.csv", "comparison.md", REPORT):
+        for name in (CSV, MARKDOWN, REPORT):
             (out / name).unlink(missing_ok=True)
         return lock
     except OSError as error:

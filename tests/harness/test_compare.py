@@ -309,6 +309,17 @@ def test_bad_input_ends_with_2_before_anything_is_flown(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("name", ["comparison.json", "comparison.csv", "comparison.md", "report.html"])
+def test_a_scenario_with_the_name_of_a_file_of_ours_is_refused(
+    place: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "other.yaml"
+    file.write_text((place / "ring.yaml").read_text().replace("name: ring", f"name: {name}"))
+    assert main(["compare", str(file), "--planners", "corner", "--out", str(tmp_path / "out")]) == 2
+    assert f"a scenario is called {name}, as a file of the comparison" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_folder_with_other_things_is_refused_and_left_alone(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
