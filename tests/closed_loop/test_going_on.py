@@ -11,7 +11,7 @@ from aircraft.interface import AircraftState
 from aircraft.point_mass import PointMass
 from harness.closed_loop import fly
 from harness.range_sensor import RangeScan
-from harness.record import AcceptedPlan, Flight, Track
+from harness.record import AcceptedPlan, Flight, Outcome, Track
 from harness.run import make_loop
 from harness.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
@@ -91,6 +91,46 @@ def test_a_plan_that_is_on_its_way_is_waited_for(
     flight, asked, _ = thinking(2.0, 3.25, latency_s=1.0)
     assert [each.time_s for each in flight.plans] == pytest.approx([1.0, 4.3])
     assert not [time_s for time_s in asked if 3.25 < time_s < 4.3]
+
+
+@pytest.mark.parametrize(("fails", "outcome"), [(False, Outcome.UNREACHABLE), (True, Outcome.PLANNER_FAILED)])
+def test_what_it_says_between_steps_ends_the_flight_there(
+    fails: bool, outcome: Outcome, answering: Install, small_world: SmallWorld
+) -> None:
+    def answer(mission: Mission, request: PlanRequest) -> Plan:
+        if request.time_s < 1.0 + 0.4 * STEP_S:
+            return Plan(PlanStatus.NO_PATH, "looks for a way", goes_on=request.time_s >= 1.0)
+        if fails:
+            raise ArithmeticError
+        # What it said once it does not say again.
+        return Plan(
+            PlanStatus.UNREACHABLE if request.time_s < 1.0 + 0.6 * STEP_S else PlanStatus.KEPT, "none"
+        )
+
+    answering(answer)
+    flight = fly(make_loop(small_world(planner={"kind": "stand_in"}), PointMass))
+    assert flight.outcome is outcome
+    assert flight.sim_s == pytest.approx(1.0 + 0.5 * STEP_S)
+
+
+def test_scans_and_plans_that_are_late_by_whole_steps_come_in_at_those(
+    answering: Install, small_world: SmallWorld
+) -> None:
+    asked: list[float] = []
+
+    def answer(mission: Mission, request: PlanRequest) -> Plan:
+        asked.append(request.time_s)
+        row = (*request.position_m, *request.direction, 0.0, 5000.0)
+        return Plan(PlanStatus.FOUND, "found", np.array([row[:2]]), Path(np.array([row])))
+
+    answering(answer)
+    late = {"sensor": {"rate_hz": 10.0, "latency_s": STEP_S}, "mission": {"time_limit_s": 3.0}}
+    fly(make_loop(small_world(planner={"kind": "stand_in"}, **late), PointMass))
+    assert asked == pytest.approx(np.arange(1, 30) * STEP_S)
+    asked.clear()
+    keys = {"kind": "stand_in", "compute_latency_s": STEP_S}
+    flight = fly(make_loop(small_world(planner=keys, **late), PointMass))
+    assert [each.time_s for each in flight.plans] == pytest.approx(np.array(asked[:-1]) + STEP_S)
 
 
 def test_why_nothing_is_found_is_told_once_and_ends_the_reason_of_a_timeout(

@@ -106,6 +106,26 @@ def test_collision_ends_the_flight_at_the_edge(
     assert -25.0 / UPDATE_RATE_HZ - 0.1 <= track.clearance_m[-1] < 0.0
 
 
+@pytest.mark.parametrize("course_deg", [0.0, 90.0, 180.0, 270.0])
+def test_a_collision_ends_it_at_the_edge_beyond_the_origin_too(
+    course_deg: float,
+    answering: Install,
+    small_world: SmallWorld,
+    flown_by_point_mass: FlyPointMass,
+) -> None:
+    answering(straight_on)
+    east, north = math.sin(math.radians(course_deg)), math.cos(math.radians(course_deg))
+    scenario = small_world(
+        {"circle": {"center_m": [2300.0 * east, 2300.0 * north], "radius_m": 300.0}},
+        planner={"kind": "stand_in"},
+        area={"bounds_m": [-6000.0, -6000.0, 6000.0, 6000.0]},
+        mission={"start_m": [-1000.0 * east, -1000.0 * north], "course_deg": course_deg},
+    )
+    flight = flown_by_point_mass(scenario)
+    assert flight.outcome.value == "collision"
+    assert -25.0 / UPDATE_RATE_HZ - 0.1 <= flight.track.clearance_m[-1] < 0.0
+
+
 @pytest.mark.parametrize("east_m", [3000.0, 3000.4, 3000.8, 3001.2, 3001.6])
 @pytest.mark.parametrize("velocity_mps", [None, [-20.0, 0.0]])
 def test_a_wall_thinner_than_a_step_is_not_flown_through_unnoticed(
@@ -133,6 +153,18 @@ def test_an_obstacle_that_pops_up_around_the_aircraft_is_hit_at_once(
     assert 84.0 <= flight.sim_s <= 84.05
 
 
+def test_an_obstacle_much_faster_than_the_aircraft_ends_the_flight_where_they_meet(
+    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    answering(straight_on)
+    fast = {"circle": {"center_m": [5000.0, 300.0], "radius_m": 100.0}, "velocity_mps": [-200.0, 0.0]}
+    flight = flown_by_point_mass(
+        small_world(fast, planner={"kind": "stand_in"}, mission={"course_deg": 90.0})
+    )
+    assert flight.outcome.value == "collision"
+    assert -225.0 / UPDATE_RATE_HZ - 0.1 <= flight.track.clearance_m[-1] < 0.0
+
+
 def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
     answering(finds_nothing)
     status, metrics = fly(small_world(IN_THE_WAY, planner={"kind": "stand_in"}))
@@ -140,12 +172,32 @@ def test_a_flight_without_any_plan_says_so(fly: Fly, answering: Install, small_w
     assert metrics["reason"].endswith("; no plan was ever found: there is no room for a turn")
 
 
-def test_leaving_the_area(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
+def test_a_plan_that_is_on_its_way_when_the_flight_ends_was_found(
+    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
     answering(straight_on)
-    status, metrics = fly(small_world(planner={"kind": "stand_in"}, mission={"course_deg": 270.0}))
+    late = {"kind": "stand_in", "compute_latency_s": 5.0}
+    flight = flown_by_point_mass(small_world(planner=late, mission={"time_limit_s": 3.0}))
+    assert flight.reason.endswith(" m from the goal")
+
+
+@pytest.mark.parametrize(
+    ("course_deg", "left_at"),
+    [(270.0, "(2998, 3400)"), (90.0, "(4002, 3400)"), (180.0, "(3600, 2998)"), (0.0, "(3600, 4002)")],
+)
+def test_leaving_the_area(
+    course_deg: float, left_at: str, fly: Fly, answering: Install, small_world: SmallWorld
+) -> None:
+    answering(straight_on)
+    status, metrics = fly(
+        small_world(
+            planner={"kind": "stand_in"},
+            area={"bounds_m": [3000.0, 3000.0, 4000.0, 4000.0]},
+            mission={"start_m": [3600.0, 3400.0], "goal_m": [3100.0, 3900.0], "course_deg": course_deg},
+        )
+    )
     assert (status, metrics["outcome"]) == (1, "out_of_bounds")
-    assert metrics["reason"] == "left the area at (-2, 300) m"
-    assert metrics["flight_time_s"] == pytest.approx(300.0 / 25.0, abs=0.11)
+    assert metrics["reason"] == f"left the area at {left_at} m"
 
 
 def test_timeout(fly: Fly, small_world: SmallWorld) -> None:
@@ -177,6 +229,15 @@ def test_planner_whose_path_cannot_be_flown(fly: Fly, answering: Install, small_
     assert metrics["reason"] == (
         "the planner gave a path that cannot be flown: route segments must be finite and longer than zero"
     )
+
+
+def test_planner_that_finds_no_path_and_calls_it_one(
+    fly: Fly, answering: Install, small_world: SmallWorld
+) -> None:
+    answering(lambda mission, request: Plan(PlanStatus.FOUND, "straight on"))
+    status, metrics = fly(small_world(planner={"kind": "stand_in"}))
+    assert (status, metrics["outcome"]) == (1, "planner_failed")
+    assert metrics["reason"] == "the planner gave a path that cannot be flown: it is none"
 
 
 @pytest.mark.parametrize("status", [0, 3, "bye\n\udcff bye"])
@@ -246,6 +307,15 @@ def test_unreachable(fly: Fly, answering: Install, small_world: SmallWorld) -> N
     assert (status, metrics["outcome"]) == (3, "unreachable")
     assert metrics["reason"] == "a closed wall lies round the goal"
     assert metrics["min_clearance_m"] is None
+
+
+def test_unreachable_at_once(
+    answering: Install, small_world: SmallWorld, flown_by_point_mass: FlyPointMass
+) -> None:
+    answering(lambda mission, request: Plan(PlanStatus.UNREACHABLE, "a wall lies round the start"))
+    flight = flown_by_point_mass(small_world(planner={"kind": "stand_in"}))
+    assert (flight.outcome.value, flight.reason) == ("unreachable", "a wall lies round the start")
+    assert flight.track.time_s == pytest.approx(np.arange(6) / UPDATE_RATE_HZ)  # a track: to the second scan
 
 
 def test_a_start_that_is_enclosed_in_plain_view_is_told_from_a_safe_turn(
