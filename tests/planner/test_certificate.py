@@ -215,6 +215,17 @@ def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> No
     assert found is None or seen.depth_m(sample(found.path, 2.0)).max() <= fine
 
 
+def test_a_turn_off_a_straight_begins_at_once() -> None:
+    certifier = Certifier(Limits(RADIUS, 60.0), KEEP, HORIZON, 4.0)
+    end_m = STRAIGHT.length_m
+    on_it = np.array([(x, 0.0, 15.0) for x in np.arange(0.0, end_m + 5.0, 5.0)])
+    seen = FreeDiscs(np.concatenate((on_it, [(end_m, -RADIUS, DISC_M + 1.0)])))
+    found = certifier.certify(STRAIGHT, seen, terrain())
+    assert found is not None
+    assert found.leaves_m == end_m
+    assert len(found.path.segments) == 2
+
+
 def test_no_further_than_the_horizon() -> None:
     path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
     found = CERTIFIER.certify(path, FreeDiscs(np.array([(0.0, 0.0, 1e5)])), terrain())
@@ -241,6 +252,10 @@ def test_nothing_is_certified_beyond_where_a_path_is_cut() -> None:
     assert cut is not None
     assert whole.leaves_m > 1400.0
     assert 500.0 < cut.leaves_m <= 600.0
+    for least_m in (0.0, 0.3 * RADIUS):
+        least = CERTIFIER.certify(STRAIGHT, space, terrain(), least_m)
+        assert least is not None
+        assert least.leaves_m == least_m
 
 
 OVER_M, AREA = 1400.0, (-10.0, -30.0, 1450.0, 500.0)
@@ -274,6 +289,12 @@ def test_a_path_is_certified_until_the_flight_is_over_where_it_and_its_sides_are
     if found is not None:
         assert found.path is STRAIGHT
         assert found.leaves_m == OVER_M
+
+
+@pytest.mark.parametrize(("reach_m", "free"), [(750.0, True), (650.0, False)])
+def test_no_path_is_certified_to_its_end_over_what_is_hidden_in_between(reach_m: float, free: bool) -> None:
+    seen = FreeDiscs(np.array([(0.0, 0.0, reach_m), (OVER_M, 0.0, reach_m)]))
+    assert (CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, WIDE) is not None) is free
 
 
 def test_outside_of_the_area_nothing_has_to_be_free() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planner.course import Course
-from planner.curves import pose_at
+from planner.curves import Pose, pose_at
 from planner.effect import CUT, UNHURRIED, Effect, Watch
 from planner.interface import Mission, Path, Plan, PlanStatus
 
@@ -62,6 +62,24 @@ def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
         assert left.segments[:, 5].tolist() == pytest.approx(lengths)
         for before, after in itertools.pairwise(left.segments):
             assert pose_at(Path(before[None]), before[5])[:2] == pytest.approx(after[:2])
+
+
+def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_near_it() -> None:
+    flown, aircraft = effect(3), Pose(400.0, 4.0, 1.0, 0.0)
+    for near_m, north in ((4.5, 0.0), (3.5, 4.0)):
+        onward = flown.onward_from(aircraft, 400.0, 300.0, near_m)
+        assert onward == [pytest.approx((400.0, north, 1.0, 0.0, 0.0, 300.0))]
+
+
+def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:
+    flown, watch = effect(3), watching()
+    watch.begin(flown, EDGES[:0])
+    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(5000.0, 100.0)]))
+    assert watch.cut_m == math.inf
+    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 401.0)]))
+    assert not watch.broken
+    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 399.0)]))
+    assert watch.broken
 
 
 def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
