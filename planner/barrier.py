@@ -222,11 +222,12 @@ class Proof:
         """Takes in some more of the points and says whether they close all ways from the first position given."""
         # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
         self._ends = self._ends or (position, self._mission.goal_m)
-        if self._taken_in(self._ends, PROVED_AT_ONCE) and self._begun_at != self._memory.gone:
+        closed = self._taken_in(self._ends, PROVED_AT_ONCE)
+        if closed and self._begun_at != self._memory.gone:
             # Some of what closes it may have been let go of since: what is left has to close it as well.
             self._begin()
             return self._taken_in(self._ends, self._memory.known)
-        return self._barrier is not None and self._barrier.closed
+        return closed
 
     def _taken_in(self, ends: tuple[Point, Point], most: int) -> bool:
         """Whether the ways are closed with so many more points."""
