@@ -67,6 +67,17 @@ def test_random_points_close_it_where_their_discs_part_the_area(seed: int, count
         assert closed
 
 
+@pytest.mark.parametrize("seed", range(60))
+def test_points_on_the_very_line_from_start_to_goal_count_once(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, goal = (225.0, 500.0), (775.0, 500.0)
+    points = 50.0 * np.unique(rng.integers(0, 21, (int(rng.integers(60, 220)), 2)), axis=0)
+    points = rng.permutation(points)
+    away = np.minimum(np.hypot(*(points - start).T), np.hypot(*(points - goal).T))
+    points = points[away > 1.01 * CLEARANCE]
+    assert barrier_of(points, start=start, goal=goal).closed is parted(points, CLEARANCE, start, goal)
+
+
 @pytest.mark.parametrize("about", [START, GOAL])
 @pytest.mark.parametrize(("gap_m", "closed"), [(0.0, True), (79.0, True), (81.0, False), (150.0, False)])
 def test_a_ring_is_closed_by_a_gap_of_no_more_than_two_clearances(
@@ -128,12 +139,13 @@ def test_what_keeps_from_the_border_as_well_needs_a_wider_gap_there(begin: float
 
 
 def test_a_border_beside_an_end_counts_for_nothing() -> None:
-    goal = (480.0, 30.0)
+    goal = (520.0, 30.0)
     wall = np.column_stack((np.full(60, 500.0), np.linspace(85.0, 1000.0, 60)))
     for end, closed in (((800.0, 30.0), True), (goal, False)):
-        barrier = Barrier((200.0, 480.0), end, BOUNDS, CLEARANCE, 50.0)
-        barrier.add(wall)
-        assert barrier.closed is closed
+        for ends in (((200.0, 480.0), end), (end, (200.0, 480.0))):
+            barrier = Barrier(*ends, BOUNDS, CLEARANCE, 50.0)
+            barrier.add(wall)
+            assert barrier.closed is closed
 
 
 def test_a_wall_beside_both_parts_nothing() -> None:

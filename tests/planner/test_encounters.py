@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner.encounters import EARLIEST, FASTEST, LATER_S, LATEST, encounters, meeting_s, met_at
@@ -46,6 +46,8 @@ def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float)
         assert told[i] == pytest.approx(simulated_s(each.points_m[i], velocity, SPEED), abs=0.006)
 
 
+@example(seed=1, pace=15.0, course=0.3, share=EARLIEST, later=0.0)
+@example(seed=1, pace=15.0, course=0.3, share=LATEST, later=LATER_S)
 @settings(deadline=None, max_examples=30)
 @given(
     seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, LATER_S)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner.curves import Limits, onward, pose_at, poses_at, sample
@@ -60,6 +60,9 @@ VELOCITY = st.tuples(st.floats(-12, 12), st.floats(-12, 12))
     st.lists(st.tuples(PLACE, VELOCITY), max_size=5),
     st.sampled_from([-1 / 230.0, -1 / 1000.0, 0.0, 1 / 400.0]),
 )
+# Far from one thing, what is nearer to the way must not be stepped over: not even where it comes to meet one.
+@example([(0.0, 60.0), (600.0, 5.0)], [], 0.0)
+@example([(0.0, 60.0)], [((1150.0, 5.0), (-12.0, 0.0))], 0.0)
 @settings(deadline=None, max_examples=60)
 def test_room_is_the_least_distance_from_what_stands_and_from_what_is_met(
     still: list[tuple[float, float]],
