@@ -175,3 +175,24 @@ def test_a_cell_is_free_where_the_rays_about_it_went_beyond(
         about = np.arange(1 - 2 ** aside.bit_length(), 2 ** aside.bit_length())
         beyond = min(reach, scan.ranges_m[(ray + about) % rays].min())
         assert seen.contains(middle[None])[0] == (inside and beyond - half - noise > away)
+
+
+@pytest.mark.parametrize("bearing", [0.0, 1.0, 2.5, math.pi, 4.0, 5.5])
+@pytest.mark.parametrize("away", [400.0, 1200.0])
+def test_what_has_appeared_hides_what_is_behind_it_on_both_its_sides_and_no_more(
+    bearing: float, away: float
+) -> None:
+    (scan,) = scans(sensor(world_of()), [MIDDLE])
+    seen = fed([scan])
+    points = np.random.default_rng(11).uniform(2000.0, 8000.0, (40_000, 2))
+    points = points[seen.contains(points)]
+    edge = np.array((MIDDLE[0] + away * math.sin(bearing), MIDDLE[1] + away * math.cos(bearing)))
+    assert seen.take_back(scan, edge[None])
+    free = seen.contains(points)
+    distance, aside = np.hypot(*(points - MIDDLE).T), (np.arctan2(*(points - MIDDLE).T) - bearing) % math.tau
+    aside = np.minimum(aside, math.tau - aside)
+    # What counts is where the middle of a cell lies: half its diagonal off at most.
+    off = 0.75 * FREE_CELL / np.maximum(distance, FREE_CELL)
+    half = math.asin(1.5 * FREE_CELL / away)
+    assert not free[(aside < half - off) & (distance > away - 0.25 * FREE_CELL)].any()
+    assert free[(aside > half + off + 2.0 * scan.spacing_rad) | (distance < away - 1.75 * FREE_CELL)].all()
