@@ -243,12 +243,10 @@ def clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> Flo
 def supported(scan: RangeScan, apart_m: float) -> NDArray[np.bool_]:
     """(n,) which rays returned something that one of the two to either side returned, too: no false return."""
     ranges = scan.ranges_m if all_round(scan) else np.concatenate((scan.ranges_m, np.full(2, math.inf)))
-    hit = ranges < math.inf
-    finite = np.where(hit, ranges, -math.inf)
     supported = np.zeros(len(ranges), dtype=np.bool_)
     for side in (1, 2):
-        # Where one of two is missing, they are infinitely far apart.
+        # Where one of two is missing, they are infinitely far apart; where both are, that is no number.
         with np.errstate(invalid="ignore"):
-            alike = np.abs(finite - np.roll(finite, side)) < apart_m
+            alike = np.abs(ranges - np.roll(ranges, side)) < apart_m
         supported |= alike | np.roll(alike, -side)
-    return (supported & hit)[: len(scan.ranges_m)]
+    return supported[: len(scan.ranges_m)]
