@@ -63,7 +63,9 @@ def test_one_minus_cosine_rises_and_falls() -> None:
     [
         (("ramp", 1.0, 0.0, 0.0, 1.0), "shape must be"),
         (("step", math.inf, 0.0, 0.0, 1.0), "must be finite"),
+        (("step", 0.0, -math.inf, 0.0, 1.0), "must be finite"),
         (("step", 1.0, 0.0, -1.0, 1.0), "begin at 0 or later"),
+        (("step", 1.0, 0.0, math.inf, 1.0), "begin at 0 or later"),
         (("step", 1.0, 0.0, 0.0, 0.0), "duration_s must be positive"),
         (("one_minus_cosine", 1.0, 0.0, 0.0, math.inf), "finite but of a step"),
     ],

@@ -11,6 +11,7 @@ import pytest
 from harness.metrics import clearance_violation_s, compute_figures, error_figures, metrics, planned_length_m
 from harness.record import AcceptedPlan, Flight, Outcome, Track, digest
 from harness.trackability import FlightLimits
+from planner.interface import Path
 
 LIMITS = FlightLimits(
     altitude_m=300.0,
@@ -112,6 +113,19 @@ def test_planned_length_survives_frequent_replanning(
     plans = [make_plan([(0, 25.0 * i, 0, 1, 0.0, 5000.0)], index=i) for i in range(101)]
     assert planned_length_m(flight(track, *plans)) == pytest.approx(2500.0)
     assert metrics(flight(track, *plans), LIMITS)["replans"] == 100
+
+
+def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end(
+    make_track: Callable[..., Track], circle_plan: AcceptedPlan
+) -> None:
+    once = circle_plan.plan.path
+    assert once is not None
+    for_ever = replace(circle_plan, plan=replace(circle_plan.plan, path=Path(once.segments, loiter=True)))
+    track = make_track(2001)
+    assert planned_length_m(flight(track, for_ever)) == pytest.approx(5000.0)
+    assert planned_length_m(flight(track, circle_plan)) == pytest.approx(once.length_m)
+    beyond = make_track(101, station_m=once.length_m + 10.0 + 2.5 * np.arange(101))
+    assert planned_length_m(flight(beyond, circle_plan)) == 0.0
 
 
 def test_error_figures_leave_out_nan() -> None:

@@ -252,6 +252,20 @@ def test_where_all_that_is_wanted_cannot_be_kept_the_clearest_way_is_flown(
     assert near.room_m(flown) > best_m - CLEARER * keeps_m
 
 
+def test_where_edges_were_taken_back_and_nothing_has_appeared_it_keeps_as_clear_as_it_can(
+    ring: MakePoints,
+) -> None:
+    """The sensor may have erred about what was certified: no fault of the planner."""
+    seen = Seen(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.show(np.array([(5000.0, 5000.0)]))
+    seen.taken_back_at = seen.revision
+    pilot.plan(request_on(plan, 25.0, seen))
+    seen.show(ring(200.0, 0.0, 160.0, 12.0))
+    answer = pilot.plan(request_on(plan, 50.0, seen))
+    assert answer.reason.startswith("something is in the way; ")
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_it_evades_into_space_that_was_seen_to_be_free(side: float, wall: MakePoints) -> None:
     """Ahead stands a wall, and there is room to either side of it."""
