@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planner.curves import Limits, onward, pose_at, poses_at, sample
 from planner.encounters import EARLIEST, LATEST
-from planner.escape import CLEARER, HOLD_SHARES
+from planner.escape import CLEARER, EVADING_S, HOLD_SHARES
 from planner.evasion import AHEAD_S, LATER, UNKNOWN_MPS, UNKNOWN_S, Threats, clearest, far_side, rolled_out
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
 from planner.rolling_window import RollingWindow
@@ -226,6 +226,43 @@ def test_where_something_has_appeared_what_is_flown_keeps_away_to_the_end_of_its
         assert room_m(answer.path or flown) > least_m - 0.05
 
 
+@pytest.mark.parametrize("place", [(400.0, 110.0), (600.0, -130.0)])
+def test_a_plan_is_left_where_what_has_just_appeared_beside_it_may_come_to_it(
+    place: tuple[float, float], ring: MakePoints
+) -> None:
+    """Further off than the clearance, if it stood still: of that nothing is known yet."""
+    seen = Seen(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.moving = (MovingEdges(1.0, ring(*place, 30.0, 12.0), (0.0, 0.0)),)
+    request = request_on(plan, 25.0, seen)
+    answer, near = pilot.plan(request), pilot._escapes.threats(request)
+    assert near is not None
+    assert answer.path is not None
+    assert near.room_m(answer.path) >= MISSION_HERE.clearance_m
+
+
+class HalfOpen(Seen):
+    """Nothing is known of what lies further east than some place."""
+
+    to_m = 1200.0
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return points_m[:, 0] < self.to_m
+
+
+@pytest.mark.parametrize("appears", [False, True])
+def test_a_plan_is_not_prolonged_to_where_what_has_just_appeared_may_come(
+    appears: bool, ring: MakePoints
+) -> None:
+    seen = HalfOpen(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.to_m = 4000.0
+    if appears:
+        seen.moving = (MovingEdges(24.0, ring(1200.0, -115.0, 30.0, 12.0), (0.0, 0.0)),)
+    answer = pilot.plan(request_on(plan, 600.0, seen))
+    assert answer.status is (PlanStatus.NO_BETTER if appears else PlanStatus.FOUND)
+
+
 @pytest.mark.parametrize("seed", [889, 902, 1087])
 def test_where_all_that_is_wanted_cannot_be_kept_the_clearest_way_is_flown(
     seed: int, ring: MakePoints
@@ -252,17 +289,21 @@ def test_where_all_that_is_wanted_cannot_be_kept_the_clearest_way_is_flown(
     assert near.room_m(flown) > best_m - CLEARER * keeps_m
 
 
-def test_where_edges_were_taken_back_and_nothing_has_appeared_it_keeps_as_clear_as_it_can(
-    ring: MakePoints,
+@pytest.mark.parametrize("appeared", [False, True])
+def test_where_not_all_stood_still_a_broken_certificate_is_no_fault_of_the_planner(
+    appeared: bool, ring: MakePoints
 ) -> None:
-    """The sensor may have erred about what was certified: no fault of the planner."""
+    """Edges were taken back, or something appeared, long before: it keeps as clear as it can."""
     seen = Seen(nothing())
     pilot, plan = flown_straight(seen)
     seen.show(np.array([(5000.0, 5000.0)]))
-    seen.taken_back_at = seen.revision
+    if appeared:
+        seen.surprised_s = 1.0
+    else:
+        seen.taken_back_at = seen.revision
     pilot.plan(request_on(plan, 25.0, seen))
     seen.show(ring(200.0, 0.0, 160.0, 12.0))
-    answer = pilot.plan(request_on(plan, 50.0, seen))
+    answer = pilot.plan(request_on(plan, 50.0, seen)._replace(time_s=2.0 + EVADING_S))
     assert answer.reason.startswith("something is in the way; ")
 
 

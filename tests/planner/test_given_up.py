@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from planner.curves import end_of
+from planner.curves import Pose, end_of
 from planner.dead_ends import RETRY_S
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
 from planner.rolling_window import MOST_EFFORT, RollingWindow
@@ -158,4 +158,7 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
         ]
 
     assert set(told(changed_s + SETTLED_S - 1.0)) == {PlanStatus.NO_PATH}
+    pilot._dead_ends.give_up(Pose(3000.0, 0.0, 1.0, 0.0))
     assert told(changed_s + SETTLED_S + 1.0)[-1] is PlanStatus.UNREACHABLE
+    # Where it is for want of room to turn, what was given up was tried once more before.
+    assert (len(given_up(pilot)) == 0) is for_turns_alone
