@@ -195,6 +195,11 @@ def test_columns_are_what_metrics_json_has(place: Path) -> None:
     for name, value in cells.items():
         kind = {"number": float, "int": int, "bool": bool, "text": str}[METRICS[name]]
         assert value is None or type(value) is kind, name
+    legs = [{"trackable": not why, "cause": why} for why in (None, "wind drift", "bank limit", "wind drift")]
+    hit = metric_cells({**metrics, "outcome": "collision", "trackability": legs}, 60.0, 1500.0)
+    assert (hit["trackability.legs"], hit["trackability.not_trackable"]) == (4, 3)
+    assert hit["trackability.causes"] == "bank limit; wind drift"
+    assert hit["length_ratio"] is None
 
 
 @pytest.mark.parametrize("workers", ["2", "4"])
@@ -241,6 +246,16 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
     said = capsys.readouterr().err
     assert said.startswith("r.parquet: is damaged: ")
     assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize("of", ["[]", "{}", '{"schema": "wayproof/results/0"}', "no JSON"])
+def test_a_table_of_something_else_is_no_campaigns(
+    of: str, place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = pq.read_table(unbroken / "results.parquet")
+    pq.write_table(rows.replace_schema_metadata({"wayproof": of}), place / "r.parquet")
+    assert main(["fly", "--from", str(place / "r.parquet"), "--run", "1"]) == 2
+    assert "is not the results.parquet of a campaign" in capsys.readouterr().err
 
 
 def test_a_row_that_was_flown_otherwise_is_told(
