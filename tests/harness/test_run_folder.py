@@ -125,6 +125,12 @@ def test_folder_with_other_things_is_refused(tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+def test_a_name_that_tables_cannot_be_written_under_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="its name must be printable"):
+        RunFolder.create(tmp_path / "run\udcff", SCENARIO, [])
+    assert not list(tmp_path.iterdir())
+
+
 def test_folder_with_a_foreign_manifest_is_refused(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text('{"name": "a web page"}')
     with pytest.raises(RunFolderError, match="not a run folder"):
