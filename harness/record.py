@@ -49,6 +49,8 @@ BLOCK_ROWS = 6000
 """Rows that are handed on together: ten minutes of flight, which is less than a second of the loop."""
 
 ROW = struct.Struct(f"={len(AircraftState._fields) + 4}d")
+THROTTLE = AircraftState._fields.index("throttle")
+"""What comes before it in a row is finite while the aircraft is under control."""
 CHORD_ERROR_M = 0.5
 
 
@@ -186,10 +188,8 @@ class TrackLog:
     ) -> None:
         """Adds one row; without a plan, `cross_track_m` and `station_m` are NaN and `plan_index` is -1.
 
-        A state that is not finite, with which control is lost, is no row.
+        A state that is not finite, with which control is lost, is no row of the track.
         """
-        if not math.isfinite(sum(state[:-1])):  # all but the throttle
-            return
         ROW.pack_into(
             self._rows, self._filled, *state, roll_command_rad, cross_track_m, station_m, plan_index
         )
@@ -205,7 +205,10 @@ class TrackLog:
 
     def _cut(self) -> None:
         rows = np.frombuffer(self._rows[: self._filled]).reshape(-1, ROW.size // 8).T
+        rows = rows[:, np.isfinite(rows[:THROTTLE]).all(axis=0)]
         self._filled = 0
+        if not rows.size:
+            return
         time, east, north, up, east_mps, north_mps, _, heading, roll, pitch = rows[:10]
         airspeed, load_factor, throttle, roll_command, cross_track, station, plan_index = rows[10:]
         block = Track(

@@ -63,6 +63,17 @@ def test_blocks_come_while_flying_and_add_up() -> None:
     np.testing.assert_array_equal(track.time_s, np.arange(10) / 10)
 
 
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_a_state_that_is_not_finite_is_no_row_nor_a_block(rows: int) -> None:
+    blocks: list[Track] = []
+    log = TrackLog(none_near, [blocks.append], block_rows=rows)
+    for tick in range(4):
+        log.add(state(tick / 10), 0.0, math.nan, math.nan, -1)
+    log.add(state(0.4)._replace(velocity_up_mps=math.inf), 0.0, math.nan, math.nan, -1)
+    np.testing.assert_array_equal(log.close().time_s, np.arange(4) / 10)
+    assert all(len(block) for block in blocks)
+
+
 def test_digest_does_not_depend_on_the_blocks() -> None:
     digests = set()
     for rows in (1, 3, 100):
