@@ -165,7 +165,7 @@ FIGURES = (
     Figure("planner time p50, ms", "p50 ms", lambda row: number(row.planner_p50_ms)),
     Figure("planner time p99, ms", "p99 ms", lambda row: number(row.planner_p99_ms)),
     Figure("planner time max, ms", "max ms", lambda row: number(row.planner_max_ms)),
-    Figure("replans", "plans", lambda row: "" if row.replans is None else str(row.replans)),
+    Figure("replans", "replans", lambda row: "" if row.replans is None else str(row.replans)),
     Figure("digest", "digest", lambda row: row.digest[:12]),
 )
 """What people are shown, in this order."""

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from harness.record import FloatArray, Track
 
 PLANNED_DASHES: Any = (0, (4, 2))
+SOLID: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}
+CHANGING = SOLID | {"ls": "--"}
+"""Obstacles that stand for the whole flight, and others where they are at first."""
 
 LEGEND_ROW_IN = 0.19
 CLOSE_UP_IN = 2.3
@@ -89,15 +92,14 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 
 def overview(scene: Scene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
-    with styled(_map_height_in(scene) + LEGEND_ROW_IN * math.ceil((3 + len(runs)) / 2)) as figure:
+    keys = _keys(scene, [run for _, run in runs])
+    with styled(_map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(keys)) / 2)) as figure:
         axes = figure.add_subplot()
         legend = _map(axes, scene)
         for index, run in runs:
             legend.append(_flown(axes, scene, run, index, DASHES[index % len(DASHES)]))
         axes.set_title(scene.name)
-        if any(run.planned.tightest is not None for _, run in runs):
-            legend.append(_tightest_key())
-        figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
+        figure.legend(handles=legend + keys, loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
@@ -111,21 +113,20 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
     """
     row = run.planned.tightest
     below_in = [] if row is None else [CLOSE_UP_IN]
-    map_in = _map_height_in(scene)
-    with styled(map_in + sum(below_in) + 3 * LEGEND_ROW_IN) as figure:
+    map_in, keys = _map_height_in(scene), _keys(scene, [run])
+    with styled(map_in + sum(below_in) + LEGEND_ROW_IN * math.ceil((4 + len(keys)) / 2)) as figure:
         rows = figure.add_gridspec(1 + len(below_in), 2, height_ratios=[map_in, *below_in])
         axes = figure.add_subplot(rows[0, :])
         legend = _map(axes, scene)
         legend.append(_flown(axes, scene, run, index))
         axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
         if row is not None:
-            legend.append(_tightest_key())
             planned = Line2D([], [], color="black", lw=0.9, ls=PLANNED_DASHES, label="planned (below)")
             legend.append(planned)
             close_up, curvature = figure.add_subplot(rows[1, 0]), figure.add_subplot(rows[1, 1])
             _close_up(close_up, scene, run, index, row)
             _curvature_near(curvature, scene, run, index, row)
-        figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
+        figure.legend(handles=legend + keys, loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
@@ -165,7 +166,7 @@ def _map(axes: Axes, scene: Scene) -> list[Any]:
     for obstacle in scene.obstacles:
         for grown, style in (
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.5, "ls": ":"}),
-            (0.0, {"fc": "0.85", "ec": "0.45", "lw": 0.7, "ls": "-" if obstacle.stands_for_ever else "--"}),
+            (0.0, SOLID if obstacle.stands_for_ever else CHANGING),
         ):
             axes.add_patch(_outline(obstacle, grown, **style))
     (east, north), (goal_east, goal_north) = np.array(scene.start_m) / 1e3, np.array(scene.goal_m) / 1e3
@@ -218,10 +219,19 @@ def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-
     return line
 
 
-def _tightest_key() -> Line2D:
-    return Line2D(
-        [], [], ls="", marker="o", mfc="none", mec="0.2", mew=1.2, ms=8, label="tightest planned turn"
-    )
+def _keys(scene: Scene, runs: Sequence[DrawnRun]) -> list[Any]:
+    """What the legend says of marks that are there for some flights only."""
+    keys: list[Any] = []
+    if not all(obstacle.stands_for_ever for obstacle in scene.obstacles):
+        keys.append(patches.Patch(**CHANGING, label="moves, or stands for a time"))
+    if any(run.outcome != "reached" for run in runs):
+        keys.append(
+            Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
+        )
+    if any(run.planned.tightest is not None for run in runs):
+        ring: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 8}
+        keys.append(Line2D([], [], ls="", label="tightest planned turn", **ring))
+    return keys
 
 
 def _thinned(points: FloatArray, scene: Scene) -> FloatArray:
@@ -242,7 +252,7 @@ def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> 
     for obstacle in scene.obstacles:
         for grown, style in (
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.6, "ls": ":"}),
-            (0.0, {"fc": "0.85", "ec": "0.45", "lw": 0.7}),
+            (0.0, SOLID),
         ):
             axes.add_patch(_outline(obstacle, grown, **style))
     planned = np.column_stack((run.planned.east_m, run.planned.north_m))

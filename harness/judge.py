@@ -54,7 +54,7 @@ class Judge:
         if clearance < 0.0:
             return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
         if self.contact_m < 0.0:
-            return Outcome.COLLISION, "went through an obstacle that is thinner than the step was long"
+            return Outcome.COLLISION, "touched an obstacle between two steps"
         if not world.inside_bounds(east, north):
             return Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m"
         to_go = self.to_go_m(state)

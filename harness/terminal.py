@@ -112,7 +112,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "cross-track error": f"{_spread(metrics['cross_track_m'])} m",
         "altitude error": f"{_spread(metrics['altitude_error_m'])} m",
         "trackable": _tracked(metrics),
-        "plans": f"{metrics['replans']}, p99 {_number(compute['p99'])} ms, max {_number(compute['max'])} ms",
+        "replans": f"{metrics['replans']}, p99 {_number(compute['p99'])} ms, max {_number(compute['max'])} ms",
         "speed": f"{_number(timing['realtime_factor'])} x real time, {_number(timing['wall_s'])} s",
     }
 

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -501,6 +502,22 @@ def test_the_map_shows_the_track_and_the_tightest_turn(drawn: tuple[figures.Scen
     tightest = (run.planned.east_m[row] / 1e3, run.planned.north_m[row] / 1e3)
     places = [np.asarray(line.get_xydata()) for line in axes.get_lines()]
     assert any(np.allclose(place, tightest) for place in places if place.shape == (1, 2))
+
+
+@pytest.mark.parametrize("changes", [False, True])
+@pytest.mark.parametrize("outcome", ["reached", "timeout"])
+def test_the_legend_explains_every_mark_that_is_there_and_no_other(
+    drawn: tuple[figures.Scene, figures.DrawnRun], changes: bool, outcome: str
+) -> None:
+    scene, run = drawn[0], replace(drawn[1], outcome=outcome)
+    if changes:
+        scene = replace(scene, obstacles=(*scene.obstacles, Obstacle(Circle((0.0, 2000.0), 9.0), (1.0, 0.0))))
+    for figure in (figures.overview(scene, [(0, run)]), figures.planner_figure(scene, run, 0)):
+        (legend,) = figure.legends
+        told = {text.get_text() for text in legend.get_texts()}
+        assert ("moves, or stands for a time" in told) is changes
+        assert ("ended, not at G" in told) is (outcome == "timeout")
+        assert "tightest planned turn" in told
 
 
 @pytest.mark.parametrize("kind", ["overview", "planner_figure", "profiles"])
