@@ -218,17 +218,30 @@ def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWor
     assert "ZeroDivisionError" in metrics["error"]
 
 
-def test_planner_whose_path_cannot_be_flown(fly: Fly, answering: Install, small_world: SmallWorld) -> None:
-    def backwards(mission: Mission, request: PlanRequest) -> Plan:
-        row = (*request.position_m, *request.direction, 0.0, -500.0)
-        return Plan(PlanStatus.FOUND, "back", np.array([row[:2]]), Path(np.array([row])))
+@pytest.mark.parametrize(
+    ("curvature_1pm", "length_m", "fault"),
+    [
+        (0.0, -500.0, "route segments must be finite and longer than zero"),
+        (1e308, 500.0, "route segments must be of finite length together, and turn by a finite angle each"),
+        (0.0, 1e308, "route segments must be of finite length together, and turn by a finite angle each"),
+    ],
+)
+def test_planner_whose_path_cannot_be_flown(
+    fly: Fly,
+    answering: Install,
+    small_world: SmallWorld,
+    curvature_1pm: float,
+    length_m: float,
+    fault: str,
+) -> None:
+    def nowhere(mission: Mission, request: PlanRequest) -> Plan:
+        row = (*request.position_m, *request.direction, curvature_1pm, length_m)
+        return Plan(PlanStatus.FOUND, "on and on", np.array([row[:2]]), Path(np.array([row, row])))
 
-    answering(backwards)
+    answering(nowhere)
     status, metrics = fly(small_world(planner={"kind": "stand_in"}))
     assert (status, metrics["outcome"]) == (1, "planner_failed")
-    assert metrics["reason"] == (
-        "the planner gave a path that cannot be flown: route segments must be finite and longer than zero"
-    )
+    assert metrics["reason"] == f"the planner gave a path that cannot be flown: {fault}"
 
 
 def test_planner_that_finds_no_path_and_calls_it_one(
