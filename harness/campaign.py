@@ -261,7 +261,7 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
         if path.is_file():
             return [path]
         if path.is_dir():
-            if files := [file for file in sorted(path.glob("*.y*ml")) if _is_scenario(file)]:
+            if files := [file for file in sorted(path.glob("[!.]*.y*ml")) if _is_scenario(file)]:
                 return files
             raise fault(f"is {entry!r}, a folder without scenario files (*.yaml, *.yml)")
     except OSError as error:

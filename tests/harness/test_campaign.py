@@ -167,6 +167,13 @@ def test_ranges_of_whole_numbers_end_at_whole_numbers(place: Path, drawn: str, w
         runs_of(place, text).check()
 
 
+def test_hidden_files_of_a_folder_are_no_scenarios(place: Path) -> None:
+    (place / "more" / "._a.yaml").write_bytes(b"\x00\x05\x16\x07")
+    (place / "more" / ".#b.yaml").symlink_to("somebody@somewhere.1234")
+    runs = runs_of(place, CAMPAIGN.replace("ring.yaml", "more"))
+    assert {run.scenario for run in all_of(runs)} == {"a", "b"}
+
+
 def test_scenarios_of_a_folder_may_end_in_yml(place: Path) -> None:
     (place / "more" / "c.yml").write_text(SCENARIO.format(name="c"))
     runs = runs_of(place, CAMPAIGN.replace("ring.yaml", "more"))
