@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import os
+import threading
+from concurrent.futures import Future
 from contextlib import ExitStack
+from queue import SimpleQueue
 from typing import Any
 
 import jsbsim
@@ -14,10 +19,9 @@ from aircraft.frames import LocalPlane
 from aircraft.injection import with_autopilot
 from aircraft.interface import STEP_RATE_HZ
 from aircraft.model_files import AircraftError, ModelFiles, TrimError
+from aircraft.properties import FOOT_M, SLUG_KG
 from aircraft.start import StartConditions
 
-FOOT_M = 0.3048
-SLUG_KG = 14.59390
 REFERENCE_ALTITUDE_M = 300.0
 FULL_TRIM = 1
 
@@ -43,10 +47,44 @@ def node(fdm: Any, path: str) -> Any:
 def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
     """A fresh jsbsim.FGFDMExec with the model and the autopilot; a second model in one would crash.
 
+    It is made in another thread, as the C library gives that a heap of its own: there all of a model lies close
+    together. Among what libraries and flights before it have left, its steps take up to a twentieth longer.
+
     Raises:
         AircraftError: the model cannot be loaded.
     """
-    jsbsim.set_logger(_Silence())
+    jsbsim.set_logger(_Silence())  # of this thread, which takes the steps
+    made: Future[Any] = Future()
+    _orders().put((made, files, step_rate_hz))
+    return made.result()
+
+
+@functools.cache
+def _orders() -> SimpleQueue[tuple[Future[Any], ModelFiles, int]]:
+    """What the thread that loads models is asked for.
+
+    It never ends: JSBSim would let go of a thread's logger when Python's lock is no longer held.
+    """
+    orders: SimpleQueue[tuple[Future[Any], ModelFiles, int]] = SimpleQueue()
+
+    def load_all() -> None:
+        jsbsim.set_logger(_Silence())
+        while True:
+            made, files, step_rate_hz = orders.get()
+            try:
+                made.set_result(_load(files, step_rate_hz))
+            except BaseException as error:
+                made.set_exception(error)
+            del made  # the model is not this thread's
+
+    threading.Thread(target=load_all, name="load models", daemon=True).start()
+    return orders
+
+
+os.register_at_fork(after_in_child=_orders.cache_clear)  # there the thread is not
+
+
+def _load(files: ModelFiles, step_rate_hz: int) -> Any:
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_debug_level(0)
     with ExitStack() as stack:

@@ -8,10 +8,11 @@ import math
 from aircraft.airframes import AircraftError, Airframe, airframe
 from aircraft.frames import LocalPlane
 from aircraft.interface import STEP_RATE_HZ, AircraftState
-from aircraft.jsbsim_loading import FOOT_M, load, node, trim
+from aircraft.jsbsim_loading import load, node, trim
 from aircraft.properties import (
     COMMAND_PROPERTIES,
     CONTROLS,
+    FOOT_M,
     STATE_PROPERTIES,
     TURBULENCE_SEVERITY,
     TURBULENCE_TYPE,

@@ -3,6 +3,9 @@
 JSBSim writes the unit into the name: fps is ft/s; angles are rad. Its wind blows *towards* north and east.
 """
 
+FOOT_M = 0.3048
+SLUG_KG = 14.59390
+
 STATE_PROPERTIES = (
     "position/lat-geod-rad",  # geodetic; lat-gc is up to 21 km off
     "position/long-gc-rad",

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import subprocess
 import sys
+import threading
+import weakref
 from pathlib import Path
 
+import jsbsim
 import pytest
 
 from aircraft.airframes import AircraftError, airframe
@@ -42,6 +46,51 @@ def test_state_has_the_throttle_that_holds_the_airspeed() -> None:
 def test_is_a_flight_model() -> None:
     model: FlightModel = model_of("aerosonde")
     assert model.step_rate_hz == 120
+
+
+def test_is_loaded_on_a_heap_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another thread has one: among what flights before it left, steps of a model take longer."""
+    threads: list[threading.Thread] = []
+    make = jsbsim.FGFDMExec
+
+    def made(properties: None) -> jsbsim.FGFDMExec:
+        threads.append(threading.current_thread())
+        return make(properties)
+
+    monkeypatch.setattr(jsbsim, "FGFDMExec", made)
+    models = [model_of("aerosonde") for _ in range(2)]
+    assert models[0].state() == models[1].state()
+    assert threads[0] is threads[1] is not threading.current_thread()
+
+
+def test_a_model_that_is_not_used_any_more_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread that loaded it does not hold it."""
+
+    class Watched(jsbsim.FGFDMExec):
+        """Of JSBSim's own it cannot be told whether it is gone."""
+
+    monkeypatch.setattr(jsbsim, "FGFDMExec", Watched)
+    model = model_of("aerosonde")
+    gone = weakref.ref(model._fdm)
+    assert isinstance(gone(), Watched)
+    del model
+    gc.collect()
+    assert gone() is None
+
+
+def test_a_forked_process_loads_models_too() -> None:
+    """There, no thread but the one that forked goes on."""
+    code = (
+        "import os\n"
+        "from tests.aircraft.test_jsbsim_model import model_of\n"
+        "model_of('aerosonde')\n"
+        "child = os.fork()\n"
+        "if not child:\n"
+        "    model_of('aerosonde')\n"
+        "    os._exit(7)\n"
+        "assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60, cwd=Path(__file__).parents[2])
 
 
 @pytest.mark.parametrize("wind", WINDS)
