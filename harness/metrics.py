@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.record import Flight, FloatArray, Outcome, Track, digest
+from harness.record import Flight, FloatArray, Outcome, digest
 from harness.smoothness import (
     flown_lengths,
     flown_profile,
@@ -57,9 +57,7 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
         "planned_length_m": float(planned_length_m(flight)),
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
         "min_clearance_m": _finite(nearest_m.min()),
-        "clearance_violation_s": clearance_violation_s(
-            dataclasses.replace(track, clearance_m=nearest_m), limits.clearance_m
-        ),
+        "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
         "cross_track_m": error_figures(followed),
         "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
         "smoothness": {
@@ -102,9 +100,9 @@ def compute_figures(compute_ms: tuple[float, ...]) -> dict[str, float | None]:
     return {"p50": float(p50), "p99": float(p99), "max": max(compute_ms)}
 
 
-def clearance_violation_s(track: Track, clearance_m: float) -> float:
+def clearance_violation_s(time_s: FloatArray, clearance_m: FloatArray, wanted_m: float) -> float:
     """Time below the wanted clearance, counted by intervals between rows."""
-    return float(np.diff(track.time_s)[track.clearance_m[1:] < clearance_m].sum())
+    return float(np.diff(time_s)[clearance_m[1:] < wanted_m].sum())
 
 
 def planned_length_m(flight: Flight) -> float:

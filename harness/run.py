@@ -25,7 +25,7 @@ from harness.compiled_guidance import path_follower
 from harness.metrics import metrics
 from harness.planner_keys import planner_of
 from harness.range_sensor import RangeSensor
-from harness.record import AcceptedPlan, Flight, Track, WriteError
+from harness.record import Flight, WriteError
 from harness.run_folder import RunFolder
 from harness.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.scenario_sections import Environment
@@ -34,8 +34,7 @@ from harness.trackability import FlightLimits
 from harness.world import World
 
 if TYPE_CHECKING:
-    from aircraft.interface import AircraftState
-    from harness.range_sensor import RangeScan
+    pass
 
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
@@ -194,7 +193,7 @@ def fly_to_folder(
     try:
         with ExitStack() as stack:
             folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
-            observers: list[Observer] = [_Writer(folder), *watching]
+            observers = [*watching]
             log = (
                 _recording(scenario, text, loop, folder, pilot or scenario.planner.kind)
                 if recording
@@ -207,29 +206,10 @@ def fly_to_folder(
             figures = measured_by(flight, flight_limits(scenario))
             if log is not None:
                 log.close(figures)
-            folder.finish(flight.plans, figures)
+            folder.finish(flight.track, flight.plans, figures)
     except OSError as error:
         raise WriteError.of("the run", out, error) from error
     return figures
-
-
-class _Writer:
-    """Writes the track block by block."""
-
-    def __init__(self, folder: RunFolder) -> None:
-        self._folder = folder
-
-    def on_block(self, block: Track) -> None:
-        self._folder.write_block(block)
-
-    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
-        """The folder holds no scans."""
-
-    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
-        """Plans are written at the end."""
-
-    def on_event(self, time_s: float, text: str) -> None:
-        """Events belong to the recording."""
 
 
 def _recording(scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pilot: str) -> Any:

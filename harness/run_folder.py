@@ -86,7 +86,6 @@ class RunFolder:
         self.path = path
         self._manifest = manifest
         self._lock = lock
-        self._track_writer: Any = None
 
     @classmethod
     def create(cls, path: Path, scenario_yaml: str, command: Sequence[str]) -> RunFolder:
@@ -130,40 +129,27 @@ class RunFolder:
         """Where the recording belongs."""
         return self.path / RECORDING
 
-    def write_block(self, block: Track) -> None:
-        """Appends consecutive rows of the track; a sink of `TrackLog`."""
+    def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
+        """Writes track, plans and metrics, then marks the run complete.
+
+        Call it last: after the recording is closed. All at once, as each time that a table is written costs what is
+        being flown its place in the caches.
+
+        Raises:
+            RunFolderError: the track has no rows.
+            ValueError: a metric is not finite (JSON has no such number).
+        """
+        if not len(track):
+            raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        table = pa.table({name: getattr(block, name) for name in TRACK_FIELDS})
-        if self._track_writer is None:
-            self._track_writer = pq.ParquetWriter(
-                self.path / (TRACK + PARTIAL),
-                table.schema,
-                compression=COMPRESSION,
-                use_dictionary=False,
-                use_byte_stream_split=SPLIT,
-            )
-        self._track_writer.write_table(table)
-
-    def finish(self, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
-        """Closes the track, writes plans and metrics, then marks the run complete.
-
-        Call it last: after the recording is closed.
-
-        Raises:
-            RunFolderError: no block of the track was written.
-            ValueError: a metric is not finite (JSON has no such number).
-        """
-        if self._track_writer is None:
-            raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
-        import pyarrow.parquet as pq
-
         text = _json(metrics)
-        self._close_track()
-        os.replace(self.path / (TRACK + PARTIAL), self.path / TRACK)
-        pq.write_table(plans_table(plans), self.path / (PLANS + PARTIAL), compression=COMPRESSION)
-        os.replace(self.path / (PLANS + PARTIAL), self.path / PLANS)
+        rows = pa.table({name: getattr(track, name) for name in TRACK_FIELDS})
+        split = {"use_dictionary": False, "use_byte_stream_split": SPLIT}
+        for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
+            pq.write_table(table, self.path / (name + PARTIAL), compression=COMPRESSION, **how)
+            os.replace(self.path / (name + PARTIAL), self.path / name)
         replace_text(self.path / METRICS, text)
         tables = (TRACK, PLANS, RECORDING)
         sums = {name: _sha256(self.path / name) for name in tables if (self.path / name).exists()}
@@ -175,14 +161,7 @@ class RunFolder:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        try:
-            self._close_track()
-        finally:
-            self._lock.release()
-
-    def _close_track(self) -> None:
-        if self._track_writer is not None and self._track_writer.is_open:
-            self._track_writer.close()
+        self._lock.release()
 
 
 def load_run(path: Path) -> Run:

@@ -133,9 +133,10 @@ def test_error_figures_leave_out_nan() -> None:
     assert compute_figures((5.0,)) == {"p50": 5.0, "p99": 5.0, "max": 5.0}
 
 
-def test_exactly_the_wanted_clearance_is_no_violation(make_track: Callable[..., Track]) -> None:
-    assert clearance_violation_s(make_track(50, clearance_m=200.0), 200.0) == 0.0
-    assert clearance_violation_s(make_track(50, clearance_m=199.9), 200.0) == pytest.approx(4.9)
+def test_exactly_the_wanted_clearance_is_no_violation() -> None:
+    times_s = np.arange(50) / 10.0
+    assert clearance_violation_s(times_s, np.full(50, 200.0), 200.0) == 0.0
+    assert clearance_violation_s(times_s, np.full(50, 199.9), 200.0) == pytest.approx(4.9)
 
 
 def test_a_contact_between_two_rows_is_below_the_wanted_clearance(

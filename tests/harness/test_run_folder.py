@@ -40,11 +40,7 @@ def fly_straight(make_track: Callable[..., Track], plan: AcceptedPlan) -> Flight
 def write_run(folder: Path, flight: Flight) -> dict[str, object]:
     figures = metrics(flight, LIMITS)
     with RunFolder.create(folder, SCENARIO, ["wayproof", "fly"]) as run:
-        for first in range(0, len(flight.track), 300):
-            run.write_block(
-                Track(**{name: column[first : first + 300] for name, column in vars(flight.track).items()})
-            )
-        run.finish(flight.plans, figures)
+        run.finish(flight.track, flight.plans, figures)
     return figures
 
 
@@ -167,13 +163,11 @@ def test_leftover_of_a_folder_killed_at_its_making_is_taken(tmp_path: Path) -> N
     assert json.loads((tmp_path / "manifest.json").read_text())["complete"] is False
 
 
-def test_run_left_without_finish_stays_incomplete(tmp_path: Path, make_track: Callable[..., Track]) -> None:
-    run = RunFolder.create(tmp_path, SCENARIO, [])
-    with run:
-        run.write_block(make_track(50))
+def test_run_left_without_finish_stays_incomplete(tmp_path: Path) -> None:
+    with RunFolder.create(tmp_path, SCENARIO, []):
+        pass
     with pytest.raises(RunFolderError, match="stopped before its end"):
         load_run(tmp_path)
-    assert (tmp_path / "track.parquet.partial").exists()
     assert not (tmp_path / TRACK).exists()
 
 
@@ -203,20 +197,21 @@ def test_process_killed_while_finishing_leaves_no_complete_run(
 def test_metric_that_json_cannot_hold_leaves_the_run_incomplete(
     tmp_path: Path, make_track: Callable[..., Track]
 ) -> None:
-    with RunFolder.create(tmp_path, SCENARIO, []) as run:
-        run.write_block(make_track(50))
-        with pytest.raises(ValueError, match="not JSON compliant"):
-            run.finish([], {"min_clearance_m": float("inf")})
+    with (
+        RunFolder.create(tmp_path, SCENARIO, []) as run,
+        pytest.raises(ValueError, match="not JSON compliant"),
+    ):
+        run.finish(make_track(50), [], {"min_clearance_m": float("inf")})
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path)
 
 
-def test_run_with_nothing_flown_cannot_finish(tmp_path: Path) -> None:
+def test_run_with_nothing_flown_cannot_finish(tmp_path: Path, make_track: Callable[..., Track]) -> None:
     with (
         RunFolder.create(tmp_path, SCENARIO, []) as run,
         pytest.raises(RunFolderError, match="nothing was flown"),
     ):
-        run.finish([], {})
+        run.finish(make_track(0), [], {})
 
 
 def test_missing_and_damaged_runs_are_told_apart(
