@@ -71,8 +71,10 @@ class ObstacleMap:
         self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
         self._range = range_m
         self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED
-        self._revision = 0
-        self._taken_back_at = 0
+        self.revision = 0
+        """Grows with every change of the set of edge points."""
+        self.taken_back_at = 0
+        """The last revision at which edge points were taken away again."""
         self._scans = 0
         self._all_stands = True  # no point was looked through the last time
         self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
@@ -86,11 +88,6 @@ class ObstacleMap:
     def spacing_m(self) -> float:
         """Edge points of one wall are about this far apart."""
         return self._cell
-
-    @property
-    def revision(self) -> int:
-        """Grows with every change of the set of edge points."""
-        return self._revision
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
         """Takes in one scan, but for some of its rays."""
@@ -111,18 +108,13 @@ class ObstacleMap:
             self._all_stands = not self._look_through(scan)
         self._scans += 1
 
-    @property
-    def taken_back_at(self) -> int:
-        """The last revision at which edge points were taken away again."""
-        return self._taken_back_at
-
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""
-        if revision >= self._revision:
+        if revision >= self.revision:
             return np.zeros((0, 2))
         slots = (self._since[: self._count] > revision).nonzero()[0]
         slots = slots[self._score[self._key[slots]] >= CONFIRMED]
-        if revision < self._revision - 1:  # else all came in at once
+        if revision < self.revision - 1:  # else all came in at once
             slots = slots[np.argsort(self._since[slots], kind="stable")]
         return _pairs(self._points[slots])
 
@@ -134,8 +126,8 @@ class ObstacleMap:
         slots = slots[self._score[self._key[slots]] > 0]
         if len(slots):
             self._score[self._key[slots]] = 0
-            self._revision += 1
-            self._taken_back_at = self._revision
+            self.revision += 1
+            self.taken_back_at = self.revision
 
     def _take_in(self, scan: RangeScan, nearest_m: float, ignored: BoolArray | None) -> None:
         """Counts hits; where they are news, also what lies between them; and near outlines in detail.
@@ -193,7 +185,7 @@ class ObstacleMap:
 
     def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
         self._grow(len(cells))
-        self._count, self._revision, unconfirmed = count_hits(
+        self._count, self.revision, unconfirmed = count_hits(
             cells,
             places,
             self._score,
@@ -202,7 +194,7 @@ class ObstacleMap:
             self._key,
             self._since,
             self._count,
-            self._revision,
+            self.revision,
             self._first_score,
             self._origin,
         )
@@ -251,8 +243,8 @@ class ObstacleMap:
         if len(weaker):
             self._score[weaker] -= 1
             if (self._score[weaker] == CONFIRMED - 1).any():
-                self._revision += 1
-                self._taken_back_at = self._revision
+                self.revision += 1
+                self.taken_back_at = self.revision
         return len(weaker) > 0
 
 

@@ -68,7 +68,7 @@ class ReflectionMap:
         self._since = np.zeros(1024, dtype=np.int64)  # revision at which it last became an edge
         self._since_s = np.zeros(1024)  # and when
         self._time_s = 0.0
-        self._revision = self._taken_back_at = 0
+        self.revision = self.taken_back_at = 0  # as `harness.sensed_world.Edges` has them
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
         self._near_count = 0
@@ -77,16 +77,6 @@ class ReflectionMap:
     def spacing_m(self) -> float:
         """Edge points of one wall are about this far apart."""
         return self._cell
-
-    @property
-    def revision(self) -> int:
-        """Grows with every change of the set of edge points."""
-        return self._revision
-
-    @property
-    def taken_back_at(self) -> int:
-        """The last revision at which edge points were taken away again."""
-        return self._taken_back_at
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""
@@ -123,8 +113,8 @@ class ReflectionMap:
         if len(slots):
             self._counts[slots] = 0.0
             self._edge[slots] = False
-            self._revision += 1
-            self._taken_back_at = self._revision
+            self.revision += 1
+            self.taken_back_at = self.revision
 
     def _add_cells(self, scan: RangeScan, hits: NDArray[np.intp]) -> None:
         """Cells that returned a ray for the first time get a slot."""
@@ -200,9 +190,9 @@ class ReflectionMap:
         now = (stopped >= share * LEAST_STOPPED) & (stopped >= share * self._least_share * (stopped + passed))
         changed = (now != was).nonzero()[0]
         if len(changed):
-            self._revision += 1
+            self.revision += 1
             gone = was[changed].any()
             self._edge[slots[changed]] = now[changed]
-            self._since[slots[changed]], self._since_s[slots[changed]] = self._revision, self._time_s
+            self._since[slots[changed]], self._since_s[slots[changed]] = self.revision, self._time_s
             if gone:
-                self._taken_back_at = self._revision
+                self.taken_back_at = self.revision

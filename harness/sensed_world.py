@@ -75,8 +75,12 @@ class SensedWorld:
         else:
             self._edges = ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
             self._moving = MovingObstacles(clearance_m, noise_m, false_returns)
-        self._found: tuple[MovingEdges, ...] = ()
-        self._surprised_s = -math.inf
+        self.moving: tuple[MovingEdges, ...] = ()
+        """What is known to move; its edges are not among the others."""
+        self.surprised_s = -math.inf
+        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
+        self.revision = self._edges.revision
+        """Grows with every change of the set of edge points."""
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
 
     @property
@@ -85,24 +89,9 @@ class SensedWorld:
         return self._edges.spacing_m
 
     @property
-    def revision(self) -> int:
-        """Grows with every change of the set of edge points."""
-        return self._edges.revision
-
-    @property
     def taken_back_at(self) -> int:
         """The last revision at which edge points were taken away again."""
         return self._edges.taken_back_at
-
-    @property
-    def moving(self) -> tuple[MovingEdges, ...]:
-        """What is known to move; its edges are not among the others."""
-        return self._found
-
-    @property
-    def surprised_s(self) -> float:
-        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
-        return self._surprised_s
 
     def edges_since(self, revision: int) -> FloatArray:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""
@@ -119,18 +108,20 @@ class SensedWorld:
     def update(self, scan: RangeScan) -> None:
         """Takes in one scan."""
         ignored = self._moving.update(smoothed(scan, self._clearance) if self._noisy else scan)
-        before = self._edges.revision
+        before = self.revision
         self._edges.update(scan, ignored)
-        if self._edges.revision != before:
+        self.revision = self._edges.revision
+        if self.revision != before:
             self._take_back(scan, self.edges_since(before))
         if len(trail_m := self._moving.trail_m):
             self._edges.forget(trail_m, self._clearance)
-        self._found = self._moving.found
-        for each in self._found:
+            self.revision = self._edges.revision
+        self.moving = self._moving.found
+        for each in self.moving:
             self._take_back(scan, each.points_m)
         self._free.update(scan)
 
     def _take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
         """What was seen to be free is not, where edges stand in it."""
         if self._free.take_back(scan, edges_m):
-            self._surprised_s = scan.available_s
+            self.surprised_s = scan.available_s
