@@ -8,7 +8,6 @@ origin replace the geodesic; they agree with it to less than 0.1 m and 0.003 deg
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 PATCH_M = 500.0
 """Half the width of a patch of the plane."""
@@ -16,40 +15,6 @@ PATCH_M = 500.0
 SEMI_MAJOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
-
-
-class Patch(NamedTuple):
-    """The local plane near a geodetic point: `LocalPlane.project` to the second order, to a tenth of a millimetre.
-
-    Attributes:
-        latitude_rad: geodetic latitude of its middle.
-        longitude_rad: longitude of its middle.
-        latitude_reach_rad: how far it holds to the north and the south, `PATCH_M` on the ground.
-        longitude_reach_rad: how far it holds to the east and the west, the same.
-        places: east + i north (m) of the middle, and its derivatives per radian: by latitude, by longitude,
-            and half those by latitude twice, by both, by longitude twice.
-        convergences: meridian convergence (rad) of the middle, and its derivatives by latitude and longitude.
-    """
-
-    latitude_rad: float
-    longitude_rad: float
-    latitude_reach_rad: float
-    longitude_reach_rad: float
-    places: tuple[complex, complex, complex, complex, complex, complex]
-    convergences: tuple[float, float, float]
-
-    def project(self, latitude_rad: float, longitude_rad: float) -> tuple[complex, float] | None:
-        """East + i north (m) and meridian convergence (rad) of a point; None where the patch does not reach."""
-        latitude0, longitude0, latitude_reach, longitude_reach, places, convergences = self
-        up, right = latitude_rad - latitude0, longitude_rad - longitude0
-        if not (-latitude_reach <= up <= latitude_reach and -longitude_reach <= right <= longitude_reach):
-            return None
-        place, by_up, by_right, by_up2, by_both, by_right2 = places
-        leans, leans_up, leans_right = convergences
-        return (
-            place + up * (by_up + up * by_up2 + right * by_both) + right * (by_right + right * by_right2),
-            leans + up * leans_up + right * leans_right,
-        )
 
 
 class LocalPlane:
@@ -120,14 +85,21 @@ class LocalPlane:
         )
         return east * stretch, north * stretch, convergence
 
-    def patch(self, latitude_rad: float, longitude_rad: float) -> Patch:
+    def patch(self, latitude_rad: float, longitude_rad: float) -> tuple[float, ...]:
         """The plane about a geodetic point, for whoever asks for many points near one another.
 
-        The terms are those of the polynomial through nine points of `project`.
+        `project` to the second order, to a tenth of a millimetre: a polynomial through nine points of it, as
+        `aircraft.guidance_law` works it out.
 
         Args:
             latitude_rad: geodetic latitude.
             longitude_rad: longitude.
+
+        Returns:
+            19 numbers: latitude and longitude (rad) of its middle; how far from there it holds, to the north and the
+            south, to the east and the west (rad; `PATCH_M` on the ground); east and north (m) of the middle, and of
+            the derivatives per radian by latitude and by longitude, and of half those by latitude twice, by both, by
+            longitude twice; meridian convergence (rad) of the middle, its derivatives by latitude and longitude.
         """
         up = PATCH_M / self._meridian_m
         right = up / math.cos(latitude_rad)
@@ -139,20 +111,18 @@ class LocalPlane:
         (here, leans), (above, leans_above), (below, leans_below) = at(0, 0), at(1, 0), at(-1, 0)
         (beyond, leans_beyond), (before, leans_before) = at(0, 1), at(0, -1)
         twist = at(1, 1)[0] - at(1, -1)[0] - at(-1, 1)[0] + at(-1, -1)[0]
-        return Patch(
-            latitude_rad,
-            longitude_rad,
-            up,
-            right,
-            (
-                here,
-                (above - below) / (2.0 * up),
-                (beyond - before) / (2.0 * right),
-                (above + below - 2.0 * here) / (2.0 * up * up),
-                twist / (4.0 * up * right),
-                (beyond + before - 2.0 * here) / (2.0 * right * right),
-            ),
-            (leans, (leans_above - leans_below) / (2.0 * up), (leans_beyond - leans_before) / (2.0 * right)),
+        places = (
+            here,
+            (above - below) / (2.0 * up),
+            (beyond - before) / (2.0 * right),
+            (above + below - 2.0 * here) / (2.0 * up * up),
+            twist / (4.0 * up * right),
+            (beyond + before - 2.0 * here) / (2.0 * right * right),
+        )
+        return (
+            *(latitude_rad, longitude_rad, up, right),
+            *(part for place in places for part in (place.real, place.imag)),
+            *(leans, (leans_above - leans_below) / (2.0 * up), (leans_beyond - leans_before) / (2.0 * right)),
         )
 
     def plane(self, latitude_deg: float, longitude_deg: float) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aircraft import guidance_law as law
-from aircraft.guidance_law import START
+from aircraft.guidance_law import ALONG, ROW, START
 from aircraft.interface import AircraftState, FloatArray, Route
 from aircraft.route import arc_point
 
@@ -67,17 +67,21 @@ class PathFollower:
             limits: what may be asked of the aircraft.
             update_rate_hz: how often `update` will be called.
         """
-        self._law = (
-            limits.roll_rate_radps / update_rate_hz,
-            # The held command acts on average half an update late.
-            limits.roll_delay_s + 0.5 / update_rate_hz,
-            limits.roll_lag_s * update_rate_hz,
-            max(TYPICAL_BANK_RAD / limits.roll_rate_radps, 1.0 / update_rate_hz),
-            limits.bank_limit_rad,
-            limits.bandwidth_radps,
+        self.memory = np.array(
+            (
+                limits.roll_rate_radps / update_rate_hz,
+                # The held command acts on average half an update late.
+                limits.roll_delay_s + 0.5 / update_rate_hz,
+                limits.roll_lag_s * update_rate_hz,
+                max(TYPICAL_BANK_RAD / limits.roll_rate_radps, 1.0 / update_rate_hz),
+                limits.bank_limit_rad,
+                limits.bandwidth_radps,
+                *(0.0, 0.0, 0.0),
+            )
         )
-        self._rows: FloatArray | None = None
-        self._at = (0, 0.0, 0.0)
+        """What it knows and remembers, see `aircraft.guidance_law.MEMORY`."""
+        self.rows: FloatArray | None = None
+        """The route, as the law has it; None without one."""
 
     def follow(self, route: Route, station_m: float = 0.0) -> None:
         """Takes a new route; the roll command goes on from where it is.
@@ -86,10 +90,10 @@ class PathFollower:
             route: what to fly.
             station_m: where on it to begin looking for the nearest point, m from its start.
         """
-        self._rows = _rows(route)
-        starts = self._rows[:, START]
+        self.rows = _rows(route)
+        starts = self.rows[:, START]
         row = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
-        self._at = (row, station_m - float(starts[row]), self._at[2])
+        self.memory[ROW], self.memory[ALONG] = row, station_m - float(starts[row])
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval.
@@ -103,11 +107,11 @@ class PathFollower:
         Raises:
             RuntimeError: if there is no route yet.
         """
-        if self._rows is None:
+        if self.rows is None:
             raise RuntimeError("follow() a route before update()")
         _, east, north, _, velocity_east, velocity_north, _, heading, _, _, airspeed, _, _ = state
-        self._at, output = law.decide(
-            self._rows, self._law, self._at, east, north, velocity_east, velocity_north, heading, airspeed
+        output = law.decide(
+            self.rows, self.memory, east, north, velocity_east, velocity_north, heading, airspeed
         )
         # At once: the constructor of a NamedTuple takes twice as long.
         return tuple.__new__(GuidanceOutput, output)

@@ -1,4 +1,4 @@
-"""The law of route following: from where the aircraft is to the roll angle it should hold.
+"""The law of route following: from where the aircraft is to the roll angle it should hold; and all of an update.
 
 The law is path curvature plus a second-order correction of the cross-track error,
 
@@ -16,6 +16,9 @@ aircraft: then the wind is estimated as ground velocity less air velocity, and `
 head.
 See R. W. Beard and T. W. McLain, "Small Unmanned Aircraft", chapter 9 (coordinated turn in wind), and
 PX4's npfg for the same use of ground and air velocity.
+
+`update` is what happens ten times a second while a route is flown, from what JSBSim tells, in its units, to a row of
+the track. What it has to know beside that stands on a sheet, one array, as arrays are what machine code reads soonest.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ import math
 import numpy as np
 
 from aircraft.interface import FloatArray
+from aircraft.properties import FOOT_M
 
 GRAVITY_MPS2 = 9.80665
 DAMPING = 0.9
@@ -38,26 +42,118 @@ START, STOP, TURNED = 6, 7, 8
 """Columns of a route's rows after those of `Route.segments`: the stations of begin and end, m, and by how much the
 route has turned up to there, rad, positive to the left."""
 
+PATCH, LIMITS, LEANS, SHEET = 0, 19, 23, 24
+"""Where on a sheet these begin: a patch of the plane (`aircraft.frames.LocalPlane.patch`); the largest angle of attack,
+rad, the least airspeed, ft/s, and altitude, ft, and the largest roll angle, rad, under control; the meridian
+convergence at the last state, rad. And how many numbers a sheet has."""
+ROLL_STEP, LEAD, LEADS_BY, BLEND, BANK_LIMIT, OMEGA, ROW, ALONG, REFERENCE, MEMORY = range(10)
+"""Places in the memory of guidance: largest change of the reference roll in an update, rad; what the command is held
+and delayed for, s; by how many updates it leads; over how long a step of curvature is blended, s; the largest roll
+command, rad; omega, rad/s; the row of the route that was followed last; how far along it, m; the reference roll so far,
+rad. And how many they are."""
+
+
+def update(
+    sheet: FloatArray,
+    memory: FloatArray,
+    route: FloatArray,
+    track: FloatArray,
+    row: int,
+    plan_index: int,
+    time_s: float,
+    latitude_rad: float,
+    longitude_rad: float,
+    up_ft: float,
+    north_fps: float,
+    east_fps: float,
+    climb_fps: float,
+    heading_rad: float,
+    roll_rad: float,
+    pitch_rad: float,
+    airspeed_fps: float,
+    load_factor: float,
+    throttle: float,
+    alpha_rad: float,
+) -> float:
+    """One update: fills a row of the track and says how to roll.
+
+    Numbers after `time_s` are those of `aircraft.properties.STATE_PROPERTIES`, and the angle of attack. A row is what
+    `AircraftState` consists of, roll command, cross-track error, station and plan index. Without a route (no rows) only
+    the state is filled in, and the command is 0.
+
+    Returns:
+        The roll command, rad; NaN where control is lost or the patch does not reach: the state is filled in, its place
+        NaN in the second case, and nothing is decided.
+    """
+    east, north, leans = in_patch(sheet, latitude_rad, longitude_rad)
+    sheet[LEANS] = leans
+    ahead, aside = FOOT_M * math.cos(leans), FOOT_M * math.sin(leans)
+    east_mps, north_mps = east_fps * ahead - north_fps * aside, east_fps * aside + north_fps * ahead
+    heading, airspeed_mps = (heading_rad - leans) % math.tau, airspeed_fps * FOOT_M
+    track[row, 0], track[row, 1], track[row, 2], track[row, 3] = time_s, east, north, up_ft * FOOT_M
+    track[row, 4], track[row, 5], track[row, 6] = east_mps, north_mps, climb_fps * FOOT_M
+    track[row, 7], track[row, 8], track[row, 9], track[row, 10] = heading, roll_rad, pitch_rad, airspeed_mps
+    track[row, 11], track[row, 12] = load_factor, throttle
+    if math.isnan(east) or not in_control(sheet, alpha_rad, airspeed_fps, up_ft, roll_rad):
+        return math.nan
+    if not len(route):
+        return 0.0
+    command, cross, station, _, _ = decide(
+        route, memory, east, north, east_mps, north_mps, heading, airspeed_mps
+    )
+    track[row, 13], track[row, 14], track[row, 15], track[row, 16] = command, cross, station, plan_index
+    return command
+
+
+def in_control(
+    sheet: FloatArray, alpha_rad: float, airspeed_fps: float, altitude_ft: float, roll_rad: float
+) -> bool:
+    """Whether an aircraft flies: not stalled, not at the ground, not rolled over, every number finite."""
+    return bool(
+        abs(alpha_rad) <= sheet[LIMITS]
+        and sheet[LIMITS + 1] <= airspeed_fps < math.inf
+        and sheet[LIMITS + 2] < altitude_ft < math.inf
+        and abs(roll_rad) <= sheet[LIMITS + 3]
+    )
+
+
+def in_patch(sheet: FloatArray, latitude_rad: float, longitude_rad: float) -> tuple[float, float, float]:
+    """East and north (m) and meridian convergence (rad) of a point; NaN where the patch does not reach."""
+    up, right = latitude_rad - float(sheet[PATCH]), longitude_rad - float(sheet[PATCH + 1])
+    if not (abs(up) <= sheet[PATCH + 2] and abs(right) <= sheet[PATCH + 3]):
+        return math.nan, math.nan, math.nan
+    leans = sheet[PATCH + 16] + up * sheet[PATCH + 17] + right * sheet[PATCH + 18]
+    return (
+        _in_second_order(sheet, PATCH + 4, up, right),
+        _in_second_order(sheet, PATCH + 5, up, right),
+        float(leans),
+    )
+
+
+def _in_second_order(sheet: FloatArray, first: int, up: float, right: float) -> float:
+    """A polynomial, its terms at every other place of the sheet: the middle, slopes, half of second derivatives."""
+    return float(
+        sheet[first]
+        + up * (sheet[first + 2] + up * sheet[first + 6] + right * sheet[first + 8])
+        + right * (sheet[first + 4] + right * sheet[first + 10])
+    )
+
 
 def decide(
     rows: FloatArray,
-    law: tuple[float, float, float, float, float, float],
-    at: tuple[int, float, float],
+    memory: FloatArray,
     east_m: float,
     north_m: float,
     velocity_east_mps: float,
     velocity_north_mps: float,
     heading_rad: float,
     airspeed_mps: float,
-) -> tuple[tuple[int, float, float], tuple[float, float, float, bool, bool]]:
+) -> tuple[float, float, float, bool, bool]:
     """The law, from one update to the next.
 
     Args:
         rows: (n, 9) the route, see `START`, as `aircraft.guidance` has it.
-        law: largest change of the reference roll in an update, rad; what the command is held and delayed for, s;
-            by how many updates it leads; over how long a step of curvature is blended, s; the largest roll
-            command, rad; omega, rad/s.
-        at: the row that was followed last, how far along it, m, and the reference roll so far, rad.
+        memory: (9,) of guidance, see `MEMORY`; its last three go on.
         east_m: position of the aircraft.
         north_m: position of the aircraft.
         velocity_east_mps: ground velocity.
@@ -66,10 +162,12 @@ def decide(
         airspeed_mps: true airspeed.
 
     Returns:
-        `at` now, and what `GuidanceOutput` consists of.
+        What `GuidanceOutput` consists of.
     """
-    roll_step, lead_s, lead_updates, blend_s, bank_limit, omega = law
-    index, along_m, cross, tangent_east, tangent_north = _nearest(rows, at[0], at[1], east_m, north_m)
+    bank_limit, omega = memory[BANK_LIMIT], memory[OMEGA]
+    index, along_m, cross, tangent_east, tangent_north = _nearest(
+        rows, int(memory[ROW]), memory[ALONG], east_m, north_m
+    )
     station = rows[index, START] + along_m
     speed = max(
         math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps), 1.0
@@ -103,8 +201,8 @@ def decide(
         # Lift acts across the course, the correction across the path.
         across = -2.0 * DAMPING * omega * (cross_mps + pull) * speed / max(along_mps, 0.3 * speed)
         # The curvature where the aircraft will be when it has rolled, averaged over the way that takes.
-        blend = speed * blend_s
-        low = station + speed * lead_s - 0.5 * blend
+        blend = speed * memory[BLEND]
+        low = station + speed * memory[LEAD] - 0.5 * blend
         if rows[index, START] <= low and low + blend <= rows[index, STOP]:
             curvature = rows[index, 4]
         else:
@@ -112,12 +210,13 @@ def decide(
         acceleration = across - curvature * (speed * speed)
         wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
     allowed = _within(bank_limit, wanted)
-    step = _within(roll_step, allowed - at[2])
-    roll = at[2] + step
+    step = _within(memory[ROLL_STEP], allowed - memory[REFERENCE])
+    roll = memory[REFERENCE] + step
     # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
-    command = _within(bank_limit, roll + lead_updates * step)
+    command = _within(bank_limit, roll + memory[LEADS_BY] * step)
     past_end = rows[index, 5] == math.inf and along_m > 0.0
-    return (index, along_m, roll), (command, cross, station, allowed != wanted, past_end)
+    memory[ROW], memory[ALONG], memory[REFERENCE] = index, along_m, roll
+    return command, cross, station, allowed != wanted, past_end
 
 
 def _nearest(
@@ -232,13 +331,18 @@ def air_direction(
 
 
 FLOAT, INDEX, ROUTE = "float64", "intp", "Array(float64, 2, 'C', readonly=True)"
+NUMBERS_OUT, ROWS_OUT = "float64[::1]", "float64[:, ::1]"
 COMPILED = (
+    (_in_second_order, (NUMBERS_OUT, INDEX, FLOAT, FLOAT)),
+    (in_patch, (NUMBERS_OUT, FLOAT, FLOAT)),
+    (in_control, (NUMBERS_OUT, *(FLOAT,) * 4)),
     (_within, (FLOAT,) * 2),
     (_rounded_off, (FLOAT,)),
     (_length, (FLOAT,) * 2),
     (air_direction, (FLOAT,) * 5),
     (_turned, (ROUTE, INDEX, FLOAT)),
     (_nearest, (ROUTE, INDEX, FLOAT, FLOAT, FLOAT)),
-    (decide, (ROUTE, "UniTuple(float64, 6)", "Tuple((intp, float64, float64))", *(FLOAT,) * 6)),
+    (decide, (ROUTE, NUMBERS_OUT, *(FLOAT,) * 6)),
+    (update, (NUMBERS_OUT, NUMBERS_OUT, ROUTE, ROWS_OUT, INDEX, INDEX, *(FLOAT,) * 14)),
 )
 """What whoever has a compiler (numba) may put machine code in the place of, in this order: types of arguments."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-import cmath
 import math
+from collections.abc import Callable
 
+import numpy as np
+
+from aircraft import guidance_law as law
 from aircraft.airframes import AircraftError, Airframe, airframe
 from aircraft.frames import LocalPlane
-from aircraft.interface import STEP_RATE_HZ, AircraftState
+from aircraft.guidance import PathFollower
+from aircraft.interface import STEP_RATE_HZ, AircraftState, FloatArray
 from aircraft.jsbsim_loading import load, node, trim
 from aircraft.properties import (
     COMMAND_PROPERTIES,
@@ -31,6 +35,10 @@ STALL_SPEED_SHARE = 0.8
 SETTLING_STEP_S = 1e-9
 INTEGRATOR_MEMORY = 6
 """Steps that replace every derivative an integrator of JSBSim remembers."""
+
+Update = Callable[[FloatArray, FloatArray, FloatArray, int, int, float], float]
+NO_ROUTE, NO_MEMORY = np.zeros((0, 9)), np.zeros(law.MEMORY)
+NO_ROUTE.setflags(write=False)
 
 
 class JsbsimModel:
@@ -65,6 +73,7 @@ class JsbsimModel:
         self._plane = plane
         self._step_rate_hz = step_rate_hz
         self._step = 0
+        self._sound_at = -1  # the last step at which the aircraft was seen to be under control
         atmosphere = atmosphere or Atmosphere()
         try:
             heading_rad = start.heading_rad(atmosphere)
@@ -72,18 +81,23 @@ class JsbsimModel:
             raise AircraftError(f"{self.airframe.name}: {error}") from None
         self._stall_rad = math.radians(self.airframe.stall_angle_deg)
         self._stall_fps = STALL_SPEED_SHARE * self.airframe.airspeed_range_mps[0] / FOOT_M
-        self._patch = plane.patch(*map(math.radians, plane.geodetic(start.east_m, start.north_m)))
-        self._convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
+        self._sheet, self._here = np.zeros(law.SHEET), np.zeros((1, len(AircraftState._fields)))
+        self._sheet[law.PATCH : law.LIMITS] = plane.patch(
+            *map(math.radians, plane.geodetic(start.east_m, start.north_m))
+        )
+        self._sheet[law.LIMITS : law.LEANS] = self._stall_rad, self._stall_fps, GROUND_FT, MAX_ROLL_RAD
+        self._sheet[law.LEANS] = convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
         self._gust: Gust | None = None
         self._windy = atmosphere.wind_mps > 0.0
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
 
         fdm = self._fdm = load(self.airframe.files, step_rate_hz)
-        trim(fdm, self.airframe.name, plane, start, heading_rad + self._convergence_rad)
-        self._read = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
+        trim(fdm, self.airframe.name, plane, start, heading_rad + convergence_rad)
+        self._readings = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
         self._alpha = node(fdm, "aero/alpha-rad").get_double_value
+        self._take = _taker(self._sheet, self._readings, self._alpha)
         self._enable = node(fdm, "wayproof/enable").set_double_value
         self._roll, self._airspeed, self._altitude = (
             node(fdm, path).get_double_value
@@ -106,36 +120,18 @@ class JsbsimModel:
 
     def state(self) -> AircraftState:
         """The state now, in the local plane."""
-        latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor, throttle = (
-            self._read
-        )
-        place, convergence = self._patch.project(latitude(), longitude()) or self._next_patch()
-        self._convergence_rad = convergence
-        velocity = complex(east(), north()) * cmath.rect(FOOT_M, convergence)
+        values = self._read_here()
+        if values[1] != values[1]:  # on to the next patch
+            latitude_rad, longitude_rad, *_ = self._readings
+            self._sheet[law.PATCH : law.LIMITS] = self._plane.patch(latitude_rad(), longitude_rad())
+            values = self._read_here()
         # At once: the constructor of a NamedTuple takes twice as long.
-        values = (
-            self._step / self._step_rate_hz,
-            place.real,
-            place.imag,
-            up() * FOOT_M,
-            velocity.real,
-            velocity.imag,
-            climb() * FOOT_M,
-            (heading() - convergence) % math.tau,
-            roll(),
-            pitch(),
-            airspeed() * FOOT_M,
-            load_factor(),
-            throttle(),
-        )
         return tuple.__new__(AircraftState, values)
 
-    def _next_patch(self) -> tuple[complex, float]:
-        """Goes on to a new patch about where the aircraft is: east + i north (m) and meridian convergence there."""
-        latitude_rad, longitude_rad = self._read[0](), self._read[1]()
-        self._patch = self._plane.patch(latitude_rad, longitude_rad)
-        east_m, north_m, convergence = self._plane.project(latitude_rad, longitude_rad)
-        return complex(east_m, north_m), convergence
+    def _read_here(self) -> list[float]:
+        command = self._take(NO_MEMORY, NO_ROUTE, self._here, 0, -1, self._step / self._step_rate_hz)
+        self._sound_at = self._step if command == 0.0 else -1
+        return self._here.tolist()[0]
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
         """Sets what the inner loops hold.
@@ -162,15 +158,46 @@ class JsbsimModel:
             run()
         self._step += steps
 
+    def fly_on(
+        self,
+        follower: PathFollower,
+        track: FloatArray,
+        row: int,
+        plan_index: int,
+        updates: int,
+        steps: int,
+        until_s: float,
+    ) -> int:
+        """Flies updates of guidance in a row, as if they were asked for one by one, to the last bit, but sooner.
+
+        In gusty air, or with guidance of another kind, it flies none.
+        """
+        if self._gust is not None or type(follower) is not PathFollower or follower.rows is None:
+            return 0
+        memory, route = follower.memory, follower.rows
+        take, run, rate, windy = self._take, self._fdm.run, self._step_rate_hz, self._windy
+        roll_command, _, _ = self._write
+        for flown in range(updates):
+            time_s = self._step / rate
+            if time_s >= until_s:
+                return flown
+            command = take(memory, route, track, row + flown, plan_index, time_s)
+            if command != command:  # out of control, or off the patch
+                return flown
+            roll_command(command)
+            if windy:
+                self._blow()
+            for _ in range(steps):
+                run()
+            self._step += steps
+        return updates
+
     def fault(self) -> str | None:
         """A sentence if control is lost: not finite, at the ground, stalled or rolled over; else None."""
+        if self._sound_at == self._step:
+            return None
         roll, airspeed, altitude, alpha = self._roll(), self._airspeed(), self._altitude(), self._alpha()
-        if (
-            abs(alpha) <= self._stall_rad
-            and self._stall_fps <= airspeed < math.inf
-            and GROUND_FT < altitude < math.inf
-            and abs(roll) <= MAX_ROLL_RAD
-        ):
+        if law.in_control(self._sheet, alpha, airspeed, altitude, roll):
             return None
         if not math.isfinite(roll + airspeed + altitude + alpha):
             return "the state is not finite"
@@ -235,7 +262,8 @@ class JsbsimModel:
         if self._gust is not None:
             share = self._gust.share(self._step / self._step_rate_hz) / FOOT_M
             east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
-        sine, cosine = math.sin(self._convergence_rad), math.cos(self._convergence_rad)
+        leans = self._sheet.item(law.LEANS)
+        sine, cosine = math.sin(leans), math.cos(leans)
         return east * cosine + north * sine, north * cosine - east * sine
 
     def _blow(self) -> None:
@@ -252,3 +280,41 @@ class JsbsimModel:
         }
         for path, value in values.items():
             node(self._fdm, path).set_double_value(value)
+
+
+def _taker(
+    sheet: FloatArray, readings: tuple[Callable[[], float], ...], alpha: Callable[[], float]
+) -> Update:
+    """`law.update` with all that JSBSim tells."""
+    update = law.update
+    latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor, throttle = (
+        readings
+    )
+
+    def take(
+        memory: FloatArray, route: FloatArray, track: FloatArray, row: int, plan_index: int, time_s: float
+    ) -> float:
+        return update(
+            sheet,
+            memory,
+            route,
+            track,
+            row,
+            plan_index,
+            time_s,
+            latitude(),
+            longitude(),
+            up(),
+            north(),
+            east(),
+            climb(),
+            heading(),
+            roll(),
+            pitch(),
+            airspeed(),
+            load_factor(),
+            throttle(),
+            alpha(),
+        )
+
+    return take

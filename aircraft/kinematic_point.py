@@ -77,6 +77,10 @@ class KinematicPoint:
         self._step += steps
         self._along_m += self._airspeed * steps / STEP_RATE_HZ
 
+    def fly_on(self, *_: object) -> int:
+        """It flies no updates by itself."""
+        return 0
+
     def fault(self) -> str | None:
         """None: a point is always under control."""
         return None

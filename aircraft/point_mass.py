@@ -100,6 +100,10 @@ class PointMass:
             self._roll = end
         self._step += steps
 
+    def fly_on(self, *_: object) -> int:
+        """It flies no updates by itself."""
+        return 0
+
     def fault(self) -> str | None:
         """A sentence if the state is not finite or the ground is reached, else None."""
         if not math.isfinite(self._east + self._north + self._heading + self._roll):

@@ -20,7 +20,7 @@ STATE_PROPERTIES = (
     "accelerations/Nz",  # 1 in level flight
     "fcs/throttle-cmd-norm",
 )
-"""Read for `AircraftState`, in the order in which `JsbsimModel.state` unpacks them."""
+"""Read for `AircraftState`, in the order in which `aircraft.guidance_law.update` takes them."""
 
 COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
 """Written for a command, in this order."""

@@ -28,8 +28,8 @@ T = TypeVar("T")
 def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any]:
     """Measures one scenario, in this process.
 
-    First the loop is flown once alone, with a stopwatch on its blocks: that gives their shares, and loads
-    what is loaded at its first use. Then come `ROUNDS` rounds of three measurements:
+    First the loop is flown once alone, with a stopwatch on its blocks and every update of guidance by itself: that
+    gives their shares, and loads what is loaded at its first use. Then come `ROUNDS` rounds of three measurements:
 
     - bare: `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start
       in the same air, for as many steps as the flight takes; loading and trimming not counted;

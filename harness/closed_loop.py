@@ -81,7 +81,8 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
 
     Everything happens at whole steps of the flight model: guidance and log at one rate, a scan at the
     sensor's. The planner is asked after a scan, and twice a step of guidance while it goes on. A scan or a plan
-    that is late takes effect at the first of these steps after its delay. Time is a count of steps.
+    that is late takes effect at the first of these steps after its delay. Steps at which nothing but guidance is
+    due are left to the model, if it can fly them by itself. Time is a count of steps.
 
     Args:
         loop: all parts of the flight; used up by it.
@@ -93,15 +94,16 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     """
     begun = time.perf_counter()
     model, follower, seen, mission = loop.model, loop.follower, loop.seen, loop.mission
-    strides = itertools.cycle(_strides(model.step_rate_hz, loop.scan_rate_hz))
+    strides, at = _strides(model.step_rate_hz, loop.scan_rate_hz), 0
     log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
     plans = _Plans(loop, observers)
     judge = Judge(loop.world, mission, loop.time_limit_s, model.fault)
     late: deque[RangeScan] = deque()
     roll_command, cross_track, station = 0.0, math.nan, math.nan
-    next_report = 0.0
+    next_report = math.inf if progress is None else 0.0
+    model.command(roll_command, loop.altitude_m, mission.speed_mps)
     while True:
-        scan_due, tick, steps = next(strides)
+        scan_due, tick, steps, updates = strides[at % len(strides)]
         state = model.state()
         verdict = judge.verdict(state)
         if verdict is not None:
@@ -121,6 +123,16 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         if tick:
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
+            if updates and plans.index >= 0 and not plans.go_on:
+                until_s = min(judge.next_look_s, plans.due_s, next_report)
+                if late:
+                    until_s = min(until_s, late[0].available_s - 1e-6)
+                updates = min(updates, len(log.table) - log.row)
+                flown = model.fly_on(follower, log.table, log.row, plans.index, updates, steps, until_s)
+                if flown:
+                    roll_command, cross_track, station = log.filled(flown)
+                    at += flown
+                    continue
             if plans.index >= 0:
                 roll_command, cross_track, station, _, _ = follower.update(state)
             model.command(roll_command, loop.altitude_m, mission.speed_mps)
@@ -136,6 +148,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
                 break
             steps -= steps // 2
         model.advance(steps)
+        at += 1
     log.add(state, roll_command, cross_track, station, plans.index)
     outcome, reason = verdict
     reason += plans.last_word(outcome)
@@ -156,15 +169,23 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     )
 
 
-def _strides(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[bool, bool, int]]:
+def _strides(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[bool, bool, int, int]]:
     """What happens at a step (scan, tick of guidance and log), and how many steps of the model come after it.
 
-    One tuple for every step at which something happens, until all of it begins again.
+    One tuple for every step at which something happens, until all of it begins again; the last number is how many
+    whole ticks begin there, one after the other, before the next scan.
     """
     scan = _whole(step_rate_hz, scan_rate_hz, "scan")
     tick = _whole(step_rate_hz, UPDATE_RATE_HZ, "guidance")
     happens = sorted({step for stride in (scan, tick) for step in range(0, math.lcm(scan, tick) + 1, stride)})
-    return [(step % scan == 0, step % tick == 0, after - step) for step, after in itertools.pairwise(happens)]
+    strides: list[tuple[bool, bool, int, int]] = []
+    updates = 0
+    for step, after in reversed(list(itertools.pairwise(happens))):
+        updates = updates + 1 if step % tick == 0 and after - step == tick else 0
+        strides.insert(0, (step % scan == 0, step % tick == 0, after - step, updates))
+        if step % scan == 0:
+            updates = 0
+    return strides
 
 
 def _whole(step_rate_hz: int, rate_hz: float, name: str) -> int:

@@ -28,7 +28,8 @@ class Judge:
         self, world: World, mission: Mission, time_limit_s: float, fault: Callable[[], str | None]
     ) -> None:
         self._world, self._mission, self._time_limit_s, self._fault = world, mission, time_limit_s, fault
-        self._next_look_s = 0.0
+        self.next_look_s = 0.0
+        """Until then nothing but a fault can end the flight."""
         self._appears_s = -math.inf
         # At the last look at the obstacles: where, when, and how much clearance.
         self._measured = (0.0, 0.0, 0.0, 0.0)
@@ -46,7 +47,7 @@ class Judge:
         fault = self._fault()
         if fault is not None:
             return Outcome.LOST_CONTROL, fault
-        if state.time_s < self._next_look_s:
+        if state.time_s < self.next_look_s:
             return None
         world, mission = self._world, self._mission
         east, north = state.east_m, state.north_m
@@ -69,7 +70,7 @@ class Judge:
         wait = min(clearance / (fastest + world.max_obstacle_speed_mps), room / fastest, LONGEST_UNCHECKED_S)
         if self._appears_s <= state.time_s:
             self._appears_s = world.next_appearance(state.time_s)
-        self._next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)
+        self.next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)
         return None
 
     def _surely_clear_m(self, east: float, north: float, time_s: float) -> float:

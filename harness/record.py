@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-import struct
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -48,7 +47,9 @@ COLUMNS = (
 BLOCK_ROWS = 6000
 """Rows that are handed on together: ten minutes of flight, which is less than a second of the loop."""
 
-ROW = struct.Struct(f"={len(AircraftState._fields) + 4}d")
+ROW = len(AircraftState._fields) + 4
+"""Numbers in a row: a state, roll command, cross-track error and station, plan index."""
+COMMANDED = slice(ROW - 4, ROW - 1)
 THROTTLE = AircraftState._fields.index("throttle")
 """What comes before it in a row is finite while the aircraft is under control."""
 CHORD_ERROR_M = 0.5
@@ -174,8 +175,10 @@ class TrackLog:
     ) -> None:
         self._clearance = clearance
         self._sinks = tuple(sinks)
-        self._rows = bytearray(block_rows * ROW.size)  # no more objects while flying than now
-        self._filled = 0
+        self.table: FloatArray = np.zeros((block_rows, ROW))  # no more objects while flying than now
+        """(k, 17) rows of this block, of what `add` takes, in its order,"""
+        self.row = 0
+        """of which those from this one on are free: one at least."""
         self._blocks: list[Track] = []
 
     def add(
@@ -190,23 +193,27 @@ class TrackLog:
 
         A state that is not finite, with which control is lost, is no row of the track.
         """
-        ROW.pack_into(
-            self._rows, self._filled, *state, roll_command_rad, cross_track_m, station_m, plan_index
-        )
-        self._filled += ROW.size
-        if self._filled == len(self._rows):
+        self.table[self.row] = (*state, roll_command_rad, cross_track_m, station_m, plan_index)
+        self.filled(1)
+
+    def filled(self, rows: int) -> tuple[float, float, float]:
+        """So many of `table` from `row` on have been filled: roll command, cross-track error, station of the last."""
+        self.row += rows
+        commanded: tuple[float, float, float] = tuple(self.table[self.row - 1, COMMANDED].tolist())
+        if self.row == len(self.table):
             self._cut()
+        return commanded
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
-        if self._filled:
+        if self.row:
             self._cut()
         return Track.joined(self._blocks)
 
     def _cut(self) -> None:
-        rows = np.frombuffer(self._rows[: self._filled]).reshape(-1, ROW.size // 8).T
+        rows = self.table[: self.row].T
         rows = rows[:, np.isfinite(rows[:THROTTLE]).all(axis=0)]
-        self._filled = 0
+        self.row = 0
         if not rows.size:
             return
         time, east, north, up, east_mps, north_mps, _, heading, roll, pitch = rows[:10]

@@ -55,6 +55,8 @@ def make_loop(
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
+    # From here on all is compiled.
+    follower = path_follower(airframe(scenario.aircraft.model).guidance_limits)
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
@@ -70,7 +72,7 @@ def make_loop(
         ),
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
-        follower=path_follower(airframe(scenario.aircraft.model).guidance_limits),
+        follower=follower,
         mission=mission,
         altitude_m=scenario.mission.altitude_m,
         time_limit_s=_given(scenario.mission.time_limit_s),
