@@ -32,10 +32,15 @@ class Question:
 
 
 def percent(share: float | None) -> str:
-    """A share in per cent."""
+    """A share in per cent; only all is 100 and only none is 0."""
     if share is None:
         return DASH
-    return f"{100 * share:.0f} %" if share in (0.0, 1.0) else f"{100 * share:.1f} %"
+    return f"{100 * share:.0f} %" if share in (0.0, 1.0) else f"{_partly(share):.1f} %"
+
+
+def _partly(share: float) -> float:
+    """Per cent of what is neither all nor none, that a digit after the point does not round to either."""
+    return min(max(100 * share, 0.1), 99.9)
 
 
 def interval(low: float | None, high: float | None) -> str:
@@ -79,7 +84,8 @@ def _success(cell: Cell) -> str:
 def _success_briefly(cell: Cell) -> str:
     if cell.success is None or cell.success_low is None or cell.success_high is None:
         return DASH
-    return f"{100 * cell.success:.3g} ({100 * cell.success_low:.0f}{DASH}{100 * cell.success_high:.0f})"
+    share = 100 * cell.success if cell.success in (0.0, 1.0) else _partly(cell.success)
+    return f"{share:.3g} ({100 * cell.success_low:.0f}{DASH}{100 * cell.success_high:.0f})"
 
 
 def _two_digits(value: float | None) -> str:

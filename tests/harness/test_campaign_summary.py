@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from scipy import stats
 from harness.campaign_figures import lengths
 from harness.campaign_groups import BINS, MOST_NAMES, NONE, grouped
 from harness.campaign_paired import mean_estimate
+from harness.campaign_questions import QUESTIONS, percent
 from harness.campaign_report import PAGE, PLAIN, write_summary
 from harness.campaign_summary import CURVE_POINTS, Cell, Summary, summarise, wilson
 from harness.campaign_terminal import print_summary
@@ -127,6 +129,15 @@ def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
         planner_p99_ms=9.0,
         planner_max_ms=9.0,
     )
+
+
+def test_nearly_all_is_not_all_and_a_few_are_not_none(tmp_path: Path) -> None:
+    """One failure in thousands of runs is what a campaign is flown for."""
+    shares = (1.0, 4999 / 5000, 0.5, 1 / 5000, 0.0)
+    assert [percent(share) for share in shares] == ["100 %", "99.9 %", "50.0 %", "0.1 %", "0 %"]
+    cell = summarise(campaign(tmp_path, [row(0)])).total
+    brief = [QUESTIONS[0].brief(replace(cell, success=share)).split()[0] for share in shares]
+    assert brief == ["100", "99.9", "50", "0.1", "0"]
 
 
 def test_a_ratio_of_a_run_that_did_not_arrive_does_not_count(tmp_path: Path) -> None:
