@@ -80,7 +80,7 @@ class PathFollower:
             )
         )
         """What it knows and remembers, see `aircraft.guidance_law.MEMORY`."""
-        self.rows: FloatArray | None = None
+        self.route: FloatArray | None = None
         """The route, as the law has it; None without one."""
 
     def follow(self, route: Route, station_m: float = 0.0) -> None:
@@ -90,8 +90,8 @@ class PathFollower:
             route: what to fly.
             station_m: where on it to begin looking for the nearest point, m from its start.
         """
-        self.rows = _rows(route)
-        starts = self.rows[:, START]
+        self.route = _rows(route)
+        starts = self.route[:, START]
         row = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
         self.memory[ROW], self.memory[ALONG] = row, station_m - float(starts[row])
 
@@ -107,11 +107,11 @@ class PathFollower:
         Raises:
             RuntimeError: if there is no route yet.
         """
-        if self.rows is None:
+        if self.route is None:
             raise RuntimeError("follow() a route before update()")
         _, east, north, _, velocity_east, velocity_north, _, heading, _, _, airspeed, _, _ = state
         output = law.decide(
-            self.rows, self.memory, east, north, velocity_east, velocity_north, heading, airspeed
+            self.route, self.memory, east, north, velocity_east, velocity_north, heading, airspeed
         )
         # At once: the constructor of a NamedTuple takes twice as long.
         return tuple.__new__(GuidanceOutput, output)

@@ -140,7 +140,7 @@ def _in_second_order(sheet: FloatArray, first: int, up: float, right: float) -> 
 
 
 def decide(
-    rows: FloatArray,
+    route: FloatArray,
     memory: FloatArray,
     east_m: float,
     north_m: float,
@@ -152,7 +152,7 @@ def decide(
     """The law, from one update to the next.
 
     Args:
-        rows: (n, 9) the route, see `START`, as `aircraft.guidance` has it.
+        route: (n, 9), see `START`, as `aircraft.guidance` has it.
         memory: (9,) of guidance, see `MEMORY`; its last three go on.
         east_m: position of the aircraft.
         north_m: position of the aircraft.
@@ -166,9 +166,9 @@ def decide(
     """
     bank_limit, omega = memory[BANK_LIMIT], memory[OMEGA]
     index, along_m, cross, tangent_east, tangent_north = _nearest(
-        rows, int(memory[ROW]), memory[ALONG], east_m, north_m
+        route, int(memory[ROW]), memory[ALONG], east_m, north_m
     )
-    station = rows[index, START] + along_m
+    station = route[index, START] + along_m
     speed = max(
         math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps), 1.0
     )
@@ -203,10 +203,10 @@ def decide(
         # The curvature where the aircraft will be when it has rolled, averaged over the way that takes.
         blend = speed * memory[BLEND]
         low = station + speed * memory[LEAD] - 0.5 * blend
-        if rows[index, START] <= low and low + blend <= rows[index, STOP]:
-            curvature = rows[index, 4]
+        if route[index, START] <= low and low + blend <= route[index, STOP]:
+            curvature = route[index, 4]
         else:
-            curvature = (_turned(rows, index, low + blend) - _turned(rows, index, low)) / blend
+            curvature = (_turned(route, index, low + blend) - _turned(route, index, low)) / blend
         acceleration = across - curvature * (speed * speed)
         wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
     allowed = _within(bank_limit, wanted)
@@ -214,19 +214,19 @@ def decide(
     roll = memory[REFERENCE] + step
     # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
     command = _within(bank_limit, roll + memory[LEADS_BY] * step)
-    past_end = rows[index, 5] == math.inf and along_m > 0.0
+    past_end = route[index, 5] == math.inf and along_m > 0.0
     memory[ROW], memory[ALONG], memory[REFERENCE] = index, along_m, roll
     return command, cross, station, allowed != wanted, past_end
 
 
 def _nearest(
-    rows: FloatArray, index: int, along_m: float, east_m: float, north_m: float
+    route: FloatArray, index: int, along_m: float, east_m: float, north_m: float
 ) -> tuple[int, float, float, float, float]:
     """Row and distance along it of the nearest point from the last one on; cross-track error and tangent there."""
     while True:
-        east = east_m - rows[index, 0]
-        north = north_m - rows[index, 1]
-        tangent_east, tangent_north, curvature = rows[index, 2], rows[index, 3], rows[index, 4]
+        east = east_m - route[index, 0]
+        north = north_m - route[index, 1]
+        tangent_east, tangent_north, curvature = route[index, 2], route[index, 3], route[index, 4]
         if curvature == 0.0:
             along = east * tangent_east + north * tangent_north
             cross = east * tangent_north - north * tangent_east
@@ -252,7 +252,7 @@ def _nearest(
                 tangent_east * cosine - tangent_north * sine,
                 tangent_east * sine + tangent_north * cosine,
             )
-        if along <= rows[index, 5] or index == len(rows) - 1:
+        if along <= route[index, 5] or index == len(route) - 1:
             return index, max(along, 0.0), cross, tangent_east, tangent_north
         index, along_m = index + 1, 0.0
 
@@ -280,13 +280,13 @@ def _rounded_off(x: float) -> float:
     return (high * high - x * x) + 2.0 * high * low + low * low
 
 
-def _turned(rows: FloatArray, index: int, station_m: float) -> float:
+def _turned(route: FloatArray, index: int, station_m: float) -> float:
     """Direction change of the route from its start to a station near a row, rad, positive to the left."""
-    while index > 0 and station_m < rows[index, START]:
+    while index > 0 and station_m < route[index, START]:
         index -= 1
-    while station_m >= rows[index, STOP]:
+    while station_m >= route[index, STOP]:
         index += 1
-    turned: float = rows[index, TURNED] + rows[index, 4] * (station_m - rows[index, START])
+    turned: float = route[index, TURNED] + route[index, 4] * (station_m - route[index, START])
     return turned
 
 

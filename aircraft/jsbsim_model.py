@@ -172,9 +172,9 @@ class JsbsimModel:
 
         In gusty air, or with guidance of another kind, it flies none.
         """
-        if self._gust is not None or type(follower) is not PathFollower or follower.rows is None:
+        if self._gust is not None or type(follower) is not PathFollower or follower.route is None:
             return 0
-        memory, route = follower.memory, follower.rows
+        memory, route = follower.memory, follower.route
         take, run, rate, windy = self._take, self._fdm.run, self._step_rate_hz, self._windy
         roll_command, _, _ = self._write
         for flown in range(updates):

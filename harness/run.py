@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -32,9 +32,6 @@ from harness.scenario_sections import Environment
 from harness.sensed_world import SensedWorld
 from harness.trackability import FlightLimits
 from harness.world import World
-
-if TYPE_CHECKING:
-    pass
 
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""

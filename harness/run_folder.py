@@ -1,4 +1,4 @@
-"""The folder of one run: written while flying, complete only when the manifest says so.
+"""The folder of one run: complete only when the manifest says so.
 
 The order of writing carries the meaning. The manifest comes first and says `complete: false`; every other
 file is written under a temporary name and renamed when it is whole; the manifest that says `complete: true`

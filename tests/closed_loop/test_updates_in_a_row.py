@@ -170,7 +170,7 @@ def test_none_are_flown_in_gusts_off_a_route_or_by_a_stranger(small_world: Small
         """May steer as it likes."""
 
     stranger = Stranger(model.airframe.guidance_limits)
-    stranger.rows = follower.rows
+    stranger.route = follower.route
     assert model.fly_on(stranger, track, 0, 0, 5, 12, math.inf) == 0
     assert model.fly_on(path_follower(model.airframe.guidance_limits), track, 0, 0, 5, 12, math.inf) == 0
     assert model.fly_on(follower, track, 0, 0, 5, 12, math.inf) == 5
