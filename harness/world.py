@@ -34,8 +34,6 @@ TOUCH_M = 1e-3
 
 # A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
 _BLOCK_ROWS = 256
-# Among so many obstacles it is judged at once: each is a candidate.
-_FEW = 16
 # What bounds are given to spare, for rounding.
 _ROUNDING_M = 1e-6
 
@@ -246,9 +244,8 @@ class World:
         """
         result = np.full(len(points_m), math.nan)
         rows = np.flatnonzero(np.isfinite(points_m).all(axis=1) & np.isfinite(times_s))
-        at_once = _BLOCK_ROWS if len(self.obstacles) > _FEW else max(len(rows), 1)
-        for first in range(0, len(rows), at_once):
-            block = rows[first : first + at_once]
+        for first in range(0, len(rows), _BLOCK_ROWS):
+            block = rows[first : first + _BLOCK_ROWS]
             result[block] = self._block_clearance(points_m[block], times_s[block])
         return result
 
