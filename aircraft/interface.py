@@ -147,7 +147,7 @@ class FlightModel(Protocol):
             until_s: at that time, or later, none begins any more.
 
         Returns:
-            How many; 0 from a model that cannot do this, and where control is lost.
+            How many: fewer where control is lost, or for reasons of the model's own; 0 from one that cannot do this.
         """
         ...
 

@@ -6,7 +6,7 @@ import functools
 import math
 import os
 import threading
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from contextlib import ExitStack
 from queue import SimpleQueue
 from typing import Any
@@ -36,6 +36,11 @@ class _Silence(jsbsim.FGLogger):
         """Drops a location."""
 
 
+_SILENCE = _Silence()
+"""The only one: JSBSim lets go of the logger of a thread that has ended without Python's lock, and so must not be the
+last to hold it."""
+
+
 def node(fdm: Any, path: str) -> Any:
     """A property that must exist: JSBSim itself would make a new one of a misspelt name."""
     found = fdm.get_property_manager().get_node(path)
@@ -53,35 +58,46 @@ def load(files: ModelFiles, step_rate_hz: int = STEP_RATE_HZ) -> Any:
     Raises:
         AircraftError: the model cannot be loaded.
     """
-    jsbsim.set_logger(_Silence())  # of this thread, which takes the steps
+    jsbsim.set_logger(_SILENCE)  # of this thread, which takes the steps
     made: Future[Any] = Future()
-    _orders().put((made, files, step_rate_hz))
-    return made.result()
+    try:
+        with _STARTING:
+            orders = _orders()
+        orders.put((made, files, step_rate_hz))
+        return made.result()
+    finally:
+        if not made.cancel():  # Ctrl-C: Python must not end while the other thread is in JSBSim
+            wait((made,))
 
 
 @functools.cache
 def _orders() -> SimpleQueue[tuple[Future[Any], ModelFiles, int]]:
-    """What the thread that loads models is asked for.
-
-    It never ends: JSBSim would let go of a thread's logger when Python's lock is no longer held.
-    """
+    """What the thread that loads models is asked for. It never ends, as with it its heap would go to others."""
     orders: SimpleQueue[tuple[Future[Any], ModelFiles, int]] = SimpleQueue()
 
     def load_all() -> None:
-        jsbsim.set_logger(_Silence())
+        jsbsim.set_logger(_SILENCE)
         while True:
             made, files, step_rate_hz = orders.get()
-            try:
-                made.set_result(_load(files, step_rate_hz))
-            except BaseException as error:
-                made.set_exception(error)
+            if made.set_running_or_notify_cancel():
+                try:
+                    made.set_result(_load(files, step_rate_hz))
+                except BaseException as error:
+                    made.set_exception(error)
             del made  # the model is not this thread's
 
     threading.Thread(target=load_all, name="load models", daemon=True).start()
     return orders
 
 
-os.register_at_fork(after_in_child=_orders.cache_clear)  # there the thread is not
+def _forked() -> None:
+    """In the new process there is no such thread."""
+    _orders.cache_clear()
+    _STARTING.release()
+
+
+_STARTING = threading.Lock()
+os.register_at_fork(before=_STARTING.acquire, after_in_parent=_STARTING.release, after_in_child=_forked)
 
 
 def _load(files: ModelFiles, step_rate_hz: int) -> Any:

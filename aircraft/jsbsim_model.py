@@ -170,7 +170,8 @@ class JsbsimModel:
     ) -> int:
         """Flies updates of guidance in a row, as if they were asked for one by one, to the last bit, but sooner.
 
-        In gusty air, or with guidance of another kind, it flies none.
+        It flies none in a gust front, or with guidance that is not just `PathFollower`; and stops where a new patch of
+        the plane begins, which is for `state` to make.
         """
         if self._gust is not None or type(follower) is not PathFollower or follower.route is None:
             return 0
@@ -285,7 +286,7 @@ class JsbsimModel:
 def _taker(
     sheet: FloatArray, readings: tuple[Callable[[], float], ...], alpha: Callable[[], float]
 ) -> Update:
-    """`law.update` with all that JSBSim tells."""
+    """`law.update` with all that JSBSim tells: compiled, if it is by now."""
     update = law.update
     latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor, throttle = (
         readings

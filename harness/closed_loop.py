@@ -101,7 +101,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     late: deque[RangeScan] = deque()
     roll_command, cross_track, station = 0.0, math.nan, math.nan
     next_report = math.inf if progress is None else 0.0
-    model.command(roll_command, loop.altitude_m, mission.speed_mps)
+    model.command(roll_command, loop.altitude_m, mission.speed_mps)  # the last two for all of the flight
     while True:
         scan_due, tick, steps, updates = strides[at % len(strides)]
         state = model.state()

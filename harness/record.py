@@ -50,6 +50,7 @@ BLOCK_ROWS = 6000
 ROW = len(AircraftState._fields) + 4
 """Numbers in a row: a state, roll command, cross-track error and station, plan index."""
 COMMANDED = slice(ROW - 4, ROW - 1)
+"""Of these, roll command, cross-track error and station."""
 THROTTLE = AircraftState._fields.index("throttle")
 """What comes before it in a row is finite while the aircraft is under control."""
 CHORD_ERROR_M = 0.5
@@ -176,9 +177,9 @@ class TrackLog:
         self._clearance = clearance
         self._sinks = tuple(sinks)
         self.table: FloatArray = np.zeros((block_rows, ROW))  # no more objects while flying than now
-        """(k, 17) rows of this block, of what `add` takes, in its order,"""
+        """(k, 17) rows of this block: what `add` takes, in its order."""
         self.row = 0
-        """of which those from this one on are free: one at least."""
+        """The first row of `table` that is free; there always is one."""
         self._blocks: list[Track] = []
 
     def add(

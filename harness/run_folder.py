@@ -132,8 +132,7 @@ class RunFolder:
     def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
         """Writes track, plans and metrics, then marks the run complete.
 
-        Call it last: after the recording is closed. All at once, as each time that a table is written costs what is
-        being flown its place in the caches.
+        Call it last: after the recording is closed.
 
         Raises:
             RunFolderError: the track has no rows.
@@ -145,6 +144,7 @@ class RunFolder:
         import pyarrow.parquet as pq
 
         text = _json(metrics)
+        # At once: whatever is written while flying costs the flight its place in the caches.
         rows = pa.table({name: getattr(track, name) for name in TRACK_FIELDS})
         split = {"use_dictionary": False, "use_byte_stream_split": SPLIT}
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import gc
+import threading
 from collections.abc import Callable
 from typing import Any, Generic, ParamSpec, TypeVar
 
@@ -65,6 +66,7 @@ class Compiled(Generic[P, R]):
 
 
 _waiting: list[Compiled[..., Any]] = []
+_compiling = threading.RLock()
 
 
 def compiled(*arguments: str) -> Callable[[Callable[P, R]], Compiled[P, R]]:
@@ -80,11 +82,12 @@ def compiled(*arguments: str) -> Callable[[Callable[P, R]], Compiled[P, R]]:
 
 def compile_all() -> None:
     """Compiles all functions imported so far that are not yet: some seconds the first time, then some tenths."""
-    if not _waiting:
-        return
-    while _waiting:
-        _waiting[0].compile()
-        del _waiting[0]
-    # The compiler stays for good: to look through it for garbage would hold a flight up for a tenth of a second.
-    gc.collect()
-    gc.freeze()
+    with _compiling:
+        if not _waiting:
+            return
+        while _waiting:
+            _waiting[0].compile()
+            del _waiting[0]
+        # The compiler stays for good: to look through it for garbage would hold a flight up for a tenth of a second.
+        gc.collect()
+        gc.freeze()

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import gc
 import math
+import signal
 import subprocess
 import sys
 import threading
+import time
 import weakref
 from pathlib import Path
 
 import jsbsim
 import pytest
 
+from aircraft import jsbsim_loading
 from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState, FlightModel
@@ -76,6 +79,56 @@ def test_a_model_that_is_not_used_any_more_is_gone(monkeypatch: pytest.MonkeyPat
     del model
     gc.collect()
     assert gone() is None
+
+
+def test_an_interrupt_waits_until_jsbsim_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python's end would be a crash of the thread that is in JSBSim."""
+    began, left, here = threading.Event(), threading.Event(), threading.get_ident()
+
+    def slow(*_: object) -> None:
+        began.set()
+        time.sleep(0.5)
+        left.set()
+
+    def interrupt() -> None:
+        began.wait()
+        signal.pthread_kill(here, signal.SIGINT)
+
+    monkeypatch.setattr(jsbsim_loading, "_load", slow)
+    threading.Thread(target=interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        model_of("aerosonde")
+    assert left.is_set()
+    monkeypatch.undo()
+    assert model_of("aerosonde").state().time_s == 0.0
+
+
+def test_threads_that_end_fly_too() -> None:
+    """They have loggers of their own, of which JSBSim lets go after them, and compile what is to be compiled."""
+    code = (
+        "import sys\n"
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        "from threading import enumerate\n"
+        "from aircraft.jsbsim_loading import _orders\n"
+        "from harness.run import make_loop\n"
+        "from harness.scenario import load_scenario\n"
+        "from harness.shipped import scenario_path\n"
+        "sys.setswitchinterval(1e-6)\n"
+        "scenario = load_scenario(scenario_path('aerosonde_forest'))\n"
+        "for _ in range(3):\n"
+        "    with ThreadPoolExecutor(8) as threads:\n"
+        "        loops = list(threads.map(make_loop, [scenario] * 8))\n"
+        "    assert len({loop.model.state() for loop in loops}) == 1\n"
+        "assert [thread.name for thread in enumerate()].count('load models') == 1\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=Path(__file__).parents[2],
+    )
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
 
 
 def test_a_forked_process_loads_models_too() -> None:
