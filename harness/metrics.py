@@ -50,18 +50,19 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
     lost_control = flight.outcome is Outcome.LOST_CONTROL
     verdicts = legs(track, flight.plans, limits, lost_control, corners)
     followed = track.cross_track_m[track.plan_index >= 0]
+    planned_m = planned_length_m(flight)
     return {
         "outcome": flight.outcome.value,
         "reason": flight.reason,
         "flown_length_m": float(flown_lengths(track).sum()),
-        "planned_length_m": float(planned_length_m(flight)),
+        "planned_length_m": planned_m,
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
         "min_clearance_m": _finite(nearest_m.min()),
         "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
         "cross_track_m": error_figures(followed),
         "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
         "smoothness": {
-            "planned": dataclasses.asdict(smoothness(planned, window, planned_length_m(flight))),
+            "planned": dataclasses.asdict(smoothness(planned, window, planned_m)),
             "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
         },
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),

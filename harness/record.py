@@ -212,7 +212,7 @@ class TrackLog:
         return Track.joined(self._blocks)
 
     def _cut(self) -> None:
-        rows = self.table[: self.row].T
+        rows = np.ascontiguousarray(self.table[: self.row].T)
         rows = rows[:, np.isfinite(rows[:THROTTLE]).all(axis=0)]
         self.row = 0
         if not rows.size:
