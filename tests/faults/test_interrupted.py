@@ -29,7 +29,7 @@ def test_a_signal_in_flight_is_said_in_a_line(
     signum: signal.Signals, recording: tuple[str, ...], tmp_path: Path
 ) -> None:
     process = start(tmp_path, *LONG, *recording)
-    wait_until((tmp_path / "run" / "track.parquet.partial").exists, process)
+    wait_until((tmp_path / "run" / "scenario.yaml").exists, process)
     process.send_signal(signum)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 128 + signum

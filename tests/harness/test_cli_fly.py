@@ -81,7 +81,6 @@ def test_json_is_the_metrics_file(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_killed_while_flying_leaves_an_incomplete_run_and_a_readable_recording(tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start(tmp_path, "fly", "paper_circles", "--out", str(out))
-    wait_for(out / "track.parquet.partial", process)
     wait_for(out / "flight.rrd", process, size=RECORDED_BYTES)
     process.send_signal(signal.SIGKILL)
     process.communicate(timeout=30)
@@ -103,7 +102,7 @@ def test_killed_while_flying_leaves_an_incomplete_run_and_a_readable_recording(t
 def test_interrupted_says_so_and_leaves_an_incomplete_run(tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start(tmp_path, "fly", "paper_circles", "--out", str(out), "--no-recording")
-    wait_for(out / "track.parquet.partial", process)
+    wait_for(out / "scenario.yaml", process)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130

@@ -363,7 +363,7 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
         start_new_session=True,
     )
     until = time.monotonic() + 60.0
-    while not (out / "paper_circles" / "rolling_window" / "track.parquet.partial").exists():
+    while not (out / "paper_circles" / "rolling_window" / "scenario.yaml").exists():
         assert process.poll() is None
         assert time.monotonic() < until
         time.sleep(0.01)
