@@ -18,6 +18,7 @@ from harness.judge import Judge
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
 from harness.sensed_world import SensedWorld
+from harness.signals import interruptible, let_interrupts_through
 from harness.world import World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
@@ -76,6 +77,7 @@ class Loop:
     scan_rate_hz: float
 
 
+@interruptible()
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
     """Flies a mission to its end.
 
@@ -256,9 +258,8 @@ class _Plans:
         begun = time.perf_counter()
         try:
             plan = self._loop.planner.plan(request)
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # whatever it is, it is no more than a plan that failed
+        except BaseException as error:  # whatever else it is, it is no more than a plan that failed
+            let_interrupts_through(error)
             self.error = trace(error)
             return Outcome.PLANNER_FAILED, f"the planner raised {sentence(error)}"
         compute_ms = 1e3 * (time.perf_counter() - begun)

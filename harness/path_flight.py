@@ -20,6 +20,7 @@ from harness.metrics import metrics
 from harness.record import AcceptedPlan, Flight, Outcome, TrackLog
 from harness.run import fly_to_folder
 from harness.scenario import Scenario, performance_of, scenario_of
+from harness.signals import interruptible
 from harness.smoothness import polyline_profile, smoothness
 from harness.trackability import FlightLimits
 from planner.interface import Path, Plan, PlanStatus
@@ -119,6 +120,7 @@ def check_path(
     )
 
 
+@interruptible()
 def fly_along(
     way: FlyBy, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
 ) -> Flight:

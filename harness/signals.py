@@ -15,6 +15,24 @@ ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
 AGAIN_S: Final = 2.0
 
 
+def let_interrupts_through(error: BaseException) -> None:
+    """Raises KeyboardInterrupt if an error is one, or is what numba made of one that came to its first calls."""
+    if isinstance(error, KeyboardInterrupt):
+        raise error
+    if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
+        raise KeyboardInterrupt from error
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """A block, or by decoration a function, that an interrupt ends as such wherever it comes."""
+    try:
+        yield
+    except SystemError as error:
+        let_interrupts_through(error)
+        raise
+
+
 @contextmanager
 def taken_as_interrupt() -> Iterator[list[int]]:
     """Lets SIGTERM and SIGHUP raise KeyboardInterrupt in the block; gives the list of those that came.

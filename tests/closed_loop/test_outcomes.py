@@ -19,6 +19,7 @@ from harness import run
 from harness.cli import main
 from harness.record import Flight
 from harness.scenario import Scenario, dump_scenario
+from harness.sensed_world import SensedWorld
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
 SmallWorld = Callable[..., Scenario]
@@ -288,16 +289,32 @@ def test_whatever_a_planner_raises_is_its_failure(
     assert metrics["error"].rstrip().splitlines()
 
 
+def interrupted_in_machine_code(*_: object) -> Any:
+    """As numba has it."""
+    raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+
+@pytest.mark.parametrize("in_machine_code", [False, True])
 def test_an_interrupt_while_it_plans_is_none(
-    fly: Fly, answering: Install, small_world: SmallWorld, tmp_path: FilePath
+    fly: Fly, answering: Install, small_world: SmallWorld, tmp_path: FilePath, in_machine_code: bool
 ) -> None:
     def is_interrupted(mission: Mission, request: PlanRequest) -> Plan:
+        if in_machine_code:
+            interrupted_in_machine_code()
         raise KeyboardInterrupt
 
     answering(is_interrupted)
     with pytest.raises(FileNotFoundError):
         fly(small_world(planner={"kind": "stand_in"}))
     assert not (tmp_path / "run" / "metrics.json").exists()
+
+
+def test_an_interrupt_of_what_is_compiled_in_the_loop_is_one(
+    small_world: SmallWorld, flown_by_point_mass: FlyPointMass, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SensedWorld, "update", interrupted_in_machine_code)
+    with pytest.raises(KeyboardInterrupt):
+        flown_by_point_mass(small_world())
 
 
 def test_planner_whose_tangents_are_no_unit_vectors(
