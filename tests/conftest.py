@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import signal
 
+from hypothesis import settings
+
+# No test is timed: how long an example takes is the machine's affair.
+settings.register_profile("wayproof", deadline=None)
+settings.load_profile("wayproof")
+
 
 def pytest_configure() -> None:
     """Signals that whoever began this had ignored (`nohup`, a job in the background) are not, for what tests begin."""
