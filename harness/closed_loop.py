@@ -18,7 +18,7 @@ from harness.judge import Judge
 from harness.range_sensor import RangeScan, RangeSensor
 from harness.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
 from harness.sensed_world import SensedWorld
-from harness.signals import interruptible, let_interrupts_through
+from harness.signals import held_back
 from harness.world import World
 from planner.interface import Mission, Plan, Planner, PlanRequest, PlanStatus
 
@@ -77,14 +77,14 @@ class Loop:
     scan_rate_hz: float
 
 
-@interruptible()
 def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None) -> Flight:
     """Flies a mission to its end.
 
     Everything happens at whole steps of the flight model: guidance and log at one rate, a scan at the
     sensor's. The planner is asked after a scan, and twice a step of guidance while it goes on. A scan or a plan
     that is late takes effect at the first of these steps after its delay. Steps at which nothing but guidance is
-    due are left to the model, if it can fly them by itself. Time is a count of steps.
+    due are left to the model, if it can fly them by itself. Time is a count of steps. Ctrl-C is taken between
+    two of these.
 
     Args:
         loop: all parts of the flight; used up by it.
@@ -94,6 +94,13 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     Raises:
         ValueError: the scan rate does not divide the simulation rate.
     """
+    with held_back() as interrupt:
+        return _flown(loop, observers, progress, interrupt)
+
+
+def _flown(
+    loop: Loop, observers: Sequence[Observer], progress: Progress | None, interrupt: Callable[[], None]
+) -> Flight:
     begun = time.perf_counter()
     model, follower, seen, mission = loop.model, loop.follower, loop.seen, loop.mission
     strides, at = _strides(model.step_rate_hz, loop.scan_rate_hz), 0
@@ -105,6 +112,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     next_report = math.inf if progress is None else 0.0
     model.command(roll_command, loop.altitude_m, mission.speed_mps)  # the last two for all of the flight
     while True:
+        interrupt()
         scan_due, tick, steps, updates = strides[at % len(strides)]
         state = model.state()
         verdict = judge.verdict(state)
@@ -258,8 +266,9 @@ class _Plans:
         begun = time.perf_counter()
         try:
             plan = self._loop.planner.plan(request)
-        except BaseException as error:  # whatever else it is, it is no more than a plan that failed
-            let_interrupts_through(error)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever it is, it is no more than a plan that failed
             self.error = trace(error)
             return Outcome.PLANNER_FAILED, f"the planner raised {sentence(error)}"
         compute_ms = 1e3 * (time.perf_counter() - begun)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
@@ -20,7 +20,7 @@ from harness.metrics import metrics
 from harness.record import AcceptedPlan, Flight, Outcome, TrackLog
 from harness.run import fly_to_folder
 from harness.scenario import Scenario, performance_of, scenario_of
-from harness.signals import interruptible
+from harness.signals import held_back
 from harness.smoothness import polyline_profile, smoothness
 from harness.trackability import FlightLimits
 from planner.interface import Path, Plan, PlanStatus
@@ -120,7 +120,6 @@ def check_path(
     )
 
 
-@interruptible()
 def fly_along(
     way: FlyBy, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
 ) -> Flight:
@@ -132,6 +131,17 @@ def fly_along(
         observers: look on.
         progress: told of the flight every few simulated seconds.
     """
+    with held_back() as interrupt:
+        return _flown(way, loop, observers, progress, interrupt)
+
+
+def _flown(
+    way: FlyBy,
+    loop: Loop,
+    observers: Sequence[Observer],
+    progress: Progress | None,
+    interrupt: Callable[[], None],
+) -> Flight:
     begun = time.perf_counter()
     model, follower = loop.model, loop.follower
     path = Path(way.segments)
@@ -145,6 +155,7 @@ def fly_along(
     steps = model.step_rate_hz // UPDATE_RATE_HZ
     updates = 0
     while True:
+        interrupt()
         state = model.state()
         guided = follower.update(state)
         model.command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps)

@@ -10,7 +10,6 @@ from pydantic import ValidationError, create_model
 
 from harness.crash import PlannerError, sentence
 from harness.scenario_sections import PlannerSpec, Section, key
-from harness.signals import let_interrupts_through
 from harness.validation import KeyFault, first_fault, unknown_key
 from planner.compiled import compile_all
 from planner.registry import PlannerKind, planner_kinds
@@ -56,8 +55,9 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
     kind = planner_kinds()[spec.kind]
     try:
         return kind.make(kind.config(**spec.own), mission)
+    except KeyboardInterrupt:
+        raise
     except BaseException as error:
-        let_interrupts_through(error)
         raise PlannerError(f"the planner {spec.kind} cannot be made: {sentence(error)}") from error
 
 

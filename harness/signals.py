@@ -1,4 +1,7 @@
-"""Signals that ask a process to end, taken like Ctrl-C, so that whatever it is doing can say so and clean up."""
+"""Signals that ask a process to end, taken like Ctrl-C, so that whatever it is doing can say so and clean up.
+
+In flight they are held back to where no machine code is at work.
+"""
 
 from __future__ import annotations
 
@@ -6,31 +9,14 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Final
 
 ENDING: Final = (signal.SIGTERM, signal.SIGHUP)
+INTERRUPTING: Final = (signal.SIGINT, *ENDING)
 AGAIN_S: Final = 2.0
-
-
-def let_interrupts_through(error: BaseException) -> None:
-    """Raises KeyboardInterrupt if an error is one, or is what numba made of one that came to its first calls."""
-    if isinstance(error, KeyboardInterrupt):
-        raise error
-    if isinstance(error, SystemError) and isinstance(error.__cause__, KeyboardInterrupt):
-        raise KeyboardInterrupt from error
-
-
-@contextmanager
-def interruptible() -> Iterator[None]:
-    """A block, or by decoration a function, that an interrupt ends as such wherever it comes."""
-    try:
-        yield
-    except SystemError as error:
-        let_interrupts_through(error)
-        raise
 
 
 @contextmanager
@@ -61,3 +47,40 @@ def taken_as_interrupt() -> Iterator[list[int]]:
     finally:
         for each in taken:
             signal.signal(each, signal.SIG_DFL)
+
+
+@contextmanager
+def held_back() -> Iterator[Callable[[], None]]:
+    """Holds back signals that Python handles until the block calls for them, or ends.
+
+    A handler runs, and raises, wherever the process is; numba, in its first calls, makes another error or a crash of
+    what is raised there. One that comes again after `AGAIN_S` is not held back: the block may never call. Outside the
+    main thread, where Python takes no signals, nothing is held.
+    """
+    held: list[int] = []
+    first_s = math.inf
+
+    def hold(number: int, frame: FrameType | None) -> None:
+        nonlocal first_s
+        held.append(number)
+        first_s = min(first_s, time.monotonic())
+        if time.monotonic() - first_s > AGAIN_S:
+            let_through()
+
+    def let_through() -> None:
+        if held:
+            number = held[0]
+            held.clear()
+            handlers[signal.Signals(number)](number, None)
+
+    main = threading.current_thread() is threading.main_thread()
+    found = {each: signal.getsignal(each) for each in INTERRUPTING if main}
+    handlers = {each: handler for each, handler in found.items() if callable(handler)}
+    for each in handlers:
+        signal.signal(each, hold)
+    try:
+        yield let_through
+    finally:
+        for each, handler in handlers.items():
+            signal.signal(each, handler)
+        let_through()

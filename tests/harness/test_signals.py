@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from harness import signals
-from harness.signals import interruptible, let_interrupts_through, taken_as_interrupt
+from harness.signals import held_back, taken_as_interrupt
 
 
 def test_one_that_comes_again_at_once_does_not_end_the_cleaning_up(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -27,14 +27,58 @@ def test_one_that_comes_again_at_once_does_not_end_the_cleaning_up(monkeypatch: 
     assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
-def test_one_that_comes_to_machine_code_is_one_still() -> None:
-    """Numba, when it first hands something over, makes a SystemError of it."""
-    with pytest.raises(KeyboardInterrupt), interruptible():
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_one_is_held_back_until_it_is_called_for(number: signal.Signals) -> None:
+    with taken_as_interrupt() as came:
+        before = signal.getsignal(number)
+        with held_back() as interrupt:
+            interrupt()
+            signal.raise_signal(number)
+            signal.raise_signal(number)
+            with pytest.raises(KeyboardInterrupt):
+                interrupt()
+            interrupt()  # both were one
+        assert came == ([number] if number is signal.SIGTERM else [])
+        assert signal.getsignal(number) is before
 
 
-def test_no_other_error_is_taken_for_one() -> None:
-    for error in (SystemError("of its own"), ValueError("wrong"), SystemExit(3)):
-        let_interrupts_through(error)
-    with pytest.raises(SystemError, match="of its own"), interruptible():
-        raise SystemError("of its own")
+def test_the_end_of_the_block_is_a_call() -> None:
+    reached = False
+
+    def never_calls() -> None:
+        nonlocal reached
+        with held_back():
+            signal.raise_signal(signal.SIGINT)
+            reached = True
+
+    with pytest.raises(KeyboardInterrupt):
+        never_calls()
+    assert reached
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_one_that_comes_again_is_not_held_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What never calls for it can be ended all the same."""
+    monkeypatch.setattr(signals, "AGAIN_S", -1.0)
+    reached = False
+
+    def never_calls() -> None:
+        nonlocal reached
+        with held_back():
+            signal.raise_signal(signal.SIGINT)
+            reached = True
+
+    with pytest.raises(KeyboardInterrupt):
+        never_calls()
+    assert not reached
+
+
+def test_a_signal_that_is_ignored_stays_so() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with held_back() as interrupt:
+            signal.raise_signal(signal.SIGINT)
+            interrupt()
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
