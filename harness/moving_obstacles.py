@@ -205,8 +205,10 @@ class MovingObstacles:
 
     def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
         """Rays that returned something, but for false returns, and where."""
-        returned = supported(scan, self._apart) if self._false_returns else scan.ranges_m < math.inf
-        hits = returned.nonzero()[0]
+        if not self._false_returns:
+            hits, from_sensor = scan.returned
+            return hits, from_sensor + complex(scan.east_m, scan.north_m)
+        hits = supported(scan, self._apart).nonzero()[0]
         return hits, scan.ends_m(hits)
 
     def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:

@@ -135,13 +135,11 @@ class ObstacleMap:
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
         self._unconfirmed = False
-        taken = supported(scan, SUPPORT * self._clearance) if self._doubtful else scan.ranges_m < math.inf
-        hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
+        hits, from_sensor = self._hits(scan, ignored)
         if not len(hits):
             return
         # Places are points seen from the corner of the grid.
-        places = scan.from_sensor_m(hits)
-        places += complex(scan.east_m, scan.north_m) - self._origin
+        places = from_sensor + (complex(scan.east_m, scan.north_m) - self._origin)
         if not self._holds(scan):
             column, row = self._column_and_row(places)
             on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
@@ -171,6 +169,14 @@ class ObstacleMap:
                     again.append((fine[sure], at[sure]))
         for each in ((cells, found), *again):
             self._count_hits(*each)
+
+    def _hits(self, scan: RangeScan, ignored: BoolArray | None) -> tuple[IntArray, ComplexArray]:
+        """Rays that met an edge, and where they did, from the sensor."""
+        if ignored is None and not self._doubtful:
+            return scan.returned
+        taken = supported(scan, SUPPORT * self._clearance) if self._doubtful else scan.ranges_m < math.inf
+        hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
+        return hits, scan.from_sensor_m(hits)
 
     def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Cells of places seen from the corner of the grid."""
@@ -226,9 +232,10 @@ class ObstacleMap:
             near = np.abs(self._points[: self._count] - sensor) < 1.125 * self._range
             self._near = near.nonzero()[0].astype(np.int32)
             self._near_at, self._near_count = sensor, self._count
-        slots = self._near
         if self._near_count < self._count:
-            slots = np.concatenate((slots, np.arange(self._near_count, self._count, dtype=np.int32)))
+            more = np.arange(self._near_count, self._count, dtype=np.int32)
+            self._near, self._near_count = np.concatenate((self._near, more)), self._count
+        slots = self._near
         # Only a ray that passes close by says anything about a point.
         through = looked_through(
             scan,
@@ -238,6 +245,8 @@ class ObstacleMap:
             aimed_m=0.25 * self._cell,
             within_m=scan.max_range_m - 2.0 * self._cell,
         )
+        if not through.any():
+            return False
         weaker = self._key[slots[through]]
         weaker = weaker[self._score[weaker] > 0]
         if len(weaker):

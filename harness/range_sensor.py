@@ -9,7 +9,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -67,6 +67,15 @@ class RangeScan:
                 array = array.copy()
                 array.setflags(write=False)
                 object.__setattr__(self, name, array)
+
+    @cached_property
+    def returned(self) -> tuple[IntArray, ComplexArray]:
+        """(k,) rays that returned something, and where they ended, east + i north of the sensor; read-only."""
+        rays = (self.ranges_m < math.inf).nonzero()[0]
+        ends = self.from_sensor_m(rays)
+        rays.setflags(write=False)
+        ends.setflags(write=False)
+        return rays, ends
 
     def from_sensor_m(self, rays: IntArray) -> ComplexArray:
         """(k,) where some rays ended, east + i north of the sensor."""
