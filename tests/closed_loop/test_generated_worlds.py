@@ -23,7 +23,7 @@ SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]
 
 
-BOUNDED = settings(deadline=None, derandomize=True, phases=(Phase.explicit, Phase.reuse, Phase.generate))
+BOUNDED = settings(derandomize=True, phases=(Phase.explicit, Phase.reuse, Phase.generate))
 """A flight takes a third of a second: a failure is shown as drawn, for shrinking it would take minutes."""
 
 

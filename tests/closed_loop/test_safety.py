@@ -41,7 +41,7 @@ CLEARANCE_M, TURN_RADIUS_M = 40.0, 110.4
 BLUR = 0.25
 """What the clearance may lack beside a corner, as a share of it: the spacing of the points that the map keeps."""
 
-BOUNDED = settings(deadline=None, derandomize=True, phases=(Phase.explicit, Phase.generate))
+BOUNDED = settings(derandomize=True, phases=(Phase.explicit, Phase.generate))
 """A flight takes seconds: a failure is shown as drawn, for shrinking it would take minutes."""
 
 

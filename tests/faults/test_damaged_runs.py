@@ -55,7 +55,6 @@ def test_export_and_report_of_a_damaged_run(
 
     @settings(
         max_examples=cases,
-        deadline=None,
         derandomize=True,
         database=None,
         suppress_health_check=list(HealthCheck),
@@ -114,7 +113,6 @@ def test_view_of_a_damaged_recording(
 
     @settings(
         max_examples=cases,
-        deadline=None,
         derandomize=True,
         database=None,
         suppress_health_check=list(HealthCheck),

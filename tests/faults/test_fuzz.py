@@ -184,7 +184,6 @@ def fuzzed(cases: int, strategy: st.SearchStrategy[Any], holds: Callable[[Any], 
 
     @settings(
         max_examples=cases,
-        deadline=None,
         derandomize=True,
         database=None,
         suppress_health_check=list(HealthCheck),

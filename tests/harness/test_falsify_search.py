@@ -29,7 +29,7 @@ def found(
 
 
 @given(st.floats(0.001, 1.0), st.sampled_from([0.1, 0.03, 0.004]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_one_key_is_narrowed_down_to_the_tolerance(edge: float, tolerance: float) -> None:
     result, asked = found(lambda point: point[0] >= edge, tolerance=tolerance)
     assert result.mildest is not None
@@ -106,7 +106,7 @@ def test_without_conditions_for_the_evolution_it_is_not_settled() -> None:
 
 
 @given(st.lists(st.floats(0.05, 0.95), min_size=2, max_size=3), st.integers(0, 3))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_where_every_key_makes_it_harder_the_mildest_is_found(edges: list[float], seed: int) -> None:
     keys, tolerance = len(edges), 0.02
     result, asked = found(

@@ -55,7 +55,7 @@ def test_with_a_fifth_of_the_returns_lost_what_is_behind_walls_stays_unknown(see
     assert distance_to(world, points[seen.contains(points)]).min() > 0.0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(seed=SEEDS, field=st.sampled_from([360.0, 360.0, 120.0]), heading=st.floats(0.0, 6.0))
 def test_seen_free_is_true_only_where_there_is_nothing(seed: int, field: float, heading: float) -> None:
     world = random_world(seed)
@@ -66,7 +66,7 @@ def test_seen_free_is_true_only_where_there_is_nothing(seed: int, field: float, 
     assert distance_to(world, points[free]).min() > 0.0
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS)
 def test_most_of_what_is_plainly_visible_is_seen_free(seed: int) -> None:
     world = random_world(seed)
@@ -148,7 +148,7 @@ def test_what_hides_just_beside_the_field_of_view_is_not_in_free_space(side: flo
     assert distance_to(world, points[free]).min() > 0.0
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     seed=SEEDS,
     field=st.sampled_from([360.0, 120.0]),

@@ -7,7 +7,7 @@ import math
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.hit_counting import CERTAIN, CONFIRMED, CORNER, PARTS, count_hits, ends, news
@@ -55,7 +55,6 @@ def pairs_of(hits: IntArray, places: ComplexArray, closed: bool) -> list[tuple[i
     return found
 
 
-@settings(deadline=None)
 @given(seed=SEED, first_score=st.sampled_from((1, CONFIRMED)))
 def test_news_are_hits_that_are_not_certain_and_what_lies_between(seed: int, first_score: int) -> None:
     rng = np.random.default_rng(seed)
@@ -75,7 +74,6 @@ def test_news_are_hits_that_are_not_certain_and_what_lies_between(seed: int, fir
     assert cells.tolist() == [cell_at(place) for place in expected]
 
 
-@settings(deadline=None)
 @given(seed=SEED, corners=st.booleans())
 def test_outlines_end_at_gaps_at_corners_and_before_what_is_behind(seed: int, corners: bool) -> None:
     hits, places, ranges, closed = hits_of(np.random.default_rng(seed))
@@ -93,7 +91,6 @@ def test_outlines_end_at_gaps_at_corners_and_before_what_is_behind(seed: int, co
     assert ends(hits, places, ranges, CELL, closed, JOIN, corners).tolist() == expected
 
 
-@settings(deadline=None)
 @given(seed=SEED, first_score=st.sampled_from((1, CONFIRMED)))
 def test_a_cell_counts_once_and_is_an_edge_as_soon_as_it_is_believed(seed: int, first_score: int) -> None:
     rng = np.random.default_rng(seed)

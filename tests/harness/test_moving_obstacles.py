@@ -65,7 +65,7 @@ def passing(
     return world_of(Obstacle(shape, velocity_mps=(velocity.real, velocity.imag))), velocity
 
 
-@settings(deadline=None, max_examples=40, derandomize=True)  # of a thousand passes three are told worse
+@settings(max_examples=40, derandomize=True)  # of a thousand passes three are told worse
 @given(
     speed=st.floats(1.0, 10.0),
     turned=st.floats(-1.4, 1.4),
@@ -246,7 +246,7 @@ STILL: list[dict[str, Any]] = [
 ]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     seed=SEEDS,
     flaws=st.sampled_from(STILL),

@@ -70,7 +70,7 @@ MOST_IN_A_CELL = 1 + 4 * 4
 """Points in a cell: one, and of a near outline one in every sixteenth of it."""
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(seed=SEEDS)
 def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
     world = random_world(seed)

@@ -77,7 +77,7 @@ def first_crossing(directions: FloatArray, shape: Any) -> FloatArray:
     return distance
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32),
     count=st.integers(1, 12),
@@ -230,7 +230,7 @@ def test_moving_obstacles_are_seen_where_they_are() -> None:
     np.testing.assert_allclose([scan[3] for scan in scans], behind_m)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**32), near=st.integers(0, 10), far=st.integers(1, 40), changing=st.booleans())
 def test_obstacles_out_of_range_do_not_change_a_bit(seed: int, near: int, far: int, changing: bool) -> None:
     rng = np.random.default_rng(seed)
@@ -248,7 +248,7 @@ def test_obstacles_out_of_range_do_not_change_a_bit(seed: int, near: int, far: i
         )
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32))
 def test_a_scan_does_not_depend_on_where_the_sensor_was_before(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -318,7 +318,7 @@ def test_a_scan_cannot_be_changed_and_keeps_no_array_of_others() -> None:
 
 
 @given(st.integers(0, 10_000), st.sampled_from([360.0, 90.0]))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_no_return_is_nearer_than_the_scan_says_before_its_rays_are_followed(seed: int, field: float) -> None:
     rng = np.random.default_rng(seed)
     world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)

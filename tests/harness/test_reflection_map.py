@@ -64,7 +64,7 @@ def random_world(seed: int) -> World:
     return world_of(*(shapes or [Circle((3200.0, 2500.0), 100.0)]))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(
     seed=SEEDS,
     flaws=st.sampled_from([{}, {"dropout": 0.1, "false_return": 0.01}, {"field_of_view_deg": 180.0}]),

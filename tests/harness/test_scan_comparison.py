@@ -27,7 +27,6 @@ def scan_of(ranges: np.ndarray[tuple[int], np.dtype[np.float64]], fan_rad: float
     return RangeScan(0.0, 0.0, AT.real, AT.imag, 0.0, 0.0, spacing, fan, ranges, RANGE)
 
 
-@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     fan_rad=st.sampled_from((math.tau, math.pi)),
@@ -86,7 +85,6 @@ def test_few_places_in_a_row_tell_nothing(several: int) -> None:
     assert several + 1 < FEWEST or sampled
 
 
-@settings(deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), within_m=st.floats(1.0, 200.0), count=st.integers(0, 30))
 def test_near_is_what_is_no_further_from_any(seed: int, within_m: float, count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -95,7 +93,6 @@ def test_near_is_what_is_no_further_from_any(seed: int, within_m: float, count: 
     np.testing.assert_array_equal(near_any(places, others, within_m), away <= within_m)
 
 
-@settings(deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
     within_m=st.floats(1.0, 200.0),
@@ -145,7 +142,7 @@ def test_a_place_away_from_those_before_and_after_it_is_not_joined_to_them() -> 
     )
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50, derandomize=True)
 @given(seed=st.integers(0, 10_000), places=st.integers(0, 40), points=st.integers(1, 40))
 def test_the_nearest_of_some_points(seed: int, places: int, points: int) -> None:
     rng = np.random.default_rng(seed)

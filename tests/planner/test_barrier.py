@@ -52,7 +52,7 @@ def circle_of(x: float, y: float, radius: float, spacing: float, gap_m: float = 
     return np.column_stack((x + radius * np.cos(angle), y + radius * np.sin(angle)))
 
 
-@settings(deadline=None, max_examples=150)
+@settings(max_examples=150)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(0, 220))
 def test_random_points_close_it_where_their_discs_part_the_area(seed: int, count: int) -> None:
     points = np.random.default_rng(seed).uniform(0.0, 1000.0, (count, 2))
@@ -88,7 +88,7 @@ def test_a_ring_is_closed_by_a_gap_of_no_more_than_two_clearances(
     assert parted(points, CLEARANCE) is closed
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     x=st.floats(100.0, 900.0),
     y=st.floats(100.0, 900.0),
@@ -184,7 +184,7 @@ def test_a_ring_round_both_parts_nothing() -> None:
     assert not barrier_of(points).closed
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 160), parts=st.integers(1, 12))
 def test_in_parts_it_is_the_same_as_at_once_and_never_opens_again(seed: int, count: int, parts: int) -> None:
     points = np.random.default_rng(seed).uniform(0.0, 1000.0, (count, 2))
@@ -196,7 +196,7 @@ def test_in_parts_it_is_the_same_as_at_once_and_never_opens_again(seed: int, cou
     assert closed is barrier_of(points).closed
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(60, 160))
 def test_order_does_not_matter_to_points_far_enough_apart(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)

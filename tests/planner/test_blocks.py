@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.blocks import MOST_BLOCKS, blocks, cells
@@ -15,7 +15,6 @@ from planner.fans import entered, first_met
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(1, 120), side=st.floats(100.0, 2000.0))
 def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count: int, side: float) -> None:
     points = np.random.default_rng(seed).uniform(-4000.0, 4000.0, (count, 2))
@@ -38,7 +37,6 @@ def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count
     assert set(pairs) == touching
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(0, 200), side=st.floats(0.1, 5000.0))
 def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side: float) -> None:
     rng = np.random.default_rng(seed)
@@ -53,7 +51,6 @@ def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side
     assert len(circles.T) <= 2 * MOST_BLOCKS
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(0, 200), bearing=st.floats(-math.pi, math.pi))
 def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, bearing: float) -> None:
     rng = np.random.default_rng(seed)
@@ -69,7 +66,6 @@ def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, beari
     assert not hit.any() or entry[order[met]] == pytest.approx(entry.min())
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(0, 200), length=st.floats(0.0, 8000.0))
 def test_a_line_enters_what_it_enters_among_all_points(seed: int, count: int, length: float) -> None:
     rng = np.random.default_rng(seed)

@@ -404,7 +404,7 @@ circles = st.lists(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(world=circles)
 def test_the_goal_is_reached_where_there_is_a_way_and_only_there(
     kind: str, ring: MakePoints, world: list[tuple[float, float, float]]

@@ -108,7 +108,7 @@ def disc_is_free(path: Path, station: float, side: float, seen: FreeDiscs) -> bo
     return bool(seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all())
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(pieces=PIECES, seed=st.integers(0, 2**32 - 1), count=st.integers(1, 8))
 def test_what_is_certified_is_free_everywhere(
     pieces: list[tuple[float, float]], seed: int, count: int, assert_flyable: AssertFlyable
@@ -139,7 +139,7 @@ def test_what_is_certified_is_free_everywhere(
             assert opposite or not terrain(points).admits(turn)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(free_m=st.floats(300.0, 1800.0))
 def test_it_is_the_last_turn_off_the_path_that_is_free(free_m: float, assert_flyable: AssertFlyable) -> None:
     # Free space ends in a straight front across the path (a very large disc).

@@ -38,7 +38,7 @@ def winding(loop: FloatArray, point: FloatArray) -> int:
     return round(float(step.sum()) / math.tau)
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(seed=st.integers(0, 2**32 - 1), sides=st.integers(3, 12))
 def test_encircled_is_an_odd_winding_number(seed: int, sides: int) -> None:
     rng = np.random.default_rng(seed)
@@ -62,7 +62,7 @@ def test_what_was_not_known_then_does_not_count() -> None:
     assert not course(BELOW, 2).same_side((START, *ABOVE), points)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     seed=st.integers(0, 2**32 - 1),
     one=st.lists(st.integers(-400, 400), min_size=1, max_size=4),

@@ -75,7 +75,6 @@ def corners(start: Pose, walk: list[tuple[float, float]]) -> list[Point]:
     return nodes
 
 
-@settings(deadline=None)
 @given(start=POSES, pieces=PIECES)
 def test_joined_segments_are_where_integration_says(
     start: Pose, pieces: list[tuple[float, float]], integrated: Integrated
@@ -85,7 +84,6 @@ def test_joined_segments_are_where_integration_says(
     np.testing.assert_allclose(end_of(Path(np.array(segments))), dense[-1], atol=1e-3)
 
 
-@settings(deadline=None)
 @given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0), more=st.floats(0.0, 1.0))
 def test_pose_sample_and_stretch_agree(
     start: Pose, pieces: list[tuple[float, float]], share: float, more: float, integrated: Integrated
@@ -108,7 +106,6 @@ def test_pose_sample_and_stretch_agree(
     assert shapely.LineString(points).distance(middle) < 0.34
 
 
-@settings(deadline=None)
 @given(start=POSES, pieces=PIECES, deviation=st.floats(0.01, 5.0))
 def test_sample_keeps_chords_near_their_arcs(
     start: Pose, pieces: list[tuple[float, float]], deviation: float, integrated: Integrated
@@ -154,7 +151,6 @@ def shortest_turn_by_search(pose: Pose, target: Point, radius: float) -> float:
     return min(lengths)
 
 
-@settings(deadline=None)
 @given(pose=POSES, away=st.floats(10.0, 3000.0), bearing=ANGLES, radius=st.floats(100.0, 600.0))
 def test_turn_onto_is_the_shorter_tangent(pose: Pose, away: float, bearing: float, radius: float) -> None:
     target = (pose.east_m + away * math.cos(bearing), pose.north_m + away * math.sin(bearing))
@@ -192,7 +188,6 @@ def assert_room_to_roll(path: Path, roll_m: float, before: float) -> None:
         last, straight = curvature, 0.0
 
 
-@settings(deadline=None)
 @given(
     start=POSES,
     walk=WALKS,
@@ -226,7 +221,6 @@ def test_a_fillet_is_smooth_and_passes_its_corners_as_near_as_asked(
         assert line.distance(shapely.Point(corner)) <= max(cut, tightest) + 0.05
 
 
-@settings(deadline=None)
 @given(radius=st.floats(50.0, 300.0), turn=st.floats(0.2, 2.2), cut=st.floats(1.0, 400.0))
 def test_one_corner_is_cut_by_what_is_asked_and_room_allows(radius: float, turn: float, cut: float) -> None:
     leg = 4000.0
@@ -305,7 +299,7 @@ def test_stations_on_a_loiter_go_round_and_round() -> None:
     assert on_loiter(straight, 400.0 + 2.5 * turn) == 400.0 + 2.5 * turn
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(start=POSES, pieces=PIECES, shares=st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
 def test_poses_at_many_stations_are_those_of_integration(
     start: Pose, pieces: list[tuple[float, float]], shares: list[float], integrated: Integrated
@@ -322,7 +316,7 @@ def test_poses_at_many_stations_are_those_of_integration(
         np.testing.assert_allclose(pose, pose_at(path, station), atol=1e-6)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     start=POSES,
     pieces=PIECES,
@@ -361,7 +355,7 @@ def test_onward_stops_at_the_end_of_a_path_without_loiter() -> None:
 
 
 @given(pose=POSES, away=st.floats(1.0, 3000.0), bearing=ANGLES, radius=st.floats(50.0, 800.0))
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 def test_turns_onto_are_one_to_each_side_the_shorter_first(
     pose: Pose, away: float, bearing: float, radius: float, integrated: Integrated
 ) -> None:

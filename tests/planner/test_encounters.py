@@ -36,7 +36,7 @@ def simulated_s(offset: FloatArray, velocity: FloatArray, speed: float) -> float
     return float(times[np.argmax(speed * times >= away)])
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(seed=SEEDS, pace=PACES, course=COURSES)
 def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float) -> None:
     each = obstacle(seed, pace, course)
@@ -48,7 +48,7 @@ def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float)
 
 @example(seed=1, pace=15.0, course=0.3, share=EARLIEST, later=0.0)
 @example(seed=1, pace=15.0, course=0.3, share=LATEST, later=LATER_S)
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(
     seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, LATER_S)
 )
@@ -66,7 +66,7 @@ def test_whoever_flies_to_any_point_of_the_outline_meets_it_where_it_is_drawn(
         assert np.hypot(*(drawn - met).T).min() <= 0.5 * SPACING + 0.5 * SPACING * math.sqrt(2.0) + 1.0
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(seed=SEEDS, pace=PACES, course=COURSES)
 def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
     seed: int, pace: float, course: float
@@ -82,7 +82,6 @@ def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
         assert off.min() < 1e-6
 
 
-@settings(deadline=None)
 @given(seed=SEEDS)
 def test_obstacles_at_rest_stay_where_they_are(seed: int) -> None:
     each = obstacle(seed, 0.0, 0.0)
@@ -92,7 +91,6 @@ def test_obstacles_at_rest_stay_where_they_are(seed: int) -> None:
     assert away.max() <= 0.5 * SPACING * math.sqrt(2.0)
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, pace=st.floats(FASTEST * SPEED, 1e4), course=COURSES)
 def test_faster_ones_are_met_after_a_bounded_time(seed: int, pace: float, course: float) -> None:
     each = obstacle(seed, pace, course)
@@ -103,7 +101,6 @@ def test_faster_ones_are_met_after_a_bounded_time(seed: int, pace: float, course
     assert (told >= away / (SPEED * (1.0 + FASTEST)) - 1e-9).all()
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, pace=PACES, course=COURSES, age_s=st.floats(0.0, 30.0))
 def test_what_was_seen_a_while_ago_has_moved_on_since(
     seed: int, pace: float, course: float, age_s: float

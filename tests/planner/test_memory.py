@@ -79,7 +79,6 @@ def scattered(seed: int, count: int, span: float) -> FloatArray:
     return np.random.default_rng(seed).uniform(-span, span, (count, 2))
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(1, 80), span=st.sampled_from([200.0, 600.0, 1500.0]))
 def test_labels_lie_between_those_of_gaps_that_are_surely_closed_and_not_surely_open(
     seed: int, count: int, span: float
@@ -90,7 +89,6 @@ def test_labels_lie_between_those_of_gaps_that_are_surely_closed_and_not_surely_
     assert is_finer(labels, components(points, 2.0 * CLEARANCE))
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, clusters=st.integers(1, 6))
 def test_clear_clusters_are_the_connected_components(seed: int, clusters: int) -> None:
     rng = np.random.default_rng(seed)
@@ -108,7 +106,6 @@ def test_clear_clusters_are_the_connected_components(seed: int, clusters: int) -
     assert is_finer(truth, labels)
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(2, 80), parts=st.integers(1, 8))
 def test_point_by_point_gives_the_same_obstacles_as_at_once(seed: int, count: int, parts: int) -> None:
     points = scattered(seed, count, 800.0)
@@ -198,7 +195,7 @@ def test_without_being_told_where_it_is_met_it_is_where_it_is() -> None:
     np.testing.assert_array_equal(memory.take_in(seen), ring(0.0, 0.0))
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(seed=SEEDS)
 def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_order(seed: int) -> None:
     """A search takes several scans: meanwhile obstacles move, others come into view, a place is refused."""
@@ -227,7 +224,7 @@ def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_o
         given_points, before = memory.points_m, memory.points_m.copy()
 
 
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 @given(seed=SEEDS)
 def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_for_what_has_gone(
     seed: int,

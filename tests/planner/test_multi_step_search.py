@@ -174,7 +174,7 @@ def test_two_circles_one_behind_the_other(ring: MakePoints) -> None:
     assert_near_the_optimum(window)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 4))
 def test_fields_of_circles(seed: int, count: int, ring: MakePoints) -> None:
     rng = np.random.default_rng(seed)
@@ -245,7 +245,7 @@ def connected(points: FloatArray, keep_m: float) -> bool:
     return any(all(part.contains(shapely.Point(end)) for end in (START, CORNER)) for part in parts)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     walls=st.lists(st.booleans(), min_size=2 * CELLS * (CELLS - 1), max_size=2 * CELLS * (CELLS - 1)),
     led=st.booleans(),

@@ -160,7 +160,7 @@ def test_flies_round_what_comes_into_view(ring: MakePoints) -> None:
     assert np.hypot(*np.diff(places, axis=0).T).sum() < 1.03 * 20_000.0
 
 
-@settings(deadline=None, max_examples=12)
+@settings(max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 6))
 def test_arrives_through_fields_of_separate_circles(
     seed: int, count: int, ring: MakePoints, assert_flyable: AssertFlyable

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from planner.curves import Limits, Point, Pose, end_of, sample
@@ -69,7 +69,6 @@ def test_a_node_that_leads_round_something_stays() -> None:
     assert len(kept) < len(nodes)
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(0, 6), nodes=st.integers(1, 8))
 def test_shortcuts_are_clear_and_never_longer(seed: int, count: int, nodes: int) -> None:
     track, points = walk(seed, nodes), spread(seed, count)
@@ -87,7 +86,6 @@ def test_shortcuts_are_clear_and_never_longer(seed: int, count: int, nodes: int)
             )
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(0, 6), nodes=st.integers(0, 6))
 def test_what_is_optimised_can_be_flown(
     seed: int, count: int, nodes: int, assert_flyable: AssertFlyable

@@ -59,7 +59,6 @@ def test_at_the_goal_the_guide_vector_has_no_length() -> None:
     assert guide_vector((3.0, 4.0), (3.0, 4.0))[2] == 0.0
 
 
-@settings(deadline=None)
 @given(seed=SEEDS, count=st.integers(1, 12))
 def test_free_sectors_are_the_bearings_on_which_a_ray_meets_nothing(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
@@ -108,7 +107,6 @@ def test_the_edges_of_a_lone_disc_are_its_two_tangents(east: float) -> None:
         assert edge.clear_m == math.inf
 
 
-@settings(deadline=None)
 @given(
     away=st.floats(1500.0, 6000.0),
     turn=st.floats(-math.pi, math.pi),
@@ -146,7 +144,7 @@ def random_window(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> 
     return window
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(seed=SEEDS, count=st.integers(2, 6))
 def test_every_edge_is_free_and_tangent(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> None:
     window = random_window(seed, count, ring, wall)
