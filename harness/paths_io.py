@@ -20,6 +20,7 @@ from aircraft.frames import LocalPlane
 from harness.given_path import SAME_PLACE_M
 from harness.input_file import InputError, read_text
 from harness.mission_items import Item, Waypoints, waypoints
+from harness.scenario_sections import ALTITUDES_M
 from harness.wording import counted
 
 FloatArray = NDArray[np.float64]
@@ -56,7 +57,8 @@ def read_path(path: Path, any_altitude: bool = False) -> GivenPath:
         any_altitude: points at different altitudes are taken, for a flight whose altitude is given otherwise.
 
     Raises:
-        InputError: the file cannot be read, is not of its format, or holds more than a path at one altitude.
+        InputError: the file cannot be read, is not of its format, or holds more than a path at one
+            altitude that can be flown.
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:
@@ -98,6 +100,12 @@ def _altitude(altitudes_m: Sequence[float], any_altitude: bool, source: str) -> 
                 f"{source}: point {number} is at {altitude:g} m, point 0 at {first:g} m; a checked path has one "
                 "altitude: level it or give --altitude-m"
             )
+    lowest, highest = ALTITUDES_M
+    if not lowest <= first <= highest:
+        raise InputError(
+            f"{source}: is at {first:g} m above the sea; must be between {lowest:g} and {highest:g} m, or give "
+            "--altitude-m"
+        )
     return first
 
 

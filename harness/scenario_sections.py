@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, mode
 SIMULATION_RATE_HZ: Final = 120
 """Integration steps per simulated second; every other rate must divide it."""
 MAX_COORDINATE_M: Final = 1e6
+ALTITUDES_M: Final = (50, 20_000)
 
 
 def key(
@@ -99,7 +100,11 @@ class MissionSpec(Section):
         le=MAX_COORDINATE_M,
     )
     altitude_m: float = key(
-        "Above mean sea level, held throughout.", unit="m", default=300.0, ge=50, le=20000
+        "Above mean sea level, held throughout.",
+        unit="m",
+        default=300.0,
+        ge=ALTITUDES_M[0],
+        le=ALTITUDES_M[1],
     )
     time_limit_s: float = key(
         "Simulated time after which the flight ends.",

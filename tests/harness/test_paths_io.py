@@ -131,6 +131,18 @@ def test_csv_with_altitudes(names: str, column: str, tmp_path: Path) -> None:
         read_path(path)
 
 
+@pytest.mark.parametrize("altitude", [20.0, 30_000.0])
+def test_an_altitude_that_cannot_be_flown_is_told_of_the_file(altitude: float, tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text(f"x_m,y_m,z_m\n1,2,{altitude}\n2,3,{altitude}\n")
+    told = (
+        f"path.csv: is at {altitude:g} m above the sea; must be between 50 and 20000 m, or give --altitude-m"
+    )
+    with pytest.raises(InputError, match=told):
+        read_path(path)
+    assert read_path(path, any_altitude=True).altitude_m is None
+
+
 def test_different_altitudes_can_be_overridden(tmp_path: Path) -> None:
     path = tmp_path / "stairs.plan"
     path.write_text(plan(item(47.0, 8.0, 100.0), item(47.1, 8.0, 150.0)))
