@@ -19,6 +19,7 @@ from aircraft.airframes import airframe
 from harness.campaign_journal import JOURNAL, columns, read_journal, rows, time_rows
 from harness.campaign_runs import CampaignRuns
 from harness.folder_lock import FolderLock
+from harness.input_file import read_index
 from harness.record import RunFolderError
 from harness.results import RESULTS, SCHEMA, TIMES, TIMINGS, table
 from harness.versions import versions
@@ -33,6 +34,7 @@ INDEX: Final = "campaign.json"
 LOCK: Final = "lock"
 RUNS: Final = "runs"
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
+MAX_INDEX_BYTES: Final = 10**9
 
 ABSENT: Final = object()
 MAX_TOLD: Final = 3
@@ -117,12 +119,14 @@ class CampaignFolder:
         if path.exists() and not path.is_dir():
             raise RunFolderError(f"{path} is a file, not a folder for a campaign")
         path.mkdir(parents=True, exist_ok=True)
-        if {each.name for each in path.iterdir()} - {LOCK, INDEX + PARTIAL} and _index(path) is None:
+        if {each.name for each in path.iterdir()} - {LOCK, INDEX + PARTIAL} and read_index(
+            path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES
+        ) is None:
             raise RunFolderError(
                 f"{path} is not empty and not a campaign's folder: choose another one or empty it first"
             )
         self._stack.callback(FolderLock(path, LOCK).release)
-        now, before = self._about(), _index(path)
+        now, before = self._about(), read_index(path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
         journal = read_journal(path)
         has_any = bool(journal.runs) or _has_rows(path / RESULTS)
         if has_any and not resume:
@@ -151,15 +155,6 @@ class CampaignFolder:
         }
         read: dict[str, Any] = json.loads(json.dumps(about))
         return read
-
-
-def _index(path: Path) -> dict[str, Any] | None:
-    """The index of a campaign's folder; None where there is none that is ours."""
-    try:
-        index = json.loads((path / INDEX).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return index if isinstance(index, dict) and index.get("schema") == FOLDER_SCHEMA else None
 
 
 def _has_rows(results: Path) -> bool:

@@ -20,6 +20,7 @@ from harness.chapters import Entry, chapter, entry, optimum_of
 from harness.compare_flights import Answer, Job, Progress, fly_all
 from harness.compare_rows import CRASHED, Row, to_csv, to_markdown
 from harness.folder_lock import FolderLock
+from harness.input_file import read_index
 from harness.optimum import Optimum
 from harness.record import RunFolderError
 from harness.run_folder import RECORDING, REPORT, load_run
@@ -154,7 +155,7 @@ def _claim(out: Path, begun: Comparison) -> FolderLock:
     try:
         out.mkdir(parents=True, exist_ok=True)
         lock = FolderLock(out)
-        if any(out.iterdir()) and not _is_comparison(out):
+        if any(out.iterdir()) and read_index(out / INDEX, SCHEMA) is None:
             lock.release()
             raise RunFolderError(
                 f"{out} is not empty and not a comparison: choose another folder or empty it first"
@@ -165,14 +166,6 @@ def _claim(out: Path, begun: Comparison) -> FolderLock:
         return lock
     except OSError as error:
         raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
-
-
-def _is_comparison(out: Path) -> bool:
-    try:
-        index = json.loads((out / INDEX).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(index, dict) and index.get("schema") == SCHEMA
 
 
 def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:

@@ -14,6 +14,7 @@ from typing import Any, Final
 from harness.falsify_keys import Vary
 from harness.falsify_search import Point
 from harness.folder_lock import FolderLock
+from harness.input_file import read_index
 from harness.record import RunFolderError
 from harness.strict_yaml import InputError
 from harness.whole_file import PARTIAL, replace_text
@@ -87,7 +88,7 @@ class SearchFolder:
             out.mkdir(parents=True, exist_ok=True)
             stack.callback(FolderLock(out).release)
             others = {each.name for each in out.iterdir()} - {TRIALS + PARTIAL, INDEX + PARTIAL}
-            if others and not _is_ours(out):
+            if others and read_index(out / INDEX, SCHEMA) is None:
                 raise RunFolderError(
                     f"{out} is not empty and not a search: choose another folder or empty it first"
                 )
@@ -139,14 +140,6 @@ def _told(out: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise RunFolderError(f"cannot write the search in {out}: {error.strerror or error}") from error
-
-
-def _is_ours(out: Path) -> bool:
-    try:
-        index = json.loads((out / INDEX).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(index, dict) and index.get("schema") == SCHEMA
 
 
 def write_index(out: Path, content: Mapping[str, Any]) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+
+MAX_JSON_BYTES: Final = 16_000_000
 
 
 class InputError(ValueError):
@@ -54,6 +57,21 @@ def read_text(path: Path, max_bytes: int, what: str) -> str:
         raise InputError(
             f"{path}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
         ) from error
+
+
+def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any] | None:
+    """A JSON file that one of our folders has; None where there is none, or it is something else.
+
+    Args:
+        path: the file.
+        schema: what its key `schema` says.
+        max_bytes: the largest that is read.
+    """
+    try:
+        index = json.loads(read_text(path, max_bytes, "an index, in JSON"))
+    except (ValueError, RecursionError):
+        return None
+    return index if isinstance(index, dict) and index.get("schema") == schema else None
 
 
 def _at_once(path: str, flags: int) -> int:

@@ -22,7 +22,7 @@ from types import TracebackType
 from typing import Any, Final
 
 from harness.folder_lock import FolderLock
-from harness.input_file import read_text
+from harness.input_file import MAX_JSON_BYTES, read_index, read_text
 from harness.plans_table import PlanRow, plan_rows, plans_table
 from harness.record import TRACK_FIELDS, AcceptedPlan, RunFolderError, Track
 from harness.versions import FLOWN_WITH, versions
@@ -45,7 +45,7 @@ REPORT_FILES = tuple(
     for kind in kinds
 )
 """What `wayproof report` adds to a run folder."""
-MAX_BYTES, MAX_JSON_BYTES = 64_000_000, 16_000_000
+MAX_BYTES = 64_000_000
 """Of a scenario and of a JSON file in the folder."""
 
 SCHEMA = "wayproof/run/1"
@@ -171,7 +171,7 @@ def load_run(path: Path) -> Run:
         RunFolderError: `path` is not a run folder, its run is incomplete, or a file of it is missing or
             damaged.
     """
-    manifest = _manifest(path)
+    manifest = read_index(path / MANIFEST, SCHEMA)
     if manifest is None:
         raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
     if manifest.get("complete") is not True:
@@ -224,7 +224,7 @@ def recording_of(path: Path) -> Path:
     if not recording.is_file():
         raise RunFolderError(f"{path} has no {RECORDING}: not a run folder, or flown with --no-recording")
     try:
-        _check(recording, _manifest(path) or {})
+        _check(recording, read_index(path / MANIFEST, SCHEMA) or {})
     except (OSError, *WRONG_CONTENT) as error:
         raise damaged(path, error) from error
     return recording
@@ -247,21 +247,12 @@ def _claim(path: Path) -> FolderLock:
     path.mkdir(parents=True, exist_ok=True)
     lock = FolderLock(path)
     others = {entry.name for entry in path.iterdir()} - {MANIFEST + PARTIAL}
-    if others and _manifest(path) is None:
+    if others and read_index(path / MANIFEST, SCHEMA) is None:
         lock.release()
         raise RunFolderError(
             f"{path} is not empty and not a run folder: choose another folder or empty it first"
         )
     return lock
-
-
-def _manifest(path: Path) -> dict[str, Any] | None:
-    """The manifest of a run folder; None where there is none that is ours."""
-    try:
-        manifest = json.loads(read_text(path / MANIFEST, MAX_JSON_BYTES, "a manifest, in JSON"))
-    except (ValueError, RecursionError):
-        return None
-    return manifest if isinstance(manifest, dict) and manifest.get("schema") == SCHEMA else None
 
 
 def _json(content: Mapping[str, Any]) -> str:

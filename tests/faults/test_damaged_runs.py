@@ -20,6 +20,12 @@ from harness.run_folder import recording_of
 from tests.faults.hostile import JSON_SNIPPETS, KEYS, as_json, spoilt, spoilt_bytes
 
 FILES = ("track.parquet", "plans.parquet", "metrics.json", "manifest.json", "scenario.yaml")
+INDICES = {
+    "manifest.json": ("fly", "paper_circles"),
+    "campaign.json": ("sweep", "forest_planners"),
+    "falsify.json": ("falsify", "paper_circles", "--vary", "environment.wind.speed_mps=0:20"),
+    "comparison.json": ("compare", "paper_circles", "--planners", "bug2"),
+}
 TREES = {"metrics.json": (JSON_SNIPPETS, as_json), "manifest.json": (JSON_SNIPPETS, as_json)}
 
 
@@ -185,3 +191,17 @@ def test_something_else_in_place_of_a_file(
             said = capsys.readouterr().err
             assert str(copy) in said
             assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", INDICES)
+@pytest.mark.parametrize("kind", ["too deep", "a pipe"])
+def test_a_folder_with_an_index_that_is_none_is_somebody_elses(
+    kind: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if kind == "a pipe":
+        os.mkfifo(tmp_path / name)
+    else:
+        (tmp_path / name).write_text("[" * 100_000)
+    assert main([*INDICES[name], "--out", str(tmp_path)]) == 2
+    assert f"{tmp_path} is not empty and not a" in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == [name]
