@@ -18,6 +18,8 @@ from harness.record import FloatArray
 
 CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 9999
+FEWEST_CASES: Final = 4
+"""Of fewer, more than a fortieth of all resamples are one case only: there is no 95 % interval."""
 BATCH: Final = 500
 """Resamples in memory at a time."""
 
@@ -31,7 +33,7 @@ class Estimate:
 
     Attributes:
         value: None where no pair gives one.
-        low: lower end; None where a single case, or one value alone, leaves nothing to resample.
+        low: lower end; None where there are fewer than `FEWEST_CASES`, or one value alone.
         high: upper end, likewise.
     """
 
@@ -109,8 +111,8 @@ def mean_estimate(differences: FloatArray, cases: IntArray) -> Estimate:
     if not len(differences):
         return Estimate()
     mean = float(differences.mean())
-    _, index = np.unique(cases, return_inverse=True)
-    if np.ptp(differences) == 0.0 or index.max() == 0:
+    different, index = np.unique(cases, return_inverse=True)
+    if np.ptp(differences) == 0.0 or len(different) < FEWEST_CASES:
         return Estimate(mean)
     from scipy import stats
 

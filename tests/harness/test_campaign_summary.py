@@ -214,6 +214,9 @@ def test_pairs_of_one_case_are_drawn_together() -> None:
     one = mean_estimate(of_case, np.arange(20))
     assert mean_estimate(np.repeat(of_case, 5), np.repeat(np.arange(20), 5)) == one
     assert mean_estimate(np.array([1.0, 0.0]), np.array([3, 3])).low is None, "a single case"
+    few, enough = np.array([1.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.5, 0.0])
+    assert mean_estimate(few, np.arange(3)).low is None, "one in 27 resamples is the least of them alone"
+    assert mean_estimate(enough, np.arange(4)).low is not None
 
 
 def test_numbers_that_differ_late_are_groups_of_their_own() -> None:
