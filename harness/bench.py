@@ -2,14 +2,15 @@
 
 All costs are processor time of the whole process, threads of libraries included, so that a ratio hides no
 work and does not count the time for which other programs had the core. Flights and bare runs take turns,
-and the least of each counts: what disturbs a measurement only ever adds to it.
+and the least of each counts: what disturbs a measurement only ever adds to it. On a machine that others share they
+take turns for longer, until the least of each has been measured twice.
 """
 
 from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,8 +20,10 @@ from harness.run import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop, s
 from harness.scenario import Scenario
 from harness.stopwatch import Stopwatch
 
-ROUNDS = 3
+FEWEST_ROUNDS, MOST_ROUNDS = 3, 10
 """Each round is one bare run, one flight without and one with the recording."""
+ALIKE = 0.01
+"""A figure is steady if two of its measurements differ by no more than this share, and no other is less."""
 
 T = TypeVar("T")
 
@@ -29,7 +32,8 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     """Measures one scenario, in this process.
 
     First the loop is flown once alone, with a stopwatch on its blocks and every update of guidance by itself: that
-    gives their shares, and loads what is loaded at its first use. Then come `ROUNDS` rounds of three measurements:
+    gives their shares, and loads what is loaded at its first use. Then come rounds of three measurements,
+    until the least of each is `ALIKE` to the next, but no more than `MOST_ROUNDS`:
 
     - bare: `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start
       in the same air, for as many steps as the flight takes; loading and trimming not counted;
@@ -42,7 +46,8 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         progress: told of the first flight as it goes on, and of each round.
 
     Returns:
-        `scenario`, `outcome`; `sim_s` and `steps` of the flight; `cpu_s`, the least seconds of `bare`,
+        `scenario`, `outcome`; `sim_s` and `steps` of the flight; `rounds`, how many there were, and whether the
+        least of each is `steady`; `cpu_s`, the least seconds of `bare`,
         `closed_loop` and `closed_loop_recording`; `bare_step_us`; the ratios `closed_loop_ratio` and
         `closed_loop_recording_ratio` of those to `bare`; `planner_ms`, `p50`, `p99` and `max` of all searches
         of a flight, the least of all flights; `blocks`, the share of each block in the flight with the
@@ -61,28 +66,34 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     steps = round(flight.sim_s * loop.model.step_rate_hz)
     if not steps or not flight.compute_ms:
         raise ValueError(f"nothing to measure: {flight.reason}")
-    bare_s: list[float] = []
-    plain: list[tuple[float, dict[str, Any]]] = []
-    recorded: list[tuple[float, dict[str, Any]]] = []
-    for number in range(1, ROUNDS + 1):
+    taken: dict[str, list[float]] = {"bare": [], "closed_loop": [], "closed_loop_recording": []}
+    searches: list[Mapping[str, float]] = []
+    for number in range(1, MOST_ROUNDS + 1):
         if progress is not None:
-            progress(flight.sim_s, 0.0, f"round {number} of {ROUNDS}")
-        bare_s.append(_bare_s(scenario, steps))
-        plain.append(_flown(scenario, recording=False))
-        recorded.append(_flown(scenario, recording=True))
-    bare, closed, recording = min(bare_s), _least(plain), _least(recorded)
-    searches = [figures["compute_ms"] for _, figures in (*plain, *recorded)]
+            progress(flight.sim_s, 0.0, f"round {number}")
+        taken["bare"].append(_bare_s(scenario, steps))
+        for name, recording in (("closed_loop", False), ("closed_loop_recording", True)):
+            cpu_s, figures = _flown(scenario, recording=recording)
+            taken[name].append(cpu_s)
+            searches.append(figures["compute_ms"])
+        steady = all(map(_steady, taken.values()))
+        if steady and number >= FEWEST_ROUNDS:
+            break
+    least = {name: min(seconds) for name, seconds in taken.items()}
+    bare, closed, recorded = least.values()
     return {
         "scenario": scenario.name,
         "outcome": flight.outcome.value,
         "sim_s": flight.sim_s,
         "steps": steps,
-        "cpu_s": {"bare": bare, "closed_loop": closed, "closed_loop_recording": recording},
+        "rounds": number,
+        "steady": steady,
+        "cpu_s": least,
         "bare_step_us": 1e6 * bare / steps,
         "closed_loop_ratio": closed / bare,
-        "closed_loop_recording_ratio": recording / bare,
+        "closed_loop_recording_ratio": recorded / bare,
         "planner_ms": {name: min(each[name] for each in searches) for name in ("p50", "p99", "max")},
-        "blocks": block_shares(in_loop, closed, max(recording, closed)),
+        "blocks": block_shares(in_loop, closed, max(recorded, closed)),
     }
 
 
@@ -129,8 +140,10 @@ def _flown(scenario: Scenario, *, recording: bool) -> tuple[float, dict[str, Any
         return _cpu_s(lambda: fly_to_folder(scenario, Path(folder) / "run", recording))
 
 
-def _least(flights: Iterable[tuple[float, Any]]) -> float:
-    return min(seconds for seconds, _ in flights)
+def _steady(seconds: Sequence[float]) -> bool:
+    """Whether the least of some measurements was measured twice."""
+    least = sorted(seconds)[:2]
+    return least[-1] <= (1.0 + ALIKE) * least[0] and len(least) == 2
 
 
 def _cpu_s(action: Callable[[], T]) -> tuple[float, T]:

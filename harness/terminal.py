@@ -124,6 +124,7 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
         "closed loop": f"{result['closed_loop_ratio']:.3f} of bare JSBSim",
         "with recording": f"{result['closed_loop_recording_ratio']:.3f} of bare JSBSim",
         "planner": ", ".join(f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")),
+        "rounds": f"{result['rounds']}, {'steady' if result['steady'] else 'not steady: the machine is busy'}",
     }
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -87,35 +88,65 @@ def test_leaves_no_file_behind(result: dict[str, Any]) -> None:
 
 
 def test_tells_of_every_round(result: dict[str, Any]) -> None:
-    states = [state for _, _, state in result["told"]]
-    assert states[-3:] == ["round 1 of 3", "round 2 of 3", "round 3 of 3"]
-    assert len(states) > 3
+    states, rounds = [state for _, _, state in result["told"]], result["rounds"]
+    assert states[-rounds:] == [f"round {number}" for number in range(1, rounds + 1)]
+    assert len(states) > rounds >= 3
 
 
-def test_the_least_of_each_measurement_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With planted costs: a bare run of 4, 2, 5 s, flights of 8, 7, 6 s, recorded ones of 9, 12, 10 s."""
-    bare, flights = iter([4.0, 2.0, 5.0]), iter([8.0, 9.0, 7.0, 12.0, 6.0, 10.0])
-    figures = iter({"p50": float(i), "p99": 10.0 + i, "max": 20.0 + i} for i in (5, 4, 3, 7, 9, 8))
-    recordings: list[bool] = []
-    steps: list[int] = []
+Planted = Callable[[list[float], list[float], list[float]], dict[str, Any]]
 
-    def bare_s(_: Scenario, count: int) -> float:
-        steps.append(count)
-        return next(bare)
 
-    def flown(_: Scenario, *, recording: bool) -> tuple[float, dict[str, Any]]:
-        recordings.append(recording)
-        return next(flights), {"compute_ms": next(figures)}
+@pytest.fixture
+def planted(monkeypatch: pytest.MonkeyPatch) -> Planted:
+    """A bench with planted costs: of bare runs, of flights, of recorded ones."""
 
-    monkeypatch.setattr(harness.bench, "_bare_s", bare_s)
-    monkeypatch.setattr(harness.bench, "_flown", flown)
-    result = bench(scenario())
-    assert recordings == [False, True] * 3
-    assert steps == [result["steps"]] * 3
+    def measured(bare: list[float], flights: list[float], recorded: list[float]) -> dict[str, Any]:
+        left = {"bare": iter(bare), False: iter(flights), True: iter(recorded)}
+        figures = iter({"p50": 9.0 - i, "p99": 10.0 + i, "max": 20.0 + i % 4} for i in range(20))
+        in_turn: list[str | bool] = []
+
+        def cost(what: str | bool) -> float:
+            in_turn.append(what)
+            return next(left[what])
+
+        def bare_s(_: Scenario, count: int) -> float:
+            steps.append(count)
+            return cost("bare")
+
+        def flown(_: Scenario, *, recording: bool) -> tuple[float, dict[str, Any]]:
+            return cost(recording), {"compute_ms": next(figures)}
+
+        steps: list[int] = []
+        monkeypatch.setattr(harness.bench, "_bare_s", bare_s)
+        monkeypatch.setattr(harness.bench, "_flown", flown)
+        result = bench(scenario())
+        assert in_turn == ["bare", False, True] * result["rounds"]
+        assert steps == [result["steps"]] * result["rounds"]
+        return result
+
+    return measured
+
+
+def test_the_least_of_each_measurement_counts(planted: Planted) -> None:
+    result = planted([4.0, 2.0, 2.0], [8.0, 6.0, 6.0], [9.0, 12.0, 9.0])
     assert result["cpu_s"] == {"bare": 2.0, "closed_loop": 6.0, "closed_loop_recording": 9.0}
     assert (result["closed_loop_ratio"], result["closed_loop_recording_ratio"]) == (3.0, 4.5)
-    assert result["planner_ms"] == {"p50": 3.0, "p99": 13.0, "max": 23.0}
+    assert result["planner_ms"] == {"p50": 4.0, "p99": 10.0, "max": 20.0}
     assert result["blocks"]["recording"] == pytest.approx(3.0 / 9.0)
+    assert (result["rounds"], result["steady"]) == (3, True)
+
+
+def test_rounds_go_on_until_the_least_of_each_was_measured_twice(planted: Planted) -> None:
+    result = planted([2.0, 2.0, 2.0, 2.0, 1.99], [8.0, 6.0, 7.0, 5.0, 5.04], [9.0, 9.0, 9.0, 9.0, 9.0])
+    assert (result["rounds"], result["steady"]) == (5, True)
+    assert result["closed_loop_ratio"] == 5.0 / 1.99
+
+
+def test_a_machine_that_never_rests_is_told(planted: Planted) -> None:
+    falling = [20.0 - each for each in range(10)]
+    result = planted(falling, [3.0] * 10, [4.0] * 10)
+    assert (result["rounds"], result["steady"]) == (10, False)
+    assert bench_rows(result)["rounds"] == "10, not steady: the machine is busy"
 
 
 def test_a_flight_without_a_plan_cannot_be_measured(monkeypatch: pytest.MonkeyPatch) -> None:
