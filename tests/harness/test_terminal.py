@@ -90,6 +90,8 @@ def test_progress_on_a_terminal_shows_time_and_distance_to_go(
 def test_the_table_of_a_bench_has_every_block() -> None:
     rows = bench_rows(
         {
+            "rounds": 4,
+            "steady": True,
             "closed_loop_ratio": 1.4321,
             "closed_loop_recording_ratio": 1.7,
             "planner_ms": {"p50": 0.1, "p99": 2.5, "max": 9.0},
@@ -98,5 +100,6 @@ def test_the_table_of_a_bench_has_every_block() -> None:
     )
     assert rows["closed loop"] == "1.432 of bare JSBSim"
     assert rows["planner"] == "p50 0.10 ms, p99 2.50 ms, max 9.00 ms"
+    assert rows["rounds"] == "4, steady"
     assert rows["  dynamics"] == "75.0%"
     assert rows["  planner"] == "5.0%"
