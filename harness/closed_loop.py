@@ -254,13 +254,13 @@ class _Plans:
         flown = self.accepted[-1].plan if self.accepted else None
         speed = max(state.groundspeed_mps, 1e-9)
         request = PlanRequest(
-            time_s=state.time_s,
-            position_m=(state.east_m, state.north_m),
-            direction=(state.velocity_east_mps / speed, state.velocity_north_mps / speed),
-            seen=self._loop.seen,
-            flown=flown,
-            station_m=station_m if flown else 0.0,
-            scanned=self._scanned,
+            state.time_s,
+            (state.east_m, state.north_m),
+            (state.velocity_east_mps / speed, state.velocity_north_mps / speed),
+            self._loop.seen,
+            flown,
+            station_m if flown else 0.0,
+            self._scanned,
         )
         self._scanned = False
         begun = time.perf_counter()
@@ -274,8 +274,9 @@ class _Plans:
         compute_ms = 1e3 * (time.perf_counter() - begun)
         self._told = plan.reason
         self.go_on = plan.goes_on
-        if plan.status is not PlanStatus.KEPT:
-            self.compute_ms.append(compute_ms)
+        if plan.status is PlanStatus.KEPT:
+            return None
+        self.compute_ms.append(compute_ms)
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
             return Outcome.UNREACHABLE, in_a_line(plan.reason)
         if plan.status is PlanStatus.NO_PATH:

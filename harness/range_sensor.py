@@ -109,16 +109,15 @@ class _Unread(RangeScan):
     """A scan whose rays are followed when somebody first reads their ranges: few scans are news to anybody."""
 
     @classmethod
-    def of(cls, face_m: float, attributes: dict[str, Any]) -> _Unread:
+    def of(cls, attributes: dict[str, Any]) -> _Unread:
         """A scan of which all is known but the ranges.
 
         Args:
-            face_m: distance to the nearest face in range, ahead or not; +inf if there is none.
-            attributes: all others, by name; and either the ranges or, as `_follow`, what gives them.
+            attributes: by name; either the ranges are among them or, as `_follow`, what gives them.
         """
         scan = cls.__new__(cls)
         # At once: a frozen dataclass would set them one by one, and that is most of the cost of a scan.
-        scan.__dict__.update(attributes, nearest_m=face_m)
+        scan.__dict__.update(attributes)
         return scan
 
     def __getattr__(self, name: str) -> FloatArray:
@@ -181,12 +180,12 @@ class RangeSensor:
         if self._flawed:  # what is drawn at random is drawn now, scan by scan
             ranges = self._fan.ranges_m(faces, east_m, north_m, heading_rad)
             return RangeScan(ranges_m=self._degraded(ranges), **seen)
-        face_m = self._nearest(faces, east_m, north_m)
+        seen["nearest_m"] = face_m = self._nearest(faces, east_m, north_m)
         if face_m == math.inf:  # nothing to follow rays to
             seen["ranges_m"] = self._fan.nothing
         else:
             seen["_follow"] = partial(self._fan.ranges_m, faces, east_m, north_m, heading_rad)
-        return _Unread.of(face_m, seen)
+        return _Unread.of(seen)
 
     def _near(self, east: float, north: float, time: float) -> Surroundings:
         """All that is in range, from the neighbour list; this renews the list when it runs out."""

@@ -119,10 +119,11 @@ class Surroundings:
         self._faces = faces
         self._circle_motions = circle_motions
         self._edge_motions = edge_motions
+        self._still = not (circle_motions.matter or edge_motions.matter)
 
     def faces(self, time_s: float) -> Faces:
         """Those that are there at a time of the interval, where they are then."""
-        if not (self._circle_motions.matter or self._edge_motions.matter):
+        if self._still:
             return self._faces
         circles, edges = self._faces.circles_m, self._faces.edges_m
         if self._circle_motions.matter:
