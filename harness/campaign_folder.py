@@ -119,14 +119,12 @@ class CampaignFolder:
         if path.exists() and not path.is_dir():
             raise RunFolderError(f"{path} is a file, not a folder for a campaign")
         path.mkdir(parents=True, exist_ok=True)
-        if {each.name for each in path.iterdir()} - {LOCK, INDEX + PARTIAL} and read_index(
-            path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES
-        ) is None:
+        if {each.name for each in path.iterdir()} - {LOCK, INDEX + PARTIAL} and _index(path) is None:
             raise RunFolderError(
                 f"{path} is not empty and not a campaign's folder: choose another one or empty it first"
             )
         self._stack.callback(FolderLock(path, LOCK).release)
-        now, before = self._about(), read_index(path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
+        now, before = self._about(), _index(path)
         journal = read_journal(path)
         has_any = bool(journal.runs) or _has_rows(path / RESULTS)
         if has_any and not resume:
@@ -155,6 +153,11 @@ class CampaignFolder:
         }
         read: dict[str, Any] = json.loads(json.dumps(about))
         return read
+
+
+def _index(path: Path) -> dict[str, Any] | None:
+    """The index of a campaign's folder, which holds all its scenarios; None where there is none that is ours."""
+    return read_index(path / INDEX, FOLDER_SCHEMA, MAX_INDEX_BYTES)
 
 
 def _has_rows(results: Path) -> bool:
