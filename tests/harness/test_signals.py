@@ -42,35 +42,24 @@ def test_one_is_held_back_until_it_is_called_for(number: signal.Signals) -> None
         assert signal.getsignal(number) is before
 
 
-def test_the_end_of_the_block_is_a_call() -> None:
-    reached = False
+@pytest.mark.parametrize("again_s", [signals.AGAIN_S, -1.0], ids=["first", "again"])
+def test_a_block_that_never_calls_is_ended_all_the_same(
+    again_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first one at its end, one that comes again where it is."""
+    monkeypatch.setattr(signals, "AGAIN_S", again_s)
+    went_on = False
 
     def never_calls() -> None:
-        nonlocal reached
+        nonlocal went_on
         with held_back():
             signal.raise_signal(signal.SIGINT)
-            reached = True
+            went_on = True
 
     with pytest.raises(KeyboardInterrupt):
         never_calls()
-    assert reached
+    assert went_on == (again_s > 0.0)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_one_that_comes_again_is_not_held_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What never calls for it can be ended all the same."""
-    monkeypatch.setattr(signals, "AGAIN_S", -1.0)
-    reached = False
-
-    def never_calls() -> None:
-        nonlocal reached
-        with held_back():
-            signal.raise_signal(signal.SIGINT)
-            reached = True
-
-    with pytest.raises(KeyboardInterrupt):
-        never_calls()
-    assert not reached
 
 
 def test_a_signal_that_is_ignored_stays_so() -> None:
