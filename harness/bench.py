@@ -1,9 +1,10 @@
 """What the closed loop costs on this machine, against the bare flight model.
 
 All costs are processor time of the whole process, threads of libraries included, so that a ratio hides no
-work and does not count the time for which other programs had the core. Flights and bare runs take turns,
-and the least of each counts: what disturbs a measurement only ever adds to it. On a machine that others share they
-take turns for longer, until the least of each has been measured twice.
+work and does not count the time for which other programs had the core. On a machine that others share, its speed
+changes from one second to the next: so a flight and its bare run take turns, half a minute of flight each, and
+only their ratio counts. The one flown while the machine was fastest is taken, as what disturbs a measurement costs the
+loop more, which needs more of the caches than the model alone.
 """
 
 from __future__ import annotations
@@ -11,19 +12,24 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from aircraft.interface import AircraftState
 from harness.closed_loop import Loop, Progress, fly
+from harness.range_sensor import RangeScan
+from harness.record import AcceptedPlan, Track
 from harness.run import atmosphere, fly_to_folder, jsbsim_aircraft, make_loop, start_conditions
 from harness.scenario import Scenario
 from harness.stopwatch import Stopwatch
 
 FEWEST_ROUNDS, MOST_ROUNDS = 3, 10
-"""Each round is one bare run, one flight without and one with the recording."""
+"""Each round is one flight without and one with the recording, both in turns with the bare model."""
+TURN_S = 30.0
+"""The bare model follows the flight in turns of so long, simulated."""
 ALIKE = 0.01
-"""A figure is steady if two of its measurements differ by no more than this share, and no other is less."""
+"""A ratio is steady if the two flown while the machine was fastest differ by no more than this share."""
 
 T = TypeVar("T")
 
@@ -32,68 +38,69 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     """Measures one scenario, in this process.
 
     First the loop is flown once alone, with a stopwatch on its blocks and every update of guidance by itself: that
-    gives their shares, and loads what is loaded at its first use. Then come rounds of three measurements,
-    until the least of each is `ALIKE` to the next, but no more than `MOST_ROUNDS`:
+    gives their shares, and loads what is loaded at its first use. Then come rounds of two flights, until both ratios
+    are steady, but no more than `MOST_ROUNDS`:
 
-    - bare: `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed start
-      in the same air, for as many steps as the flight takes; loading and trimming not counted;
     - closed loop: the whole flight from the scenario to a complete run folder without the recording:
       loading, trimming, flying, metrics, writing and closing every file;
     - the same with the recording.
+
+    Either takes turns with `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed
+    start in the same air, for as many steps as the flight takes; its loading and trimming are not counted.
 
     Args:
         scenario: a complete scenario.
         progress: told of the first flight as it goes on, and of each round.
 
     Returns:
-        `scenario`, `outcome`; `sim_s` and `steps` of the flight; `rounds`, how many there were, and whether the
-        least of each is `steady`; `cpu_s`, the least seconds of `bare`,
-        `closed_loop` and `closed_loop_recording`; `bare_step_us`; the ratios `closed_loop_ratio` and
-        `closed_loop_recording_ratio` of those to `bare`; `planner_ms`, `p50`, `p99` and `max` of all searches
-        of a flight, the least of all flights; `blocks`, the share of each block in the flight with the
-        recording.
+        `scenario`, `outcome`; `sim_s` and `steps` of the flight; `rounds`, how many there were, and whether both
+        ratios are `steady`; `cpu_s`, for `closed_loop` and `closed_loop_recording` the seconds of `bare` and `flight`;
+        `bare_step_us` in the first of them; the ratios `closed_loop_ratio` and `closed_loop_recording_ratio`;
+        `planner_ms`, `p50`, `p99` and `max` of all searches of a flight, the least of all flights; `blocks`, the share
+        of each block in the flight with the recording.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
         ValueError: the flight is over before anything was planned or flown, so there is nothing to compare.
     """
-    watch = Stopwatch()
+    watch, bare = Stopwatch(), _Bare(scenario)
     loop = watched(make_loop(scenario), watch)
-    loop_s, flight = _cpu_s(lambda: fly(loop, (), progress))
-    cpu = loop_s / flight.wall_s
-    in_loop = {block: cpu * seconds for block, seconds in watch.seconds.items()}
-    in_loop["loop"] = loop_s - sum(in_loop.values())
-    steps = round(flight.sim_s * loop.model.step_rate_hz)
-    if not steps or not flight.compute_ms:
+    whole_s, flight = _cpu_s(lambda: fly(loop, [bare], progress))
+    if not bare.steps or not flight.compute_ms:
         raise ValueError(f"nothing to measure: {flight.reason}")
-    taken: dict[str, list[float]] = {"bare": [], "closed_loop": [], "closed_loop_recording": []}
-    searches: list[Mapping[str, float]] = []
+    in_loop = {block: whole_s / flight.wall_s * seconds for block, seconds in watch.seconds.items()}
+    in_loop["loop"] = whole_s - bare.cpu_s - sum(in_loop.values())
+    taken: dict[bool, list[_Turns]] = {False: [], True: []}
     for number in range(1, MOST_ROUNDS + 1):
         if progress is not None:
             progress(flight.sim_s, 0.0, f"round {number}")
-        taken["bare"].append(_bare_s(scenario, steps))
-        for name, recording in (("closed_loop", False), ("closed_loop_recording", True)):
-            cpu_s, figures = _flown(scenario, recording=recording)
-            taken[name].append(cpu_s)
-            searches.append(figures["compute_ms"])
+        for recording, turns in taken.items():
+            turns.append(_in_turns(scenario, recording))
         steady = all(map(_steady, taken.values()))
         if steady and number >= FEWEST_ROUNDS:
             break
-    least = {name: min(seconds) for name, seconds in taken.items()}
-    bare, closed, recorded = least.values()
+    closed, recorded = (min(turns, key=_bare_s) for turns in taken.values())
+    searches = [each.figures["compute_ms"] for turns in taken.values() for each in turns]
     return {
         "scenario": scenario.name,
         "outcome": flight.outcome.value,
         "sim_s": flight.sim_s,
-        "steps": steps,
+        "steps": bare.steps,
         "rounds": number,
         "steady": steady,
-        "cpu_s": least,
-        "bare_step_us": 1e6 * bare / steps,
-        "closed_loop_ratio": closed / bare,
-        "closed_loop_recording_ratio": recorded / bare,
+        "cpu_s": {
+            name: {"bare": each.bare_s, "flight": each.flight_s}
+            for name, each in (("closed_loop", closed), ("closed_loop_recording", recorded))
+        },
+        "bare_step_us": 1e6 * closed.bare_s / bare.steps,
+        "closed_loop_ratio": closed.ratio,
+        "closed_loop_recording_ratio": recorded.ratio,
         "planner_ms": {name: min(each[name] for each in searches) for name in ("p50", "p99", "max")},
-        "blocks": block_shares(in_loop, closed, max(recorded, closed)),
+        "blocks": block_shares(
+            {block: seconds / bare.cpu_s for block, seconds in in_loop.items()},
+            closed.ratio,
+            max(recorded.ratio, closed.ratio),
+        ),
     }
 
 
@@ -110,40 +117,87 @@ def watched(loop: Loop, watch: Stopwatch) -> Loop:
     )
 
 
-def block_shares(in_loop: Mapping[str, float], closed_s: float, recording_s: float) -> dict[str, float]:
+def block_shares(in_loop: Mapping[str, float], closed: float, recorded: float) -> dict[str, float]:
     """Share of each block in a whole flight with the recording; they sum to 1.
 
     What comes before and after the loop (loading, metrics, files) is booked to `record`, what the recording
     adds to `recording`.
 
     Args:
-        in_loop: seconds of each block in a flight of the loop alone.
-        closed_s: processor time of the whole flight without the recording.
-        recording_s: that of the whole flight with it, not less.
+        in_loop: cost of each block in a flight of the loop alone, in any unit.
+        closed: cost of the whole flight without the recording.
+        recorded: that of the whole flight with it, not less.
     """
-    loop_s = sum(in_loop.values())
-    scale = min(1.0, closed_s / loop_s)  # the lone flight may have been disturbed
-    seconds = {block: each * scale for block, each in in_loop.items()}
-    seconds["record"] = seconds.get("record", 0.0) + closed_s - scale * loop_s
-    seconds["recording"] = recording_s - closed_s
-    return {block: each / recording_s for block, each in seconds.items()}
+    loop = sum(in_loop.values())
+    scale = min(1.0, closed / loop)  # the lone flight may have been disturbed
+    costs = {block: each * scale for block, each in in_loop.items()}
+    costs["record"] = costs.get("record", 0.0) + closed - scale * loop
+    costs["recording"] = recorded - closed
+    return {block: each / recorded for block, each in costs.items()}
 
 
-def _bare_s(scenario: Scenario, steps: int) -> float:
-    model = jsbsim_aircraft(scenario, start_conditions(scenario), atmosphere(scenario))
-    return _cpu_s(lambda: model.advance(steps))[0]
+class _Bare:
+    """Flies the bare model as far as the flight that it observes has come."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._model = jsbsim_aircraft(scenario, start_conditions(scenario), atmosphere(scenario))
+        self.cpu_s, self.steps, self._turn_s = 0.0, 0, TURN_S
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        if state.time_s >= self._turn_s:
+            self._turn_s = state.time_s + TURN_S
+            self._fly_to(state.time_s)
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        pass
+
+    def on_block(self, block: Track) -> None:
+        pass
+
+    def on_event(self, time_s: float, text: str) -> None:
+        self._fly_to(time_s)
+
+    def _fly_to(self, time_s: float) -> None:
+        steps = round(time_s * self._model.step_rate_hz) - self.steps
+        begun = time.thread_time()  # what another thread does meanwhile, it does for the flight
+        self._model.advance(steps)
+        self.cpu_s += time.thread_time() - begun
+        self.steps += steps
 
 
-def _flown(scenario: Scenario, *, recording: bool) -> tuple[float, dict[str, Any]]:
-    """Processor time and figures of one flight into a folder that is thrown away."""
+@dataclass(frozen=True)
+class _Turns:
+    """What a flight and its bare run cost in turns, and the flight's figures."""
+
+    bare_s: float
+    flight_s: float
+    figures: Mapping[str, Any]
+
+    @property
+    def ratio(self) -> float:
+        return self.flight_s / self.bare_s
+
+
+def _in_turns(scenario: Scenario, recording: bool) -> _Turns:
+    """One flight into a folder that is thrown away."""
+    bare = _Bare(scenario)
     with tempfile.TemporaryDirectory(prefix="wayproof-bench-") as folder:
-        return _cpu_s(lambda: fly_to_folder(scenario, Path(folder) / "run", recording))
+        whole_s, figures = _cpu_s(
+            lambda: fly_to_folder(scenario, Path(folder) / "run", recording, watching=[bare])
+        )
+    return _Turns(bare.cpu_s, whole_s - bare.cpu_s, figures)
 
 
-def _steady(seconds: Sequence[float]) -> bool:
-    """Whether the least of some measurements was measured twice."""
-    least = sorted(seconds)[:2]
-    return least[-1] <= (1.0 + ALIKE) * least[0] and len(least) == 2
+def _bare_s(turns: _Turns) -> float:
+    return turns.bare_s
+
+
+def _steady(taken: Sequence[_Turns]) -> bool:
+    """Whether the two flown while the machine was fastest have the same ratio."""
+    low, high = (
+        sorted(turns.ratio for turns in sorted(taken, key=_bare_s)[:2]) if len(taken) > 1 else (0.0, 1.0)
+    )
+    return high <= (1.0 + ALIKE) * low
 
 
 def _cpu_s(action: Callable[[], T]) -> tuple[float, T]:

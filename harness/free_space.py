@@ -7,12 +7,11 @@ import math
 import numpy as np
 
 from harness.edge_grid import MOST_CELLS
+from harness.looked_through import through_cells
 from harness.range_sensor import RangeScan, all_round
-from planner.compiled import BOOL, FLOAT, FLOATS, GRID, ROWS, compiled
+from planner.compiled import BOOLS_OUT, FLOAT, GRID, ROWS, compiled
 from planner.interface import BoolArray, FloatArray
 
-CELLS, CELLS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]"
-"""Parts of grids."""
 NARROWEST_RAD = 1e-3
 """What something hides is told by bearings no finer than this."""
 
@@ -52,7 +51,7 @@ class FreeSpace:
         x_first, y_first, x_low, x_high, y_low, y_high = self._window(scan, len(self._disc) // 2)
         if x_low >= x_high or y_low >= y_high:
             return
-        _look_through(
+        through_cells(
             self._seen[x_low:x_high, y_low:y_high],
             self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first],
             scan.ranges_m,
@@ -76,8 +75,11 @@ class FreeSpace:
         Returns:
             Whether any of it does: an edge point with free cells all about it.
         """
-        edges_m = edges_m[self.contains(edges_m)]
-        if not (len(edges_m) and self.surrounds(edges_m).any()):
+        free = np.zeros(len(edges_m), dtype=np.bool_)
+        if not self._count_free(free, edges_m):
+            return False
+        edges_m = edges_m[free]
+        if not self.surrounds(edges_m).any():
             return False
         _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
         seen = self._seen[x_low:x_high, y_low:y_high]
@@ -124,78 +126,26 @@ class FreeSpace:
 
     def contains(self, points_m: FloatArray) -> BoolArray:
         """(k,) whether each point lies in a cell seen to be free."""
-        return _contains(self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
+        free = np.zeros(len(points_m), dtype=np.bool_)
+        self._count_free(free, points_m)
+        return free
+
+    def _count_free(self, free: BoolArray, points_m: FloatArray) -> int:
+        """How many of (k, 2) points lie in free cells; (k,) `free` becomes true for these."""
+        return _count_free(free, self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
 
 
-@compiled(CELLS_OUT, CELLS, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT)
-def _look_through(
-    seen: BoolArray,
-    disc: BoolArray,
-    ranges: FloatArray,
-    x_first: float,
-    y_first: float,
-    cell: float,
-    start_rad: float,
-    spacing_rad: float,
-    closed: bool,
-    reach: float,
-    noise: float,
-) -> None:
-    """Marks the cells of a disc about the sensor that all rays which meet them went beyond, and one to either side.
-
-    So many rays to either side of the one towards its middle, or up to twice as many: 2^k - 1. The ends of the fan
-    are joined.
-
-    Args:
-        seen: cells seen to be free.
-        disc: of these, those to be asked.
-        ranges: of all rays.
-        x_first: corner of the first cell, from the sensor.
-        y_first: corner of the first cell, from the sensor.
-        cell: width of a cell.
-        start_rad: bearing of the first ray.
-        spacing_rad: of the rays.
-        closed: the last ray is the neighbour of the first.
-        reach: ranges count up to this one.
-        noise: so much further than a cell the rays have to go.
-    """
-    rays, half = len(ranges), 0.75 * cell
-    for column in range(seen.shape[0]):
-        x = (column + 0.5) * cell + x_first
-        for row in range(seen.shape[1]):
-            # Most of what is in reach has been seen from the places before.
-            if seen[column, row] or not disc[column, row]:
-                continue
-            y = (row + 0.5) * cell + y_first
-            distance = math.sqrt(x * x + y * y)
-            beyond = distance + half + noise
-            if beyond >= reach:
-                continue
-            clockwise = math.atan2(x, y) - start_rad
-            while clockwise < 0.0:
-                clockwise += math.tau
-            ray = round(clockwise / spacing_rad)
-            level = math.ceil(half / spacing_rad / max(distance, half)) + 1
-            if not closed and not level <= ray < rays - level:
-                continue
-            wide = 1
-            while wide <= level:
-                wide *= 2
-            beside, left = (ray - wide + 1) % rays, 2 * wide - 1
-            while left and ranges[beside] > beyond:
-                beside = beside + 1 if beside + 1 < rays else 0
-                left -= 1
-            seen[column, row] = not left
-
-
-@compiled(GRID, ROWS, FLOAT, FLOAT, FLOAT)
-def _contains(seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float) -> BoolArray:
-    out = np.zeros(len(points), dtype=np.bool_)
+@compiled(BOOLS_OUT, GRID, ROWS, FLOAT, FLOAT, FLOAT)
+def _count_free(
+    free: BoolArray, seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float
+) -> int:
+    many = 0
     for i in range(len(points)):
         column, row = math.floor((points[i, 0] - x0) / cell), math.floor((points[i, 1] - y0) / cell)
         if 0 <= column < seen.shape[0] and 0 <= row < seen.shape[1]:
-            out[i] = seen[column, row]
-    return out
+            free[i] = seen[column, row]
+            many += free[i]
+    return many
 
 
 def _disc(cells: int) -> BoolArray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.compiled import BOOL, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS, PLACES, compiled
+from planner.compiled import BOOL, COUNT, COUNTS, COUNTS_OUT, FLOAT, FLOATS, PLACES, PLACES_OUT, compiled
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 CONFIRMED = 2
@@ -22,7 +22,7 @@ CORNER = 0.3
 """Sine of the turn from which on a wall has a corner."""
 
 SCORES, SLOTS = "Array(int8, 1, 'C', readonly=True)", "Array(int32, 1, 'C', readonly=True)"
-SCORES_OUT, SLOTS_OUT, PLACES_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128[::1]", "complex128"
+SCORES_OUT, SLOTS_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128"
 
 
 @compiled(COUNTS, PLACES, SCORES, SLOTS, FLOAT, COUNT, COUNT, BOOL, FLOAT, COUNT)
@@ -194,3 +194,44 @@ def count_hits(
             raised = 1
             since[slot[cell]] = revision + 1
     return known, revision + raised, unconfirmed
+
+
+@compiled(
+    FLOAT,
+    COUNT,
+    COUNT,
+    BOOL,
+    FLOAT,
+    COUNTS,
+    PLACES,
+    SCORES_OUT,
+    SLOTS_OUT,
+    PLACES_OUT,
+    COUNTS_OUT,
+    COUNTS_OUT,
+    COUNT,
+    COUNT,
+    COUNT,
+    PLACE,
+)
+def count_news(
+    cell_m: float,
+    rows: int,
+    rays: int,
+    closed: bool,
+    join_m: float,
+    hits: IntArray,
+    places: ComplexArray,
+    score: NDArray[np.int8],
+    slot: NDArray[np.int32],
+    points: ComplexArray,
+    cell_of: IntArray,
+    since: IntArray,
+    known: int,
+    revision: int,
+    first_score: int,
+    corner: complex,
+) -> tuple[int, int, bool]:
+    """`count_hits` of what is `news`; there is room for `PARTS` times as many points as hits."""
+    cells, found = news(hits, places, score, slot, cell_m, rows, rays, closed, join_m, first_score)
+    return count_hits(cells, found, score, slot, points, cell_of, since, known, revision, first_score, corner)

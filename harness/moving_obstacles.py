@@ -93,10 +93,13 @@ class MovingObstacles:
         self._time_s = 0.0
 
     @property
+    def follows(self) -> bool:
+        """Whether anything may move."""
+        return len(self._tracks) > 0
+
+    @property
     def found(self) -> tuple[MovingEdges, ...]:
         """What is known to move, or has just appeared, as it was at the time of the last scan."""
-        if not self._tracks:
-            return ()
         return tuple(
             MovingEdges(
                 self._time_s,
@@ -206,8 +209,7 @@ class MovingObstacles:
     def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
         """Rays that returned something, but for false returns, and where."""
         if not self._false_returns:
-            hits, from_sensor = scan.returned
-            return hits, from_sensor + complex(scan.east_m, scan.north_m)
+            return scan.returned()
         hits = supported(scan, self._apart).nonzero()[0]
         return hits, scan.ends_m(hits)
 

@@ -10,14 +10,15 @@ one lost return opens none. The grids cover the area with a border, so that the 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.edge_grid import EdgeGrid
-from harness.hit_counting import CONFIRMED, count_hits, ends, news
+from harness.hit_counting import CONFIRMED, PARTS, count_hits, count_news, ends, news
 from harness.range_sensor import RangeScan, all_round, supported
-from harness.scan_comparison import looked_through, near_any
+from harness.scan_comparison import count_looked_through, near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 SUPPORT = 0.5
@@ -135,11 +136,9 @@ class ObstacleMap:
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
         self._unconfirmed = False
-        hits, from_sensor = self._hits(scan, ignored)
+        hits, places = self._hits(scan, ignored)
         if not len(hits):
             return
-        # Places are points seen from the corner of the grid.
-        places = from_sensor + (complex(scan.east_m, scan.north_m) - self._origin)
         if not self._holds(scan):
             column, row = self._column_and_row(places)
             on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
@@ -148,10 +147,11 @@ class ObstacleMap:
                 return
         rays, cell, join, first = len(scan.ranges_m), self._cell, self._join, self._first_score
         closed = all_round(scan) and bool(hits[0] + rays - hits[-1] <= 2)
-        cells, found = news(hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first)
         if nearest_m >= self._near_by:
-            self._count_hits(cells, found)
+            self._grow(PARTS * len(hits))
+            self._take_over(count_news(cell, self._ny, rays, closed, join, hits, places, *self._counted()))
             return
+        cells, found = news(hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first)
         corners = nearest_m < DETAIL[-1][0] * self._clearance
         near = ends(hits, places, scan.ranges_m, cell, closed, join, corners)
         ranges, places = scan.ranges_m[hits[near]], places[near]
@@ -171,12 +171,12 @@ class ObstacleMap:
             self._count_hits(*each)
 
     def _hits(self, scan: RangeScan, ignored: BoolArray | None) -> tuple[IntArray, ComplexArray]:
-        """Rays that met an edge, and where they did, from the sensor."""
+        """Rays that met an edge, and where they did, from the corner of the grid."""
         if ignored is None and not self._doubtful:
-            return scan.returned
+            return scan.returned(self._origin)
         taken = supported(scan, SUPPORT * self._clearance) if self._doubtful else scan.ranges_m < math.inf
         hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
-        return hits, scan.from_sensor_m(hits)
+        return hits, scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
 
     def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Cells of places seen from the corner of the grid."""
@@ -191,9 +191,11 @@ class ObstacleMap:
 
     def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
         self._grow(len(cells))
-        self._count, self.revision, unconfirmed = count_hits(
-            cells,
-            places,
+        self._take_over(count_hits(cells, places, *self._counted()))
+
+    def _counted(self) -> tuple[Any, ...]:
+        """What hits are counted in, as `harness.hit_counting` takes it."""
+        return (
             self._score,
             self._slot,
             self._points,
@@ -204,6 +206,9 @@ class ObstacleMap:
             self._first_score,
             self._origin,
         )
+
+    def _take_over(self, counted: tuple[int, int, bool]) -> None:
+        self._count, self.revision, unconfirmed = counted
         self._unconfirmed |= unconfirmed
 
     def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
@@ -236,16 +241,17 @@ class ObstacleMap:
             more = np.arange(self._near_count, self._count, dtype=np.int32)
             self._near, self._near_count = np.concatenate((self._near, more)), self._count
         slots = self._near
+        through = np.zeros(len(slots), dtype=np.bool_)
         # Only a ray that passes close by says anything about a point.
-        through = looked_through(
+        if not count_looked_through(
+            through,
             scan,
             self._points.take(slots),
             1.5 * self._cell,
             abreast=1,
             aimed_m=0.25 * self._cell,
             within_m=scan.max_range_m - 2.0 * self._cell,
-        )
-        if not through.any():
+        ):
             return False
         weaker = self._key[slots[through]]
         weaker = weaker[self._score[weaker] > 0]

@@ -9,15 +9,15 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.obstacle import LEAST_M2
-from harness.ray_casting import Fan
-from harness.world import Faces, Surroundings, World
+from harness.ray_casting import Fan, nearest_face_m
+from harness.world import Surroundings, World
+from planner.compiled import COUNTS_OUT, FLOAT, FLOATS, PLACES, PLACES_OUT, compiled, fused
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -68,14 +68,12 @@ class RangeScan:
                 array.setflags(write=False)
                 object.__setattr__(self, name, array)
 
-    @cached_property
-    def returned(self) -> tuple[IntArray, ComplexArray]:
-        """(k,) rays that returned something, and where they ended, east + i north of the sensor; read-only."""
-        rays = (self.ranges_m < math.inf).nonzero()[0]
-        ends = self.from_sensor_m(rays)
-        rays.setflags(write=False)
-        ends.setflags(write=False)
-        return rays, ends
+    def returned(self, origin_m: complex = 0j) -> tuple[IntArray, ComplexArray]:
+        """(k,) rays that returned something, and where they ended, east + i north from an origin."""
+        most, sensor = len(self.ranges_m), complex(self.east_m, self.north_m) - origin_m
+        rays, places = np.empty(most, dtype=np.intp), np.empty(most, dtype=np.complex128)
+        many = _returned(rays, places, self.fan, self.ranges_m, -self.heading_rad, sensor.real, sensor.imag)
+        return rays[:many], places[:many]
 
     def from_sensor_m(self, rays: IntArray) -> ComplexArray:
         """(k,) where some rays ended, east + i north of the sensor."""
@@ -180,10 +178,11 @@ class RangeSensor:
         if self._flawed:  # what is drawn at random is drawn now, scan by scan
             ranges = self._fan.ranges_m(faces, east_m, north_m, heading_rad)
             return RangeScan(ranges_m=self._degraded(ranges), **seen)
-        seen["nearest_m"] = face_m = self._nearest(faces, east_m, north_m)
-        if face_m == math.inf:  # nothing to follow rays to
-            seen["ranges_m"] = self._fan.nothing
+        face_m = nearest_face_m(faces.circles_m, faces.edges_m, east_m, north_m)
+        if face_m > self._config.range_m:  # nothing to follow rays to
+            seen["nearest_m"], seen["ranges_m"] = math.inf, self._fan.nothing
         else:
+            seen["nearest_m"] = face_m
             seen["_follow"] = partial(self._fan.ranges_m, faces, east_m, north_m, heading_rad)
         return _Unread.of(seen)
 
@@ -200,19 +199,6 @@ class RangeSensor:
             )
             self._listed_at = (east, north, time)
         return listed
-
-    def _nearest(self, faces: Faces, east: float, north: float) -> float:
-        """Distance to the nearest face, ahead or not; +inf beyond the range."""
-        nearest = math.inf
-        for x, y, radius in faces.circles:
-            nearest = min(nearest, abs(math.hypot(x - east, y - north) - radius))
-        if faces.edges_m.shape[1]:
-            edges = faces.edges_m[::2] + 1j * faces.edges_m[1::2] - complex(east, north)
-            start, along = edges[0], edges[1] - edges[0]
-            length_m2 = np.maximum((along * along.conj()).real, LEAST_M2)
-            share = -(start * along.conj()).real / length_m2
-            nearest = min(nearest, float(np.abs(start + np.clip(share, 0.0, 1.0) * along).min()))
-        return nearest if nearest <= self._config.range_m else math.inf
 
     def _degraded(self, ranges: FloatArray) -> FloatArray:
         """Ranges with the imperfections of the sensor."""
@@ -234,6 +220,26 @@ def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
     return np.random.default_rng(
         np.random.SeedSequence(root.entropy, spawn_key=key, pool_size=root.pool_size)
     )
+
+
+@compiled(COUNTS_OUT, PLACES_OUT, PLACES, FLOATS, FLOAT, FLOAT, FLOAT)
+def _returned(
+    rays: IntArray,
+    places: ComplexArray,
+    fan: ComplexArray,
+    ranges: FloatArray,
+    turned_rad: float,
+    east: float,
+    north: float,
+) -> int:
+    many, cos, sin = 0, math.cos(turned_rad), math.sin(turned_rad)
+    for ray in range(len(ranges)):
+        if ranges[ray] < math.inf:
+            right, ahead = fan[ray].real * ranges[ray], fan[ray].imag * ranges[ray]
+            x, y = fused(right, cos, -(ahead * sin)), fused(right, sin, ahead * cos)
+            rays[many], places[many] = ray, complex(x + east, y + north)
+            many += 1
+    return many
 
 
 def all_round(scan: RangeScan) -> bool:

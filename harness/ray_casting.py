@@ -12,9 +12,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from harness.obstacle import LEAST_M2
 from harness.world import Faces
 from planner.compiled import COUNT, FLOAT, FLOATS, FLOATS_OUT, compiled
 from planner.interface import ComplexArray, FloatArray
+
+FACES = "Array(float64, 2, 'A', readonly=True)"
 
 # Rays tried beyond the bearings of a face, in rays: more than bearings err, even at a tangent (1.5e-8 rad).
 _MARGIN_RAYS = 1e-3
@@ -130,6 +133,29 @@ class Fan:
         counts = [high - low for low, high in tries]
         rays = np.concatenate([self._fan[:, low:high] for low, high in tries], axis=1)
         return rays, faces.repeat(counts, axis=1)
+
+
+@compiled(FACES, FACES, FLOAT, FLOAT)
+def nearest_face_m(circles: FloatArray, edges: FloatArray, east: float, north: float) -> float:
+    """Distance from a place to the nearest face, ahead or not; +inf where there is none.
+
+    Args:
+        circles: (3, c) as `Faces` has them,
+        edges: (4, e) and these.
+        east: of the place, m.
+        north: of the place, m.
+    """
+    nearest = math.inf
+    for i in range(circles.shape[1]):
+        away = math.hypot(circles[0, i] - east, circles[1, i] - north) - circles[2, i]
+        nearest = min(nearest, abs(away))
+    for i in range(edges.shape[1]):
+        right, ahead = edges[0, i] - east, edges[1, i] - north
+        along_right, along_ahead = edges[2, i] - edges[0, i], edges[3, i] - edges[1, i]
+        length_m2 = max(along_right * along_right + along_ahead * along_ahead, LEAST_M2)
+        share = min(max(-(right * along_right + ahead * along_ahead) / length_m2, 0.0), 1.0)
+        nearest = min(nearest, math.hypot(right + share * along_right, ahead + share * along_ahead))
+    return nearest
 
 
 @compiled(FLOATS_OUT, FLOATS, FLOATS, COUNT, COUNT, FLOAT, FLOAT, FLOAT, FLOAT)

@@ -92,5 +92,4 @@ def returns_m(scan: RangeScan) -> FloatArray:
     """(k, 2) places from which something came back."""
     if scan.nearest_m == math.inf:
         return np.zeros((0, 2))
-    places = scan.returned[1] + complex(scan.east_m, scan.north_m)
-    return places.view(np.float64).reshape(-1, 2)
+    return scan.returned()[1].view(np.float64).reshape(-1, 2)

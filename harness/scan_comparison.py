@@ -10,9 +10,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from harness.looked_through import through_places
 from harness.range_sensor import RangeScan, all_round, clockwise_from
 from harness.registration import FEWEST
-from planner.compiled import BOOL, COUNT, FLOAT, FLOATS, PLACES, compiled
+from planner.compiled import FLOAT, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
 
 MISSING = 3
@@ -23,13 +24,12 @@ ABREAST = 2
 
 def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
     """(k,) which places were looked through by a scan before: what is there now has come."""
-    some = looked_through(before, places, sure_m, every=FEWEST)
-    return looked_through(before, places, sure_m) if some.any() else some
+    return looked_through(before, places, sure_m) if any_come(before, places, sure_m) else _none_of(places)
 
 
 def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
     """Whether `come` may hold for any of (k,) places: in a still world it mostly does not."""
-    return bool(looked_through(before, places, sure_m, every=FEWEST).any())
+    return count_looked_through(_none_of(places), before, places, sure_m, every=FEWEST) > 0
 
 
 def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
@@ -67,11 +67,27 @@ def looked_through(
     abreast: int = ABREAST,
     aimed_m: float = math.inf,
     within_m: float = math.inf,
-    every: int = 1,
 ) -> BoolArray:
-    """(k,) whether a scan looked through places, surely: with the ray towards each and some to either side.
+    """(k,) which places `count_looked_through` counts."""
+    through = _none_of(places)
+    count_looked_through(through, scan, places, sure_m, abreast, aimed_m, within_m)
+    return through
+
+
+def count_looked_through(
+    through: BoolArray,
+    scan: RangeScan,
+    places: ComplexArray,
+    sure_m: float,
+    abreast: int = ABREAST,
+    aimed_m: float = math.inf,
+    within_m: float = math.inf,
+    every: int = 1,
+) -> int:
+    """How many places a scan looked through, surely: with the ray towards each and some to either side.
 
     Args:
+        through: (k,) all false; those that it looked through become true.
         scan: the scan.
         places: (k,) places.
         sure_m: how much further than a place the rays went.
@@ -80,7 +96,8 @@ def looked_through(
         within_m: how far away it says anything.
         every: only so many places on is one asked: one is among as many in a row.
     """
-    return _through(
+    return through_places(
+        through,
         places,
         scan.ranges_m,
         scan.east_m,
@@ -96,42 +113,8 @@ def looked_through(
     )
 
 
-@compiled(PLACES, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
-def _through(
-    places: ComplexArray,
-    ranges: FloatArray,
-    east: float,
-    north: float,
-    start_rad: float,
-    spacing_rad: float,
-    closed: bool,
-    within_m: float,
-    sure_m: float,
-    abreast: int,
-    aimed_m: float,
-    every: int,
-) -> BoolArray:
-    through, rays = np.zeros(len(places), dtype=np.bool_), len(ranges)
-    for i in range(0, len(places), every):
-        dx, dy = places[i].real - east, places[i].imag - north
-        distance = math.hypot(dx, dy)
-        if distance >= within_m:
-            continue
-        clockwise = math.atan2(dx, dy) - start_rad
-        while clockwise < 0.0:
-            clockwise += math.tau
-        towards = clockwise / spacing_rad
-        ray = round(towards)
-        if abs(towards - ray) * spacing_rad * distance >= aimed_m:
-            continue
-        if not closed and not abreast <= ray < rays - abreast:
-            continue
-        beside, left = (ray - abreast) % rays, 2 * abreast + 1
-        while left and ranges[beside] > distance + sure_m:
-            beside = beside + 1 if beside + 1 < rays else 0
-            left -= 1
-        through[i] = not left
-    return through
+def _none_of(places: ComplexArray) -> BoolArray:
+    return np.zeros(len(places), dtype=np.bool_)
 
 
 def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: bool) -> list[IntArray]:

@@ -113,13 +113,18 @@ class SensedWorld:
         self.revision = self._edges.revision
         if self.revision != before:
             self._take_back(scan, self.edges_since(before))
+        if self.moving or self._moving.follows:
+            self._note_moving(scan)
+        self._free.update(scan)
+
+    def _note_moving(self, scan: RangeScan) -> None:
+        """Where something moves, nothing stands, nor is it free."""
         if len(trail_m := self._moving.trail_m):
             self._edges.forget(trail_m, self._clearance)
             self.revision = self._edges.revision
         self.moving = self._moving.found
         for each in self.moving:
             self._take_back(scan, each.points_m)
-        self._free.update(scan)
 
     def _take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
         """What was seen to be free is not, where edges stand in it."""

@@ -299,7 +299,8 @@ class World:
 
         if not len(self._standing):
             return []
-        probe = self.obstacles[self._standing[self._tree.nearest(shapely.Point(east, north))]]
+        some = self._tree.query_nearest(shapely.Point(east, north), all_matches=False)[0]
+        probe = self.obstacles[self._standing[some]]
         nearest = float(probe.distance(np.array([[east, north]]), np.zeros(1))[0])
         listed = self._listed(east, north, max(nearest, 0.0) + 2.0 * slack + _ROUNDING_M)
         return [int(index) for index in listed]

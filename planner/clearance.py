@@ -74,17 +74,18 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
 
 @compiled(ROWS, ROWS, FLOATS, FLOAT)
 def _first_breach(rows: FloatArray, points: FloatArray, radius: FloatArray, from_m: float) -> float:
-    first, begins = math.inf, 0.0
+    first, begins, last = math.inf, 0.0, len(radius) - 1
     for which in range(len(rows)):
         half = 0.5 * rows[which, 5]
         east, north = _place(rows, which, half)
         for i in range(len(points)):
-            dx, dy, reach = points[i, 0] - east, points[i, 1] - north, half + radius[i]
+            keep = radius[min(i, last)]
+            dx, dy, reach = points[i, 0] - east, points[i, 1] - north, half + keep
             if dx * dx + dy * dy >= reach * reach:
                 continue  # most points are out of reach
             distance, along = _to_segment(rows, which, points[i, 0], points[i, 1])
             # Where a segment is nearest at its start, the path only leads away from there on.
-            if distance < radius[i] and (along > 0.0 or not which) and from_m <= begins + along < first:
+            if distance < keep and (along > 0.0 or not which) and from_m <= begins + along < first:
                 first = begins + along
         begins += rows[which, 5]
     return first
@@ -104,7 +105,8 @@ def first_breach(
     Returns:
         The station in metres; infinite where the distance is kept.
     """
-    return _first_breach(path.segments, points_m, _each(radius_m, points_m), from_m)
+    radii_m = radius_m if isinstance(radius_m, np.ndarray) else np.array((radius_m,))
+    return _first_breach(path.segments, points_m, radii_m, from_m)
 
 
 @compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)

@@ -125,8 +125,8 @@ class Watch:
         self._since += 1
         if len(fresh_m):
             self._waiting.append(fresh_m)
-            away = np.hypot(fresh_m[:, 0] - position[0], fresh_m[:, 1] - position[1])
-            self._nearest_m = min(self._nearest_m, float(away.min()))
+            away_m = min(math.dist(position, edge) for edge in fresh_m.tolist())
+            self._nearest_m = min(self._nearest_m, away_m)
         elif not self._waiting:
             return False
         if self._since < WATCHED_TOGETHER and self._nearest_m > self._urgent:

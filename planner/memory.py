@@ -154,8 +154,8 @@ class ObstacleMemory:
         self._points[new] = fresh
         self._genuine[new] = genuine
         self._count = total
-        at = np.floor(fresh / self.cell_m).astype(np.int64)
         if new.start == 0:
+            at = np.floor(fresh / self.cell_m).astype(np.int64)
             cells, which = np.unique(at, axis=0, return_inverse=True)
             labels = _gathered(cells)
             for cell, label in zip(map(tuple, cells.tolist()), labels.tolist(), strict=True):
@@ -163,7 +163,8 @@ class ObstacleMemory:
             self._next = len(cells)
             self._labels[new] = labels[which.ravel()]
             return
-        cells_of = [tuple(cell) for cell in at.tolist()]
+        side = self.cell_m
+        cells_of = [(math.floor(east / side), math.floor(north / side)) for east, north in fresh.tolist()]
         for cell in dict.fromkeys(cells_of):
             if cell not in self._of_cell:
                 self._join(cell)

@@ -50,9 +50,9 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 
 def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
     cpu = result["cpu_s"]
-    assert result["closed_loop_ratio"] == pytest.approx(cpu["closed_loop"] / cpu["bare"])
-    assert result["closed_loop_recording_ratio"] == pytest.approx(cpu["closed_loop_recording"] / cpu["bare"])
-    assert result["bare_step_us"] == pytest.approx(1e6 * cpu["bare"] / result["steps"])
+    for name in ("closed_loop", "closed_loop_recording"):
+        assert result[f"{name}_ratio"] == pytest.approx(cpu[name]["flight"] / cpu[name]["bare"])
+    assert result["bare_step_us"] == pytest.approx(1e6 * cpu["closed_loop"]["bare"] / result["steps"])
 
 
 def test_the_bare_run_has_as_many_steps_as_the_flight(result: dict[str, Any]) -> None:
@@ -93,58 +93,70 @@ def test_tells_of_every_round(result: dict[str, Any]) -> None:
     assert len(states) > rounds >= 3
 
 
-Planted = Callable[[list[float], list[float], list[float]], dict[str, Any]]
+def test_the_bare_model_follows_the_flight_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    flown: list[int] = []
+
+    def advance(steps: int) -> None:
+        flown.append(steps)
+        plain(steps)
+
+    monkeypatch.setattr(harness.bench, "TURN_S", 10.0)
+    bare = harness.bench._Bare(scenario())
+    plain = bare._model.advance
+    monkeypatch.setattr(bare._model, "advance", advance)
+    bare._turn_s = 10.0
+    flight = fly(make_loop(scenario()), [bare])
+    assert sum(flown) == bare.steps == round(120 * flight.sim_s)
+    assert set(flown[:-1]) == {1200}
+    assert 0 < flown[-1] <= 1260
+    assert bare.cpu_s > 0.0
+
+
+Planted = Callable[[list[tuple[float, float]], list[tuple[float, float]]], dict[str, Any]]
 
 
 @pytest.fixture
 def planted(monkeypatch: pytest.MonkeyPatch) -> Planted:
-    """A bench with planted costs: of bare runs, of flights, of recorded ones."""
+    """A bench with planted costs of bare runs and flights, without and with the recording."""
 
-    def measured(bare: list[float], flights: list[float], recorded: list[float]) -> dict[str, Any]:
-        left = {"bare": iter(bare), False: iter(flights), True: iter(recorded)}
+    def measured(flights: list[tuple[float, float]], recorded: list[tuple[float, float]]) -> dict[str, Any]:
+        left = {False: iter(flights), True: iter(recorded)}
         figures = iter({"p50": 9.0 - i, "p99": 10.0 + i, "max": 20.0 + i % 4} for i in range(20))
-        in_turn: list[str | bool] = []
+        in_turn: list[bool] = []
 
-        def cost(what: str | bool) -> float:
-            in_turn.append(what)
-            return next(left[what])
+        def in_turns(_: Scenario, recording: bool) -> Any:
+            in_turn.append(recording)
+            return harness.bench._Turns(*next(left[recording]), {"compute_ms": next(figures)})
 
-        def bare_s(_: Scenario, count: int) -> float:
-            steps.append(count)
-            return cost("bare")
-
-        def flown(_: Scenario, *, recording: bool) -> tuple[float, dict[str, Any]]:
-            return cost(recording), {"compute_ms": next(figures)}
-
-        steps: list[int] = []
-        monkeypatch.setattr(harness.bench, "_bare_s", bare_s)
-        monkeypatch.setattr(harness.bench, "_flown", flown)
+        monkeypatch.setattr(harness.bench, "_in_turns", in_turns)
         result = bench(scenario())
-        assert in_turn == ["bare", False, True] * result["rounds"]
-        assert steps == [result["steps"]] * result["rounds"]
+        assert in_turn == [False, True] * result["rounds"]
         return result
 
     return measured
 
 
-def test_the_least_of_each_measurement_counts(planted: Planted) -> None:
-    result = planted([4.0, 2.0, 2.0], [8.0, 6.0, 6.0], [9.0, 12.0, 9.0])
-    assert result["cpu_s"] == {"bare": 2.0, "closed_loop": 6.0, "closed_loop_recording": 9.0}
+def test_what_was_flown_while_the_machine_was_fastest_counts(planted: Planted) -> None:
+    result = planted([(4.0, 8.0), (2.0, 6.0), (2.1, 6.3)], [(3.0, 13.5), (4.0, 16.0), (2.0, 9.0)])
+    assert result["cpu_s"] == {
+        "closed_loop": {"bare": 2.0, "flight": 6.0},
+        "closed_loop_recording": {"bare": 2.0, "flight": 9.0},
+    }
     assert (result["closed_loop_ratio"], result["closed_loop_recording_ratio"]) == (3.0, 4.5)
     assert result["planner_ms"] == {"p50": 4.0, "p99": 10.0, "max": 20.0}
     assert result["blocks"]["recording"] == pytest.approx(3.0 / 9.0)
     assert (result["rounds"], result["steady"]) == (3, True)
 
 
-def test_rounds_go_on_until_the_least_of_each_was_measured_twice(planted: Planted) -> None:
-    result = planted([2.0, 2.0, 2.0, 2.0, 1.99], [8.0, 6.0, 7.0, 5.0, 5.04], [9.0, 9.0, 9.0, 9.0, 9.0])
+def test_rounds_go_on_until_the_two_fastest_are_alike(planted: Planted) -> None:
+    result = planted([(2.0, 8.0), (2.1, 6.0), (2.2, 7.0), (1.9, 5.0), (1.95, 5.14)], [(2.0, 9.0)] * 5)
     assert (result["rounds"], result["steady"]) == (5, True)
-    assert result["closed_loop_ratio"] == 5.0 / 1.99
+    assert result["closed_loop_ratio"] == 5.0 / 1.9
 
 
 def test_a_machine_that_never_rests_is_told(planted: Planted) -> None:
-    falling = [20.0 - each for each in range(10)]
-    result = planted(falling, [3.0] * 10, [4.0] * 10)
+    falling = [(20.0 - each, 30.0) for each in range(10)]
+    result = planted(falling, [(3.0, 4.0)] * 10)
     assert (result["rounds"], result["steady"]) == (10, False)
     assert bench_rows(result)["rounds"] == "10, not steady: the machine is busy"
 
@@ -153,7 +165,7 @@ def test_a_flight_without_a_plan_cannot_be_measured(monkeypatch: pytest.MonkeyPa
     short = scenario()
     late = short.model_copy(update={"mission": short.mission.model_copy(update={"time_limit_s": 0.4})})
     late = late.model_copy(update={"sensor": late.sensor.model_copy(update={"latency_s": 1.0})})
-    monkeypatch.setattr(harness.bench, "_bare_s", lambda *_: pytest.fail("measured all the same"))
+    monkeypatch.setattr(harness.bench, "_in_turns", lambda *_: pytest.fail("measured all the same"))
     with pytest.raises(ValueError, match=r"nothing to measure: time limit 0\.4 s"):
         bench(late)
 
@@ -180,7 +192,7 @@ def test_shares_of_blocks_sum_to_one(in_loop: dict[str, float], files_s: float, 
 
 
 def test_a_disturbed_lone_flight_leaves_the_shares_in_proportion() -> None:
-    shares = block_shares({"dynamics": 6.0, "map": 3.0, "record": 1.0}, closed_s=5.0, recording_s=5.0)
+    shares = block_shares({"dynamics": 6.0, "map": 3.0, "record": 1.0}, closed=5.0, recorded=5.0)
     assert shares == pytest.approx({"dynamics": 0.6, "map": 0.3, "record": 0.1, "recording": 0.0})
 
 

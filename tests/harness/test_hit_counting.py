@@ -5,12 +5,13 @@ from __future__ import annotations
 import cmath
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.hit_counting import CERTAIN, CONFIRMED, CORNER, PARTS, count_hits, ends, news
+from harness.hit_counting import CERTAIN, CONFIRMED, CORNER, PARTS, count_hits, count_news, ends, news
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 CELL, SIDE, JOIN = 10.0, 40, 60.0
@@ -125,3 +126,24 @@ def test_a_cell_counts_once_and_is_an_edge_as_soon_as_it_is_believed(seed: int, 
     assert score.tolist() == list(scores.values())
     assert since[: told[0]].tolist() == [when[cell] for cell in expected]
     assert points[count : told[0]].tolist() == [first[cell] + corner for cell in expected[count:]]
+
+
+@given(seed=SEED, first_score=st.sampled_from((1, CONFIRMED)))
+def test_news_that_are_counted_at_once_count_the_same(seed: int, first_score: int) -> None:
+    rng = np.random.default_rng(seed)
+    hits, places, _, closed = hits_of(rng)
+    score, known = grids_of(rng)
+
+    def counted() -> list[Any]:
+        room = len(known) + PARTS * len(hits)
+        cell_of, since = np.zeros(room, dtype=np.intp), np.zeros(room, dtype=np.intp)
+        cell_of[: len(known)] = known
+        return [score.copy(), slots_of(known), np.zeros(room, dtype=np.complex128), cell_of, since]
+
+    one, other = counted(), counted()
+    state: list[Any] = [len(known), 7, first_score, complex(5.0, 6.0)]
+    cells, found = news(hits, places, one[0], one[1], CELL, SIDE, RAYS, closed, JOIN, first_score)
+    told = count_hits(cells, found, *(one + state))
+    assert count_news(CELL, SIDE, RAYS, closed, JOIN, hits, places, *(other + state)) == told
+    for left, right in zip(one, other, strict=True):
+        np.testing.assert_array_equal(left, right)

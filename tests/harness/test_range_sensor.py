@@ -354,3 +354,28 @@ def test_flaws_are_drawn_as_scans_are_taken_not_as_they_are_read() -> None:
     at_once = [eyes[1].scan(0.0, 0.0, 0.0, time).ranges_m.tolist() for time in (0.0, 0.5)]
     assert late == (at_once[1], at_once[0])
     assert first.nearest_m == min(at_once[0])
+
+
+@given(seed=st.integers(0, 10_000), field=st.sampled_from([360.0, 90.0]))
+@settings(max_examples=40)
+def test_what_returned_is_told_from_any_origin(seed: int, field: float) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
+    scan = sensor(world, field_of_view_deg=field).scan(40.0, -30.0, rng.uniform(0.0, math.tau), 0.0)
+    expected = (scan.ranges_m < math.inf).nonzero()[0]
+    directions = scan.directions.copy().view(np.complex128).ravel()
+    for origin in (0j, complex(-700.0, 900.0)):
+        rays, places = scan.returned(origin)
+        assert rays.tolist() == expected.tolist()
+        ends = complex(40.0, -30.0) - origin + (directions * scan.ranges_m)[rays]
+        np.testing.assert_allclose(places, ends, rtol=0.0, atol=1e-9)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=40)
+def test_the_nearest_face_is_as_far_as_it_is(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
+    scan = sensor(world).scan(0.0, 0.0, 0.0, 0.0)
+    away_m = abs(world.clearance_at(0.0, 0.0, 0.0))
+    assert scan.nearest_m == (pytest.approx(away_m, abs=1e-6) if away_m <= scan.max_range_m else math.inf)

@@ -30,7 +30,7 @@ def scan_of(ranges: np.ndarray[tuple[int], np.dtype[np.float64]], fan_rad: float
 @given(
     seed=st.integers(0, 2**32 - 1),
     fan_rad=st.sampled_from((math.tau, math.pi)),
-    abreast=st.integers(0, 3),
+    abreast=st.integers(1, 3),
     aimed_m=st.sampled_from((math.inf, 10.0)),
     within_m=st.sampled_from((math.inf, 700.0)),
 )

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.compiled import FLOAT, ROWS, Compiled
+from planner.compiled import FLOAT, ROWS, Compiled, fused
 from planner.fans import encircled
 
 
@@ -20,6 +20,10 @@ def twice(x: float) -> float:
 
 def inverse(x: float) -> float:
     return 1.0 / x
+
+
+def product_and(a: float, b: float, c: float) -> float:
+    return fused(a, b, c)
 
 
 def unknown(x: float) -> float:
@@ -33,7 +37,7 @@ def total(rows: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> float:
 @pytest.fixture(autouse=True)
 def names_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiling puts what is compiled in the place of a function."""
-    for function in (twice, inverse, unknown, total):
+    for function in (twice, inverse, product_and, unknown, total):
         monkeypatch.setitem(globals(), function.__name__, function)
 
 
@@ -110,3 +114,12 @@ def test_what_is_only_read_may_be_read_only() -> None:
     rows = np.eye(2)
     rows.setflags(write=False)
     assert made(rows) == 2.0
+
+
+def test_a_product_and_a_sum_that_are_fused_are_rounded_once() -> None:
+    made = Compiled(product_and, (FLOAT, FLOAT, FLOAT))
+    made.compile()
+    numbers = np.random.default_rng(1).normal(size=(500, 3))
+    numbers[:, 2] = -numbers[:, 0] * numbers[:, 1]  # nothing but what rounding takes away is left
+    assert [made(*each) for each in numbers.tolist()] == [fused(*each) for each in numbers.tolist()]
+    assert np.count_nonzero([fused(*each) for each in numbers.tolist()]) > 400
