@@ -108,9 +108,8 @@ def _flown(
     plans = _Plans(loop, observers)
     judge = Judge(loop.world, mission, loop.time_limit_s, model.fault)
     late: deque[RangeScan] = deque()
-    roll_command, cross_track, station = 0.0, math.nan, math.nan
-    next_report = math.inf if progress is None else 0.0
-    model.command(roll_command, loop.altitude_m, mission.speed_mps)  # the last two for all of the flight
+    station, next_report = math.nan, math.inf if progress is None else 0.0
+    model.command(0.0, loop.altitude_m, mission.speed_mps)  # the last two for all of the flight
     while True:
         interrupt()
         scan_due, tick, steps, updates = strides[at % len(strides)]
@@ -140,11 +139,12 @@ def _flown(
                 updates = min(updates, len(log.table) - log.row)
                 flown = model.fly_on(follower, log.table, log.row, plans.index, updates, steps, until_s)
                 if flown:
-                    roll_command, cross_track, station = log.filled(flown)
+                    station = log.filled(flown)
                     at += flown
                     continue
-            if plans.index >= 0:
-                roll_command, cross_track, station, _, _ = follower.update(state)
+            roll_command, cross_track, station = (
+                follower.update(state)[:3] if plans.index >= 0 else log.commanded
+            )
             model.command(roll_command, loop.altitude_m, mission.speed_mps)
             log.add(state, roll_command, cross_track, station, plans.index)
             if progress is not None and state.time_s >= next_report:
@@ -159,7 +159,7 @@ def _flown(
             steps -= steps // 2
         model.advance(steps)
         at += 1
-    log.add(state, roll_command, cross_track, station, plans.index)
+    log.add(state, *log.commanded, plans.index)
     outcome, reason = verdict
     reason += plans.last_word(outcome)
     if progress is not None:

@@ -68,7 +68,7 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
         "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),
         "max_load_factor": _finite(track.load_factor.max()),
         "trackable": bool(verdicts) and all(leg.trackable for leg in verdicts),
-        "trackability": [dataclasses.asdict(leg) for leg in verdicts],
+        "trackability": [dict(vars(leg)) for leg in verdicts],
         "replans": max(len(flight.plans) - 1, 0),
         "compute_ms": compute_figures(flight.compute_ms),
         "timing": {

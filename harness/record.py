@@ -49,7 +49,7 @@ BLOCK_ROWS = 6000
 
 ROW = len(AircraftState._fields) + 4
 """Numbers in a row: a state, roll command, cross-track error and station, plan index."""
-COMMANDED = slice(ROW - 4, ROW - 1)
+COMMANDED, STATION = slice(ROW - 4, ROW - 1), ROW - 2
 """Of these, roll command, cross-track error and station."""
 THROTTLE = AircraftState._fields.index("throttle")
 """What comes before it in a row is finite while the aircraft is under control."""
@@ -179,7 +179,8 @@ class TrackLog:
         self.table: FloatArray = np.zeros((block_rows, ROW))  # no more objects while flying than now
         """(k, 17) rows of this block: what `add` takes, in its order."""
         self.row = 0
-        """The first row of `table` that is free; there always is one."""
+        """The first row of `table` that is free; there always is one, and the one before is the last of all."""
+        self.table[-1, COMMANDED] = 0.0, math.nan, math.nan
         self._blocks: list[Track] = []
 
     def add(
@@ -197,13 +198,19 @@ class TrackLog:
         self.table[self.row] = (*state, roll_command_rad, cross_track_m, station_m, plan_index)
         self.filled(1)
 
-    def filled(self, rows: int) -> tuple[float, float, float]:
-        """So many of `table` from `row` on have been filled: roll command, cross-track error, station of the last."""
+    def filled(self, rows: int) -> float:
+        """So many of `table` from `row` on have been filled: the station of the last."""
         self.row += rows
-        commanded: tuple[float, float, float] = tuple(self.table[self.row - 1, COMMANDED].tolist())
+        station = float(self.table[self.row - 1, STATION])
         if self.row == len(self.table):
             self._cut()
-        return commanded
+        return station
+
+    @property
+    def commanded(self) -> tuple[float, float, float]:
+        """Roll command, cross-track error and station of the last row; 0 and NaN before the first."""
+        roll_command, cross_track, station = self.table[self.row - 1, COMMANDED].tolist()
+        return roll_command, cross_track, station
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""

@@ -53,6 +53,7 @@ class Compiled(Generic[P, R]):
 
     def _compile_first(self, *args: Any) -> R:
         compile_all()
+        assert self._code != self._compile_first
         return self._code(*args)
 
     def compile(self) -> None:
