@@ -38,7 +38,6 @@ class Fan:
         self.first_rad = 0.5 * self.spacing_rad - field_rad / 2
         """Bearing of ray 0 from the nose."""
         self._range_m = range_m
-        self._turn = math.tau / self.spacing_rad
         offsets = self.first_rad + self.spacing_rad * np.arange(rays)
         self._fan = np.array((np.sin(offsets), np.cos(offsets)))  # seen from the nose: to its right, ahead
         self._fan_right, self._fan_ahead = self._fan
@@ -53,30 +52,24 @@ class Fan:
         """(n,) ranges to the nearest face, +inf beyond the range."""
         sin, cos = math.sin(heading_rad), math.cos(heading_rad)
         ranges = self.nothing.copy()
-        for circle in faces.circles:
-            self._hit_circle(ranges, circle, complex(east, north), complex(cos, sin))
+        if faces.circles_m.shape[1]:
+            _lower_to_circles(
+                ranges,
+                self._fan_right,
+                self._fan_ahead,
+                faces.circles_m,
+                east,
+                north,
+                cos,
+                sin,
+                self._range_m,
+                self.first_rad,
+                self.spacing_rad,
+            )
         if faces.edges_m.shape[1]:
             away_east, away_north = faces.edges_m[::2] - east, faces.edges_m[1::2] - north
             self._hit_edges(ranges, cos * away_east - sin * away_north, sin * away_east + cos * away_north)
         return ranges
-
-    def _hit_circle(
-        self, ranges: FloatArray, circle: tuple[float, float, float], place: complex, heading: complex
-    ) -> None:
-        """Lowers ranges to a circle: centre east and north, radius; from a place, with a nose."""
-        east, north, radius = circle
-        centre = (complex(east, north) - place) * heading  # to the right + i ahead
-        away = abs(centre)
-        if away - radius > self._range_m:
-            return
-        half_rad = math.asin(radius / away) if away > radius else math.pi
-        right, ahead = centre.real, centre.imag
-        # The power of the sensor's place: the square of its tangent to the circle, negative inside.
-        power = (away - radius) * (away + radius)
-        for low, high in self._tried(math.atan2(right, ahead) - half_rad, 2.0 * half_rad):
-            _lower_to_circle(
-                ranges, self._fan_right, self._fan_ahead, low, high, right, ahead, power, self._range_m
-            )
 
     def _hit_edges(self, ranges: FloatArray, right: FloatArray, ahead: FloatArray) -> None:
         """Lowers ranges to edges; (2, e) where they start and end, to the right and ahead.
@@ -94,9 +87,11 @@ class Fan:
         )
         tries, faces = [], []
         for face, (bearing, wide) in enumerate(zip(first.tolist(), np.abs(width).tolist(), strict=True)):
-            for span in self._tried(bearing, wide):
-                tries.append(span)
-                faces.append(face)
+            low, high, again = _tried(bearing, wide, self.first_rad, self.spacing_rad, len(self.rays))
+            for span in ((low, high), (0, again)):
+                if span[0] < span[1]:
+                    tries.append(span)
+                    faces.append(face)
         if not tries:
             return
         along_right, along_ahead = end_right - start_right, end_ahead - start_ahead
@@ -111,22 +106,6 @@ class Fan:
         distance[hit] = lever[hit] / (end_side[hit] - start_side[hit])
         distance[(distance < 0) | (distance > self._range_m)] = math.inf
         _lower(ranges, tries, distance)
-
-    def _tried(self, first_rad: float, width_rad: float) -> Iterable[tuple[int, int]]:
-        """Spans of rays (first, last + 1) that may meet a face.
-
-        Args:
-            first_rad: bearing from the nose at which the face begins.
-            width_rad: how far it reaches clockwise from there.
-        """
-        rays, first = len(self.rays), (first_rad - self.first_rad) % math.tau / self.spacing_rad
-        last = first + width_rad / self.spacing_rad
-        low, high = math.ceil(first - _MARGIN_RAYS), math.floor(last + _MARGIN_RAYS) + 1
-        if high <= rays:
-            return ((low, high),) if low < high else ()
-        # It may begin in this turn and reach into the next: it is tried as it is, and one turn back.
-        again = min(math.floor(last - self._turn + _MARGIN_RAYS) + 1, rays)
-        return tuple(span for span in ((low, rays), (0, again)) if span[0] < span[1])
 
     def _pairs(self, tries: Sequence[tuple[int, int]], faces: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Rays and faces that may meet: (2, p) directions to the right and ahead, and (k, p) rows of faces."""
@@ -158,40 +137,84 @@ def nearest_face_m(circles: FloatArray, edges: FloatArray, east: float, north: f
     return nearest
 
 
-@compiled(FLOATS_OUT, FLOATS, FLOATS, COUNT, COUNT, FLOAT, FLOAT, FLOAT, FLOAT)
-def _lower_to_circle(
+@compiled(FLOAT, FLOAT, FLOAT, FLOAT, COUNT)
+def _tried(
+    bearing_rad: float, width_rad: float, first_rad: float, spacing_rad: float, rays: int
+) -> tuple[int, int, int]:
+    """Rays that may meet a face: of two spans the first, after the last, and after the last of one from ray 0 on.
+
+    Args:
+        bearing_rad: from the nose at which the face begins.
+        width_rad: how far it reaches clockwise from there.
+        first_rad: bearing of ray 0 from the nose.
+        spacing_rad: of the rays.
+        rays: how many.
+    """
+    first = (bearing_rad - first_rad) % math.tau / spacing_rad
+    last = first + width_rad / spacing_rad
+    low, high = math.ceil(first - _MARGIN_RAYS), math.floor(last + _MARGIN_RAYS) + 1
+    if high <= rays:
+        return low, high, 0
+    # It may begin in this turn and reach into the next: it is tried as it is, and one turn back.
+    return low, rays, min(math.floor(last - math.tau / spacing_rad + _MARGIN_RAYS) + 1, rays)
+
+
+@compiled(FLOATS_OUT, FLOATS, FLOATS, FACES, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+def _lower_to_circles(
     ranges: FloatArray,
     fan_right: FloatArray,
     fan_ahead: FloatArray,
-    low: int,
-    high: int,
-    right: float,
-    ahead: float,
-    power: float,
+    circles: FloatArray,
+    east: float,
+    north: float,
+    cos: float,
+    sin: float,
     range_m: float,
+    first_rad: float,
+    spacing_rad: float,
 ) -> None:
-    """Lowers the ranges of the rays from `low` on, before `high`, to a circle.
+    """Lowers ranges to circles.
 
     Args:
         ranges: of all rays, m.
         fan_right: unit vectors of the rays as the nose sees them,
         fan_ahead: to its right and ahead.
-        low: first ray.
-        high: after the last one.
-        right: centre of the circle, to the right of the nose.
-        ahead: centre of the circle, ahead.
-        power: of the sensor's place, m2; negative inside, where the far side is met.
+        circles: (3, c) as `Faces` has them.
+        east: of the sensor.
+        north: of the sensor.
+        cos: of its heading,
+        sin: and the sine.
         range_m: nothing is met beyond it.
+        first_rad: bearing of ray 0 from the nose.
+        spacing_rad: of the rays.
     """
-    for ray in range(low, high):
-        along = fan_right[ray] * right + fan_ahead[ray] * ahead
-        half_chord2 = along * along - power
-        if half_chord2 < 0.0:
+    rays = len(ranges)
+    for circle in range(circles.shape[1]):
+        away_east, away_north, radius = (
+            circles[0, circle] - east,
+            circles[1, circle] - north,
+            circles[2, circle],
+        )
+        right, ahead = away_east * cos - away_north * sin, away_east * sin + away_north * cos
+        away = math.hypot(right, ahead)
+        if away - radius > range_m:
             continue
-        half_chord = math.sqrt(half_chord2)
-        distance = along + half_chord if power <= 0.0 else along - half_chord
-        if 0.0 <= distance <= range_m:
-            ranges[ray] = min(ranges[ray], distance)
+        half_rad = math.asin(radius / away) if away > radius else math.pi
+        # The power of the sensor's place: the square of its tangent to the circle, negative inside.
+        power = (away - radius) * (away + radius)
+        low, high, again = _tried(
+            math.atan2(right, ahead) - half_rad, 2.0 * half_rad, first_rad, spacing_rad, rays
+        )
+        for begin, end in ((low, high), (0, again)):
+            for ray in range(begin, end):
+                along = fan_right[ray] * right + fan_ahead[ray] * ahead
+                half_chord2 = along * along - power
+                if half_chord2 < 0.0:
+                    continue
+                half_chord = math.sqrt(half_chord2)
+                distance = along + half_chord if power <= 0.0 else along - half_chord
+                if 0.0 <= distance <= range_m:
+                    ranges[ray] = min(ranges[ray], distance)
 
 
 def _lower(ranges: FloatArray, tries: Iterable[tuple[int, int]], distance: FloatArray) -> None:

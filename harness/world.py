@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from harness.motions import Motions, gaps_to
 from harness.obstacle import Circle, Obstacle, Polygon
-from planner.interface import BoolArray, FloatArray, IntArray
+from planner.interface import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from shapely import STRtree
@@ -36,54 +37,8 @@ TOUCH_M = 1e-3
 _BLOCK_ROWS = 256
 # What bounds are given to spare, for rounding.
 _ROUNDING_M = 1e-6
-
-
-class _Motions:
-    """Straight-line motion and presence of n things, one column each.
-
-    Args:
-        rows: (5, n): velocity east, velocity north, epoch, first and last time of presence.
-    """
-
-    def __init__(self, rows: FloatArray) -> None:
-        self._rows = rows
-        self.speeds_mps: FloatArray = np.hypot(rows[0], rows[1])
-        self.matter = bool(self.speeds_mps.any() or np.isfinite(rows[3:]).any())
-
-    @classmethod
-    def of(cls, obstacles: Iterable[Obstacle]) -> _Motions:
-        rows = [(*o.velocity_mps, o.epoch_s, *o.interval_s) for o in obstacles]
-        return cls(np.array(rows, dtype=np.float64).reshape(-1, 5).T.copy())
-
-    def take(self, columns: IntArray) -> _Motions:
-        return _Motions(self._rows[:, columns])
-
-    def shifts(self, time_s: float) -> FloatArray:
-        """(2, n) displacement since the epoch."""
-        shifts: FloatArray = self._rows[:2] * (time_s - self._rows[2])
-        return shifts
-
-    def present(self, start_s: float, stop_s: float) -> BoolArray:
-        """(n,) whether there at some time of an interval."""
-        present: BoolArray = (self._rows[3] <= stop_s) & (start_s <= self._rows[4])
-        return present
-
-    def gaps(self, boxes: FloatArray, east: float, north: float, time_s: float) -> FloatArray:
-        """(n,) lower bound of the distance to each thing, there or not, by its rounded box (5, n) at the epoch."""
-        if self.matter:
-            boxes = np.vstack((boxes[:2] + self.shifts(time_s), boxes[2:]))
-        return _gaps(boxes, east, north)
-
-    def next_start(self, time_s: float) -> float:
-        """First time after `time_s` at which something appears, else +inf."""
-        starts = self._rows[3]
-        return float(starts[starts > time_s].min(initial=math.inf))
-
-    def changes(self, start_s: float, stop_s: float) -> list[float]:
-        """Times within an interval at which something appears or goes, in order."""
-        times = self._rows[3:]
-        within: list[float] = np.unique(times[(start_s < times) & (times < stop_s)]).tolist()
-        return within
+# The boxes of no more obstacles than these are compared all at once, which is sooner done than to ask the tree.
+_FEW = 512
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,11 +54,6 @@ class Faces:
     circles_m: FloatArray
     edges_m: FloatArray
 
-    @cached_property
-    def circles(self) -> list[tuple[float, float, float]]:
-        """The same circles one by one."""
-        return list(zip(*self.circles_m.tolist(), strict=True))
-
 
 class Surroundings:
     """Every face that comes near a place during an interval of time; made by `World.surroundings`.
@@ -112,9 +62,7 @@ class Surroundings:
         until_s: the end of that interval; +inf in a world where nothing ever moves, comes or goes.
     """
 
-    def __init__(
-        self, faces: Faces, circle_motions: _Motions, edge_motions: _Motions, until_s: float
-    ) -> None:
+    def __init__(self, faces: Faces, circle_motions: Motions, edge_motions: Motions, until_s: float) -> None:
         self.until_s = until_s
         self._faces = faces
         self._circle_motions = circle_motions
@@ -138,8 +86,9 @@ class Surroundings:
 class World:
     """Obstacles in a rectangular area, as they truly are.
 
-    Those that stand for ever are found through a tree of their boxes, so that an answer costs the same in a world
-    of ten and of a hundred thousand; those that move or come and go are all looked at every time.
+    Those that stand for ever are found through a tree of their boxes, if they are many, so that an answer costs the
+    same in a world of a thousand and of a hundred thousand; those that move or come and go are all looked at every
+    time.
 
     Args:
         obstacles: their order gives their index.
@@ -152,8 +101,9 @@ class World:
         self._boxes = np.array([o.shape.rounded_box for o in self.obstacles]).reshape(-1, 5).T.copy()
         stands = np.array([o.stands_for_ever for o in self.obstacles], dtype=np.bool_)
         self._standing, self._changing = np.flatnonzero(stands), np.flatnonzero(~stands)
-        self._motions = _Motions.of(self.obstacles[index] for index in self._changing.tolist())
-        self._tree = _tree(self._boxes[:, self._standing])
+        self._motions = Motions.of(self.obstacles[index] for index in self._changing.tolist())
+        self._standing_boxes = self._boxes[:, self._standing]
+        self._tree = None if len(self._standing) <= _FEW else _tree(self._standing_boxes)
 
     @classmethod
     def from_scenario(cls, scenario: Scenario) -> World:
@@ -267,7 +217,7 @@ class World:
         middle, half_s = (start_s + stop_s) / 2, (stop_s - start_s) / 2
         listed = np.union1d(self._listed(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
         obstacles = [self.obstacles[index] for index in listed.tolist()]
-        boxes, motions = self._boxes[:, listed], _Motions.of(obstacles)
+        boxes, motions = self._boxes[:, listed], Motions.of(obstacles)
         reach = radius_m + _ROUNDING_M + motions.speeds_mps * half_s
         close = (motions.gaps(boxes, east_m, north_m, middle) <= reach) & motions.present(start_s, stop_s)
         is_circle = np.array([isinstance(o.shape, Circle) for o in obstacles], dtype=np.bool_)
@@ -277,7 +227,7 @@ class World:
         owners = np.repeat(polygons, np.array([each.shape[1] for each in edges_of], dtype=np.intp))
         ends = edges + np.tile(motions.shifts(middle)[:, owners], (2, 1))
         edge_boxes = np.vstack(((ends[:2] + ends[2:]) / 2, np.abs(ends[2:] - ends[:2]) / 2, 0 * owners))
-        within = _gaps(edge_boxes, east_m, north_m) <= reach[owners]
+        within = gaps_to(edge_boxes, east_m, north_m) <= reach[owners]
         return Surroundings(
             Faces(boxes[:, circles][[0, 1, 4]], edges[:, within]),
             motions.take(circles),
@@ -287,6 +237,8 @@ class World:
 
     def _listed(self, east: float, north: float, reach: float) -> IntArray:
         """Indices of the standing obstacles that may come within a reach of a point, and some more."""
+        if self._tree is None:
+            return self._standing[gaps_to(self._standing_boxes, east, north) <= reach]
         import shapely
 
         corners = east - reach, north - reach, east + reach, north + reach
@@ -295,15 +247,32 @@ class World:
 
     def _nearest(self, east: float, north: float, slack: float) -> list[int]:
         """Indices of the standing obstacles that may be the nearest one to a point within a slack of a place."""
-        import shapely
-
         if not len(self._standing):
             return []
+        if self._tree is None:
+            gaps = gaps_to(self._standing_boxes, east, north)
+            near: list[int] = self._standing[
+                gaps <= self._reach(int(gaps.argmin()), east, north, slack)
+            ].tolist()
+            return near
+        import shapely
+
         some = self._tree.query_nearest(shapely.Point(east, north), all_matches=False)[0]
+        near = self._listed(east, north, self._reach(some, east, north, slack)).tolist()
+        return near
+
+    def _reach(self, some: int, east: float, north: float, slack: float) -> float:
+        """So near to a place are all standing obstacles that may be the nearest to a point within a slack of it.
+
+        Args:
+            some: any of the standing obstacles; the nearer, the less.
+            east: of the place, m.
+            north: of the place, m.
+            slack: m.
+        """
         probe = self.obstacles[self._standing[some]]
         nearest = float(probe.distance(np.array([[east, north]]), np.zeros(1))[0])
-        listed = self._listed(east, north, max(nearest, 0.0) + 2.0 * slack + _ROUNDING_M)
-        return [int(index) for index in listed]
+        return max(nearest, 0.0) + 2.0 * slack + _ROUNDING_M
 
     def _block_clearance(self, points: FloatArray, times: FloatArray) -> FloatArray:
         """`clearance` for finite rows near one another."""
@@ -329,15 +298,3 @@ def _tree(boxes: FloatArray) -> STRtree:
     east, north, half_width, half_height, rounding = boxes
     width, height = half_width + rounding, half_height + rounding
     return shapely.STRtree(shapely.box(east - width, north - height, east + width, north + height))
-
-
-def _gaps(boxes: FloatArray, east: float, north: float) -> FloatArray:
-    """(n,) signed distances from a point to rounded boxes (5, n).
-
-    A shape inside a box is never nearer than the box (formula: Quilez, "2D distance functions").
-    """
-    beside = np.abs(boxes[0] - east) - boxes[2]
-    above = np.abs(boxes[1] - north) - boxes[3]
-    outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)
-    gaps: FloatArray = outside + np.minimum(np.maximum(beside, above), 0.0) - boxes[4]
-    return gaps

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+import harness.world
 from harness import scenario_obstacles
 from harness import scenario_sections as sections
 from harness.world import Circle, Obstacle, Polygon, World
@@ -21,6 +23,14 @@ BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
 REFEREE = Path(__file__).parents[3] / "shared" / "tools" / "referee.py"
 
 FloatArray = NDArray[np.float64]
+
+
+@pytest.fixture(params=[512, -1], ids=["few are compared", "all are in a tree"], scope="module", autouse=True)
+def few(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What holds of a world holds whichever way its obstacles are found."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(harness.world, "_FEW", request.param)
+        yield
 
 
 def star(rng: np.random.Generator, east: float, north: float, size: float) -> Polygon:
