@@ -87,6 +87,28 @@ def news(
     return counted[:k], found[:k]
 
 
+@compiled(COUNTS_OUT, SCORES, COUNTS, COUNTS, COUNT, COUNT)
+def edges_after(
+    slots: IntArray, score: NDArray[np.int8], cell_of: IntArray, since: IntArray, known: int, revision: int
+) -> int:
+    """How many edges became so after a revision; the first of `slots` become theirs.
+
+    Args:
+        slots: room for all that are known.
+        score: of each cell.
+        cell_of: by slot: its cell,
+        since: and the revision at which it became an edge.
+        known: how many slots are in use.
+        revision: of the map.
+    """
+    many = 0
+    for slot in range(known):
+        if since[slot] > revision and score[cell_of[slot]] >= CONFIRMED:
+            slots[many] = slot
+            many += 1
+    return many
+
+
 @compiled(COUNTS, PLACES, FLOATS, FLOAT, BOOL, FLOAT, BOOL)
 def ends(
     hits: IntArray,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.edge_grid import EdgeGrid
-from harness.hit_counting import CONFIRMED, PARTS, count_hits, count_news, ends, news
+from harness.hit_counting import CONFIRMED, PARTS, count_hits, count_news, edges_after, ends, news
 from harness.range_sensor import RangeScan, all_round, supported
 from harness.scan_comparison import count_looked_through, near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
@@ -113,8 +113,9 @@ class ObstacleMap:
         """(k, 2) edge points that came in after `revision`, in the order in which they did."""
         if revision >= self.revision:
             return np.zeros((0, 2))
-        slots = (self._since[: self._count] > revision).nonzero()[0]
-        slots = slots[self._score[self._key[slots]] >= CONFIRMED]
+        slots = np.empty(self._count, dtype=np.intp)
+        many = edges_after(slots, self._score, self._key, self._since, self._count, revision)
+        slots = slots[:many]
         if revision < self.revision - 1:  # else all came in at once
             slots = slots[np.argsort(self._since[slots], kind="stable")]
         return _pairs(self._points[slots])

@@ -11,7 +11,17 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.hit_counting import CERTAIN, CONFIRMED, CORNER, PARTS, count_hits, count_news, ends, news
+from harness.hit_counting import (
+    CERTAIN,
+    CONFIRMED,
+    CORNER,
+    PARTS,
+    count_hits,
+    count_news,
+    edges_after,
+    ends,
+    news,
+)
 from planner.interface import ComplexArray, FloatArray, IntArray
 
 CELL, SIDE, JOIN = 10.0, 40, 60.0
@@ -147,3 +157,18 @@ def test_news_that_are_counted_at_once_count_the_same(seed: int, first_score: in
     assert count_news(CELL, SIDE, RAYS, closed, JOIN, hits, places, *(other + state)) == told
     for left, right in zip(one, other, strict=True):
         np.testing.assert_array_equal(left, right)
+
+
+@given(seed=SEED, revision=st.integers(-1, 6))
+def test_edges_are_told_that_became_so_after_a_revision(seed: int, revision: int) -> None:
+    rng = np.random.default_rng(seed)
+    score, known = grids_of(rng)
+    since = rng.integers(0, 6, len(known))
+    slots = np.empty(len(known), dtype=np.intp)
+    expected = [
+        i for i, cell in enumerate(known.tolist()) if since[i] > revision and score[cell] >= CONFIRMED
+    ]
+    many = edges_after(slots, score, known, since, len(known), revision)
+    assert slots[:many].tolist() == expected
+    fewer = edges_after(slots, score, known, since, len(known) // 2, revision)
+    assert slots[:fewer].tolist() == [slot for slot in expected if slot < len(known) // 2]
