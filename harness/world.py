@@ -33,6 +33,8 @@ Fix = tuple[float, float, float]
 TOUCH_M = 1e-3
 """What is thinner along a way is no contact."""
 
+NO_EDGES = np.zeros((4, 0))
+
 # A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
 _BLOCK_ROWS = 256
 # What bounds are given to spare, for rounding.
@@ -58,29 +60,35 @@ class Faces:
 class Surroundings:
     """Every face that comes near a place during an interval of time; made by `World.surroundings`.
 
-    Attributes:
+    Args:
+        still: those of what stands for ever.
+        changing: those of what moves or comes and goes, as they are at its epoch.
+        motions: of the circles among these, and of the edges.
         until_s: the end of that interval; +inf in a world where nothing ever moves, comes or goes.
     """
 
-    def __init__(self, faces: Faces, circle_motions: Motions, edge_motions: Motions, until_s: float) -> None:
+    def __init__(
+        self,
+        still: Faces,
+        changing: Faces | None = None,
+        motions: tuple[Motions, Motions] | None = None,
+        until_s: float = math.inf,
+    ) -> None:
         self.until_s = until_s
-        self._faces = faces
-        self._circle_motions = circle_motions
-        self._edge_motions = edge_motions
-        self._still = not (circle_motions.matter or edge_motions.matter)
+        self._still, self._changing, self._motions = still, changing, motions
 
     def faces(self, time_s: float) -> Faces:
         """Those that are there at a time of the interval, where they are then."""
-        if self._still:
-            return self._faces
-        circles, edges = self._faces.circles_m, self._faces.edges_m
-        if self._circle_motions.matter:
-            there = self._circle_motions.present(time_s, time_s)
-            circles = np.vstack((circles[:2] + self._circle_motions.shifts(time_s), circles[2:]))[:, there]
-        if self._edge_motions.matter:
-            there = self._edge_motions.present(time_s, time_s)
-            edges = (edges + np.tile(self._edge_motions.shifts(time_s), (2, 1)))[:, there]
-        return Faces(circles, edges)
+        if self._changing is None or self._motions is None:
+            return self._still
+        of_circles, of_edges = self._motions
+        circles, edges = self._changing.circles_m.copy(), self._changing.edges_m.copy()
+        circles[:2] += of_circles.shifts(time_s)
+        edges += np.tile(of_edges.shifts(time_s), (2, 1))
+        return Faces(
+            np.hstack((self._still.circles_m, circles[:, of_circles.present(time_s, time_s)])),
+            np.hstack((self._still.edges_m, edges[:, of_edges.present(time_s, time_s)])),
+        )
 
 
 class World:
@@ -99,6 +107,8 @@ class World:
         self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
         self.bounds_m = bounds_m
         self._boxes = np.array([o.shape.rounded_box for o in self.obstacles]).reshape(-1, 5).T.copy()
+        self._discs = self._boxes[[0, 1, 4]]
+        self._circular = np.array([isinstance(o.shape, Circle) for o in self.obstacles], dtype=np.bool_)
         stands = np.array([o.stands_for_ever for o in self.obstacles], dtype=np.bool_)
         self._standing, self._changing = np.flatnonzero(stands), np.flatnonzero(~stands)
         self._motions = Motions.of(self.obstacles[index] for index in self._changing.tolist())
@@ -214,26 +224,27 @@ class World:
         A few more may be among them: boxes are compared, not shapes. A caller that moves keeps the answer as
         long as it stays in a smaller circle (a neighbour list; Verlet 1967, doi:10.1103/PhysRev.159.98).
         """
-        middle, half_s = (start_s + stop_s) / 2, (stop_s - start_s) / 2
-        listed = np.union1d(self._listed(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
+        reach = radius_m + _ROUNDING_M
+        still = self._faces(self._listed(east_m, north_m, reach))
+        if still.edges_m.size:
+            starts, ends = still.edges_m[:2], still.edges_m[2:]
+            boxes = np.vstack(((starts + ends) / 2, np.abs(ends - starts) / 2, np.zeros(starts.shape[1])))
+            still = Faces(still.circles_m, still.edges_m[:, gaps_to(boxes, east_m, north_m) <= reach])
+        if not len(self._changing):
+            return Surroundings(still)
+        gaps = self._motions.gaps(self._boxes[:, self._changing], east_m, north_m, (start_s + stop_s) / 2)
+        near = gaps <= reach + self._motions.speeds_mps * (stop_s - start_s) / 2
+        listed = self._changing[near & self._motions.present(start_s, stop_s)]
         obstacles = [self.obstacles[index] for index in listed.tolist()]
-        boxes, motions = self._boxes[:, listed], Motions.of(obstacles)
-        reach = radius_m + _ROUNDING_M + motions.speeds_mps * half_s
-        close = (motions.gaps(boxes, east_m, north_m, middle) <= reach) & motions.present(start_s, stop_s)
-        is_circle = np.array([isinstance(o.shape, Circle) for o in obstacles], dtype=np.bool_)
-        circles, polygons = np.flatnonzero(close & is_circle), np.flatnonzero(close & ~is_circle)
-        edges_of = [obstacles[index].shape.edges_m for index in polygons.tolist()]
-        edges = np.hstack([np.zeros((4, 0)), *edges_of])
-        owners = np.repeat(polygons, np.array([each.shape[1] for each in edges_of], dtype=np.intp))
-        ends = edges + np.tile(motions.shifts(middle)[:, owners], (2, 1))
-        edge_boxes = np.vstack(((ends[:2] + ends[2:]) / 2, np.abs(ends[2:] - ends[:2]) / 2, 0 * owners))
-        within = gaps_to(edge_boxes, east_m, north_m) <= reach[owners]
-        return Surroundings(
-            Faces(boxes[:, circles][[0, 1, 4]], edges[:, within]),
-            motions.take(circles),
-            motions.take(owners[within]),
-            stop_s if len(self._changing) else math.inf,
-        )
+        circles = [each for each in obstacles if isinstance(each.shape, Circle)]
+        edges = [each for each in obstacles for _ in range(each.shape.edges_m.shape[1])]
+        return Surroundings(still, self._faces(listed), (Motions.of(circles), Motions.of(edges)), stop_s)
+
+    def _faces(self, listed: IntArray) -> Faces:
+        """Faces of some obstacles, each at its epoch, in the order in which they are listed."""
+        circular = self._circular[listed]
+        edges = [self.obstacles[index].shape.edges_m for index in listed[~circular].tolist()]
+        return Faces(self._discs[:, listed[circular]], np.hstack(edges) if edges else NO_EDGES)
 
     def _listed(self, east: float, north: float, reach: float) -> IntArray:
         """Indices of the standing obstacles that may come within a reach of a point, and some more."""
@@ -242,7 +253,7 @@ class World:
         import shapely
 
         corners = east - reach, north - reach, east + reach, north + reach
-        listed: IntArray = self._standing[self._tree.query(shapely.box(*corners))]
+        listed: IntArray = self._standing[np.sort(self._tree.query(shapely.box(*corners)))]
         return listed
 
     def _nearest(self, east: float, north: float, slack: float) -> list[int]:
