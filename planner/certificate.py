@@ -18,9 +18,17 @@ from functools import lru_cache
 import numpy as np
 
 from planner.clearance import inside_bounds
-from planner.curves import Limits, Segment, along, between, curvature_at, full_turn, place_on, poses_at
+from planner.curves import (
+    Limits,
+    Segment,
+    along,
+    between,
+    full_turn,
+    place_on,
+)
 from planner.interface import BoolArray, FloatArray, Path, SeenWorld
 from planner.route_optimisation import Terrain
+from planner.stations import places_along, poses_at, turn_centres
 
 DISC, BEYOND = 1.04, 0.5
 """The certified disc is so many times as large as the turn, for tracking error and rolling in, and reaches beyond it
@@ -81,9 +89,10 @@ class Certifier:
     def seen_free_to_m(self, path: Path, seen: SeenWorld) -> float:
         """Station up to which a path lies in space seen to be free."""
         end = min(path.length_m, self._horizon)
-        stations: FloatArray = np.linspace(0.0, end, max(math.ceil(end / self._spacing), 1) + 1)
-        hidden = np.flatnonzero(~seen.seen_free(poses_at(path, stations)[:, :2]))
-        return float(stations[hidden[0]]) if len(hidden) else end
+        pieces = max(math.ceil(end / self._spacing), 1)
+        free = seen.seen_free(places_along(path, end, pieces))
+        hidden = int(free.argmin())  # the first
+        return end if free[hidden] else hidden * (end / pieces)
 
     def certify(
         self, path: Path, seen: SeenWorld, terrain: Terrain, to_m: float = math.inf
@@ -136,13 +145,8 @@ class Certifier:
 
     def _discs_free(self, path: Path, stations: FloatArray, seen: SeenWorld) -> BoolArray:
         """(k, 2) whether the disc of a turn to each side, at each of (k,) stations, has been seen to be free."""
-        poses, bends = poses_at(path, stations)[:, None], curvature_at(path, stations)[:, None]
-        # Where the path turns the other way, the turn begins after room to roll.
-        roll = np.where(np.array(SIDES) * bends < 0.0, self._limits.roll_m, 0.0)[..., None]
-        leftwards = np.concatenate((-poses[..., 3:], poses[..., 2:3]), axis=2)
-        aside = np.array(SIDES)[:, None] * self._limits.radius_m * leftwards
-        centres = poses[..., :2] + roll * poses[..., 2:] + aside
-        places = (centres[:, :, None] + self._disc).reshape(-1, 2)
+        centres = turn_centres(path, stations, self._limits.radius_m, self._limits.roll_m)
+        places = (centres.reshape(-1, 1, 2) + self._disc).reshape(-1, 2)
         free: BoolArray = np.all(seen.seen_free(places).reshape(len(stations), len(SIDES), -1), axis=2)
         return free
 

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.compiled import FLOATS, ROWS, compiled
 from planner.interface import FloatArray, Mission, Path
 
 Point = tuple[float, float]
@@ -60,37 +59,6 @@ def place_on(path: Path, station_m: float) -> tuple[Pose, float]:
             return along(row, left), row[4]
         left -= row[5]
     return end_of(path), 0.0
-
-
-def poses_at(path: Path, stations_m: FloatArray) -> FloatArray:
-    """(k, 4) poses at (k,) stations along a path, clamped to its ends."""
-    return _poses_at(path.segments, np.ascontiguousarray(stations_m))
-
-
-@compiled(ROWS, FLOATS)
-def _poses_at(rows: FloatArray, stations: FloatArray) -> FloatArray:
-    poses = np.empty((len(stations), 4))
-    for i in range(len(stations)):
-        which, along = 0, max(stations[i], 0.0)
-        while along > rows[which, 5] and which < len(rows) - 1:
-            along -= rows[which, 5]
-            which += 1
-        along = min(along, rows[which, 5])
-        tx, ty, half = rows[which, 2], rows[which, 3], 0.5 * rows[which, 4] * along
-        chord = along * (math.sin(half) / half if half else 1.0)
-        cos, sin = math.cos(half), math.sin(half)
-        cx, cy = tx * cos - ty * sin, ty * cos + tx * sin  # direction of the chord
-        poses[i, 0], poses[i, 1] = rows[which, 0] + chord * cx, rows[which, 1] + chord * cy
-        poses[i, 2], poses[i, 3] = cx * cos - cy * sin, cy * cos + cx * sin
-    return poses
-
-
-def curvature_at(path: Path, stations_m: FloatArray) -> FloatArray:
-    """(k,) curvature at (k,) stations along a path, 1/m."""
-    ends = np.cumsum(path.segments[:, 5])
-    which = np.minimum(np.searchsorted(ends, stations_m), len(ends) - 1)
-    curvature: FloatArray = path.segments[which, 4]
-    return curvature
 
 
 def pose_at(path: Path, station_m: float) -> Pose:

@@ -19,9 +19,10 @@ import numpy as np
 from planner.blocks import Blocks, blocks
 from planner.clearance import inside_bounds
 from planner.compiled import COUNTS, FLOAT, ROWS, compiled
-from planner.curves import Limits, Point, Pose, Segment, along, full_turn, poses_at
+from planner.curves import Limits, Point, Pose, Segment, along, full_turn
 from planner.encounters import EARLIEST, LATEST
 from planner.interface import FloatArray, IntArray, Mission, Path, PlanRequest
+from planner.stations import poses_at
 
 AHEAD_S = 30.0
 """So far ahead what moves is taken to keep its velocity, and ways are judged."""

@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.certificate import DISC, Certified, Certifier, disc_radius_m, least_sensor_range_m
-from planner.curves import Limits, along, between, end_of, pose_at, poses_at, sample
+from planner.curves import Limits, along, between, end_of, pose_at, sample
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path
 from planner.route_optimisation import Terrain
+from planner.stations import poses_at
 
 AssertFlyable = Callable[[Path, float], None]
 

@@ -28,12 +28,12 @@ from planner.curves import (
     onward_in_turn,
     place_on,
     pose_at,
-    poses_at,
     sample,
     turn_onto,
     turns_onto,
 )
 from planner.interface import FloatArray, Path
+from planner.stations import places_along, poses_at, turn_centres
 
 Integrated = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
@@ -314,6 +314,25 @@ def test_poses_at_many_stations_are_those_of_integration(
         np.testing.assert_allclose(pose[:2], expected[:2], atol=5e-3)
         np.testing.assert_allclose(pose[2:], expected[2:], atol=1e-6)
         np.testing.assert_allclose(pose, pose_at(path, station), atol=1e-6)
+    end_m = float(stations.max())
+    even = np.linspace(0.0, end_m, len(shares) + 1)
+    np.testing.assert_allclose(places_along(path, end_m, len(shares)), poses_at(path, even)[:, :2], atol=1e-6)
+
+
+@settings(max_examples=60)
+@given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0))
+def test_turns_off_a_path_begin_after_a_straight_where_it_turns_the_other_way(
+    start: Pose, pieces: list[tuple[float, float]], share: float
+) -> None:
+    path = Path(np.array(joined(start, pieces)))
+    station = share * path.length_m
+    pose, bend = place_on(path, station)
+    centres = turn_centres(path, np.array([0.0, station]), 100.0, 15.0)
+    assert centres.shape == (2, 2, 2)
+    for side, centre in zip((1.0, -1.0), centres[1], strict=True):
+        begins = along((*pose, 0.0, 0.0), 15.0) if side * bend < 0.0 else pose
+        across = along((*begins, side / 100.0, 0.0), 100.0 * math.pi)
+        np.testing.assert_allclose(centre, np.add(begins[:2], across[:2]) / 2.0, atol=1e-6)
 
 
 @settings(max_examples=60)

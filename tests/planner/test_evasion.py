@@ -12,12 +12,13 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planner.curves import Limits, onward, pose_at, poses_at, sample
+from planner.curves import Limits, onward, pose_at, sample
 from planner.encounters import EARLIEST, LATEST
 from planner.escape import CLEARER, EVADING_S, HOLD_SHARES
 from planner.evasion import AHEAD_S, LATER, UNKNOWN_MPS, UNKNOWN_S, Threats, clearest, far_side, rolled_out
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
 from planner.rolling_window import RollingWindow
+from planner.stations import poses_at
 from tests.planner.test_rolling_window import MISSION, Seen, first_request, nothing, planner, request_on
 
 MakePoints = Callable[..., FloatArray]

@@ -13,10 +13,11 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.curves import end_of, pose_at, poses_at, sample
+from planner.curves import end_of, pose_at, sample
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
 from planner.rolling_window import RollingWindow
 from planner.rolling_window_config import RollingWindowConfig
+from planner.stations import poses_at
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
