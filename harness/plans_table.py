@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.record import AcceptedPlan, FloatArray, polyline
+from harness.polylines import polylines
+from harness.record import AcceptedPlan, FloatArray
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -54,7 +55,7 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
         "status": pa.array([accepted.plan.status.value for accepted in plans], pa.string()),
         "compute_ms": pa.array([accepted.compute_ms for accepted in plans], pa.float64()),
         "waypoints": _points_column([accepted.plan.waypoints_m for accepted in plans]),
-        "path": _points_column([polyline(accepted.segments) for accepted in plans]),
+        "path": _points_column(polylines([accepted.segments for accepted in plans])),
         "segments": _points_column([accepted.segments for accepted in plans], 6),
         "loiter": pa.array([accepted.loiter for accepted in plans], pa.bool_()),
         "length_m": pa.array([path.length_m for path in paths if path], pa.float64()),

@@ -53,7 +53,6 @@ COMMANDED, STATION = slice(ROW - 4, ROW - 1), ROW - 2
 """Of these, roll command, cross-track error and station."""
 THROTTLE = AircraftState._fields.index("throttle")
 """What comes before it in a row is finite while the aircraft is under control."""
-CHORD_ERROR_M = 0.5
 
 
 class RunFolderError(ValueError):
@@ -136,6 +135,12 @@ class Track:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def part(self, first: int, stop: int) -> Track:
+        """Some of its rows."""
+        part = object.__new__(Track)
+        part.__dict__.update({name: column[first:stop] for name, column in vars(self).items()})
+        return part
 
     @staticmethod
     def joined(blocks: Sequence[Track]) -> Track:
@@ -307,38 +312,3 @@ class Flight:
     wall_s: float
     error: str | None = None
     contact_m: float = math.inf
-
-
-def polyline(segments: FloatArray, chord_error_m: float = CHORD_ERROR_M) -> FloatArray:
-    """Points along joined lines and arcs, dense enough that no chord leaves its arc by more than an error.
-
-    A chord that spans the angle `a` of an arc of curvature `k` leaves it by (1 - cos(a / 2)) / k.
-
-    Args:
-        segments: (n, 6) start east, start north, unit tangent east, unit tangent north, curvature (1/m,
-            positive = left), length (m).
-        chord_error_m: largest distance between a chord and its arc.
-
-    Returns:
-        (k, 2) points, the ends of every segment among them.
-    """
-    east, north, tangent_east, tangent_north, curvature, length = segments.T
-    bent = np.abs(curvature)
-    sharpest = 2.0 * np.arccos(np.clip(1.0 - chord_error_m * bent, 0.0, 1.0))
-    pieces = np.maximum(
-        np.ceil(np.divide(bent * length, sharpest, out=np.ones_like(bent), where=sharpest > 0)), 1
-    )
-    counts = pieces.astype(np.int64)
-    row = np.repeat(np.arange(len(segments)), counts)
-    first = np.repeat(np.cumsum(counts) - counts, counts)
-    station = (np.arange(len(row)) - first) / counts[row] * length[row]
-    row, station = np.append(row, len(segments) - 1), np.append(station, length[-1])
-    half = 0.5 * curvature[row] * station
-    chord = station * np.sinc(half / np.pi)
-    ahead, left = chord * np.cos(half), chord * np.sin(half)
-    return np.column_stack(
-        (
-            east[row] + ahead * tangent_east[row] - left * tangent_north[row],
-            north[row] + ahead * tangent_north[row] + left * tangent_east[row],
-        )
-    )

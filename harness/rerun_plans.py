@@ -8,7 +8,8 @@ import numpy as np
 import rerun as rr
 
 from harness import rerun_blueprint as look
-from harness.record import AcceptedPlan, FloatArray, polyline
+from harness.polylines import polylines
+from harness.record import AcceptedPlan, FloatArray
 from harness.rerun_scene import circle, fan
 from harness.rerun_strips import strips_2d, strips_3d
 
@@ -73,7 +74,7 @@ def send_plans(
         return
     times = [look.time_column(np.array([each.time_s for each in plans]))]
     pictures = [each.plan.picture() if each.plan.picture else None for each in plans]
-    paths = [polyline(each.segments, chord_error_m) for each in plans]
+    paths = polylines([each.segments for each in plans], chord_error_m)
     waypoints = [each.plan.waypoints_m for each in plans]
     guides = np.array([p.guide_m for p in pictures if p]).reshape(-1, 2, 2)
     strips: dict[str, list[list[FloatArray]]] = {

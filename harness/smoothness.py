@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.record import AcceptedPlan, FloatArray, Track
+from planner.curves import along
 
 COURSE_WINDOW_S = 1.0
 """Time over which the curvature rate is taken. The flown curvature is averaged over an odd number of rows' intervals,
@@ -145,18 +146,16 @@ def planned_profile(track: Track, plans: Sequence[AcceptedPlan], window_m: float
         plans: `plans[i]` is the plan of rows with `plan_index` i.
         window_m: length over which a corner is taken to be turned.
     """
-    stretches = stations_in_effect(track)
-    parts: list[Profile] = []
-    for number, (index, start, end) in enumerate(stretches):
-        if number:
-            before, _, left = stretches[number - 1]
-            corner = _corner(_tangent(plans[before], left), _tangent(plans[index], start))
-            if abs(corner) > CORNER_RAD:
-                parts.append(Profile(np.array([window_m]), np.array([corner / window_m])))
-        parts.append(_stretch(plans[index], start, end, window_m))
-    length = np.concatenate([[], *(part.length_m for part in parts)])
-    curvature = np.concatenate([[], *(part.curvature_1pm for part in parts)])
-    return Profile(length[length > 0], curvature[length > 0])
+    pieces: list[tuple[float, float]] = []
+    left: tuple[float, float] | None = None
+    for index, start, end in stations_in_effect(track):
+        taken_up = _tangent(plans[index], start)
+        if left is not None:
+            pieces += _corner(left, taken_up, window_m)
+        pieces += _stretch(plans[index], start, end, window_m)
+        left = _tangent(plans[index], end)
+    length, curvature = np.array([each for each in pieces if each[0] > 0.0]).reshape(-1, 2).T
+    return Profile(length, curvature)
 
 
 def polyline_profile(points_m: FloatArray, window_m: float) -> Profile:
@@ -204,46 +203,38 @@ def stations_in_effect(track: Track) -> list[tuple[int, float, float]]:
     return stretches
 
 
-def _stretch(accepted: AcceptedPlan, start_m: float, end_m: float, window_m: float) -> Profile:
-    """The pieces of a plan between two stations; beyond its end a line, or the loiter circle again."""
-    segments = accepted.segments
-    joint = np.append(0.0, np.cumsum(segments[:, 5]))
-    lengths = np.clip(np.minimum(joint[1:], end_m) - np.maximum(joint[:-1], start_m), 0.0, None)
-    curvatures = segments[:, 4]
-    turn = segments[:-1, 4] * segments[:-1, 5]
-    out_east = segments[:-1, 2] * np.cos(turn) - segments[:-1, 3] * np.sin(turn)
-    out_north = segments[:-1, 2] * np.sin(turn) + segments[:-1, 3] * np.cos(turn)
-    corner = np.arctan2(
-        out_east * segments[1:, 3] - out_north * segments[1:, 2],
-        out_east * segments[1:, 2] + out_north * segments[1:, 3],
-    )
-    turned = (np.abs(corner) > CORNER_RAD) & (joint[1:-1] > start_m) & (joint[1:-1] < end_m)
-    if turned.any():
-        at = np.flatnonzero(turned) + 1
-        lengths = np.insert(lengths, at, window_m)
-        curvatures = np.insert(curvatures, at, corner[at - 1] / window_m)
-    beyond = max(end_m - max(start_m, float(joint[-1])), 0.0)
-    return Profile(
-        np.append(lengths, beyond), np.append(curvatures, segments[-1, 4] if accepted.loiter else 0.0)
-    )
+def _stretch(
+    accepted: AcceptedPlan, start_m: float, end_m: float, window_m: float
+) -> list[tuple[float, float]]:
+    """Length and curvature of pieces of a plan between two stations; beyond its end a line, or the circle again."""
+    pieces: list[tuple[float, float]] = []
+    begins, arrived = 0.0, None
+    for row in accepted.segments.tolist():
+        if arrived is not None and start_m < begins < end_m:
+            pieces += _corner(arrived, row[2:4], window_m)
+        ends = begins + row[5]
+        pieces.append((min(ends, end_m) - max(begins, start_m), row[4]))
+        begins, arrived = ends, along(row, row[5])[2:]
+    pieces.append((end_m - max(start_m, begins), row[4] if accepted.loiter else 0.0))
+    return pieces
 
 
 def _tangent(accepted: AcceptedPlan, station_m: float) -> tuple[float, float]:
     """Unit tangent of a plan at a station; beyond its end that of the line, or the loiter circle, there."""
-    segments = accepted.segments
-    begins = np.append(0.0, np.cumsum(segments[:-1, 5]))
-    row = max(int(np.searchsorted(begins, station_m, side="right")) - 1, 0)
-    east, north, curvature, length = segments[row, 2:].tolist()
-    along = max(station_m - float(begins[row]), 0.0)
-    turn = curvature * (along if accepted.loiter else min(along, length))
-    cosine, sine = math.cos(turn), math.sin(turn)
-    return east * cosine - north * sine, north * cosine + east * sine
+    *before, last = accepted.segments.tolist()
+    away = max(station_m, 0.0)
+    for row in before:
+        if away < row[5]:
+            return along(row, away)[2:]
+        away -= row[5]
+    return along(last, away if accepted.loiter else min(away, last[5]))[2:]
 
 
-def _corner(before: tuple[float, float], after: tuple[float, float]) -> float:
-    """Angle from one direction to another, rad, positive to the left."""
+def _corner(before: Sequence[float], after: Sequence[float], window_m: float) -> list[tuple[float, float]]:
+    """The arc, positive to the left, that counts for a change of direction; none for rounding."""
     (x0, y0), (x1, y1) = before, after
-    return math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
+    angle = math.atan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
+    return [(window_m, angle / window_m)] if abs(angle) > CORNER_RAD else []
 
 
 def _max_rate(profile: Profile, window_m: float) -> float:

@@ -174,7 +174,8 @@ def legs(
         The legs in order of time; empty where no plan was flown.
     """
     ends = np.array([corner.station_m for corner in corners])
-    stretches = _stretches(track, track.plan_index + np.searchsorted(ends, track.station_m))
+    leg = track.plan_index + np.searchsorted(ends, track.station_m) if corners else track.plan_index
+    stretches = _stretches(track, leg)
     reached = np.searchsorted(np.maximum.accumulate(track.station_m), ends) - 1
     judged = []
     for first, last in stretches:
@@ -218,7 +219,7 @@ def _judge(
     lost_control: bool,
     cut_m: float,
 ) -> Leg:
-    leg = _rows(track, first, last + 1)
+    leg = track.part(first, last + 1)
     off = np.nan_to_num(np.abs(leg.cross_track_m))
     high = np.abs(leg.up_m - limits.altitude_m)
     slow = np.abs(_averaged(leg.airspeed_mps - limits.airspeed_mps, leg, SPEED_S))
@@ -237,7 +238,7 @@ def _judge(
         cause = "speed or throttle saturation"
     elif high.max() > limits.max_altitude_error_m:
         sinking = max(int(high.argmax()), 1)
-        before = _rows(leg, int(np.searchsorted(leg.time_s, leg.time_s[sinking] - LEAD_S)), sinking)
+        before = leg.part(int(np.searchsorted(leg.time_s, leg.time_s[sinking] - LEAD_S)), sinking)
         stopped = _at_a_stop(before).mean() >= SATURATED_SHARE
         cause = "speed or throttle saturation" if stopped else "tracking error"
     return Leg(
@@ -258,7 +259,7 @@ def _before_peak(track: Track, peak: int, threshold_m: float) -> Track:
     """The rows up to a peak of the cross-track error, from shortly before it outgrew what it may be."""
     within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= threshold_m)
     grows = int(within[-1]) if len(within) else 0
-    return _rows(track, int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S)), peak + 1)
+    return track.part(int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S)), peak + 1)
 
 
 def _cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> str:
@@ -337,8 +338,3 @@ def _wind_from_left_mps(track: Track) -> float:
     angle = np.radians(track.heading_deg - track.course_deg)
     across: FloatArray = -track.airspeed_mps * np.sin(angle)
     return float(across.mean())
-
-
-def _rows(track: Track, first: int, stop: int) -> Track:
-    """A part of a track."""
-    return Track(**{name: column[first:stop] for name, column in vars(track).items()})

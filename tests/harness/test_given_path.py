@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.given_path import FloatArray, fly_by
-from harness.record import polyline
+from harness.polylines import polylines
 from planner.curves import end_of
 from planner.interface import Path
 
@@ -40,7 +40,7 @@ def test_a_corner_is_flown_by_with_the_turn_radius(turn_deg: float) -> None:
     assert corner.cut_m == pytest.approx(150.0 / math.cos(out / 2) - 150.0)
     assert way.segments[:, 4] == pytest.approx([0.0, math.copysign(1 / 150.0, turn_deg), 0.0])
     assert joints(way.segments).max() < 1e-6
-    near = np.hypot(*(polyline(way.segments, 1e-4) - points[1]).T).min()
+    near = np.hypot(*(polylines([way.segments], 1e-4)[0] - points[1]).T).min()
     assert near == pytest.approx(corner.cut_m, abs=0.01)
     trim = 150.0 * math.tan(abs(out) / 2)
     assert corner.station_m == pytest.approx(3000.0 - trim + 75.0 * abs(out))
@@ -78,7 +78,7 @@ def test_points_on_a_circle_give_the_circle_back(
     # The first and the last arc have a whole leg for themselves.
     assert (bend[bend > 0] >= 0.45 / radius).all()
     assert (bend <= 1.02 / radius + 1e-12).all()
-    off = np.abs(np.hypot(*polyline(way.segments, 1e-4).T) - radius)
+    off = np.abs(np.hypot(*polylines([way.segments], 1e-4)[0].T) - radius)
     assert off.max() <= sagitta
     assert way.corners == ()
 
@@ -96,7 +96,7 @@ def test_a_curve_may_have_a_point_every_few_millimetres() -> None:
     way = fly_by(points, 110.0, 1.0)
     assert way.corners == ()
     assert np.abs(way.segments[:, 4]).max() < 1.0 / 250.0
-    drawn = polyline(way.segments, 0.1)
+    drawn = polylines([way.segments], 0.1)[0]
     off = np.hypot(*drawn.T)[(drawn[:, 1] > 5.0) & (drawn[:, 0] > 30.0)] - 300.0
     assert np.abs(off).max() < 1.0
 

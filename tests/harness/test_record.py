@@ -6,11 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from aircraft.interface import AircraftState
-from harness.record import COLUMNS, TRACK_FIELDS, AcceptedPlan, FloatArray, Track, TrackLog, digest, polyline
+from harness.record import COLUMNS, TRACK_FIELDS, AcceptedPlan, FloatArray, Track, TrackLog, digest
 from planner.interface import Plan, PlanStatus
 
 CONTRACT = (
@@ -105,6 +103,15 @@ def test_track_is_read_only_and_copies(make_track: Callable[..., Track]) -> None
         track.east_m[0] = 1.0
 
 
+def test_a_part_of_a_track_is_some_of_its_rows(make_track: Callable[..., Track]) -> None:
+    track = make_track(7, east_m=np.arange(7.0), plan_index=np.arange(7))
+    part = track.part(2, 5)
+    assert len(part) == 3
+    assert digest(part) == digest(Track(**{name: column[2:5] for name, column in vars(track).items()}))
+    with pytest.raises(ValueError, match="read-only"):
+        part.east_m[0] = 1.0
+
+
 def test_columns_of_different_length_are_refused(make_track: Callable[..., Track]) -> None:
     columns = dict(vars(make_track(5)))
     with pytest.raises(ValueError, match="track column up_m has shape"):
@@ -114,28 +121,3 @@ def test_columns_of_different_length_are_refused(make_track: Callable[..., Track
 def test_accepted_plan_needs_a_path() -> None:
     with pytest.raises(ValueError, match="accepted plan 3 has no path"):
         AcceptedPlan(3, 0.0, 1.0, Plan(PlanStatus.NO_PATH, "none"))
-
-
-@given(
-    radius=st.floats(20.0, 20000.0),
-    turn=st.floats(0.01, 2 * math.pi),
-    bearing=st.floats(-math.pi, math.pi),
-    side=st.sampled_from([-1.0, 1.0]),
-)
-def test_polyline_stays_by_its_arc(radius: float, turn: float, bearing: float, side: float) -> None:
-    tangent = np.array([math.cos(bearing), math.sin(bearing)])
-    centre = np.array([100.0, -50.0]) + side * radius * np.array([-tangent[1], tangent[0]])
-    points = polyline(np.array([[100.0, -50.0, *tangent, side / radius, radius * turn]]), 0.5)
-    away = np.hypot(*(points - centre).T)
-    np.testing.assert_allclose(away, radius, rtol=1e-9)
-    middles = np.hypot(*(0.5 * (points[1:] + points[:-1]) - centre).T)
-    assert (radius - middles).max() <= 0.5 + 1e-6
-    spoke = points[0] - centre
-    cosine, sine = math.cos(side * turn), math.sin(side * turn)
-    end = centre + np.array([cosine * spoke[0] - sine * spoke[1], sine * spoke[0] + cosine * spoke[1]])
-    np.testing.assert_allclose(points[-1], end, atol=1e-6 * radius)
-
-
-def test_polyline_of_lines_is_their_ends() -> None:
-    segments = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 10.0], [10.0, 0.0, 0.0, 1.0, 0.0, 5.0]])
-    np.testing.assert_allclose(polyline(segments), [[0, 0], [10, 0], [10, 5]], atol=1e-12)
