@@ -114,7 +114,7 @@ class Fan:
         return rays, faces.repeat(counts, axis=1)
 
 
-@compiled(FACES, FACES, FLOAT, FLOAT)
+@compiled(FACES, FACES, FLOAT, FLOAT, unchecked=True)  # every scan begins with it
 def nearest_face_m(circles: FloatArray, edges: FloatArray, east: float, north: float) -> float:
     """Distance from a place to the nearest face, ahead or not; +inf where there is none.
 

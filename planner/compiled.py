@@ -40,10 +40,12 @@ class Compiled(Generic[P, R]):
     Args:
         function: the function.
         arguments: their types. Others are refused: nothing is ever compiled anew.
+        unchecked: others are not refused, and may overwrite anything: to compare types takes as long as a short
+            function does. Not for one that other compiled ones call.
     """
 
-    def __init__(self, function: Callable[P, R], arguments: tuple[str, ...]) -> None:
-        self._function, self._arguments = function, arguments
+    def __init__(self, function: Callable[P, R], arguments: tuple[str, ...], unchecked: bool = False) -> None:
+        self._function, self._arguments, self._unchecked = function, arguments, unchecked
         self._code: Callable[..., R] = self._compile_first
         functools.update_wrapper(self, function)
 
@@ -69,6 +71,9 @@ class Compiled(Generic[P, R]):
                 raise
             # There is no place to keep it, or no room there.
             code = numba.njit(signature, error_model="numpy")(self._function)
+        if self._unchecked:
+            (only,) = code.overloads.values()
+            code = only.entry_point
         self._code = code
         # Functions of the same file that call it find what is compiled.
         self._function.__globals__[self._function.__name__] = code
@@ -78,11 +83,11 @@ _waiting: list[Compiled[..., Any]] = []
 _compiling = threading.RLock()
 
 
-def compiled(*arguments: str) -> Callable[[Callable[P, R]], Compiled[P, R]]:
+def compiled(*arguments: str, unchecked: bool = False) -> Callable[[Callable[P, R]], Compiled[P, R]]:
     """Has a function compiled for arguments of these types."""
 
     def compile_later(function: Callable[P, R]) -> Compiled[P, R]:
-        made = Compiled(function, arguments)
+        made = Compiled(function, arguments, unchecked)
         _waiting.append(made)
         return made
 

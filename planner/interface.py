@@ -161,7 +161,7 @@ class Path:
     loiter: bool = False
 
     def __post_init__(self) -> None:
-        rows = np.array(self.segments, dtype=np.float64).reshape(-1, 6)
+        rows = np.array(self.segments, dtype=np.float64, order="C").reshape(-1, 6)
         rows.setflags(write=False)
         object.__setattr__(self, "segments", rows)
 

@@ -108,6 +108,18 @@ def test_nothing_is_compiled_in_flight() -> None:
         encircled(loop, points)
 
 
+def test_without_a_check_of_types_the_same_is_computed() -> None:
+    checked, unchecked = Compiled(total, (ROWS,)), Compiled(total, (ROWS,), unchecked=True)
+    rows = np.random.default_rng(3).normal(size=(5, 2))
+    for made in (checked, unchecked):
+        made.compile()
+    assert unchecked(rows) == checked(rows)
+    with pytest.raises(TypeError, match="No matching definition"):
+        checked(rows.astype(np.float32))
+    with pytest.raises(TypeError, match="can't unbox array"):
+        unchecked(rows.astype(np.float32))
+
+
 def test_what_is_only_read_may_be_read_only() -> None:
     made = Compiled(total, (ROWS,))
     made.compile()

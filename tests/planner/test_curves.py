@@ -319,6 +319,13 @@ def test_poses_at_many_stations_are_those_of_integration(
     np.testing.assert_allclose(places_along(path, end_m, len(shares)), poses_at(path, even)[:, :2], atol=1e-6)
 
 
+def test_a_path_may_be_given_column_by_column() -> None:
+    rows = joined(EAST, [(0.0, 100.0), (0.01, 50.0)])
+    stations = np.array([30.0, 120.0])
+    by_columns = poses_at(Path(np.asfortranarray(rows)), stations)
+    np.testing.assert_array_equal(by_columns, poses_at(Path(np.array(rows)), stations))
+
+
 @settings(max_examples=60)
 @given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0))
 def test_turns_off_a_path_begin_after_a_straight_where_it_turns_the_other_way(
