@@ -180,7 +180,27 @@ def time_column(time_s: FloatArray) -> rr.TimeColumn:
     return rr.TimeColumn(TIMELINE, duration=np.round(time_s * 1e9).astype("timedelta64[ns]"))
 
 
-def blueprint(frame: Frame, runs: Sequence[str] = ("",)) -> rrb.Blueprint:
+class Layout(rrb.Blueprint):
+    """A blueprint that can be let go of.
+
+    rerun 0.41 keeps what it writes one to for as long as the process lives: two threads and 3 MB each
+    (rerun-io/rerun#2116).
+    """
+
+    _stream: rr.RecordingStream | None = None
+
+    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
+        self._stream = stream
+        super()._log_to_stream(stream)
+
+    def let_go(self) -> None:
+        """Once it has been sent."""
+        if self._stream is not None:
+            self._stream.disconnect()
+            self._stream = None
+
+
+def blueprint(frame: Frame, runs: Sequence[str] = ("",)) -> Layout:
     """The layout: plan view and 3-D flight, states, events and summary, time series.
 
     Args:
@@ -199,7 +219,7 @@ def blueprint(frame: Frame, runs: Sequence[str] = ("",)) -> rrb.Blueprint:
     about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
     states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
     below = [events, about, *([attitude_view()] if len(runs) == 1 else [])]
-    return rrb.Blueprint(
+    return Layout(
         rrb.Horizontal(
             rrb.Vertical(
                 rrb.Horizontal(plan_view(frame, runs), flight_view(frame, runs), column_shares=[1, 1]),

@@ -19,7 +19,7 @@ import rerun as rr
 from aircraft.interface import AircraftState
 from harness import rerun_blueprint as look
 from harness.record import AcceptedPlan, FloatArray, Track
-from harness.rerun_file import RecordingFile
+from harness.rerun_file import RecordingFile, recording_stream
 from harness.rerun_moving import Tracked, log_tracked_style
 from harness.rerun_plans import log_plan_style, send_plans
 from harness.rerun_scene import lines_2d, log_moving, log_obstacle, log_scene, log_summary, quaternions
@@ -74,9 +74,7 @@ class RerunLog:
         if not path.parent.is_dir():
             raise FileNotFoundError(f"no folder {path.parent} for the recording")
         self._scene = scene
-        self._rec = rr.RecordingStream("wayproof", recording_id=recording_id)
-        self._rec.set_log_time_enabled(False)
-        self._rec.set_log_tick_enabled(False)
+        self._rec = recording_stream(recording_id)
         self._file = RecordingFile(self._rec, path, look.blueprint(scene.frame))
         self._rec.send_recording_name(scene.name)
         span_m = scene.frame.span_m

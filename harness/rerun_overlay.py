@@ -14,7 +14,7 @@ import rerun as rr
 from harness import rerun_blueprint as look
 from harness.compare_rows import escaped, number
 from harness.record import RunFolderError
-from harness.rerun_file import RecordingFile
+from harness.rerun_file import RecordingFile, recording_stream
 
 SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
 """Below PLAN and WORLD: what all runs of a scenario have in common."""
@@ -43,7 +43,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
     chunks = [_chunks(recording) for recording in recordings]
     runs = [f"runs/{place}/" for place in range(len(recordings))]
     title = ", ".join(names)
-    with _stream(f"overlay: {title}") as rec:
+    with recording_stream(f"overlay: {title}") as rec:
         file = RecordingFile(rec, path, look.blueprint(_frame(chunks[0], recordings[0]), runs))
         rec.send_recording_name(title)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
@@ -69,18 +69,11 @@ def send_recording(recording: Path, runs: int, address: str) -> None:
     """
     chunks = _chunks(recording)
     names = [f"runs/{place}/" for place in range(runs)] if runs > 1 else [""]
-    with _stream(str(recording)) as rec:
+    with recording_stream(str(recording)) as rec:
         rec.connect_grpc(address, default_blueprint=look.blueprint(_frame(chunks, recording), names))
         rec.send_chunks(chunks)
         rec.flush()
         rec.disconnect()
-
-
-def _stream(recording_id: str) -> rr.RecordingStream:
-    rec = rr.RecordingStream("wayproof", recording_id=recording_id)
-    rec.set_log_time_enabled(False)
-    rec.set_log_tick_enabled(False)
-    return rec
 
 
 def _chunks(recording: Path) -> list[rr.chunk.Chunk]:

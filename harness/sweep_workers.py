@@ -24,9 +24,6 @@ ONE_THREAD: Final = dict.fromkeys(
 )
 """Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it."""
 
-RECORDED_EACH: Final = 25
-"""Flights of a process that records: rerun 0.41 keeps the layout of every recording, about 3 MB, for ever."""
-
 CONNECT_S: Final = 10.0
 SCHEDULER_PORT: Final = 8786
 JOBS_EACH: Final = 2
@@ -69,11 +66,10 @@ class _Lane:
 
     TRIES: Final = 2
 
-    def __init__(self, line: _Line, flights_each: int | None) -> None:
+    def __init__(self, line: _Line) -> None:
         self.busy = False
         self._line = line
         self._closed = False
-        self._flights_each = self._left = flights_each
         self._pool: ProcessPoolExecutor | None = None
         self._broken: ProcessPoolExecutor | None = None
 
@@ -109,7 +105,6 @@ class _Lane:
         if self._pool is None:
             spawn = multiprocessing.get_context("spawn")
             self._pool = ProcessPoolExecutor(1, mp_context=spawn, initializer=_begin)
-            self._left = self._flights_each
         return self._pool
 
     def _over(self, flown: Future[Answer], job: Job, answer: Future[Answer], tries: int) -> None:
@@ -124,10 +119,6 @@ class _Lane:
                 self._try(job, answer, tries)
                 return
             error = WorkerDiedError()
-        elif self._left is not None:
-            self._left -= 1
-            if self._left == 0:
-                self._retire()
         self.go_on(over=True)
         if error is None:
             answer.set_result(flown.result())
@@ -138,20 +129,17 @@ class _Lane:
         self._closed = True
 
     def end(self) -> None:
-        self._retire(wait=True)
-
-    def _retire(self, *, wait: bool = False) -> None:
         if self._pool is not None:
-            self._pool.shutdown(wait=wait, cancel_futures=True)
+            self._pool.shutdown(cancel_futures=True)
             self._pool = None
 
 
 class LocalWorkers:
     """Processes of this machine."""
 
-    def __init__(self, number: int, flights_each: int | None) -> None:
+    def __init__(self, number: int) -> None:
         self._line = _Line()
-        self._lanes = [_Lane(self._line, flights_each) for _ in range(number)]
+        self._lanes = [_Lane(self._line) for _ in range(number)]
 
     def free(self) -> int:
         """Room for a job that flies and one that waits for each process."""
@@ -180,17 +168,12 @@ class LocalWorkers:
 
 
 @contextmanager
-def local_workers(number: int, *, recording: bool = False) -> Iterator[Workers]:
-    """Processes of this machine; they end with the context, in mid-flight if need be.
-
-    Args:
-        number: of processes.
-        recording: whether they may write recordings; then a process ends after `RECORDED_EACH` flights.
-    """
+def local_workers(number: int) -> Iterator[Workers]:
+    """So many processes of this machine; they end with the context, in mid-flight if need be."""
     before = set(multiprocessing.active_children())
     kept = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(ONE_THREAD)
-    workers = LocalWorkers(number, RECORDED_EACH if recording else None)
+    workers = LocalWorkers(number)
     try:
         yield workers
     finally:

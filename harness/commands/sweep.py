@@ -105,10 +105,9 @@ def _fly(
     from harness.sweep_terminal import sweep_bar
     from harness.sweep_workers import dask_workers, local_workers
 
-    recording = runs.campaign.recordings != "none"
     try:
         with (
-            dask_workers(scheduler) if scheduler else local_workers(workers, recording=recording) as flyers,
+            dask_workers(scheduler) if scheduler else local_workers(workers) as flyers,
             CampaignFolder(path, runs, resume=resume) as folder,
             nullcontext() if silent else sweep_bar(len(runs), len(folder.done)) as report,
         ):

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from harness import sweep_workers
 from harness.campaign import load_campaign
 from harness.campaign_folder import CampaignFolder
 from harness.campaign_runs import CampaignRuns
@@ -628,18 +626,22 @@ from harness.sweep_flight import Job, fly_job
 runs = CampaignRuns(load_campaign(Path("campaign.yaml")))
 grown = []
 for number in range(len(runs)):
-    answer = fly_job(Job(number, runs.packed(number), Path("run"), "none", True))
+    answer = fly_job(Job(number, runs.packed(number), Path("run"), sys.argv[1], True))
     assert answer.row["outcome"] == "reached", answer.row
-    grown.append(psutil.Process().memory_info().rss / 2**20)
+    process = psutil.Process()
+    grown.append((process.memory_info().rss / 2**20, process.num_threads()))
 sys.stdout.write(json.dumps(grown))
 """
 
 
-@pytest.mark.slow
-def test_a_worker_does_not_grow_over_500_flights(place: Path) -> None:
-    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 128"))
+@pytest.mark.parametrize(
+    ("recordings", "draws", "flights"),
+    [pytest.param("none", 128, 512, marks=pytest.mark.slow), ("all", 8, 32)],
+)
+def test_a_worker_does_not_grow(place: Path, recordings: str, draws: int, flights: int) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", f"draws: {draws}"))
     flown = subprocess.run(
-        [sys.executable, "-c", FLIGHTS_IN_ONE_PROCESS],
+        [sys.executable, "-c", FLIGHTS_IN_ONE_PROCESS, recordings],
         cwd=place,
         env={**os.environ, **ONE_THREAD, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -648,23 +650,8 @@ def test_a_worker_does_not_grow_over_500_flights(place: Path) -> None:
         check=False,
     )
     assert flown.returncode == 0, flown.stderr
-    used_mib = json.loads(flown.stdout)
-    assert len(used_mib) == 512
+    used_mib, threads = zip(*json.loads(flown.stdout), strict=True)
+    assert len(used_mib) == flights
     # The first flights fill caches and the heap; a leak of half a track a flight would show.
     assert used_mib[-1] - used_mib[11] < 10.0
-
-
-def test_a_process_that_records_ends_after_some_flights(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sweep_workers, "RECORDED_EACH", 2)
-    (place / "campaign.yaml").write_text(f"{CAMPAIGN}recordings: failures\n")
-    begun = []
-    executor = ProcessPoolExecutor
-
-    def counting(*arguments: Any, **options: Any) -> Any:
-        begun.append(arguments)
-        return executor(*arguments, **options)
-
-    monkeypatch.setattr(sweep_workers, "ProcessPoolExecutor", counting)
-    assert sweep(place, "--workers", "1") == 0
-    assert begun == [(1,)] * 4, "of one process each"
-    assert len(rows_of(place / "out")) == 8
+    assert threads[-1] <= threads[11]
