@@ -23,8 +23,15 @@ _MESSAGE = struct.Struct("<QQ")
 
 
 def recording_stream(recording_id: str) -> rr.RecordingStream:
-    """What a recording is logged to. Threads and memory of those that were ended before are set free."""
-    rr.init("wayproof", init_logging=False)
+    """What a recording is logged to. Threads and memory of those that were ended before are set free.
+
+    In the fork of a process that has recorded rerun cannot do that: there they stay.
+    """
+    try:
+        rr.init("wayproof", init_logging=False)
+    except RuntimeError as error:
+        if "fork" not in str(error).lower():
+            raise
     rec = rr.RecordingStream("wayproof", recording_id=recording_id)
     rec.set_log_time_enabled(False)
     rec.set_log_tick_enabled(False)

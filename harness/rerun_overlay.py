@@ -70,7 +70,9 @@ def send_recording(recording: Path, runs: int, address: str) -> None:
     chunks = _chunks(recording)
     names = [f"runs/{place}/" for place in range(runs)] if runs > 1 else [""]
     with recording_stream(str(recording)) as rec:
-        rec.connect_grpc(address, default_blueprint=look.blueprint(_frame(chunks, recording), names))
+        layout = look.blueprint(_frame(chunks, recording), names)
+        rec.connect_grpc(address, default_blueprint=layout)
+        layout.let_go()
         rec.send_chunks(chunks)
         rec.flush()
         rec.disconnect()

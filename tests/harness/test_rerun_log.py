@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import subprocess
 import sys
 import urllib.request
@@ -416,6 +417,38 @@ os._exit(9)
     shown = tmp_path / "overlay.rrd"
     write_overlay([tmp_path / "a.rrd", tmp_path / "a.rrd"], ["one", "two"], shown)
     assert rerun("rrd", "verify", str(shown)).returncode == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+@pytest.mark.parametrize("ended", [True, False])
+def test_the_fork_of_a_process_that_records_can_record(tmp_path: Path, ended: bool) -> None:
+    script = f"""
+import os, signal, sys
+sys.path[:0] = {[str(Path(__file__).parent), str(Path(__file__).parents[2])]!r}
+from pathlib import Path
+from conftest import track
+from test_rerun_log import SCENE
+from harness.rerun_log import RerunLog
+def log(name):
+    log = RerunLog(Path({str(tmp_path)!r}, name), SCENE, "a")
+    log.on_block(track(600, plan_index=-1))
+    return log
+first = log("parent.rrd")
+if {ended}:
+    first.end()
+child = os.fork()
+if not child:
+    signal.alarm(60)
+    log("one.rrd").end()
+    log("two.rrd").end()
+    os._exit(0)
+assert os.waitpid(child, 0)[1] == 0
+first.end()
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    for name in ("parent.rrd", "one.rrd", "two.rrd"):
+        assert len(column(read(tmp_path / name), "/series/bank/flown", "scalars")) == 600
 
 
 def test_recording_is_silent(
