@@ -60,7 +60,7 @@ class Route:
 
     Attributes:
         segments: (n, 6) float64, one row a segment: start east, start north, unit tangent east, unit tangent
-            north at the start, curvature (1/m, positive = left turn), length (m). Read-only.
+            north at the start, curvature (1/m, positive = left turn), length (m). Read-only, row by row.
         loiter: the last segment is a full circle that is flown again and again.
     """
 
@@ -68,7 +68,7 @@ class Route:
     loiter: bool = False
 
     def __post_init__(self) -> None:
-        rows = np.array(self.segments, dtype=np.float64)
+        rows = np.array(self.segments, dtype=np.float64, order="C")
         if rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
             raise ValueError(f"route segments must have shape (n, 6), n > 0; got {rows.shape}")
         if not np.isfinite(rows).all() or (rows[:, 5] <= 0).any():

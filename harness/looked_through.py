@@ -93,7 +93,7 @@ def through_cells(
                 continue
             if coarse:
                 ray = nearly_towards(x, y, start_rad, spacing_rad)
-                if ray < rays and ranges[ray] <= beyond:
+                if 0 <= ray < rays and ranges[ray] <= beyond:
                     continue
             clockwise = math.atan2(x, y) - start_rad
             while clockwise < 0.0:
@@ -153,7 +153,7 @@ def through_places(
             continue
         if coarse:
             ray = nearly_towards(dx, dy, start_rad, spacing_rad)
-            if ray < rays and ranges[ray] <= distance + sure_m:
+            if 0 <= ray < rays and ranges[ray] <= distance + sure_m:
                 continue
         clockwise = math.atan2(dx, dy) - start_rad
         while clockwise < 0.0:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from harness.obstacle import Obstacle
-from planner.interface import BoolArray, FloatArray, IntArray
+from planner.interface import BoolArray, FloatArray
 
 
 class Motions:
@@ -31,10 +31,6 @@ class Motions:
         """Those of some obstacles."""
         rows = [(*o.velocity_mps, o.epoch_s, *o.interval_s) for o in obstacles]
         return cls(np.array(rows, dtype=np.float64).reshape(-1, 5).T.copy())
-
-    def take(self, columns: IntArray) -> Motions:
-        """Those of some of them."""
-        return Motions(self._rows[:, columns])
 
     def shifts(self, time_s: float) -> FloatArray:
         """(2, n) displacement since the epoch."""

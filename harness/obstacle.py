@@ -121,11 +121,18 @@ class Obstacle:
         shape: where it is at `epoch_s`.
         velocity_mps: (east, north).
         active_s: first and last time at which it is there, both included; None: always.
+
+    Raises:
+        ValueError: a velocity or a first time is not finite.
     """
 
     shape: Circle | Polygon
     velocity_mps: tuple[float, float] = (0.0, 0.0)
     active_s: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not all(map(math.isfinite, (*self.velocity_mps, self.epoch_s))):
+            raise ValueError(f"an obstacle needs a finite velocity and first time; got {self}")
 
     @property
     def epoch_s(self) -> float:

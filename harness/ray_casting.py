@@ -197,7 +197,7 @@ def _lower_to_circles(
         )
         right, ahead = away_east * cos - away_north * sin, away_east * sin + away_north * cos
         away = math.hypot(right, ahead)
-        if away - radius > range_m:
+        if not away - radius <= range_m:  # or what tells where it is is not a number
             continue
         half_rad = math.asin(radius / away) if away > radius else math.pi
         # The power of the sensor's place: the square of its tangent to the circle, negative inside.

@@ -87,12 +87,12 @@ class Certifier:
         self._disc = _disc(disc_radius_m(limits.radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: SeenWorld) -> float:
-        """Station up to which a path lies in space seen to be free."""
+        """Station up to which a path lies in space seen to be free: that of the first place that does not."""
         end = min(path.length_m, self._horizon)
         pieces = max(math.ceil(end / self._spacing), 1)
         free = seen.seen_free(places_along(path, end, pieces))
         hidden = int(free.argmin())  # the first
-        return end if free[hidden] else hidden * (end / pieces)
+        return end if free[hidden] else min(hidden * (end / pieces), end)
 
     def certify(
         self, path: Path, seen: SeenWorld, terrain: Terrain, to_m: float = math.inf

@@ -1,8 +1,9 @@
 """Geometry compiled to machine code (numba): the loops over edge points that most of a planner's time goes to.
 
 All functions are compiled together, for the types of arguments that they name, by `compile_all` before a flight: what
-was compiled is kept on disk, by file, so that a compiled function calls none of another file. To import them takes no
-time. Fast mathematics is left off: the same numbers give the same results.
+was compiled is kept on disk, by file, so that a compiled function calls none of another file (but `fused`, which is an
+instruction), and numbers that it takes from one never change. To import them takes no time. Fast mathematics is left
+off: the same numbers give the same results.
 """
 
 from __future__ import annotations

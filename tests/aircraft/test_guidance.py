@@ -84,6 +84,16 @@ def test_beyond_the_end_a_route_goes_straight_on_and_a_loiter_round() -> None:
     assert route_point(joined([(0.0, 50.0)]), 80.0) == pytest.approx((0.0, 80.0, 0.0, 1.0))
 
 
+@pytest.mark.parametrize("loiter", [False, True])
+def test_a_route_is_kept_row_by_row_however_it_was_given(loiter: bool) -> None:
+    rows = joined([(0.0, 500.0), (1 / 150.0, 300.0), (0.0, 400.0)]).segments
+    follower = PathFollower(LIMITS)
+    follower.follow(Route(np.asfortranarray(rows), loiter))
+    assert follower.route is not None
+    assert follower.route.flags.c_contiguous  # compiled guidance reads it as it lies in memory
+    np.testing.assert_array_equal(follower.route[:3, :6], rows)
+
+
 def test_update_needs_a_route() -> None:
     with pytest.raises(RuntimeError, match=r"follow\(\) a route"):
         PathFollower(LIMITS).update(PointMass(northwards()).state())

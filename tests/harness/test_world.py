@@ -381,6 +381,18 @@ def test_a_polygon_without_three_finite_vertices_is_an_error(
         Polygon(vertices)
 
 
+@pytest.mark.parametrize("velocity", [(math.nan, 0.0), (0.0, math.inf)])
+def test_an_obstacle_that_moves_beyond_all_measure_is_an_error(velocity: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="finite velocity"):
+        Obstacle(Circle((0.0, 0.0), 1.0), velocity)
+
+
+@pytest.mark.parametrize("first", [-math.inf, math.nan])
+def test_an_obstacle_appears_at_a_finite_time(first: float) -> None:
+    with pytest.raises(ValueError, match="finite velocity and first time"):
+        Obstacle(Circle((0.0, 0.0), 1.0), active_s=(first, math.inf))
+
+
 @pytest.mark.skipif(not REFEREE.exists(), reason="the independent referee is not beside this repository")
 def test_clearance_agrees_with_the_independent_referee() -> None:
     spec = importlib.util.spec_from_file_location("referee", REFEREE)

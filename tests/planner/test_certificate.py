@@ -174,6 +174,14 @@ def test_an_edge_point_in_the_turn_forbids_it_though_it_was_seen_free() -> None:
     assert less is None or less.leaves_m < 130.0
 
 
+@given(length=st.floats(50.0, HORIZON))
+def test_a_path_is_not_free_beyond_its_end(length: float) -> None:
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)]))
+    only_the_end_hidden = FreeDiscs(np.array([(-1e6, 0.0, 1e6 + length - 0.1)]))
+    assert length - 1e-9 < CERTIFIER.seen_free_to_m(path, only_the_end_hidden) <= length
+    assert CERTIFIER.seen_free_to_m(path, FreeDiscs(np.array([(0.0, 0.0, 1e6)]))) == length
+
+
 @pytest.mark.parametrize("free", [0.0, 50.0, 0.9 * RADIUS])
 def test_where_nothing_is_free_there_is_none(free: float) -> None:
     assert CERTIFIER.certify(STRAIGHT, FreeDiscs(np.array([(0.0, 0.0, free)])), terrain()) is None
