@@ -54,11 +54,12 @@ def end_of(path: Path) -> Pose:
 def place_on(path: Path, station_m: float) -> tuple[Pose, float]:
     """The pose `station_m` along a path, clamped to its ends, and the curvature (1/m) there."""
     left = max(station_m, 0.0)
-    for row in path.segments.tolist():
+    *before, last = path.segments.tolist()
+    for row in before:
         if left <= row[5]:
             return along(row, left), row[4]
         left -= row[5]
-    return end_of(path), 0.0
+    return along(last, min(left, last[5])), last[4]
 
 
 def pose_at(path: Path, station_m: float) -> Pose:
