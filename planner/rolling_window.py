@@ -54,6 +54,10 @@ plan in effect serves; where it does not; and where no safe one is flown, or som
 MOST_EFFORT = 4
 """Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
 
+AGAIN = 3
+"""So often all is tried again before a goal is called unreachable for want of room to turn: a way that is narrower may
+be seen to be safe from elsewhere on the turn, or at another look."""
+
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 
 
@@ -97,6 +101,7 @@ class RollingWindow:
         self._least_room_m = BROKEN_SHARE * mission.clearance_m
         self._effort = 0  # grows with every search that was in vain
         self._forgiven = False  # what was given up is, or was, tried again
+        self._again = 0  # how often that was where there is no room to turn
         self._refused_at_m = 0.0
         self._watch = Watch(
             mission,
@@ -268,18 +273,21 @@ class RollingWindow:
         if stuck is None and thinking is not None:
             # What moved may have closed it; where edges were only taken back, to try it again once tells.
             doubtful = self._dead_ends.unrest.ever or (self._memory.taken_back and not self._forgiven)
-            if no_room and settled and not (doubtful and len(self._memory.refused_m)):
+            narrow = no_room and settled and not (doubtful and len(self._memory.refused_m))
+            if narrow and self._again == AGAIN:
                 told = (
                     f"no gap in it has room to turn ({2.0 * self._turns_keep_m:.0f} m) or is seen to lead on"
                 )
                 return Plan(PlanStatus.UNREACHABLE, no_way_through(told))
+            self._again += narrow
             # No way is left but those given up, or one that takes more looking for. Or none that can be flown
             # from here: elsewhere on the turn there may be one.
-            if (only_given_up or self._effort == MOST_EFFORT) and (turned or not thinking.tracks):
+            at_end = only_given_up or self._effort == MOST_EFFORT
+            if narrow or (at_end and (turned or not thinking.tracks)):
                 self._refused_at_m = request.station_m
                 self._memory.forgive()
                 self._forgiven = True
-            self._effort = min(self._effort + 1, MOST_EFFORT)
+            self._effort = 0 if narrow else min(self._effort + 1, MOST_EFFORT)
         return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect goes on")
 
     def _certain(self) -> bool:

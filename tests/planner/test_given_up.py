@@ -12,7 +12,7 @@ import pytest
 from planner.curves import Pose, end_of
 from planner.dead_ends import RETRY_S
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
-from planner.rolling_window import MOST_EFFORT, RollingWindow
+from planner.rolling_window import AGAIN, MOST_EFFORT, RollingWindow
 from planner.unrest import SETTLED_S
 from tests.planner.test_rolling_window import (
     MISSION,
@@ -100,7 +100,7 @@ def test_a_goal_in_view_that_cannot_be_hit_is_approached_another_way() -> None:
 
 @pytest.mark.parametrize(("gone", "searches"), [(0, 1), (3, MOST_EFFORT)])
 def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, searches: int) -> None:
-    """All is given up, and the edges leave no way that has room to turn."""
+    """All is given up, and the edges leave no way that has room to turn: all is tried again before."""
     pilot, seen, plan, flown_m = circling(replace(MISSION, turn_radius_m=500.0), 3000.0)
     pilot._memory.gone += gone
     request, effect = request_on(plan, flown_m, seen), pilot._effect
@@ -109,7 +109,7 @@ def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, search
     in_vain = SimpleNamespace(done=True, stuck=None, tracks=[])
     told = [
         pilot._no_way(request, effect, flown_m, in_vain).status  # type: ignore[arg-type]
-        for _ in range(searches + 1 - pilot._effort)
+        for _ in range(searches + 1 + AGAIN * (MOST_EFFORT + 1) - pilot._effort)
     ]
     assert told == [PlanStatus.NO_PATH] * (len(told) - 1) + [PlanStatus.UNREACHABLE]
 
@@ -154,11 +154,11 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
         request = request_on(plan, flown_m, seen)._replace(time_s=time_s)
         return [
             pilot._no_way(request, effect, flown_m, in_vain).status  # type: ignore[arg-type]
-            for _ in range(MOST_EFFORT + 2)
+            for _ in range((AGAIN + 1) * (MOST_EFFORT + 2))
         ]
 
     assert set(told(changed_s + SETTLED_S - 1.0)) == {PlanStatus.NO_PATH}
     pilot._dead_ends.give_up(Pose(3000.0, 0.0, 1.0, 0.0))
     assert told(changed_s + SETTLED_S + 1.0)[-1] is PlanStatus.UNREACHABLE
-    # Where it is for want of room to turn, what was given up was tried once more before.
+    # Where it is for want of room to turn, what was given up was tried again before.
     assert (len(given_up(pilot)) == 0) is for_turns_alone
