@@ -32,7 +32,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     }
     for leg in _listed(bad, "legs not trackable", rows):
         cut = leg["corner_cut_m"]
-        off = f"{leg['max_cross_track_m']:.3g} m off" + (f", corner cut by {cut:.0f} m" if cut else "")
+        off = f"{leg['max_cross_track_m']:.3g} m off" + (f", corner to be cut by {cut:.0f} m" if cut else "")
         rows[f"  leg {leg['number']}"] = (
             f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, {off}"
         )

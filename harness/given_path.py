@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+GIVEN = "path as given"
+"""Stands for the planner's name where there was none."""
+
 SAME_PLACE_M = 0.01
 """Points that are not further apart are one."""
 

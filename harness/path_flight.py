@@ -15,7 +15,7 @@ import numpy as np
 from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.interface import Route
 from harness.closed_loop import Loop, Observer, Progress
-from harness.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy, fly_by
+from harness.given_path import GIVEN, SAME_PLACE_M, CutCorner, FloatArray, FlyBy, fly_by
 from harness.metrics import metrics
 from harness.record import AcceptedPlan, Flight, Outcome, TrackLog
 from harness.run import fly_to_folder
@@ -114,7 +114,7 @@ def check_path(
         out,
         recording,
         progress,
-        pilot="path as given",
+        pilot=GIVEN,
         flown_by=partial(fly_along, way),
         measured_by=partial(_measured, points_m, way),
     )
@@ -159,7 +159,8 @@ def _flown(
         state = model.state()
         guided = follower.update(state)
         model.command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps)
-        outcome = _outcome(model.fault(), guided.past_end, state.time_s, limit_s)
+        off_m = abs(guided.cross_track_m) if guided.past_end else None
+        outcome = _outcome(model.fault(), off_m, loop.mission.goal_radius_m, state.time_s, limit_s)
         log.add(state, guided.roll_command_rad, guided.cross_track_m, guided.station_m, 0)
         if progress is not None and updates % round(PROGRESS_EVERY_S * UPDATE_RATE_HZ) == 0:
             progress(state.time_s, path.length_m - guided.station_m, "following")
@@ -173,11 +174,23 @@ def _flown(
     return Flight(log.close(), (accepted,), *outcome, compute_ms=(), sim_s=state.time_s, wall_s=wall_s)
 
 
-def _outcome(fault: str | None, past_end: bool, time_s: float, limit_s: float) -> tuple[Outcome, str] | None:
-    """How a flight ends now; None while it goes on."""
+def _outcome(
+    fault: str | None, off_m: float | None, near_m: float, time_s: float, limit_s: float
+) -> tuple[Outcome, str] | None:
+    """How a flight ends now; None while it goes on.
+
+    Args:
+        fault: how control was lost.
+        off_m: how far beside the path the aircraft passed its end; None before that.
+        near_m: so near to it the end is reached.
+        time_s: now.
+        limit_s: time limit.
+    """
     if fault is not None:
         return Outcome.LOST_CONTROL, fault
-    if past_end:
+    if off_m is not None and off_m > near_m:
+        return Outcome.TIMEOUT, f"passed the end of the path {off_m:,.0f} m beside it after {time_s:.0f} s"
+    if off_m is not None:
         return Outcome.REACHED, f"at the end of the path after {time_s:.0f} s"
     if time_s >= limit_s:
         return Outcome.TIMEOUT, f"not at the end of the path after {time_s:.0f} s, twice what it should take"

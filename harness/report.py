@@ -76,6 +76,7 @@ def report_html(
 def run_html(
     chapter: Chapter,
     legs: Sequence[Mapping[str, Any]],
+    corners: Sequence[Mapping[str, Any]] | None,
     *,
     aircraft: str,
     scenario_yaml: str,
@@ -89,6 +90,7 @@ def run_html(
     Args:
         chapter: with one row, and the figures of the path and of its profiles.
         legs: `trackability` of `metrics.json`.
+        corners: of a path that was given, `check.corners` in there; None where a planner made the path.
         aircraft: its name.
         scenario_yaml: the scenario as flown.
         command: the command line that flew it.
@@ -102,6 +104,7 @@ def run_html(
         row=chapter.rows[0],
         legs=legs,
         lost=[leg for leg in legs if not leg["trackable"]],
+        corners=corners,
         aircraft=aircraft,
         scenario_yaml=scenario_yaml,
         command=command,

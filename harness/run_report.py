@@ -38,12 +38,16 @@ def _written(run: Run, folder: Path) -> Path:
     optimum = optimum_of(scenario)
     flight = entry(scenario, run, optimum)
     page, manifest = folder / REPORT, run.manifest
-    _, *arguments = shlex.split(manifest["command"][0])
+    line, *_ = manifest["command"]
+    if not isinstance(line, str):
+        raise TypeError(f"command: must be text; got {type(line).__name__}")
+    _, *arguments = shlex.split(line)
     command = shlex.join(["wayproof", *arguments])
     versions = {name: version for name, version in manifest["versions"].items() if version}
     text = run_html(
         run_chapter(scenario, flight, optimum),
         run.metrics["trackability"],
+        run.metrics["check"]["corners"] if "check" in run.metrics else None,
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
         command=command,

@@ -45,6 +45,12 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
     assert check["given"]["heading_change_deg"] == pytest.approx(180.0)
     assert check["given"]["angle_over_length_radpm"] == pytest.approx(math.pi / 4060.0)
     assert [corner["waypoint"] for corner in check["corners"]] == [1, 2]
+    assert main(["report", str(out)]) == 0
+    page = (out / "report.html").read_text()
+    assert "strip-1: path as given, aerosonde" in page
+    for corner in check["corners"]:
+        assert f"<td>{corner['flown_cut_m']:.0f}</td><td>{corner['allowed_cut_m']:.0f}</td>" in page
+    assert "for a planner to fly" in page
     scenario = parse_scenario(run.scenario_yaml)
     assert scenario.name == "strip-1"
     assert (scenario.mission.start_m, scenario.mission.goal_m) == ((0.0, 0.0), (60.0, 2000.0))
@@ -64,6 +70,21 @@ def test_a_circuit_is_flown_to_its_end_and_is_trackable(
     assert [round(corner["turn_deg"]) for corner in said["check"]["corners"]] == [-90, -90, -90]
     assert said["smoothness"]["flown"]["heading_change_deg"] > 250.0
     assert not (tmp_path / "run" / "flight.rrd").exists()
+
+
+def test_an_end_that_is_passed_far_off_is_not_reached(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text("x_m,y_m\n0,0\n2400,0\n1900,500\n3000,700\n7000,0\n")
+    options = ["--aircraft", "T38", "--no-recording", "--out", str(tmp_path / "run")]
+    assert main(["check", str(path), *options, "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    track = load_run(tmp_path / "run").track
+    off_m = math.dist((track.east_m[-1], track.north_m[-1]), (7000.0, 0.0))
+    assert off_m > 1000.0
+    assert (said["outcome"], said["trackable"]) == ("timeout", False)
+    assert "passed the end of the path" in said["reason"]
 
 
 def test_the_same_check_gives_the_same_digest(strip: Path, tmp_path: Path) -> None:

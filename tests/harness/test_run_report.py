@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,18 @@ def test_a_folder_without_a_complete_run_is_refused(
     assert main(["report", str(tmp_path)]) == 2
     assert "is not a run folder" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", [[None], [7], [], None, "", ["'"]])
+def test_a_manifest_with_another_command_is_damaged(
+    command: Any, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    manifest = json.loads((copy / "manifest.json").read_text())
+    (copy / "manifest.json").write_text(json.dumps(manifest | {"command": command}))
+    assert main(["report", str(copy)]) == 2
+    assert "damaged" in capsys.readouterr().err
 
 
 def test_a_browser_shows_the_report_on_phone_and_screen(run: Path, chromium: Any) -> None:
