@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from harness.campaign_questions import QUESTIONS, difference, percent, ratio, shade
+from harness.campaign_questions import QUESTIONS, difference, ratio, shade
 from harness.campaign_summary import Summary
 from harness.compare_rows import number
 from harness.record import WriteError
@@ -53,7 +53,6 @@ def summary_html(summary: Summary) -> str:
         pictures=list(_pictures(summary)) if summary.total.runs else [],
         difference=difference,
         ratio=ratio,
-        percent=percent,
         number=number,
         shade=shade,
     )

@@ -85,6 +85,8 @@ def fly(
         from harness.terminal import flight_rows, print_table
 
         print_table(f"{loaded.name}: {loaded.planner.kind}, {loaded.aircraft.model}", flight_rows(metrics))
+        if digest and not given and not otherwise:
+            typer.echo("digest: as the campaign flew it")
         typer.echo(f"run folder: {folder}")
     if view:
         open_viewer([folder])

@@ -335,7 +335,10 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     page = write_summary(summarise(folder), folder).read_text()
     assert 'href="runs/6/flight.rrd"' in page
     assert 'href="runs/5/flight.rrd"' not in page
-    assert 'of the wanted. <a href="runs/6">Run folder</a>' in page
+    assert ', -0.18 of the wanted. <a href="runs/6">Run folder</a>' in page
+    assert worst[-1].clearance_ratio is not None
+    assert worst[-1].clearance_ratio > 1.0
+    assert f", {worst[-1].clearance_ratio:.2f} of the wanted." in page
 
 
 def test_without_the_wanted_clearance_the_nearest_run_is_the_worst(tmp_path: Path) -> None:

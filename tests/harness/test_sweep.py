@@ -266,6 +266,11 @@ def test_a_row_that_was_flown_otherwise_is_told(
     again = ["fly", "--from", str(place / "r.parquet"), "--run", "1", "--out", str(place / "run"), "--quiet"]
     assert main(again) == 1
     assert f"run 1 was flown otherwise (digest {'0' * 64})" in capsys.readouterr().err
+    again[2] = str(unbroken / "results.parquet")
+    assert main(again[:-1]) == 0
+    assert "digest: as the campaign flew it" in capsys.readouterr().out
+    assert main([*again[:-1], "--seed", "5"]) == 0
+    assert "as the campaign flew it" not in capsys.readouterr().out
 
 
 def with_plugin(place: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0") -> None:
