@@ -268,7 +268,9 @@ def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list
         raise fault(f"is {shown(entry)}: {error.strerror}") from error
     if entry in shipped:
         return [shipped[entry]]
-    raise fault(f"is {entry!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}")
+    raise fault(
+        f"is {entry[:200]!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}"
+    )
 
 
 def _is_scenario(file: Path) -> bool:

@@ -26,7 +26,7 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
     """
     kinds = planner_kinds()
     if spec.kind not in kinds:
-        raise KeyFault(("planner", "kind"), f"is {spec.kind!r}; must be one of {', '.join(kinds)}")
+        raise KeyFault(("planner", "kind"), f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}")
     kind = kinds[spec.kind]
     known = tuple(field.name for field in fields(kind.config))
     for name in spec.own:

@@ -241,6 +241,7 @@ def test_overrides_replace_keys_before_defaults_follow(tmp_path: Path) -> None:
         (("name.first", "1"), "command line: name.first: no such key"),
         (("mission.start_m[7]", "1"), "command line: mission.start_m[7]: does not exist; there are 2"),
         (("planner.kind", "other"), "command line: planner.kind: is 'other'; must be one of rolling_window"),
+        (("planner.kind", 2000 * "x"), f"command line: planner.kind: is '{40 * 'x'}'; must be one of"),
     ],
 )
 def test_a_bad_override_is_named(setting: tuple[str, str], message: str, tmp_path: Path) -> None:
