@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 import pyarrow as pa
@@ -641,7 +642,7 @@ sys.stdout.write(json.dumps(grown))
 
 @pytest.mark.parametrize(
     ("recordings", "draws", "flights"),
-    [pytest.param("none", 128, 512, marks=pytest.mark.slow), ("all", 12, 48)],
+    [pytest.param("none", 128, 512, marks=pytest.mark.slow), ("all", 16, 64)],
 )
 def test_a_worker_does_not_grow(place: Path, recordings: str, draws: int, flights: int) -> None:
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", f"draws: {draws}"))
@@ -657,7 +658,7 @@ def test_a_worker_does_not_grow(place: Path, recordings: str, draws: int, flight
     assert flown.returncode == 0, flown.stderr
     used_mib, threads = zip(*json.loads(flown.stdout), strict=True)
     assert len(used_mib) == flights
-    # The first flights fill caches and the heap, and recordings let it swing by 10 MiB from flight to flight: the least
-    # of ten is what is kept. A leak of half a track a flight would show.
-    assert min(used_mib[-10:]) - min(used_mib[12:22]) < 10.0
-    assert threads[-1] <= threads[11]
+    # The first flights fill caches and the heap, and with recordings it swings by 10 MiB from flight to flight: so
+    # means of twenty are compared. A leak of half a track a flight would show.
+    assert fmean(used_mib[-20:]) - fmean(used_mib[24:44]) < 10.0
+    assert threads[-1] <= threads[24]
