@@ -14,7 +14,8 @@ from aircraft.interface import AircraftState, FloatArray, Route
 from aircraft.route import arc_point
 
 UPDATE_RATE_HZ = 10
-"""Roll commands a second. Flown on the 14-turn courses of `harness.tracking`, 20 a second track no better: the command
+"""Roll commands a second. Flown on the 14-turn courses of `harness.bench.tracking`, 20 a second track no better:
+the command
 is held for half an update more, which the preview makes up for."""
 
 TYPICAL_BANK_RAD = math.radians(30.0)
@@ -46,7 +47,7 @@ class GuidanceOutput(NamedTuple):
     roll_command_rad: float
     cross_track_m: float
     """Distance from the path, positive to its right."""
-    station_m: float
+    arc_length_m: float
     """Distance along the route of the nearest point; grows on in a loiter."""
     bank_saturated: bool
     """The bank limit cut the command."""
@@ -83,17 +84,17 @@ class PathFollower:
         self.route: FloatArray | None = None
         """The route, as the law has it; None without one."""
 
-    def follow(self, route: Route, station_m: float = 0.0) -> None:
+    def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route; the roll command goes on from where it is.
 
         Args:
             route: what to fly.
-            station_m: where on it to begin looking for the nearest point, m from its start.
+            arc_length_m: where on it to begin looking for the nearest point, m from its start.
         """
         self.route = _rows(route)
         starts = self.route[:, START]
-        row = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
-        self.memory[ROW], self.memory[ALONG] = row, station_m - float(starts[row])
+        row = max(int(np.searchsorted(starts, arc_length_m, side="right")) - 1, 0)
+        self.memory[ROW], self.memory[ALONG] = row, arc_length_m - float(starts[row])
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval.

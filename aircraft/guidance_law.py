@@ -8,7 +8,7 @@ with a, e positive to the right of the path (the curvature kappa is therefore ta
 here), chi the course and psi the heading. Curvature is that where the aircraft will be when it has rolled,
 averaged over the time that rolling into a turn takes, so that line and arc join without a bump. Clothoids
 in their place gained too little for what they would ask of every planner: on the 14-turn courses of
-`harness.tracking`, three seeds, calm, 20 updates a second, p95/max were .049/.091 m with this and .074/.085
+`harness.bench.tracking`, three seeds, calm, 20 updates a second, p95/max were .049/.091 m with this and .074/.085
 m with clothoids as long as the roll-in for the Aerosonde, .101/.182 and .063/.119 m for c172p, .101/.644
 and .110/.417 m for T38. The roll command leads by the time constant of the roll loop, so that roll itself
 follows the law. Wind enters through the ground velocity alone, except where it is stronger than the
@@ -280,13 +280,13 @@ def _rounded_off(x: float) -> float:
     return (high * high - x * x) + 2.0 * high * low + low * low
 
 
-def _turned(route: FloatArray, index: int, station_m: float) -> float:
+def _turned(route: FloatArray, index: int, arc_length_m: float) -> float:
     """Direction change of the route from its start to a station near a row, rad, positive to the left."""
-    while index > 0 and station_m < route[index, START]:
+    while index > 0 and arc_length_m < route[index, START]:
         index -= 1
-    while station_m >= route[index, STOP]:
+    while arc_length_m >= route[index, STOP]:
         index += 1
-    turned: float = route[index, TURNED] + route[index, 4] * (station_m - route[index, START])
+    turned: float = route[index, TURNED] + route[index, 4] * (arc_length_m - route[index, START])
     return turned
 
 

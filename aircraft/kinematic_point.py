@@ -85,24 +85,24 @@ class KinematicPoint:
         """None: a point is always under control."""
         return None
 
-    def follow(self, route: Route, station_m: float = 0.0) -> None:
+    def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route.
 
         Args:
             route: what to fly.
-            station_m: where on it to begin looking for the nearest point, m from its start.
+            arc_length_m: where on it to begin looking for the nearest point, m from its start.
         """
         east, north, *_ = route_point(self._way, self._along_m)
-        station_m = _nearest_station(route, station_m, east, north)
-        joint_east, joint_north, *_ = route_point(route, station_m)
-        rows = _rest(route, station_m)
+        arc_length_m = _nearest_station(route, arc_length_m, east, north)
+        joint_east, joint_north, *_ = route_point(route, arc_length_m)
+        rows = _rest(route, arc_length_m)
         gap = math.hypot(joint_east - east, joint_north - north)
         if gap > JOINED_M:
             towards = (joint_east - east) / gap, (joint_north - north) / gap
             rows = np.vstack(([[east, north, *towards, 0.0, gap]], rows))
         self._way = Route(rows, route.loiter)
         self._gap_m = gap if gap > JOINED_M else 0.0
-        self._joins_at_m, self._along_m = station_m, 0.0
+        self._joins_at_m, self._along_m = arc_length_m, 0.0
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Says where on its route the point is; it has nothing to decide.
@@ -114,33 +114,33 @@ class KinematicPoint:
         return GuidanceOutput(
             roll_command_rad=0.0,
             cross_track_m=max(-on_route_m, 0.0),
-            station_m=self._joins_at_m + max(on_route_m, 0.0),
+            arc_length_m=self._joins_at_m + max(on_route_m, 0.0),
             bank_saturated=False,
             past_end=not self._way.loiter and self._along_m > route_length(self._way),
         )
 
 
-def _nearest_station(route: Route, station_m: float, east_m: float, north_m: float) -> float:
+def _nearest_station(route: Route, arc_length_m: float, east_m: float, north_m: float) -> float:
     """The station of the point of a route nearest to a place, sought from a station on by Newton's method."""
-    nearest, gap, station = station_m, math.inf, station_m
+    nearest, gap, station = arc_length_m, math.inf, arc_length_m
     for _ in range(JOINING_STEPS):
         at_east, at_north, tangent_east, tangent_north = route_point(route, station)
         away_east, away_north = east_m - at_east, north_m - at_north
         if math.hypot(away_east, away_north) < gap:
             nearest, gap = station, math.hypot(away_east, away_north)
-        station = max(station + away_east * tangent_east + away_north * tangent_north, station_m)
+        station = max(station + away_east * tangent_east + away_north * tangent_north, arc_length_m)
     return nearest
 
 
-def _rest(route: Route, station_m: float) -> FloatArray:
+def _rest(route: Route, arc_length_m: float) -> FloatArray:
     """(n, 6) what is left of a route from a station on; a closing loiter is left whole."""
     ends = np.cumsum(route.segments[:, 5])
-    index = int(np.searchsorted(ends, station_m, side="right"))
-    here = route_point(route, station_m)
+    index = int(np.searchsorted(ends, arc_length_m, side="right"))
+    here = route_point(route, arc_length_m)
     if index == len(ends) and not route.loiter:
         return np.array([[*here, 0.0, 1.0]])
     index = min(index, len(ends) - 1)
     curvature, length = route.segments[index, 4:].tolist()
     whole = route.loiter and index == len(ends) - 1
-    first = [*here, curvature, length if whole else float(ends[index]) - station_m]
+    first = [*here, curvature, length if whole else float(ends[index]) - arc_length_m]
     return np.vstack(([first], route.segments[index + 1 :]))

@@ -41,20 +41,20 @@ def route_length(route: Route) -> float:
     return float(route.segments[:, 5].sum())
 
 
-def route_point(route: Route, station_m: float) -> tuple[float, float, float, float]:
+def route_point(route: Route, arc_length_m: float) -> tuple[float, float, float, float]:
     """Point and unit tangent of a route at a station.
 
     Args:
         route: any route.
-        station_m: distance from its start; beyond the end a loiter goes round, any other route straight on.
+        arc_length_m: distance from its start; beyond the end a loiter goes round, any other route straight on.
 
     Returns:
         East, north (m), tangent east, tangent north.
     """
     starts = np.concatenate(([0.0], np.cumsum(route.segments[:-1, 5])))
-    index = max(int(np.searchsorted(starts, station_m, side="right")) - 1, 0)
+    index = max(int(np.searchsorted(starts, arc_length_m, side="right")) - 1, 0)
     east, north, tangent_east, tangent_north, curvature, length = route.segments[index].tolist()
-    along = station_m - float(starts[index])
+    along = arc_length_m - float(starts[index])
     over = 0.0
     if index == len(starts) - 1 and not route.loiter:
         over = max(along - length, 0.0)

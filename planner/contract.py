@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from planner.curves import Point, along, on_loiter, pose_at, sample
+from planner.geometry.curves import Point, along, on_loiter, pose_at, sample
 from planner.interface import (
     BoolArray,
     FloatArray,
@@ -68,9 +68,9 @@ class InRange:
     """
 
     spacing_m = SPACING_M
-    taken_back_at = 0
+    last_removal_revision = 0
     moving: tuple[MovingEdges, ...] = ()
-    surprised_s = -math.inf
+    last_contradiction_s = -math.inf
 
     def __init__(self, circles: Sequence[Circle], range_m: float) -> None:
         self.revision = 0
@@ -109,9 +109,9 @@ class Given:
 
     spacing_m = SPACING_M
     revision = 1
-    taken_back_at = 0
+    last_removal_revision = 0
     moving: tuple[MovingEdges, ...] = ()
-    surprised_s = -math.inf
+    last_contradiction_s = -math.inf
 
     def __init__(self, points_m: FloatArray) -> None:
         self._points = points_m

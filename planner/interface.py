@@ -67,7 +67,7 @@ class MovingEdges:
         object.__setattr__(self, "points_m", _frozen(self.points_m))
 
 
-class SeenWorld(Protocol):
+class MapView(Protocol):
     """What the sensor has shown so far: obstacle edges and free space. All that a planner may know."""
 
     @property
@@ -81,7 +81,7 @@ class SeenWorld(Protocol):
         ...
 
     @property
-    def taken_back_at(self) -> int:
+    def last_removal_revision(self) -> int:
         """The last revision at which edge points were taken away again; 0 where none ever was."""
         ...
 
@@ -91,7 +91,7 @@ class SeenWorld(Protocol):
         ...
 
     @property
-    def surprised_s(self) -> float:
+    def last_contradiction_s(self) -> float:
         """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
         ...
 
@@ -197,16 +197,16 @@ class PlanRequest(NamedTuple):
         direction: unit vector of its ground velocity.
         seen: what is known of the world.
         flown: the plan in effect, None before the first.
-        station_m: how far along `flown.path` the aircraft is.
+        arc_length_m: how far along `flown.path` the aircraft is.
         scanned: a scan has come in since the last request.
     """
 
     time_s: float
     position_m: tuple[float, float]
     direction: tuple[float, float]
-    seen: SeenWorld
+    seen: MapView
     flown: Plan | None = None
-    station_m: float = 0.0
+    arc_length_m: float = 0.0
     scanned: bool = True
 
 
@@ -244,7 +244,7 @@ class Plan:
         waypoints_m: (k, 2) fixed-altitude waypoints; empty unless FOUND.
         path: the curve through them; None unless FOUND.
         picture: makes a picture of how it came about, where the planner can tell: asked for only where somebody looks.
-        goes_on: more is looked for: the planner wants to be asked again before the next scan.
+        wants_more_time: more is looked for: the planner wants to be asked again before the next scan.
 
     Raises:
         ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
@@ -255,7 +255,7 @@ class Plan:
     waypoints_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
     path: Path | None = None
     picture: Callable[[], PlanPicture] | None = None
-    goes_on: bool = False
+    wants_more_time: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "waypoints_m", _frozen(self.waypoints_m))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from planner.interface import FloatArray, IntArray, SeenWorld
+from planner.interface import FloatArray, IntArray, MapView
 
 FIRST_MOVING = -1000
 """Label of the first obstacle that moves; those of the others are below."""
@@ -90,7 +90,7 @@ class ObstacleMemory:
         if not self._genuine[: self._count].all():
             self._keep_only(self.genuine_m, NOTHING)
 
-    def take_in(self, seen: SeenWorld, met: Sequence[FloatArray] | None = None) -> FloatArray:
+    def take_in(self, seen: MapView, met: Sequence[FloatArray] | None = None) -> FloatArray:
         """Remembers what has come in since the last call, and returns it: (k, 2). Lets go of what was taken back.
 
         Args:
@@ -128,9 +128,9 @@ class ObstacleMemory:
             )
         return self._with_moving
 
-    def _take_in(self, seen: SeenWorld) -> FloatArray:
+    def _take_in(self, seen: MapView) -> FloatArray:
         fresh = seen.edges_since(self._revision)
-        if seen.taken_back_at > self._revision >= 0:
+        if seen.last_removal_revision > self._revision >= 0:
             self.taken_back, known = True, seen.edges_since(-1)
             self._keep_only(known[: len(known) - len(fresh)], self.refused_m)
         self._revision = seen.revision

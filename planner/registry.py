@@ -13,8 +13,10 @@ from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
-from planner import bug1, bug2, dubins_tree, rolling_window, rolling_window_config, tangent_bug, vfh_plus
+from planner.baselines import bug1, bug2, dubins_tree, tangent_bug, vfh_plus
 from planner.interface import Mission, Planner
+from planner.rolling_window import config as rolling_window_config
+from planner.rolling_window import planner as rolling_window
 
 GROUP = "wayproof.planners"
 

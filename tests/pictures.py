@@ -15,8 +15,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from harness.cli import main as wayproof
-from harness.rerun_viewer import NO_DRIVER, ViewerError, screenshot
+from harness.cli.app import main as wayproof
+from harness.recording.viewer import NO_DRIVER, ViewerError, screenshot
 from tests.page import NoBrowserError, browser, shown
 
 ROOT = Path(__file__).parents[1]

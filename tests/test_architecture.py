@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -40,36 +41,85 @@ ALLOWED = {
 # Packages that only these files (patterns of `fnmatch`) may import.
 ONLY_IN = {
     "jsbsim": ("aircraft/jsbsim_loading.py",),
-    "rerun": ("harness/rerun_*.py",),
-    "yaml": ("aircraft/airframes.py", "harness/strict_yaml.py"),
-    "typer": ("harness/cli.py", "harness/commands/*.py"),
+    "rerun": ("harness/recording/*.py",),
+    "yaml": ("aircraft/airframes.py", "harness/files/strict_yaml.py"),
+    "typer": ("harness/cli/*.py"),
     "matplotlib": ("harness/*figure*.py",),
-    "jinja2": ("harness/report.py",),
+    "jinja2": ("harness/report/page.py",),
     "scipy": (
-        "harness/sampling.py",
-        "harness/campaign_paired.py",
-        "harness/campaign_summary.py",
-        "harness/falsify_search.py",
+        "harness/campaign/sampling.py",
+        "harness/campaign/paired.py",
+        "harness/campaign/summary.py",
+        "harness/falsify/search.py",
     ),
-    "distributed": ("harness/sweep_workers.py",),
+    "distributed": ("harness/campaign/workers.py",),
     "numba": ("planner/compiled.py",),
-    "ompl": ("planner/dubins_tree.py",),
-    "harness.cli": ("harness/__main__.py",),
+    "ompl": ("planner/baselines/dubins_tree.py",),
+    "harness.cli.app": ("harness/__main__.py",),
 }
 # Slow to import: inside the function that needs them, but for files that are imported late themselves.
 LATE = {
     "jsbsim": ("aircraft/jsbsim_loading.py",),
     "numba": (),
-    "rerun": ("harness/rerun_*.py",),
+    "rerun": ("harness/recording/*.py",),
     "pyarrow": (),
     "scipy": (),
     "shapely": (),
-    "typer": ("harness/cli.py", "harness/commands/*.py"),
+    "typer": ("harness/cli/*.py"),
     "matplotlib": ("harness/*figure*.py",),
-    "jinja2": ("harness/report.py",),
+    "jinja2": ("harness/report/page.py",),
     "ompl": (),
     "distributed": (),
 }
+
+LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "harness": (
+        ("cli",),
+        ("bench", "campaign", "compare", "falsify"),
+        ("report",),
+        ("run",),
+        ("recording",),
+        ("analysis",),
+        ("run_files",),
+        ("flight",),
+        ("world",),
+        ("mapping",),
+        ("scenario",),
+        ("files",),
+    ),
+    "planner": (
+        ("contract",),
+        ("registry",),
+        ("baselines",),
+        ("rolling_window",),
+        ("memory", "world_stability"),
+        ("geometry",),
+        ("compiled",),
+        ("interface",),
+    ),
+}
+"""Subpackages and modules of a package, from the top down: each may import itself and what stands below it."""
+FORBIDDEN = {("harness", "mapping"): ("harness.scenario", "harness.world")}
+"""What a subpackage may not import although it stands below: the map must not reach the truth."""
+MOST_MODULES = 20
+
+
+def upward(path: str, source: str) -> list[str]:
+    """The imports of a source that lead to its own layer, to a higher one, or to what is forbidden."""
+    package, place, *_ = [*Path(path).with_suffix("").parts, ""]
+    layers = LAYERS.get(package, ())
+    level = {name: number for number, names in enumerate(layers) for name in names}
+    if place not in level:
+        return []
+    found = []
+    for module in imports(source):
+        top, _, rest = module.partition(".")
+        there = rest.partition(".")[0]
+        if top == package and there in level and there != place and level[there] <= level[place]:
+            found.append(f"{path} imports {module}")
+        if module.startswith(FORBIDDEN.get((package, place), ("-",))):
+            found.append(f"{path} imports {module}")
+    return found
 
 
 def at_the_top(source: str) -> str:
@@ -113,13 +163,44 @@ def breaches(path: str, source: str) -> list[str]:
     return found
 
 
-def among(path: str, patterns: tuple[str, ...]) -> bool:
+def among(path: str, patterns: Sequence[str]) -> bool:
     return any(fnmatch(path, pattern) for pattern in patterns)
 
 
 @pytest.mark.parametrize("path", SOURCES)
 def test_keeps_the_import_rules(path: str) -> None:
     assert breaches(path, SOURCES[path].read_text()) == []
+
+
+@pytest.mark.parametrize("path", SOURCES)
+def test_imports_lead_down(path: str) -> None:
+    assert upward(path, SOURCES[path].read_text()) == []
+
+
+@pytest.mark.parametrize("package", LAYERS)
+def test_every_place_of_a_package_has_a_layer(package: str) -> None:
+    places = {Path(path).relative_to(package).parts[0] for path in SOURCES if path.startswith(package)}
+    listed = {name for names in LAYERS[package] for name in names}
+    assert {place.removesuffix(".py") for place in places} - {"__init__", "__main__"} == listed
+
+
+def test_no_package_is_a_drawer() -> None:
+    folders = Counter(Path(path).parent for path in SOURCES if Path(path).stem != "__init__")
+    assert {str(folder): count for folder, count in folders.items() if count > MOST_MODULES} == {}
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("harness/mapping/a.py", "from harness.world.world import World"),
+        ("harness/mapping/a.py", "def f():\n    from harness.scenario.sections import Sensor"),
+        ("harness/flight/a.py", "if TYPE_CHECKING:\n    from harness.run import scenario_flight"),
+        ("harness/compare/a.py", "from harness.campaign.table import Table"),
+        ("planner/geometry/a.py", "from planner.memory import Memory"),
+    ],
+)
+def test_an_import_upwards_is_seen(path: str, source: str) -> None:
+    assert upward(path, source)
 
 
 @pytest.mark.parametrize("path", SOURCES)
@@ -136,23 +217,23 @@ def test_is_named_for_what_it_does(path: str) -> None:
     ("path", "source"),
     [
         ("planner/a.py", "import jsbsim"),
-        ("planner/a.py", "from harness.world import World"),
+        ("planner/a.py", "from harness.world.world import World"),
         ("planner/a.py", "from aircraft.interface import Route"),
         ("aircraft/a.py", "def f():\n    from planner import dubins"),
         ("aircraft/a.py", "import jsbsim"),
         ("harness/a.py", "import rerun as rr"),
         ("harness/a.py", "import rerun.blueprint as rrb"),
-        ("harness/a.py", "from harness import cli"),
+        ("harness/a.py", "from harness.cli import app"),
         ("harness/a.py", "import yaml"),
         ("harness/a.py", "import matplotlib.pyplot"),
-        ("harness/rerun_a.py", "import shapely"),
+        ("harness/recording/a.py", "import shapely"),
         ("harness/a.py", "import pyarrow as pa"),
         ("planner/a.py", "class A:\n    import shapely"),
         ("planner/a.py", "def f():\n    import ompl.base"),
-        ("planner/dubins_tree.py", "from ompl import base"),
+        ("planner/baselines/dubins_tree.py", "from ompl import base"),
         ("harness/a.py", "def f():\n    from ompl import base"),
         ("harness/a.py", "def f():\n    import jinja2"),
-        ("harness/sampling.py", "from scipy.stats import qmc"),
+        ("harness/campaign/sampling.py", "from scipy.stats import qmc"),
         ("harness/a.py", "def f():\n    import distributed"),
     ],
 )
@@ -163,13 +244,13 @@ def test_a_breach_is_seen(path: str, source: str) -> None:
 @pytest.mark.parametrize(
     ("path", "source"),
     [
-        ("harness/rerun_a.py", "import rerun as rr"),
-        ("harness/rerun_a.py", "def f():\n    import shapely"),
+        ("harness/recording/a.py", "import rerun as rr"),
+        ("harness/recording/a.py", "def f():\n    import shapely"),
         ("harness/a.py", "if TYPE_CHECKING:\n    import pyarrow as pa"),
         ("aircraft/a.py", "import numpy as np\nimport math"),
-        ("planner/dubins_tree.py", "def f():\n    from ompl import base"),
-        ("harness/figures.py", "import matplotlib as mpl"),
-        ("harness/report.py", "import jinja2"),
+        ("planner/baselines/dubins_tree.py", "def f():\n    from ompl import base"),
+        ("harness/report/figures.py", "import matplotlib as mpl"),
+        ("harness/report/page.py", "import jinja2"),
     ],
 )
 def test_what_is_allowed_is_no_breach(path: str, source: str) -> None:

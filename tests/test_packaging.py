@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from harness.run_folder import load_run
+from harness.run_files.run_folder import load_run
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("planner", "aircraft", "harness")
@@ -65,7 +65,7 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
         archive.extractall(tmp_path / "site")
     (tmp_path / "empty").mkdir()
     where = "import harness, sys; sys.stdout.write(harness.__file__)"
-    command = "from harness.cli import main; raise SystemExit(main())"
+    command = "from harness.cli.app import main; raise SystemExit(main())"
     for code, arguments, shown in (
         (where, [], str(tmp_path / "site")),
         (command, ["fly", "aerosonde_forest", "--no-recording"], "reached: inside the goal circle"),

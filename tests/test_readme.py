@@ -15,8 +15,8 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from harness.cli import main
-from harness.run_folder import load_run
+from harness.cli.app import main
+from harness.run_files.run_folder import load_run
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

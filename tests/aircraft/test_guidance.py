@@ -111,7 +111,7 @@ def test_cross_track_is_signed_to_the_right(offset: float, curvature: float, sha
     follower.follow(route)
     output = follower.update(state)
     assert output.cross_track_m == pytest.approx(offset, abs=1e-6)
-    assert output.station_m == pytest.approx(share * 600.0, abs=1e-6)
+    assert output.arc_length_m == pytest.approx(share * 600.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (6.0, -4.0), (-12.0, 0.0)])
@@ -178,7 +178,7 @@ def test_a_loiter_is_flown_for_ever() -> None:
     flown = fly(joined([(0.0, 200.0), (-1 / 150.0, circle)], loiter=True), northwards(), 300.0)
     state, output = flown[-1]
     assert math.hypot(state.east_m - 150.0, state.north_m - 200.0) == pytest.approx(150.0, abs=0.1)
-    assert output.station_m == pytest.approx(300.0 * AIRSPEED, rel=0.01)
+    assert output.arc_length_m == pytest.approx(300.0 * AIRSPEED, rel=0.01)
     assert not output.past_end
 
 
@@ -195,7 +195,7 @@ def test_progress_stays_on_its_own_branch_of_a_crossing_route() -> None:
     """A loop that crosses its own start: at the crossing both branches are equally near."""
     route = joined([(0.0, 600.0), (1 / 150.0, 150.0 * 1.5 * math.pi), (0.0, 800.0)])
     flown = fly(route, northwards(), 60.0)
-    steps = [b[1].station_m - a[1].station_m for a, b in pairwise(flown)]
+    steps = [b[1].arc_length_m - a[1].arc_length_m for a, b in pairwise(flown)]
     assert min(steps) > 0.0
     assert max(steps) < 2.0 * AIRSPEED / UPDATE_RATE_HZ
     assert max(abs(output.cross_track_m) for _, output in flown) < 0.35
@@ -213,7 +213,7 @@ def test_hand_over_in_a_turn_makes_no_bump() -> None:
             row = whole.segments[1].copy()
             row[:4] = arc_point(tuple(whole.segments[1]), 60.0)
             row[5] = 540.0
-            follower.follow(Route(np.vstack((row, whole.segments[2]))), station_m=30.0)
+            follower.follow(Route(np.vstack((row, whole.segments[2]))), arc_length_m=30.0)
         output = follower.update(model.state())
         rolls.append(output.roll_command_rad)
         errors.append(abs(output.cross_track_m))

@@ -41,7 +41,7 @@ def test_flies_straight_on_before_its_first_route_and_after_its_last() -> None:
     point = KinematicPoint(NORTH)
     point.advance(2 * SECOND)
     assert place(point) == pytest.approx((0.0, 40.0))
-    point.follow(CORNER, station_m=40.0)
+    point.follow(CORNER, arc_length_m=40.0)
     point.advance(20 * SECOND)
     assert place(point) == pytest.approx((340.0, 100.0))
     assert point.update(point.state()).past_end
@@ -68,7 +68,7 @@ def test_is_exactly_where_the_route_is(seconds: float, route: Route) -> None:
     state, guided = point.state(), point.update(point.state())
     assert (state.east_m, state.north_m) == pytest.approx(route_point(route, station)[:2], abs=1e-9)
     assert (guided.cross_track_m, guided.roll_command_rad) == (0.0, 0.0)
-    assert guided.station_m == pytest.approx(station)
+    assert guided.arc_length_m == pytest.approx(station)
     assert guided.past_end == (station > route_length(route))
 
 
@@ -93,17 +93,17 @@ def test_goes_round_a_loiter_for_ever_and_counts_on() -> None:
     point.advance(3 * SECOND)
     assert place(point) == pytest.approx(entered, abs=1e-6)
     guided = point.update(point.state())
-    assert guided.station_m == pytest.approx(100.0 + 3 * one_turn_m)
+    assert guided.arc_length_m == pytest.approx(100.0 + 3 * one_turn_m)
     assert not guided.past_end
 
 
-@pytest.mark.parametrize("station_m", [200.0, 200.0 + 300.0 * math.pi])
-def test_a_loiter_taken_up_under_way_is_still_flown_round(station_m: float) -> None:
+@pytest.mark.parametrize("arc_length_m", [200.0, 200.0 + 300.0 * math.pi])
+def test_a_loiter_taken_up_under_way_is_still_flown_round(arc_length_m: float) -> None:
     point = KinematicPoint(NORTH)
     point.follow(LOITER)
     point.advance(10 * SECOND)
-    point.follow(LOITER, station_m=station_m)
-    assert point.update(point.state()).station_m == pytest.approx(station_m)
+    point.follow(LOITER, arc_length_m=arc_length_m)
+    assert point.update(point.state()).arc_length_m == pytest.approx(arc_length_m)
     for _ in range(20):
         point.advance(SECOND)
         assert math.dist(place(point), (-50.0, 100.0)) == pytest.approx(50.0)
@@ -112,8 +112,8 @@ def test_a_loiter_taken_up_under_way_is_still_flown_round(station_m: float) -> N
 def test_a_new_route_under_way_is_joined_at_the_nearest_point_without_a_jump() -> None:
     point = KinematicPoint(NORTH)
     point.advance(2 * SECOND)
-    point.follow(BENT, station_m=38.0)
-    assert point.update(point.state()).station_m == pytest.approx(40.0)
+    point.follow(BENT, arc_length_m=38.0)
+    assert point.update(point.state()).arc_length_m == pytest.approx(40.0)
     assert point.update(point.state()).cross_track_m == 0.0
     assert place(point) == pytest.approx((0.0, 40.0))
 
@@ -127,11 +127,11 @@ def test_a_route_that_begins_elsewhere_is_joined_in_a_straight_line() -> None:
     point.advance(SECOND)
     assert place(point) == pytest.approx((12.0, 16.0))
     assert point.update(point.state()).cross_track_m == pytest.approx(30.0)
-    assert point.update(point.state()).station_m == 0.0
+    assert point.update(point.state()).arc_length_m == 0.0
     point.advance(2 * SECOND)
     assert place(point) == pytest.approx((30.0, 50.0))
     assert point.update(point.state()).cross_track_m == 0.0
-    assert point.update(point.state()).station_m == pytest.approx(10.0)
+    assert point.update(point.state()).arc_length_m == pytest.approx(10.0)
 
 
 def test_the_air_does_not_touch_it() -> None:

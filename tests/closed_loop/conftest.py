@@ -6,15 +6,15 @@ from typing import Any
 import pytest
 
 from aircraft.point_mass import PointMass
-from harness.closed_loop import fly
-from harness.record import Flight
-from harness.run import make_loop
-from harness.scenario import Scenario, parse_scenario
-from harness.strict_yaml import dump
+from harness.files.strict_yaml import dump
+from harness.flight.closed_loop import fly
+from harness.flight.record import Flight
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario, parse_scenario
 from planner import registry
 from planner.interface import Mission, Plan, PlanRequest
 from planner.registry import PlannerKind
-from planner.rolling_window_config import RollingWindowConfig
+from planner.rolling_window.config import RollingWindowConfig
 
 SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.closed_loop import fly
-from harness.metrics import metrics
-from harness.path_flight import check_path, scenario_for
-from harness.record import FloatArray
-from harness.run import flight_limits, make_loop
-from harness.scenario import Scenario
+from harness.analysis.metrics import metrics
+from harness.flight.closed_loop import fly
+from harness.flight.record import FloatArray
+from harness.run.path_flight import check_path, scenario_for
+from harness.run.scenario_flight import flight_limits, make_loop
+from harness.scenario.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
 Check = Callable[..., dict[str, Any]]

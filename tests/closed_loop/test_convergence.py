@@ -19,11 +19,11 @@ import shapely
 
 from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions
-from harness.closed_loop import fly
-from harness.record import FloatArray, Outcome
-from harness.run import make_loop
-from harness.scenario import Scenario, dump_scenario, mission_of, parse_scenario
-from harness.strict_yaml import dump
+from harness.files.strict_yaml import dump
+from harness.flight.closed_loop import fly
+from harness.flight.record import FloatArray, Outcome
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario, dump_scenario, mission_of, parse_scenario
 
 SIDE_M, CLEARANCE_M, THICK_M = 5000.0, 40.0, 30.0
 GOAL_RADIUS_M, APART_M = 60.0, 2000.0

@@ -9,9 +9,9 @@ from typing import Any
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from harness.metrics import clearance_violation_s
-from harness.record import Flight, Outcome
-from harness.scenario import Scenario
+from harness.analysis.metrics import clearance_violation_s
+from harness.flight.record import Flight, Outcome
+from harness.scenario.scenario import Scenario
 
 CELL_M, CELLS = 1100.0, 4
 FIRST_CENTRE_M = 1350.0

@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 
 from aircraft.point_mass import PointMass
-from harness.closed_loop import fly
-from harness.record import Outcome
-from harness.run import make_loop
-from harness.scenario import Scenario
-from harness.smoothness import flown_lengths
-from planner.clearance import inside_bounds
-from planner.curves import end_of
+from harness.analysis.smoothness import flown_lengths
+from harness.flight.closed_loop import fly
+from harness.flight.record import Outcome
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario
+from planner.geometry.clearance import inside_bounds
+from planner.geometry.curves import end_of
 
 SmallWorld = Callable[..., Scenario]
 

@@ -9,11 +9,11 @@ import pytest
 
 from aircraft.interface import AircraftState
 from aircraft.point_mass import PointMass
-from harness.closed_loop import fly
-from harness.range_sensor import RangeScan
-from harness.record import AcceptedPlan, Flight, Outcome, Track
-from harness.run import make_loop
-from harness.scenario import Scenario
+from harness.flight.closed_loop import fly
+from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.mapping.scan import RangeScan
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
 SmallWorld = Callable[..., Scenario]
@@ -53,7 +53,7 @@ def thinking(
             if request.flown is None:
                 return found
             if begins_s <= request.time_s < found_s - 1e-6:
-                return Plan(PlanStatus.NO_PATH, "looks for a way", goes_on=True)
+                return Plan(PlanStatus.NO_PATH, "looks for a way", wants_more_time=True)
             first = all(time_s < found_s - 1e-6 for time_s in asked[:-1])
             return found if first and request.time_s >= begins_s else Plan(PlanStatus.KEPT, "serves")
 
@@ -99,7 +99,7 @@ def test_what_it_says_between_steps_ends_the_flight_there(
 ) -> None:
     def answer(mission: Mission, request: PlanRequest) -> Plan:
         if request.time_s < 1.0 + 0.4 * STEP_S:
-            return Plan(PlanStatus.NO_PATH, "looks for a way", goes_on=request.time_s >= 1.0)
+            return Plan(PlanStatus.NO_PATH, "looks for a way", wants_more_time=request.time_s >= 1.0)
         if fails:
             raise ArithmeticError
         # What it said once it does not say again.

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.closed_loop import fly
-from harness.record import Flight, Outcome
-from harness.run import make_loop
-from harness.scenario import Scenario, scenario_of
+from harness.flight.closed_loop import fly
+from harness.flight.record import Flight, Outcome
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario, scenario_of
 
 WORLDS = Path(__file__).parents[3] / "shared" / "worlds"
 FAMILIES = ("circles_mid", "paper_like", "faster_forest", "barn")

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from harness.record import Flight, Outcome
-from harness.scenario import Scenario
-from harness.sensed_world import NOISY
+from harness.flight.record import Flight, Outcome
+from harness.mapping.sensed_map import NOISY
+from harness.scenario.scenario import Scenario
 from tests.closed_loop.moving_worlds import TURNED_DEG, moving, popping_up
 
 SmallWorld = Callable[..., Scenario]

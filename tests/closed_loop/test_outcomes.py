@@ -16,10 +16,10 @@ from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState
 from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions
-from harness import run
-from harness.cli import main
-from harness.record import Flight
-from harness.scenario import Scenario, dump_scenario
+from harness.cli.app import main
+from harness.flight.record import Flight
+from harness.run import scenario_flight as run
+from harness.scenario.scenario import Scenario, dump_scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
 SmallWorld = Callable[..., Scenario]

@@ -21,16 +21,16 @@ from hypothesis import strategies as st
 
 from aircraft.interface import AircraftState
 from aircraft.point_mass import PointMass
-from harness.cli import main
-from harness.closed_loop import fly
-from harness.range_sensor import RangeScan
-from harness.record import AcceptedPlan, Flight, Outcome, Track
-from harness.run import make_loop
-from harness.scenario import Scenario, dump_scenario
-from harness.sensed_world import SensedWorld
-from harness.world import World
-from planner.clearance import distances
-from planner.curves import on_loiter, pose_at, sample
+from harness.cli.app import main
+from harness.flight.closed_loop import fly
+from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.mapping.scan import RangeScan
+from harness.mapping.sensed_map import SensedMap
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario, dump_scenario
+from harness.world.world import World
+from planner.geometry.clearance import distances
+from planner.geometry.curves import on_loiter, pose_at, sample
 from planner.interface import Path
 
 SmallWorld = Callable[..., Scenario]
@@ -225,7 +225,7 @@ def test_a_world_that_lies_ends_the_flight_as_a_fault_of_the_planner(
     ]
     if not told:
         never = property(lambda _: -math.inf, lambda *_: None)
-        monkeypatch.setattr(SensedWorld, "surprised_s", never, raising=False)
+        monkeypatch.setattr(SensedMap, "last_contradiction_s", never, raising=False)
     events = Events()
     flight = fly(make_loop(scenario_with(small_world, ring), PointMass), [events])
     if told:

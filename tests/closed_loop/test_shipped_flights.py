@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.run import fly_to_folder
-from harness.run_folder import Run, load_run
-from harness.scenario import Scenario, load_scenario, parse_scenario
-from harness.shipped import scenario_path
+from harness.run.scenario_flight import fly_to_folder
+from harness.run_files.run_folder import Run, load_run
+from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
+from harness.scenario.shipped import scenario_path
 
 TOOLS = Path(__file__).parents[2].parent / "shared" / "tools"
 OPTIMUM_M = 94_318.0

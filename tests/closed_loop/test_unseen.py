@@ -13,11 +13,11 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.obstacle import Obstacle
-from harness.record import COLUMNS, Flight, FloatArray, Outcome
-from harness.run import make_loop
-from harness.scenario import Scenario
-from harness.world import World
+from harness.flight.record import COLUMNS, Flight, FloatArray, Outcome
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario
+from harness.world.obstacle import Obstacle
+from harness.world.world import World
 from planner.interface import Mission, Plan, PlanRequest
 from planner.registry import planner_kinds
 

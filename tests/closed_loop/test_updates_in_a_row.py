@@ -14,13 +14,13 @@ from aircraft import guidance_law as law
 from aircraft.guidance import PathFollower
 from aircraft.interface import Route
 from aircraft.jsbsim_model import JsbsimModel
-from harness import closed_loop
-from harness.closed_loop import fly
-from harness.compiled_guidance import path_follower
-from harness.record import Flight, Outcome, TrackLog, digest
-from harness.run import atmosphere, jsbsim_aircraft, make_loop, start_conditions
-from harness.scenario import Scenario, load_scenario
-from harness.shipped import scenario_path
+from harness.flight import closed_loop
+from harness.flight.closed_loop import fly
+from harness.flight.record import Flight, Outcome, TrackLog, digest
+from harness.run.compiled_guidance import path_follower
+from harness.run.scenario_flight import atmosphere, jsbsim_aircraft, make_loop, start_conditions
+from harness.scenario.scenario import Scenario, load_scenario
+from harness.scenario.shipped import scenario_path
 from tests.closed_loop.conftest import SmallWorld
 
 TREE = {"circle": {"center_m": [3000.0, 3100.0], "radius_m": 300.0}}
@@ -56,7 +56,7 @@ def same(flight: Flight, other: Flight) -> bool:
     """Whether two flights are the same, but for the time that they took."""
     return (
         digest(flight.track) == digest(other.track)
-        and np.array_equal(flight.track.station_m, other.track.station_m, equal_nan=True)
+        and np.array_equal(flight.track.arc_length_m, other.track.arc_length_m, equal_nan=True)
         and np.array_equal(flight.track.throttle, other.track.throttle)
         and (flight.outcome, flight.reason) == (other.outcome, other.reason)
         and [plan.time_s for plan in flight.plans] == [plan.time_s for plan in other.plans]

@@ -11,13 +11,13 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from harness.obstacle import Circle, Obstacle, Polygon
-from harness.range_sensor import RangeSensor
-from harness.scenario_sections import Sensor
-from harness.sensed_world import SensedWorld
-from harness.world import World
+from harness.mapping.sensed_map import SensedMap
+from harness.scenario.sections import Sensor
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.range_sensor import RangeSensor
+from harness.world.world import World
 from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
-from planner.curves import on_loiter, pose_at
+from planner.geometry.curves import on_loiter, pose_at
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.registry import PlannerKind, planner_kinds
 
@@ -46,7 +46,7 @@ class Flight:
     def __init__(self, kind: str, obstacles: tuple[Obstacle, ...]) -> None:
         world = World(obstacles, MISSION.bounds_m)
         self.planner = make(KINDS[kind], MISSION)
-        self.seen = SensedWorld(MISSION.bounds_m, MISSION.clearance_m, MISSION.sensor_range_m)
+        self.seen = SensedMap(MISSION.bounds_m, MISSION.clearance_m, MISSION.sensor_range_m)
         config = Sensor(range_m=MISSION.sensor_range_m, rays=360)
         self._sensor = RangeSensor(world, config, np.random.SeedSequence(1))
         self.request = PlanRequest(0.0, START, AHEAD, self.seen)
@@ -54,7 +54,7 @@ class Flight:
 
     def go(self, seconds: int) -> None:
         """Asks after every scan, twice a second, and flies 25 m a second, up to the goal."""
-        flown, station = self.request.flown, self.request.station_m
+        flown, station = self.request.flown, self.request.arc_length_m
         for number in range(2 * seconds):
             time_s = 0.5 * number
             position, direction = START, AHEAD

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import yaml
 
-from harness.cli import main
-from harness.scenario import Scenario, dump_scenario, load_scenario, parse_scenario, scenario_schema
-from harness.shipped import scenario_path, shipped_scenarios, summary
+from harness.cli.app import main
+from harness.scenario.scenario import Scenario, dump_scenario, load_scenario, parse_scenario, scenario_schema
+from harness.scenario.shipped import scenario_path, shipped_scenarios, summary
 
 SHIPPED = shipped_scenarios()
 Point = tuple[float, float]

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.run import fly_to_folder
-from harness.scenario import load_scenario
+from harness.run.scenario_flight import fly_to_folder
+from harness.scenario.scenario import load_scenario
 
 FOREST = Path(__file__).parents[2] / "scenarios" / "aerosonde_forest.yaml"
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli import main
-from harness.run_folder import load_run
+from harness.cli.app import main
+from harness.run_files.run_folder import load_run
 from tests.faults.command import FOREST, start
 
 GIB = 2**30

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from harness.cli import main
-from harness.record import RunFolderError
-from harness.rerun_file import end_of_whole
-from harness.rerun_overlay import write_overlay
-from harness.run_folder import recording_of
+from harness.cli.app import main
+from harness.files.errors import RunFolderError
+from harness.recording.file import end_of_whole
+from harness.recording.overlay import write_overlay
+from harness.run_files.run_folder import recording_of
 from tests.faults.hostile import JSON_SNIPPETS, KEYS, as_json, spoilt, spoilt_bytes
 
 FILES = ("track.parquet", "plans.parquet", "metrics.json", "manifest.json", "scenario.yaml")

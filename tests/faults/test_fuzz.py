@@ -17,17 +17,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from typer import BadParameter
 
-from harness import strict_yaml
-from harness.campaign import CampaignFile, load_campaign
-from harness.campaign_runs import CampaignRuns
-from harness.commands.falsify import range_of
-from harness.falsify_keys import vary_of
-from harness.given_path import fly_by
-from harness.input_file import InputError
-from harness.path_flight import scenario_for
-from harness.paths_io import read_path
-from harness.scenario import Scenario, dump_scenario, load_scenario, parse_scenario
-from harness.world_generators import GENERATORS, WorldSpec
+from harness.campaign.campaign_file import CampaignFile, load_campaign
+from harness.campaign.runs import CampaignRuns
+from harness.cli.falsify import range_of
+from harness.falsify.keys import vary_of
+from harness.files import strict_yaml
+from harness.files.input_file import InputError
+from harness.run.path_flight import scenario_for
+from harness.run_files.given_path import fly_by
+from harness.run_files.path_files import read_path
+from harness.scenario.scenario import Scenario, dump_scenario, load_scenario, parse_scenario
+from harness.scenario.world_generators import GENERATORS, WorldSpec
 from tests.faults.hostile import (
     CAMPAIGN_SNIPPETS,
     CELLS,

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli import main
-from harness.folder_lock import FolderLock
-from harness.record import RunFolderError
-from harness.run_folder import load_run
+from harness.cli.app import main
+from harness.files.errors import RunFolderError
+from harness.files.folder_lock import FolderLock
+from harness.run_files.run_folder import load_run
 from tests.faults.command import FOREST, ROOT, run, start, wait_until
 
 FLY = ("fly", str(FOREST), "--out", "run")

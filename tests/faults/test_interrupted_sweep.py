@@ -9,7 +9,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from harness.run_folder import load_run
+from harness.run_files.run_folder import load_run
 from tests.faults.command import CAMPAIGN_FILES, run, start, wait_until
 
 SWEEP = ("sweep", "campaign.yaml", "--out", "out", "--workers", "1", "--quiet")

@@ -17,8 +17,9 @@ import pyarrow.parquet as pq
 import pytest
 import rerun as rr
 
-from harness.record import RunFolderError, digest
-from harness.run_folder import load_run
+from harness.files.errors import RunFolderError
+from harness.flight.record import digest
+from harness.run_files.run_folder import load_run
 from tests.faults.command import CAMPAIGN_FILES, FOREST, run, start
 
 KILLS = [3, pytest.param(50, marks=pytest.mark.slow)]

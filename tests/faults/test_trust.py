@@ -16,8 +16,8 @@ from aircraft.frames import LocalPlane
 from aircraft.jsbsim_loading import load, trim
 from aircraft.model_files import AircraftError, model_files
 from aircraft.start import StartConditions
-from harness.cli import main
-from harness.rerun_viewer import served
+from harness.cli.app import main
+from harness.recording.viewer import served
 from tests.faults.command import FOREST, ROOT
 
 MODEL = Path(aircraft.__path__[0], "aerosonde")

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.closed_loop import fly
-from harness.falsify import Breaking, falsify
-from harness.falsify_keys import vary_of
-from harness.metrics import metrics
-from harness.run import flight_limits, kinematic_loop
-from harness.scenario import Scenario, load_scenario
+from harness.analysis.metrics import metrics
+from harness.falsify.breaking_point import Breaking, falsify
+from harness.falsify.keys import vary_of
+from harness.flight.closed_loop import fly
+from harness.run.scenario_flight import flight_limits, kinematic_loop
+from harness.scenario.scenario import Scenario, load_scenario
 
 SCENARIO = """
 schema: wayproof/scenario/1

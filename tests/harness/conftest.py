@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.record import AcceptedPlan, FloatArray, Track
+from harness.flight.record import AcceptedPlan, FloatArray, Track
 from planner.interface import Path, Plan, PlanPicture, PlanStatus
 from tests.harness.breaking import SCENARIO
 from tests.page import NoBrowserError, browser
@@ -37,7 +37,7 @@ def track(rows: int, **columns: FloatArray | float) -> Track:
         "cross_track_m": 0.0,
         "clearance_m": 1000.0,
         "plan_index": 0,
-        "station_m": 25.0 * time_s,
+        "arc_length_m": 25.0 * time_s,
         "throttle": 0.5,
     }
     filled = {name: np.broadcast_to(value, rows) for name, value in {**level, **columns}.items()}
@@ -71,7 +71,7 @@ def circle_track(radius_m: float, seconds: float, speed_mps: float = 25.0) -> Tr
         course_deg=np.degrees(-angle) % 360.0,
         heading_deg=np.degrees(-angle) % 360.0,
         groundspeed_mps=speed_mps,
-        station_m=speed_mps * time_s,
+        arc_length_m=speed_mps * time_s,
     )
 
 

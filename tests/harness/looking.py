@@ -10,9 +10,10 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from harness.range_sensor import RangeScan, RangeSensor
-from harness.scenario_sections import Sensor
-from harness.world import Circle, Obstacle, Polygon, World
+from harness.mapping.scan import RangeScan
+from harness.scenario.sections import Sensor
+from harness.world.range_sensor import RangeSensor
+from harness.world.world import Circle, Obstacle, Polygon, World
 
 FloatArray = NDArray[np.float64]
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.obstacle import Circle, Obstacle, Polygon
-from harness.range_sensor import RangeScan, RangeSensor
-from harness.scenario_sections import Sensor
-from harness.world import World
+from harness.mapping.scan import RangeScan
+from harness.scenario.sections import Sensor
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.range_sensor import RangeSensor
+from harness.world.world import World
 
 FloatArray = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from planner.curves import Segment
-from planner.interface import BoolArray, FloatArray, MovingEdges, Path, SeenWorld
+from planner.geometry.curves import Segment
+from planner.interface import BoolArray, FloatArray, MapView, MovingEdges, Path
 
 MakePoints = Callable[..., FloatArray]
 
@@ -36,9 +36,9 @@ def wall(start_m: tuple[float, float], end_m: tuple[float, float], spacing_m: fl
 class Known:
     """Edge points that are all known from the beginning, in space that is seen to be free."""
 
-    spacing_m, revision, taken_back_at = 50.0, 1, 0
+    spacing_m, revision, last_removal_revision = 50.0, 1, 0
     moving: tuple[MovingEdges, ...] = ()
-    surprised_s = -math.inf
+    last_contradiction_s = -math.inf
 
     def __init__(self, points: FloatArray) -> None:
         self._points = points
@@ -104,5 +104,5 @@ def assert_flyable_fixture() -> Callable[[Path, float], None]:
 
 
 @pytest.fixture(name="known")
-def known_fixture() -> Callable[[FloatArray], SeenWorld]:
+def known_fixture() -> Callable[[FloatArray], MapView]:
     return Known

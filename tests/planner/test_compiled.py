@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from planner.compiled import FLOAT, ROWS, Compiled, fused
-from planner.fans import encircled
+from planner.geometry.fans import encircled
 
 
 def twice(x: float) -> float:
@@ -58,7 +58,7 @@ def test_to_import_planners_compiles_nothing(tmp_path: Path) -> None:
     source = """
 import sys, planner.registry
 print("numba" in sys.modules)
-from planner.clearance import inside_bounds
+from planner.geometry.clearance import inside_bounds
 from planner.interface import Path
 print(inside_bounds(Path([(0.0, 0.0, 1.0, 0.0, 0.0, 9.0)]), (0.0, 0.0, 10.0, 10.0)), "numba" in sys.modules)
 """
@@ -82,7 +82,7 @@ def test_where_the_disk_is_full_functions_are_compiled_all_the_same(tmp_path: Pa
     source = """
 import resource
 from planner.compiled import compile_all
-from planner.fans import encircled
+from planner.geometry.fans import encircled
 import numpy as np
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 print(encircled(np.zeros((3, 2)), np.ones((1, 2)))[0])

@@ -22,11 +22,11 @@ class Batches:
 
     spacing_m = CLEARANCE / 4.0
     moving: tuple[MovingEdges, ...] = ()
-    surprised_s = -math.inf
+    last_contradiction_s = -math.inf
 
     def __init__(self) -> None:
         self.revision = 0
-        self.taken_back_at = 0
+        self.last_removal_revision = 0
         self._points: list[tuple[int, FloatArray]] = []
 
     def add(self, points: FloatArray) -> None:
@@ -35,13 +35,13 @@ class Batches:
 
     def take_back(self, keep: FloatArray) -> None:
         self.revision += 1
-        self.taken_back_at = self.revision
+        self.last_removal_revision = self.revision
         self._points = [(1, keep)]
 
     def thin_out(self, rng: np.random.Generator) -> None:
         """Takes back some points, one by one."""
         self.revision += 1
-        self.taken_back_at = self.revision
+        self.last_removal_revision = self.revision
         self._points = [(at, points[rng.random(len(points)) < 0.95]) for at, points in self._points]
 
     def edges_since(self, revision: int) -> FloatArray:

@@ -1,0 +1,1 @@
+"""Figures of a flight: pure functions of record and world."""

@@ -1,0 +1,122 @@
+"""The figures of one flight, the content of `metrics.json`: pure functions of what was flown and asked."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from harness.analysis.smoothness import (
+    flown_lengths,
+    flown_profile,
+    planned_profile,
+    smoothness,
+    stations_in_effect,
+    window_m,
+)
+from harness.analysis.trackability import Corner, FlightLimits, legs, saturated
+from harness.flight.record import Flight, FloatArray, Outcome, digest
+
+
+def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()) -> dict[str, Any]:
+    """All figures of a flight, ready for JSON: a figure that does not exist is None, never NaN or infinity.
+
+    Distances are of the flown track as logged. `planned_length_m` is the curve length of those parts of the
+    plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two.
+    Cross-track
+    figures are of the rows flown under a plan, altitude figures of all rows. `clearance_violation_s` counts the
+    intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
+    `replans` counts the plans accepted after the first. `compute_ms` is over all calls in which the planner searched,
+    `smoothness` is defined in `harness.analysis.smoothness`, `trackability` in `harness.analysis.trackability`;
+    `error` is the traceback
+    of what the planner raised.
+
+    Args:
+        flight: the flight; its track has at least one row.
+        limits: what the flight is measured against.
+        corners: of a path that was given, in order.
+
+    Raises:
+        ValueError: the track is empty.
+    """
+    track = flight.track
+    if not len(track):
+        raise ValueError("a flight without a track has no metrics")
+    nearest_m = track.clearance_m.copy()
+    nearest_m[-1] = min(nearest_m[-1], flight.contact_m)
+    window = window_m(track)
+    planned = planned_profile(track, flight.plans, window)
+    lost_control = flight.outcome is Outcome.LOST_CONTROL
+    verdicts = legs(track, flight.plans, limits, lost_control, corners)
+    followed = track.cross_track_m[track.plan_index >= 0]
+    planned_m = planned_length_m(flight)
+    return {
+        "outcome": flight.outcome.value,
+        "reason": flight.reason,
+        "flown_length_m": float(flown_lengths(track).sum()),
+        "planned_length_m": planned_m,
+        "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
+        "min_clearance_m": _finite(nearest_m.min()),
+        "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
+        "cross_track_m": error_figures(followed),
+        "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
+        "smoothness": {
+            "planned": dataclasses.asdict(smoothness(planned, window, planned_m)),
+            "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),
+        },
+        "bank_saturation_fraction": float(saturated(track, limits.bank_limit_rad).mean()),
+        "max_load_factor": _finite(track.load_factor.max()),
+        "trackable": bool(verdicts) and all(leg.trackable for leg in verdicts),
+        "trackability": [dict(vars(leg)) for leg in verdicts],
+        "replans": max(len(flight.plans) - 1, 0),
+        "compute_ms": compute_figures(flight.compute_ms),
+        "timing": {
+            "sim_s": flight.sim_s,
+            "wall_s": flight.wall_s,
+            "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
+        },
+        "digest": digest(track),
+        "error": flight.error,
+    }
+
+
+def error_figures(error: FloatArray) -> dict[str, float | None]:
+    """rms, 95th percentile and maximum of an absolute error, NaN left out; None without a value."""
+    size = np.abs(error[np.isfinite(error)])
+    if not len(size):
+        return {"rms": None, "p95": None, "max": None}
+    return {
+        "rms": math.sqrt(float(np.mean(size * size))),
+        "p95": float(np.percentile(size, 95)),
+        "max": float(size.max()),
+    }
+
+
+def compute_figures(compute_ms: tuple[float, ...]) -> dict[str, float | None]:
+    """Median, 99th percentile and maximum of search times in ms; None without a search."""
+    if not compute_ms:
+        return {"p50": None, "p99": None, "max": None}
+    p50, p99 = np.percentile(compute_ms, (50, 99))
+    return {"p50": float(p50), "p99": float(p99), "max": max(compute_ms)}
+
+
+def clearance_violation_s(time_s: FloatArray, clearance_m: FloatArray, wanted_m: float) -> float:
+    """Time below the wanted clearance, counted by intervals between rows."""
+    return float(np.diff(time_s)[clearance_m[1:] < wanted_m].sum())
+
+
+def planned_length_m(flight: Flight) -> float:
+    """Length of the planned curve that was in effect: progress along each plan while it was flown, up to its end."""
+    flown_m = 0.0
+    for index, start, end in stations_in_effect(flight.track):
+        plan = flight.plans[index]
+        length = math.inf if plan.loiter else float(plan.segments[:, 5].sum())
+        flown_m += max(min(end, length) - start, 0.0)
+    return flown_m
+
+
+def _finite(value: np.float64) -> float | None:
+    return float(value) if np.isfinite(value) else None

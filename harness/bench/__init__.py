@@ -1,0 +1,1 @@
+"""What the closed loop costs, and how close an aircraft tracks: measurements."""

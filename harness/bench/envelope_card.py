@@ -1,0 +1,165 @@
+"""The envelope card of an aircraft: what it can do, measured by flying it in JSBSim.
+
+The first page, mass and speeds and banks, is the aircraft's survey, which planning uses; the others fly turns
+and courses at given airspeeds and winds. A card is kept by the content of model and package.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Final
+
+from aircraft.airframes import AircraftError, Airframe, airframe
+from aircraft.card_cache import cached
+from aircraft.envelope import performance
+from aircraft.guidance import UPDATE_RATE_HZ
+from aircraft.guidance_law import GRAVITY_MPS2
+from aircraft.start import Atmosphere
+from harness.bench.tracking import ALTITUDE_M, course, fly_course
+
+BANKS_DEG: Final = (10.0, 20.0, 30.0, 40.0, 45.0)
+SETTLING_S: Final = 10.0
+TURNING_S: Final = 30.0
+COURSE_SEED: Final = 1
+COURSE_TURNS: Final = 8
+RADIUS_TOLERANCE: Final = 0.02
+DEFAULT_WIND_SHARE: Final = 0.3
+FORMAT: Final = 1
+"""Goes up with what a card consists of, so that older ones are made anew."""
+
+Report = Callable[[int, int, str], None]
+
+
+def envelope_card(
+    name: str,
+    airspeeds_mps: Sequence[float] = (),
+    winds_mps: Sequence[float] = (),
+    report: Report | None = None,
+) -> dict[str, Any]:
+    """The card of an aircraft, flown unless that has been done before.
+
+    Args:
+        name: a name or folder that `airframe` knows.
+        airspeeds_mps: true airspeeds to look at; default: cruise.
+        winds_mps: winds in which paths are tracked, besides calm air; default: 30 % of each airspeed.
+        report: told what is done, of how much, and what is at hand.
+
+    Returns:
+        `aircraft`, `mass_kg`, `airspeed_range_mps`, `cruise_mps`, `bank_limit_deg`, `roll_rate_dps`, `verified`,
+        and `at`: for each airspeed `airspeed_mps`, `roll_in_s`, `level_bank_deg`, `turns` (see `flown_turn`) and
+        `tracked` (see `tightest`).
+
+    Raises:
+        AircraftError: there is no such aircraft, or it cannot fly at one of the airspeeds or in one of the winds.
+    """
+    frame = airframe(name)
+    speeds = tuple(airspeeds_mps) or (frame.cruise_mps,)
+    for speed in speeds:
+        for wind in (0.0, *winds_mps):
+            performance(frame, speed, wind)
+    digest = frame.files.digest()
+    pages = []
+    for done, speed in enumerate(speeds):
+        winds = sorted({0.0, *(winds_mps or (round(DEFAULT_WIND_SHARE * speed, 2),))})
+        if report is not None:
+            report(done, len(speeds), f"{frame.name} at {speed:g} m/s")
+        title = f"{frame.name}-envelope-{FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
+        pages.append(cached(title, digest, partial(_page, frame, speed, winds)))
+    return {
+        "aircraft": frame.name,
+        "mass_kg": frame.mass_kg,
+        "airspeed_range_mps": list(frame.airspeed_range_mps),
+        "cruise_mps": frame.cruise_mps,
+        "bank_limit_deg": frame.bank_limit_deg,
+        "roll_rate_dps": frame.roll_rate_dps,
+        "verified": frame.verified,
+        "at": pages,
+    }
+
+
+def _page(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:
+    from aircraft.survey import roll_in_s
+
+    banks = (*(bank for bank in BANKS_DEG if bank < frame.bank_limit_deg), frame.bank_limit_deg)
+    return {
+        "airspeed_mps": speed,
+        "roll_in_s": roll_in_s(frame, speed),
+        "level_bank_deg": frame.level_bank_deg(speed),
+        "turns": [flown_turn(frame, speed, bank) for bank in banks],
+        "tracked": [tightest(frame, speed, wind) for wind in winds],
+    }
+
+
+def flown_turn(frame: Airframe, speed: float, bank_deg: float) -> dict[str, float | None]:
+    """One turn at a bank, after 10 s of rolling in and settling, for 30 s.
+
+    Returns:
+        `bank_deg`; `radius_m`, path length over change of course, None if control is lost on the way; the
+        greatest `load_factor`; `altitude_lost_m` and `airspeed_lost_mps`, the most below what was commanded from
+        the roll-in on.
+    """
+    from aircraft.survey import in_flight
+
+    model = in_flight(frame, speed)
+    steps = model.step_rate_hz // UPDATE_RATE_HZ
+    model.command(math.radians(bank_deg), ALTITUDE_M, speed)
+    length = turned = lost_m = lost_mps = 0.0
+    load = 1.0
+    before = model.state()
+    while before.time_s < SETTLING_S + TURNING_S:
+        model.advance(steps)
+        state = model.state()
+        if model.fault():
+            return {
+                "bank_deg": bank_deg,
+                "radius_m": None,
+                "load_factor": load,
+                "altitude_lost_m": lost_m,
+                "airspeed_lost_mps": lost_mps,
+            }
+        lost_m = max(lost_m, ALTITUDE_M - state.up_m)
+        lost_mps = max(lost_mps, speed - state.airspeed_mps)
+        load = max(load, state.load_factor)
+        if before.time_s >= SETTLING_S:
+            length += state.groundspeed_mps * (state.time_s - before.time_s)
+            turned += math.remainder(state.course_rad - before.course_rad, math.tau)
+        before = state
+    return {
+        "bank_deg": bank_deg,
+        "radius_m": length / turned,
+        "load_factor": load,
+        "altitude_lost_m": lost_m,
+        "airspeed_lost_mps": lost_mps,
+    }
+
+
+def tightest(frame: Airframe, speed: float, wind_mps: float) -> dict[str, float | None]:
+    """The tightest radius of which a course of 8 turns is tracked in a wind without the bank being cut.
+
+    Tracked means within the error that planning allows for. The search is between the radius at the bank limit
+    in calm air and the one of planning, to 2 %.
+
+    Returns:
+        `wind_mps`, `planned_radius_m` as planning has it with its margins, and `tightest_radius_m`, None if even
+        that is not tracked.
+    """
+    planned = performance(frame, speed, wind_mps)
+    air = Atmosphere(wind_east_mps=wind_mps)
+
+    def tracks(radius_m: float) -> bool:
+        try:
+            flown = fly_course(frame, speed, air, course(COURSE_SEED, radius_m, COURSE_TURNS))
+        except (AircraftError, ArithmeticError):
+            return False
+        return flown.bank_saturation == 0.0 and flown.cross_track_max_m <= planned.tracking_error_m
+
+    good: float | None = None
+    bad = 0.9 * speed**2 / (GRAVITY_MPS2 * math.tan(math.radians(frame.bank_limit_deg)))
+    if tracks(planned.turn_radius_m):
+        good = planned.turn_radius_m
+        while good - bad > RADIUS_TOLERANCE * good:
+            middle = 0.5 * (good + bad)
+            good, bad = (middle, bad) if tracks(middle) else (good, middle)
+    return {"wind_mps": wind_mps, "planned_radius_m": planned.turn_radius_m, "tightest_radius_m": good}

@@ -1,0 +1,197 @@
+"""How close an aircraft stays to planned paths: random courses flown in JSBSim, the worst of many.
+
+A course is a chain of lines and arcs as planners make them, at the radius that planning uses in that air. The
+figures are those of guidance, autopilot and flight model together; no planner takes part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from aircraft.airframes import Airframe, airframe
+from aircraft.envelope import performance
+from aircraft.frames import LocalPlane
+from aircraft.guidance import UPDATE_RATE_HZ
+from aircraft.interface import Route
+from aircraft.route import arc_point
+from aircraft.start import Atmosphere, StartConditions
+from harness.run.compiled_guidance import path_follower
+
+ALTITUDE_M: Final = 300.0
+COURSE_RAD: Final = 0.3
+TURNS: Final = 14
+TURN_DEG: Final = (20.0, 120.0)
+STRAIGHT_RADII: Final = (1.0, 4.0)
+"""Least and greatest length of the line between two turns, in turn radii."""
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How a course was flown, or the limits for it: m, and a share of the time."""
+
+    cross_track_p95_m: float
+    cross_track_max_m: float
+    altitude_p95_m: float
+    bank_saturation: float
+
+    def within(self, limits: Tracking) -> bool:
+        """Whether no figure is above its limit."""
+        return all(mine <= limit for mine, limit in zip(self._figures, limits._figures, strict=True))
+
+    def worse(self, other: Tracking) -> Tracking:
+        """The greater of each figure."""
+        return Tracking(*map(max, zip(self._figures, other._figures, strict=True)))
+
+    def times(self, factor: float) -> Tracking:
+        """Limits for an aircraft that is coarser by a factor."""
+        across, most, altitude, saturation = self._figures
+        return Tracking(factor * across, factor * most, factor * altitude, saturation)
+
+    @property
+    def _figures(self) -> tuple[float, float, float, float]:
+        return self.cross_track_p95_m, self.cross_track_max_m, self.altitude_p95_m, self.bank_saturation
+
+
+@dataclass(frozen=True)
+class Case:
+    """One kind of air.
+
+    Attributes:
+        name: for the table.
+        wind_share: steady wind over airspeed; its direction is drawn.
+        turbulence, intensity: as `Atmosphere` has them.
+        limits: promised for the Aerosonde.
+    """
+
+    name: str
+    limits: Tracking
+    wind_share: float = 0.0
+    turbulence: str | None = None
+    intensity: str | None = None
+
+    def atmosphere(self, airspeed_mps: float, seed: int) -> Atmosphere:
+        """The air of a seed."""
+        towards = np.random.default_rng((seed, 2)).uniform(0.0, math.tau)
+        wind = self.wind_share * airspeed_mps
+        east, north = wind * math.sin(towards), wind * math.cos(towards)
+        return Atmosphere(east, north, self.turbulence, self.intensity, seed)
+
+
+CASES: Final = (
+    Case("calm", Tracking(0.15, 0.35, 0.15, 0.0)),
+    Case("wind 30 %", Tracking(0.20, 0.50, 0.15, 0.0), 0.3),
+    Case("wind 50 %", Tracking(0.30, 0.80, 0.20, 0.0), 0.5),
+    Case("moderate Tustin", Tracking(0.50, 2.0, 1.0, 0.0), 0.0, "tustin", "moderate"),
+    Case("moderate Milspec", Tracking(0.50, 2.0, 1.0, 0.0), 0.0, "milspec", "moderate"),
+    Case("severe, wind 30 %", Tracking(1.0, 4.0, 2.0, 0.05), 0.3, "tustin", "severe"),
+)
+LIMIT_FACTORS: Final = {"aerosonde": 1.0, "c172p": 4.0, "T38": 8.0}
+"""By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified."""
+
+
+def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
+    """Lines and arcs of 20 to 120 degrees, left and right, at one radius, from (0, 0) along `COURSE_RAD`."""
+    rng = np.random.default_rng((seed, 1))
+    pieces = [(0.0, STRAIGHT_RADII[1] * radius_m)]
+    for _ in range(turns):
+        curvature = rng.choice((-1.0, 1.0)) / radius_m
+        pieces.append((curvature, math.radians(rng.uniform(*TURN_DEG)) * radius_m))
+        pieces.append((0.0, rng.uniform(*STRAIGHT_RADII) * radius_m))
+    rows = []
+    point = (0.0, 0.0, math.sin(COURSE_RAD), math.cos(COURSE_RAD))
+    for curvature, length in pieces:
+        rows.append((*point, curvature, length))
+        point = arc_point(rows[-1], length)
+    return Route(np.array(rows))
+
+
+def fly_course(frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Route) -> Tracking:
+    """Flies a route from its start to its end.
+
+    Raises:
+        AircraftError: the aircraft cannot start in this air.
+        ArithmeticError: control is lost on the way; the message says how.
+    """
+    from aircraft.jsbsim_model import JsbsimModel
+
+    model = JsbsimModel(
+        frame,
+        StartConditions(0.0, 0.0, ALTITUDE_M, COURSE_RAD, airspeed_mps),
+        LocalPlane(47.0, 8.0),
+        air,
+    )
+    follower = path_follower(frame.guidance_limits)
+    follower.follow(route)
+    steps = model.step_rate_hz // UPDATE_RATE_HZ
+    cross, altitude, saturated = [], [], 0
+    while True:
+        state = model.state()
+        if fault := model.fault():
+            raise ArithmeticError(f"{frame.name}: control is lost after {state.time_s:.0f} s: {fault}")
+        output = follower.update(state)
+        if output.past_end:
+            break
+        cross.append(abs(output.cross_track_m))
+        altitude.append(abs(state.up_m - ALTITUDE_M))
+        saturated += output.bank_saturated
+        model.command(output.roll_command_rad, ALTITUDE_M, airspeed_mps)
+        model.advance(steps)
+    return Tracking(
+        float(np.percentile(cross, 95)),
+        max(cross),
+        float(np.percentile(altitude, 95)),
+        saturated / len(cross),
+    )
+
+
+def tracked(name: str, case: Case, seeds: Sequence[int], airspeed_mps: float | None = None) -> Tracking:
+    """The worst of the courses of some seeds, each at the radius that planning uses in the air of the case."""
+    frame = airframe(name)
+    speed = airspeed_mps or frame.cruise_mps
+    worst = Tracking(0.0, 0.0, 0.0, 0.0)
+    for seed in seeds:
+        air = case.atmosphere(speed, seed)
+        radius_m = performance(frame, speed, air.wind_mps, air.intensity).turn_radius_m
+        worst = worst.worse(fly_course(frame, speed, air, course(seed, radius_m)))
+    return worst
+
+
+def bench_tracking(
+    name: str, seeds: int, progress: Callable[[int, int, str], None] | None = None
+) -> dict[str, Any]:
+    """Flies every case.
+
+    Args:
+        name: an aircraft.
+        seeds: courses per case, of seeds 1, 2 and so on.
+        progress: told what is done, of how much, and the case at hand.
+
+    Returns:
+        `aircraft`, `airspeed_mps`, `seeds`, and `cases`: for each its name, the figures of `Tracking`, worst
+        over the seeds, its `limits` likewise (None where nothing is promised) and whether they are `kept`.
+
+    Raises:
+        AircraftError: the aircraft cannot be flown in one of the cases.
+        ArithmeticError: control is lost on the way.
+    """
+    factor = LIMIT_FACTORS.get(name)
+    rows = []
+    for done, case in enumerate(CASES):
+        if progress is not None:
+            progress(done, len(CASES), case.name)
+        flown = tracked(name, case, range(1, seeds + 1))
+        limits = case.limits.times(factor) if factor else None
+        rows.append(
+            {
+                "case": case.name,
+                **vars(flown),
+                "limits": vars(limits) if limits else None,
+                "kept": flown.within(limits) if limits else None,
+            }
+        )
+    return {"aircraft": name, "airspeed_mps": airframe(name).cruise_mps, "seeds": seeds, "cases": rows}

@@ -1,0 +1,1 @@
+"""Monte-Carlo campaigns: many flights, their results and their answers."""

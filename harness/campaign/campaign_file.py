@@ -1,0 +1,293 @@
+"""Campaign files: the type that is the file format, and reading one with the scenario files that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import BeforeValidator, Field, Strict, ValidationError, model_validator
+
+from harness.campaign.sampling import Distribution, Sampler
+from harness.files import strict_yaml
+from harness.files.strict_yaml import InputError, Loc, Node, fault_line, node_of
+from harness.scenario.scenario import model_or_folder
+from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
+from harness.scenario.shipped import shipped_scenarios
+from harness.scenario.validation import KeyFault, input_error, shown
+from harness.scenario.world_generators import WorldSpec
+
+SCHEMA: Final = "wayproof/campaign/1"
+MAX_RUNS: Final = 1_000_000
+
+OTHERWISE: Final[dict[Loc, str]] = {
+    ("schema",): "leave it out",
+    ("name",): "leave it out",
+    ("seed",): "every case gets a seed of its own, from the campaign's",
+    ("planner", "kind"): "name planners under `planners`",
+    ("aircraft", "model"): "name aircraft under `aircraft`",
+}
+"""Keys of a scenario that a campaign gives in another way."""
+
+Keys = dict[str, Any]
+Values = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
+
+
+def _named(name: str) -> BeforeValidator:
+    """Takes bare text for a section with one key."""
+    section = PlannerSpec if name == "kind" else AircraftSpec
+    return BeforeValidator(
+        lambda value: {name: value} if isinstance(value, str) else value, json_schema_input_type=str | section
+    )
+
+
+class Campaign(Section):
+    """Many flights, completely described.
+
+    A case is one draw of one combination of scenario, world and grid values; every planner with every aircraft
+    flies each case. Attributes equal the keys of the file, except `schema_` and `set_`, which are `schema` and
+    `set` there.
+    """
+
+    schema_: Literal["wayproof/campaign/1"] = key("Format and version.", alias="schema")
+    name: str = key("Names the folder.", pattern=r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$", max_length=100)
+    seed: int = key("Root seed; every case's seed and draws derive from it.", unit="1", ge=0, le=2**53)
+    scenarios: Annotated[tuple[str, ...], Strict(False)] = key(
+        "What is flown: scenario files or folders of them, from the campaign file on, or names that `wayproof "
+        "list scenarios` prints. Default: none, the worlds are flown with every default.",
+        default=(),
+    )
+    worlds: Annotated[tuple[WorldSpec, ...], Strict(False)] = key(
+        "Generators; each makes area.bounds_m, obstacles, mission.start_m and mission.goal_m in place of the "
+        "scenario's. Default: the scenarios' own worlds.",
+        default=(),
+    )
+    planners: Annotated[
+        tuple[Annotated[PlannerSpec, _named("kind")], ...],
+        Strict(False),
+    ] = key("Kinds, or a kind with keys of `planner`. Default: the scenario's own planner.", default=())
+    aircraft: Annotated[
+        tuple[Annotated[AircraftSpec, _named("model")], ...],
+        Strict(False),
+    ] = key("Models, or a model with keys of `aircraft`. Default: the scenario's own.", default=())
+    set_: Keys = key("Values by key path of a scenario, for every run.", default_factory=dict, alias="set")
+    grid: dict[str, Values] = key(
+        "Lists of values by key path of a scenario; every combination is flown.", default_factory=dict
+    )
+    random: dict[str, Distribution] = key(
+        "What to draw, by key path of a scenario, anew for every case.", default_factory=dict
+    )
+    sampler: Sampler = key(
+        "How the draws of one combination are spread: each for itself, or evenly over all ranges together.",
+        default="independent",
+    )
+    draws: int = key("Draws of every combination.", unit="1", default=1, ge=1, le=MAX_RUNS)
+    recordings: Literal["all", "failures", "none"] = key(
+        "Of which runs a run folder is kept; failures are those that do not reach the goal.", default="none"
+    )
+    optimum: bool = key("Whether to compute the shortest path of every run's world.", default=True)
+
+    @model_validator(mode="after")
+    def _can_be_flown(self) -> Campaign:
+        if not (self.scenarios or self.worlds):
+            raise KeyFault((), "has neither scenarios nor worlds; must have at least one of them")
+        labels = [world.name for world in self.worlds]
+        for index, label in enumerate(labels):
+            if label in labels[:index]:
+                raise KeyFault(("worlds", index), f"is called {label} as another; give each a label")
+        taken: dict[Loc, str] = {}
+        for section, keys in (("set", self.set_), ("grid", self.grid), ("random", self.random)):
+            for name in keys:
+                self._check_key((section, name), taken)
+        for section, entries in (("planners", self.planners), ("aircraft", self.aircraft)):
+            self._check_entries(section, entries, taken)
+        return self
+
+    @staticmethod
+    def _check_entries(section: str, entries: Sequence[Section], taken: dict[Loc, str]) -> None:
+        """Refuses an entry that stands there already, or whose key is given for every entry elsewhere."""
+        for index, entry in enumerate(entries):
+            if entry in entries[:index]:
+                raise KeyFault((section, index), "is there already; leave it out or give it another key")
+            for name in entry.model_fields_set | (entry.model_extra or {}).keys():
+                named = taken.get((section.removesuffix("s"), name), "set")
+                if not named.startswith("set"):
+                    raise KeyFault((section, index, name), f"is given under {named} too; keep one of them")
+
+    def _check_key(self, where: tuple[str, str], taken: dict[Loc, str]) -> None:
+        """Refuses a key path that is none, is not for a campaign to give, or is given already."""
+        try:
+            loc = strict_yaml.loc_of(where[1])
+        except ValueError as error:
+            raise KeyFault(where, str(error)) from error
+        for other, way in OTHERWISE.items():
+            if other[: len(loc)] == loc:
+                raise KeyFault(where, f"cannot be given here; {way}")
+        for other, named in taken.items():
+            if other[: len(loc)] == loc[: len(other)]:
+                raise KeyFault(where, f"is given under {named} too; keep one of them")
+        taken[loc] = strict_yaml.key_path(where)
+
+
+@dataclass(frozen=True)
+class Base:
+    """A scenario that a campaign starts from.
+
+    Attributes:
+        file: name of its file; of the campaign itself, if that names no scenarios.
+        source: what its faults name it.
+        root: its keys.
+    """
+
+    file: str
+    source: str
+    root: Node
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario."""
+        return self.word(("name",), Path(self.file).stem)
+
+    def word(self, loc: Loc, default: str) -> str:
+        """The text at `loc`, or what stands for it where there is none."""
+        node = self.root.at(loc)
+        return node.value if node and isinstance(node.value, str) else default
+
+
+@dataclass(frozen=True)
+class CampaignFile:
+    """A campaign file as it was read.
+
+    Attributes:
+        campaign: its content.
+        source: what its faults name it.
+        root: its keys, with their lines.
+        bases: the scenarios that it names, in order; at least one.
+    """
+
+    campaign: Campaign
+    source: str
+    root: Node
+    bases: tuple[Base, ...]
+
+    def plain(self) -> dict[str, Any]:
+        """All of it as JSON has it: enough to fly every run again, without a file."""
+        return {
+            "campaign": self.root.plain(),
+            "scenarios": [{"file": base.file, "keys": base.root.plain()} for base in self.bases],
+        }
+
+    @classmethod
+    def from_plain(cls, plain: dict[str, Any], source: str) -> CampaignFile:
+        """What `plain` gave.
+
+        Raises:
+            InputError: it is something else.
+        """
+        try:
+            root = node_of(plain["campaign"], 1)
+            given = [(Path(each["file"]).name, dict(each["keys"])) for each in plain["scenarios"]]
+        except (KeyError, TypeError, ValueError):
+            given = []
+        if not given:
+            raise InputError(f"{source}: holds no campaign, or only a part of it; give another copy")
+        bases = tuple(Base(name, f"{name} in {source}", node_of(keys, 1)) for name, keys in given)
+        return cls(_validated(root, source), source, root, bases)
+
+
+def load_campaign(path: Path) -> CampaignFile:
+    """Reads a campaign file and the scenario files that it names; the scenarios themselves are not checked.
+
+    Raises:
+        InputError: a file cannot be read or is not a campaign; a line of its text names file, line and key.
+    """
+    source, root = str(path), strict_yaml.read(path)
+    root = _with_folders(root, path.parent)
+    campaign = _validated(root, source)
+    if not campaign.scenarios:
+        line = root.line_of(("worlds",))
+        node = Node({"schema": Node("wayproof/scenario/1", line), "name": Node(campaign.name, line)}, line)
+        return CampaignFile(campaign, source, root, (Base(campaign.name, source, node),))
+    bases: dict[str, Base] = {}
+    for index, entry in enumerate(campaign.scenarios):
+        loc: Loc = ("scenarios", index)
+        for file in _files(entry, path.parent, partial(_fault, source, root, loc)):
+            found = _with_folder(_mapping(file), ("aircraft", "model"), file.parent)
+            base = Base(file.name, str(file), found)
+            if base.name in bases:
+                raise _fault(source, root, loc, f"is a second scenario called {base.name}; rename one")
+            bases[base.name] = base
+    return CampaignFile(campaign, source, root, tuple(bases.values()))
+
+
+def is_campaign(path: Path) -> bool:
+    """Whether a file says that it is a campaign."""
+    try:
+        schema = strict_yaml.read(path).at(("schema",))
+    except InputError:
+        return False
+    return schema is not None and str(schema.value).startswith("wayproof/campaign/")
+
+
+def campaign_schema() -> dict[str, Any]:
+    """JSON Schema of the format."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Campaign.model_json_schema()}
+
+
+def _validated(root: Node, source: str) -> Campaign:
+    try:
+        return Campaign.model_validate(root.plain())
+    except ValidationError as error:
+        raise input_error(error, Campaign, root, source) from error
+
+
+def _fault(source: str, root: Node, loc: Loc, sentence: str) -> InputError:
+    return InputError(fault_line(source, root.line_of(loc), loc, sentence))
+
+
+def _mapping(file: Path) -> Node:
+    root = strict_yaml.read(file)
+    if not isinstance(root.value, dict):
+        raise InputError(f"{file}:{root.line}: must be a mapping that begins with `schema:`")
+    return root
+
+
+def _files(entry: str, folder: Path, fault: Callable[[str], InputError]) -> list[Path]:
+    """The scenario files that an entry means: a file, those of a folder, or a shipped one."""
+    path, shipped = folder / entry, shipped_scenarios()
+    try:
+        if path.is_file():
+            return [path]
+        if path.is_dir():
+            if files := [file for file in sorted(path.glob("[!.]*.y*ml")) if _is_scenario(file)]:
+                return files
+            raise fault(f"is {entry!r}, a folder without scenario files (*.yaml, *.yml)")
+    except OSError as error:
+        raise fault(f"is {shown(entry)}: {error.strerror}") from error
+    if entry in shipped:
+        return [shipped[entry]]
+    raise fault(
+        f"is {entry[:200]!r}; must be a scenario file, a folder of them or one of {', '.join(shipped)}"
+    )
+
+
+def _is_scenario(file: Path) -> bool:
+    return file.suffix in (".yaml", ".yml") and not is_campaign(file)
+
+
+def _with_folders(root: Node, folder: Path) -> Node:
+    """The campaign's keys with every aircraft that is a folder given from the root of the file system on."""
+    entries = root.at(("aircraft",))
+    for index, entry in enumerate(entries.value if entries and isinstance(entries.value, tuple) else ()):
+        inside = ("model",) if isinstance(entry.value, dict) else ()
+        root = _with_folder(root, ("aircraft", index, *inside), folder)
+    return root
+
+
+def _with_folder(root: Node, loc: Loc, folder: Path) -> Node:
+    node = root.at(loc)
+    if node is None or not isinstance(node.value, str):
+        return root
+    return strict_yaml.replaced(root, loc, Node(model_or_folder(node.value, folder), node.line))

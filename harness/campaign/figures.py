@@ -1,0 +1,93 @@
+"""Figures of a campaign: success against a varied key, and how long the ways were. Drawn without a screen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from harness.campaign.summary import CURVE_POINTS, Table
+from harness.report.figure_style import DASHES, colour, styled
+
+HEIGHT_IN = 2.9
+LEGEND_LETTERS, KEY_LETTERS = 66, 6
+"""Letters that a row of the legend has room for, and as many as the key before each name takes."""
+LEGEND_ROWS, ROW_IN = 3, 0.17
+"""Rows of the legend that a figure has room for, and how much higher each other one makes it."""
+ROTATED_FROM = 5
+"""From so many groups on, their labels stand slanted."""
+LABEL_LETTERS = 32
+"""A longer label of a group loses its middle, for it takes room from what is drawn."""
+
+
+def success(table: Table) -> Figure:
+    """Share of goals reached against the groups of a key, with Wilson intervals, a line for each planner."""
+    labels = [_short(label) for label in table.rows.labels]
+    planners = table.columns.labels if table.columns else ("",)
+    with styled(_height_in(planners)) as figure:
+        axes = figure.add_subplot()
+        for index, planner in enumerate(planners):
+            own = [(place, cells[index]) for place, cells in enumerate(table.cells) if cells[index].runs]
+            shift = 0.12 * (index - (len(planners) - 1) / 2)
+            shares = [
+                (cell.success or 0.0, cell.success_low or 0.0, cell.success_high or 0.0) for _, cell in own
+            ]
+            value, low, high = 100.0 * np.array(shares).reshape(-1, 3).T
+            axes.errorbar(
+                [place + shift for place, _ in own],
+                value,
+                yerr=np.maximum([value - low, high - value], 0.0),
+                color=colour(index),
+                ls=DASHES[index % len(DASHES)] if table.rows.numeric else "",
+                marker="o",
+                ms=3.5,
+                lw=1.0,
+                capsize=2.5,
+                label=planner,
+            )
+        slanted = len(labels) > ROTATED_FROM or max(map(len, labels), default=0) > 16
+        axes.set_xticks(
+            range(len(labels)), labels, rotation=30 if slanted else 0, ha="right" if slanted else "center"
+        )
+        axes.set(xlim=(-0.5, len(labels) - 0.5), ylim=(-3, 103), xlabel=table.rows.key, ylabel="reached, %")
+        axes.grid(axis="y", color="0.9", lw=0.6)
+        _legend(figure, planners)
+    return figure
+
+
+def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
+    """Share of the goals reached with at most a length over the optimum, a line for each planner."""
+    shares = np.linspace(0.0, 100.0, CURVE_POINTS)
+    with styled(_height_in(tuple(curves))) as figure:
+        axes = figure.add_subplot()
+        for index, (planner, ratios) in enumerate(curves.items()):
+            axes.plot(
+                ratios, shares, color=colour(index), ls=DASHES[index % len(DASHES)], lw=1.3, label=planner
+            )
+        axes.set(xlabel="flown length over the clairvoyant optimum", ylabel="share of goals reached, %")
+        axes.grid(color="0.9", lw=0.6)
+        _legend(figure, tuple(curves))
+    return figure
+
+
+def _short(label: str) -> str:
+    end = (LABEL_LETTERS - len("...")) // 2
+    return label if len(label) <= LABEL_LETTERS else f"{label[:end]}...{label[-end:]}"
+
+
+def _height_in(planners: Sequence[str]) -> float:
+    """Of a figure with these planners in its legend."""
+    return HEIGHT_IN + ROW_IN * max(math.ceil(len(planners) / _columns(planners)) - LEGEND_ROWS, 0)
+
+
+def _columns(planners: Sequence[str]) -> int:
+    """How many names a row of the legend has."""
+    columns = LEGEND_LETTERS // (KEY_LETTERS + max(map(len, planners), default=0))
+    return min(max(columns, 1), 3)
+
+
+def _legend(figure: Figure, planners: Sequence[str]) -> None:
+    if len(planners) > 1:
+        figure.legend(loc="outside lower center", ncols=_columns(planners), frameon=False)

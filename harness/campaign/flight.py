@@ -1,0 +1,108 @@
+"""One run of a campaign, flown where it was sent to: a process of its own, here or on another machine."""
+
+from __future__ import annotations
+
+import errno
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from harness.campaign.results import ERROR, metric_cells, time_cells
+from harness.files.crash import PlannerError, sentence, trace
+from harness.files.errors import RunFolderError, WriteError
+from harness.scenario.scenario import Scenario, unpacked
+
+FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+"""What a disk that takes no more says, a temporary file's too: that is no fault of the run."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be flown.
+
+    Attributes:
+        run: its number.
+        packed: the scenario to fly (`harness.scenario.scenario.packed`).
+        folder: the run folder, if it is kept.
+        recordings: when it is kept.
+        optimum: whether to compute the shortest path of the world.
+    """
+
+    run: int
+    packed: bytes
+    folder: Path
+    recordings: Literal["all", "failures", "none"]
+    optimum: bool
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a job.
+
+    Attributes:
+        run: its number.
+        row: cells of `results.parquet`, by column; those of the job itself are left out.
+        times: cells of `timings.parquet`.
+    """
+
+    run: int
+    row: dict[str, Any]
+    times: dict[str, Any]
+
+
+def fly_job(job: Job) -> Answer:
+    """Flies a job. What goes wrong in the flight is an answer too.
+
+    Raises:
+        OSError: the run folder cannot be written (`WriteError`), or the disk is full.
+        RunFolderError: it cannot be made.
+    """
+    try:
+        scenario = unpacked(job.packed)
+        metrics = _flown(job, scenario)
+        optimum_m = _optimum_m(scenario) if job.optimum else None
+        cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
+    except (WriteError, RunFolderError):
+        raise
+    except PlannerError as error:
+        return failed(job.run, sentence(error), trace(error))
+    except Exception as error:
+        if (full := _full(error)) is not None:
+            raise full from None
+        return failed(job.run, sentence(error), trace(error))
+    return Answer(job.run, cells, time_cells(metrics))
+
+
+def _full(error: Exception) -> OSError | None:
+    """What the disk said, if it takes no more."""
+    cause = error if isinstance(error, OSError) else error.__cause__
+    return cause if isinstance(cause, OSError) and cause.errno in FULL else None
+
+
+def failed(run: int, reason: str, error: str) -> Answer:
+    """The answer of a run that did not come to an end."""
+    return Answer(run, {"outcome": ERROR, "reason": reason, "error": error}, {})
+
+
+def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
+    from harness.analysis.metrics import metrics
+    from harness.flight.closed_loop import fly
+    from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
+
+    if job.recordings == "all":
+        return fly_to_folder(scenario, job.folder, recording=True)
+    found = metrics(fly(make_loop(scenario)), flight_limits(scenario))
+    if job.recordings == "failures" and found["outcome"] != "reached":
+        # Failures are few: to fly them again costs less than to record every flight.
+        fly_to_folder(scenario, job.folder, recording=True)
+    return found
+
+
+def _optimum_m(scenario: Scenario) -> float | None:
+    from harness.world.optimum import shortest_path
+    from harness.world.world import World
+
+    world, mission = World.from_scenario(scenario), scenario.mission
+    return shortest_path(
+        world.obstacles, world.bounds_m, mission.start_m, mission.goal_m, scenario.planner.clearance_m
+    ).length_m

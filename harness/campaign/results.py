@@ -1,0 +1,183 @@
+"""The results of a campaign as rows: their columns, and the tables of a journal's lines.
+
+`results.parquet` has one row a run, sorted by run, and nothing that depends on the machine's speed or on who
+flew what when, so that its bytes are the same whatever flew it; times are in `timings.parquet`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from harness.analysis.smoothness import Smoothness
+from harness.files.strict_yaml import InputError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+RESULTS: Final = "results.parquet"
+TIMINGS: Final = "timings.parquet"
+SCHEMA: Final = "wayproof/results/1"
+ERROR: Final = "error"
+"""Outcome of a run that did not come to an end; the other outcomes are those of `metrics.json`."""
+
+RUN: Final = {
+    "run": "int",
+    "case": "int",
+    "scenario": "text",
+    "world": "text",
+    "planner": "text",
+    "aircraft": "text",
+    "seed": "int",
+}
+"""Columns before those of the varied keys, and what they hold."""
+
+_SPREAD = ("rms", "p95", "max")
+METRICS: Final = {
+    "outcome": "text",
+    "reason": "text",
+    "flown_length_m": "number",
+    "planned_length_m": "number",
+    "flight_time_s": "number",
+    "min_clearance_m": "number",
+    "clearance_violation_s": "number",
+    **{f"cross_track_m.{name}": "number" for name in _SPREAD},
+    **{f"altitude_error_m.{name}": "number" for name in _SPREAD},
+    **{f"smoothness.{of}.{f.name}": "number" for of in ("planned", "flown") for f in fields(Smoothness)},
+    "bank_saturation_fraction": "number",
+    "max_load_factor": "number",
+    "trackable": "bool",
+    "trackability.legs": "int",
+    "trackability.not_trackable": "int",
+    "trackability.causes": "text",
+    "replans": "int",
+    "wanted_clearance_m": "number",
+    "optimum_m": "number",
+    "length_ratio": "number",
+    "digest": "text",
+    "error": "text",
+}
+"""Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
+
+Of the legs of `trackability` there are their number, that of those not trackable, and their causes, each once;
+`wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the
+world and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a
+traceback.
+"""
+
+TIMES: Final = {
+    "run": "int",
+    "compute_ms.p50": "number",
+    "compute_ms.p99": "number",
+    "compute_ms.max": "number",
+    "wall_s": "number",
+    "realtime_factor": "number",
+}
+"""Columns of `timings.parquet`."""
+
+
+def metric_cells(
+    metrics: Mapping[str, Any], wanted_clearance_m: float | None, optimum_m: float | None
+) -> dict[str, Any]:
+    """The content of `metrics.json` as cells of a row, by column.
+
+    Args:
+        metrics: the content.
+        wanted_clearance_m: distance from obstacles that the planner was to keep.
+        optimum_m: length of the shortest path; None where there is none or it is not wanted.
+    """
+    legs = metrics["trackability"]
+    causes = sorted({leg["cause"] for leg in legs if leg["cause"]})
+    reached = metrics["outcome"] == "reached"
+    flat = dict(_flat({name: value for name, value in metrics.items() if name not in _NOT_FLAT}))
+    return {
+        **flat,
+        "trackability.legs": len(legs),
+        "trackability.not_trackable": sum(not leg["trackable"] for leg in legs),
+        "trackability.causes": "; ".join(causes),
+        "wanted_clearance_m": wanted_clearance_m,
+        "optimum_m": optimum_m,
+        "length_ratio": metrics["flown_length_m"] / optimum_m if reached and optimum_m else None,
+    }
+
+
+def time_cells(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """The wall-clock times of `metrics.json` as cells of a row, by column."""
+    compute, timing = metrics["compute_ms"], metrics["timing"]
+    return {
+        **{f"compute_ms.{name}": compute[name] for name in ("p50", "p99", "max")},
+        "wall_s": timing["wall_s"],
+        "realtime_factor": timing["realtime_factor"],
+    }
+
+
+_NOT_FLAT = ("trackability", "compute_ms", "timing")
+
+
+def _flat(content: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
+    for name, value in content.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, value
+
+
+def table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], metadata: str) -> pa.Table:
+    """Rows as a table.
+
+    Args:
+        rows: cells by column; those that are missing are null.
+        columns: what each column holds: int, number, bool, text or json.
+        metadata: JSON text that goes with it.
+    """
+    import pyarrow as pa
+
+    types = {"int": pa.int64(), "number": pa.float64(), "bool": pa.bool_()}
+    schema = pa.schema(
+        [(name, types.get(kind, pa.string())) for name, kind in columns.items()],
+        metadata={"wayproof": metadata},
+    )
+    ordered = sorted(rows, key=lambda row: row["run"])
+    arrays = [pa.array([row.get(field.name) for row in ordered], field.type) for field in schema]
+    return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def campaign_of(results: Path) -> dict[str, Any]:
+    """What `results.parquet` says of the campaign that it is of, as `CampaignFile.plain` gave it.
+
+    Raises:
+        InputError: the file is something else.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not results.exists():
+        raise InputError(f"{results}: there is no such file")
+    try:
+        schema = pq.read_schema(results)
+        found = json.loads((schema.metadata or {})[b"wayproof"])
+    except (OSError, pa.ArrowException, KeyError, ValueError, RecursionError) as error:
+        raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one") from error
+    if not isinstance(found, dict) or found.get("schema") != SCHEMA or "digest" not in schema.names:
+        raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one")
+    return found
+
+
+def row_of(results: Path, run: int) -> dict[str, Any] | None:
+    """The row of a run; None if it is not there.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        rows = pq.read_table(results, filters=[("run", "=", run)]).to_pylist()
+    except (OSError, pa.ArrowException, ValueError) as error:
+        text = str(error).splitlines()[0]
+        raise InputError(f"{results}: is damaged: {text}") from error
+    return dict(rows[0]) if rows else None

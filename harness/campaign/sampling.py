@@ -1,0 +1,141 @@
+"""Random values: what a campaign may draw a key from, and designs that spread the draws of several keys.
+
+Every value comes from a number in [0, 1) through the inverse of its distribution, so that any design over the
+unit cube serves every distribution.
+"""
+
+from __future__ import annotations
+
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, Strict, field_validator, model_validator
+
+from harness.files.strict_yaml import Loc
+from harness.scenario.sections import Section, key
+
+if TYPE_CHECKING:
+    from scipy.stats import qmc
+
+FloatArray = NDArray[np.float64]
+Sampler = Literal["independent", "latin_hypercube", "sobol"]
+
+LEAST: Final = 1e-12
+"""Nearest to 0 and 1 that a normal distribution is asked for its inverse: 7 standard deviations off."""
+
+Number = Annotated[float, Field(ge=-1e12, le=1e12)]
+
+
+class Normal(Section):
+    """A Gaussian, cut off where limits are given: what lies beyond them is not drawn."""
+
+    mean: Number = key("Mean, before it is cut off.")
+    sigma: Number = key("Standard deviation, before it is cut off.", gt=0)
+    least: Number | None = key("Nothing below this is drawn. Default: no limit.", default=None)
+    most: Number | None = key("Nothing above this is drawn. Default: no limit.", default=None)
+
+    @model_validator(mode="after")
+    def _leaves_something(self) -> Normal:
+        low, high = self.limits
+        if not high - low > LEAST:
+            raise ValueError("leaves nothing between least and most; must be least < most, not far from mean")
+        return self
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Probabilities of a value below `least` and of one below `most`."""
+        bell = NormalDist(self.mean, self.sigma)
+        low = 0.0 if self.least is None else bell.cdf(self.least)
+        return low, 1.0 if self.most is None else bell.cdf(self.most)
+
+
+class Distribution(Section):
+    """What a key is drawn from: exactly one of the forms."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": [name]} for name in ("uniform", "normal", "choice")]}
+    )
+
+    uniform: Annotated[tuple[Number, Number], Strict(False)] | None = key(
+        "Evenly between two numbers; of a key that takes whole ones alone, both ends are drawn as often as the others.",
+        default=None,
+    )
+    normal: Normal | None = key("A Gaussian.", default=None)
+    choice: Annotated[tuple[Any, ...], Strict(False)] | None = key(
+        "One of these values, of any kind, each as likely as the others.", default=None, min_length=1
+    )
+
+    @field_validator("uniform")
+    @classmethod
+    def _in_order(cls, uniform: tuple[float, float] | None) -> tuple[float, float] | None:
+        if uniform and not uniform[0] < uniform[1]:
+            raise ValueError(f"is {list(uniform)}; must be [least, most] with least < most")
+        return uniform
+
+    @model_validator(mode="after")
+    def _has_one_form(self) -> Distribution:
+        given = [name for name in ("uniform", "normal", "choice") if getattr(self, name) is not None]
+        if len(given) != 1:
+            have = " and ".join(given) if given else "none"
+            raise ValueError(f"has {have} of uniform, normal, choice; must have exactly one")
+        return self
+
+    def number(self, share: float) -> float:
+        """The value below which `share` of the draws lie; only without a choice."""
+        if self.uniform:
+            low, high = self.uniform
+            return min(low + (high - low) * share, high)
+        assert self.normal
+        low, high = self.normal.limits
+        reached = min(max(low + (high - low) * share, LEAST), 1.0 - LEAST)
+        drawn = NormalDist(self.normal.mean, self.normal.sigma).inv_cdf(reached)
+        least = drawn if self.normal.least is None else max(drawn, self.normal.least)
+        return least if self.normal.most is None else min(least, self.normal.most)
+
+    def whole_number(self, share: float) -> int:
+        """The same for a key that takes whole numbers alone."""
+        if not self.uniform:
+            return round(self.number(share))
+        low, high = map(int, self.uniform)
+        return low + min(int((high - low + 1) * share), high - low)
+
+    def ends(self) -> list[tuple[Loc, float]]:
+        """Where it begins and ends, as far as that is given, and where in it that is said."""
+        if self.uniform:
+            return [(("uniform", index), end) for index, end in enumerate(self.uniform)]
+        limits = {"least": self.normal.least, "most": self.normal.most} if self.normal else {}
+        return [(("normal", name), end) for name, end in limits.items() if end is not None]
+
+    def chosen(self, share: float) -> int:
+        """Index of the choice that a number in [0, 1) stands for."""
+        assert self.choice
+        return min(int(share * len(self.choice)), len(self.choice) - 1)
+
+
+def design(sampler: Sampler, draws: int, keys: int, seed: int) -> FloatArray:
+    """(draws, keys) points of the unit cube that cover it evenly together.
+
+    A Latin hypercube (McKay, Beckman and Conover, Technometrics 21, 1979) has one draw in each of `draws`
+    slices of every key; a scrambled Sobol sequence (Owen, 1995) is even in all keys at once, best where the
+    number of draws is a power of two.
+
+    Args:
+        sampler: the kind; independent draws need no design.
+        draws: number of points.
+        keys: dimensions, at least 1.
+        seed: of the scrambling.
+    """
+    from scipy.stats import qmc
+
+    rng = np.random.default_rng(seed)
+    if sampler == "latin_hypercube":
+        return _points(qmc.LatinHypercube(keys, rng=rng), draws)
+    assert sampler == "sobol"
+    return _points(qmc.Sobol(keys, rng=rng), 1 << max(draws - 1, 0).bit_length())[:draws]
+
+
+def _points(engine: qmc.QMCEngine, number: int) -> FloatArray:
+    points: FloatArray = np.asarray(engine.random(number), dtype=np.float64)
+    return points

@@ -1,0 +1,305 @@
+"""The answers of a campaign: what its runs say by two varied keys, which ran worst, which planner did better.
+
+Pure functions of the tables in a campaign's folder. A share has Wilson's 95 % interval (Wilson 1927). A run
+that crashed counts as one that did not reach its goal; so does a goal that the planner proved unreachable.
+"""
+
+from __future__ import annotations
+
+import itertools
+import shlex
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.campaign.groups import Axis, grouped
+from harness.campaign.paired import CONFIDENCE, Duel, duels
+from harness.campaign.results import ERROR, RESULTS
+from harness.campaign.table import NAMED, Runs, load_tables, planned_runs, runs_of, varied_keys
+from harness.files.strict_yaml import InputError
+from harness.flight.record import FloatArray
+from harness.run_files.run_folder import RECORDING
+
+WORST: Final = 10
+BY_DEFAULT: Final = 3
+"""Without a choice, tables are made of every two of so many varied keys, the first ones."""
+
+CURVE_POINTS: Final = 201
+SEVERITY: Final = tuple(
+    f"collision lost_control out_of_bounds planner_failed {ERROR} timeout unreachable".split()
+)
+"""Outcomes other than `reached`, the worst first."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What a group of runs comes to. A figure that no run of it has is None.
+
+    Attributes:
+        runs: how many.
+        reached: how many of them reached their goal.
+        success: their share, from 0 to 1.
+        success_low: lower end of its interval.
+        success_high: upper end.
+        length_median: flown length over the clairvoyant optimum where the goal was reached, median.
+        length_p95: the same, 95th percentile.
+        least_clearance_m: least distance to an obstacle edge in any run.
+        below_wanted: share of the runs flown that were below the wanted clearance at any time.
+        trackable: share of the runs flown in which every leg was tracked.
+        planner_p50_ms: median over the runs of a run's median search time.
+        planner_p99_ms: largest 99th percentile of a run; of all searches together it is no larger.
+        planner_max_ms: longest search.
+    """
+
+    runs: int
+    reached: int
+    success: float | None = None
+    success_low: float | None = None
+    success_high: float | None = None
+    length_median: float | None = None
+    length_p95: float | None = None
+    least_clearance_m: float | None = None
+    below_wanted: float | None = None
+    trackable: float | None = None
+    planner_p50_ms: float | None = None
+    planner_p99_ms: float | None = None
+    planner_max_ms: float | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """The runs by two keys.
+
+    Attributes:
+        rows: the first key.
+        columns: the second key; None for all runs in one column.
+        cells: one a row and column; empty groups have no runs.
+    """
+
+    rows: Axis
+    columns: Axis | None
+    cells: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True)
+class WorstRun:
+    """A run to look at.
+
+    Attributes:
+        run: its number.
+        name: scenario or world, planner and aircraft.
+        seed: of the flight.
+        outcome: as in `results.parquet`.
+        reason: the same as a sentence.
+        min_clearance_m: least distance to an obstacle edge.
+        clearance_ratio: the same over the wanted one, where that is known.
+        varied: the varied keys with their values.
+        folder: its run folder relative to the campaign's, empty where none was kept.
+        recording: whether there is a recording in it.
+        view: the command that shows the recording, empty without one.
+        command: flies it again.
+    """
+
+    run: int
+    name: str
+    seed: int
+    outcome: str
+    reason: str
+    min_clearance_m: float | None
+    clearance_ratio: float | None
+    varied: Mapping[str, Any]
+    folder: str
+    recording: bool
+    view: str
+    command: str
+
+
+@dataclass(frozen=True)
+class Summary:
+    """The answers.
+
+    Attributes:
+        name: the folder's.
+        varied: keys that were varied.
+        outcomes: number of runs by outcome, the most frequent first.
+        total: all runs.
+        tables: one for each choice of keys.
+        curves: one for each key that a table has, by planner.
+        lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
+        worst: collisions first, then other failures, then what came closest to an obstacle.
+        duels: planners on the same cases.
+        planned: how many runs the campaign has, flown or not; None where the results do not say so.
+    """
+
+    name: str
+    varied: tuple[str, ...]
+    outcomes: Mapping[str, int]
+    total: Cell
+    tables: tuple[Table, ...]
+    curves: tuple[Table, ...]
+    lengths: Mapping[str, tuple[float, ...]]
+    worst: tuple[WorstRun, ...]
+    duels: tuple[Duel, ...]
+    planned: int | None = None
+
+    @property
+    def missing(self) -> int:
+        """How many runs are still to be flown, as far as is known."""
+        return 0 if self.planned is None else self.planned - self.total.runs
+
+
+def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summary:
+    """The answers of the campaign in a folder.
+
+    Args:
+        folder: with `results.parquet` and `timings.parquet`.
+        by: one or two keys for each table; default: every two of the first varied keys.
+
+    Raises:
+        InputError: the folder holds no campaign, or a key is no column of it.
+    """
+    results, timings = load_tables(folder)
+    keys = varied_keys(results)
+    for each in by or ():
+        if len(each) not in (1, 2) or len(set(each)) < len(each):
+            raise InputError(f"wayproof: --by {','.join(each)}: must be one key, or two different ones")
+    runs = runs_of(results, timings, list(dict.fromkeys([*keys, *itertools.chain(*(by or ())), *NAMED])))
+    chosen = [list(each) for each in (by if by is not None else _default_choice(keys, runs))]
+    singles = dict.fromkeys(itertools.chain(*chosen))
+    return Summary(
+        name=folder.resolve().name,
+        varied=tuple(keys),
+        outcomes=dict(Counter(runs.names["outcome"]).most_common()),
+        total=cell(runs, np.ones(len(runs), dtype=bool)),
+        tables=tuple(table(runs, each) for each in chosen),
+        curves=tuple(table(runs, [key, "planner"]) for key in singles if key != "planner"),
+        lengths=_lengths(runs),
+        worst=_worst(runs, folder, keys),
+        duels=duels(runs),
+        planned=planned_runs(results),
+    )
+
+
+def _are_crossed(worlds: Sequence[str], scenarios: Sequence[str]) -> bool:
+    """Whether one world was flown with several scenarios: else it stands for its scenario."""
+    return len(set(zip(worlds, scenarios, strict=True))) > len(set(worlds))
+
+
+def _default_choice(keys: Sequence[str], runs: Runs) -> list[tuple[str, ...]]:
+    """Every two of the first keys."""
+    crossed = _are_crossed(runs.names["world"], runs.names["scenario"])
+    first = [key for key in keys if key != "scenario" or crossed or "world" not in keys][:BY_DEFAULT]
+    return [tuple(first)] if len(first) == 1 else list(itertools.combinations(first, 2))
+
+
+def table(runs: Runs, keys: Sequence[str]) -> Table:
+    """The runs by one key or two."""
+    rows, of_row = grouped(keys[0], runs.varied[keys[0]])
+    if len(keys) == 1:
+        cells = tuple((cell(runs, of_row == place),) for place in range(len(rows.labels)))
+        return Table(rows, None, cells)
+    columns, of_column = grouped(keys[1], runs.varied[keys[1]])
+    return Table(
+        rows,
+        columns,
+        tuple(
+            tuple(
+                cell(runs, (of_row == row) & (of_column == column)) for column in range(len(columns.labels))
+            )
+            for row in range(len(rows.labels))
+        ),
+    )
+
+
+def cell(runs: Runs, among: NDArray[np.bool_]) -> Cell:
+    """What the runs among some come to."""
+    count, reached = int(among.sum()), int((runs.reached & among).sum())
+    if not count:
+        return Cell(0, 0)
+    low, high = wilson(reached, count)
+    ratios = _finite(runs.length_ratio[among & runs.reached])
+    clear, tracked = _finite(runs.min_clearance_m[among]), _finite(runs.trackable[among])
+    below = _finite(runs.clearance_violation_s[among]) > 0.0
+    p50, p99, most = (_finite(runs.planner_ms[name][among]) for name in ("p50", "p99", "max"))
+    return Cell(
+        count,
+        reached,
+        success=reached / count,
+        success_low=low,
+        success_high=high,
+        length_median=float(np.median(ratios)) if len(ratios) else None,
+        length_p95=float(np.percentile(ratios, 95)) if len(ratios) else None,
+        least_clearance_m=float(clear.min()) if len(clear) else None,
+        below_wanted=float(below.mean()) if len(below) else None,
+        trackable=float(tracked.mean()) if len(tracked) else None,
+        planner_p50_ms=float(np.median(p50)) if len(p50) else None,
+        planner_p99_ms=float(p99.max()) if len(p99) else None,
+        planner_max_ms=float(most.max()) if len(most) else None,
+    )
+
+
+def wilson(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a share, `trials` at least 1."""
+    from scipy import stats
+
+    interval = stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    return values[np.isfinite(values)]
+
+
+def _lengths(runs: Runs) -> dict[str, tuple[float, ...]]:
+    curves = {}
+    for planner in dict.fromkeys(runs.names["planner"]):
+        own = np.array([name == planner for name in runs.names["planner"]])
+        ratios = _finite(runs.length_ratio[own & runs.reached])
+        if len(ratios):
+            curves[planner] = tuple(np.quantile(ratios, np.linspace(0.0, 1.0, CURVE_POINTS)).tolist())
+    return curves
+
+
+def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...]:
+    """Failures by severity, then all runs by clearance over the wanted one, or by clearance where that is unknown."""
+    ratio = runs.min_clearance_m / np.where(runs.wanted_clearance_m > 0.0, runs.wanted_clearance_m, np.nan)
+    near = ratio if np.isfinite(ratio).any() else runs.min_clearance_m
+    severity = {outcome: place for place, outcome in enumerate((*SEVERITY, "reached"))}
+    outcomes = runs.names["outcome"]
+    order = sorted(
+        range(len(runs)),
+        key=lambda row: (
+            severity.get(outcomes[row], len(SEVERITY) - 1),
+            near[row] if np.isfinite(near[row]) else np.inf,
+            runs.run[row],
+        ),
+    )
+    return tuple(_worst_run(runs, row, float(ratio[row]), folder, keys) for row in order[:WORST])
+
+
+def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[str]) -> WorstRun:
+    number, names = int(runs.run[row]), runs.names
+    kept, clearance = Path("runs") / str(number), float(runs.min_clearance_m[row])
+    world, scenario = names["world"][row], names["scenario"][row]
+    crossed = world and _are_crossed(names["world"], names["scenario"])
+    place = (scenario, world) if crossed else (world or scenario,)
+    recording = (folder / kept / RECORDING).is_file()
+    return WorstRun(
+        run=number,
+        name=", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row]))),
+        seed=int(runs.seed[row]),
+        outcome=names["outcome"][row],
+        reason=names["reason"][row],
+        min_clearance_m=clearance if np.isfinite(clearance) else None,
+        clearance_ratio=ratio if np.isfinite(ratio) else None,
+        varied={key: runs.varied[key][row] for key in keys if key not in NAMED},
+        folder=str(kept) if (folder / kept).is_dir() else "",
+        recording=recording,
+        view=shlex.join(["wayproof", "view", str(folder / kept)]) if recording else "",
+        command=shlex.join(["wayproof", "fly", "--from", str(folder / RESULTS), "--run", str(number)]),
+    )

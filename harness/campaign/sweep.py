@@ -1,0 +1,95 @@
+"""Flies the runs of a campaign that are missing: jobs out to workers, answers into the folder."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from typing import Any, Final
+
+from harness.campaign.flight import Answer, Job, failed
+from harness.campaign.folder import RUNS, CampaignFolder
+from harness.campaign.results import ERROR
+from harness.campaign.runs import CampaignRuns
+from harness.campaign.workers import WorkerDiedError, Workers
+from harness.files.errors import RunFolderError
+
+TABLES_EVERY_S: Final = 30.0
+TABLES_SHARE: Final = 0.01
+"""Tables are made anew at least this far apart, and so seldom that it takes at most this share of the time."""
+
+LOOK_S: Final = 2.0
+"""How often it is looked whether there are more workers."""
+
+Progress = Callable[[Answer], None]
+
+
+def sweep(
+    runs: CampaignRuns, folder: CampaignFolder, workers: Workers, progress: Progress | None = None
+) -> None:
+    """Flies what is missing; whatever ends it, what is done is in the folder's tables.
+
+    Args:
+        runs: the campaign.
+        folder: its folder, claimed.
+        workers: who flies.
+        progress: told of every run that is over.
+
+    Raises:
+        OSError: the folder, or a run folder in it, cannot be written; or who flies has gone.
+    """
+    jobs = _jobs(runs, folder)
+    ahead = next(jobs, None)
+    flying: dict[Future[Answer], int] = {}
+    tables_due = time.monotonic() + TABLES_EVERY_S
+    try:
+        while ahead is not None or flying:
+            while ahead is not None and workers.free() > 0:
+                flying[workers.start(ahead)] = ahead.run
+                ahead = next(jobs, None)
+            if not flying:
+                time.sleep(LOOK_S)
+            for future in wait(flying, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
+                answer = _answer(future, flying.pop(future))
+                if answer.row["outcome"] == ERROR:
+                    # What a crash has left is no whole run folder.
+                    shutil.rmtree(folder.path / RUNS / str(answer.run), ignore_errors=True)
+                folder.append(answer.run, _row(runs, answer), answer.times)
+                if progress is not None:
+                    progress(answer)
+            if time.monotonic() >= tables_due:
+                begun = time.monotonic()
+                folder.write_tables()
+                took_s = time.monotonic() - begun
+                tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
+    finally:
+        folder.write_tables()
+
+
+def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:
+    """What is missing, made when it is its turn."""
+    campaign = runs.campaign
+    for number in range(len(runs)):
+        if number not in folder.done:
+            yield Job(
+                number,
+                runs.packed(number),
+                (folder.path / RUNS / str(number)).resolve(),
+                campaign.recordings,
+                campaign.optimum,
+            )
+
+
+def _answer(future: Future[Answer], run: int) -> Answer:
+    try:
+        return future.result()
+    except WorkerDiedError:
+        reason = "the process that flew it died, each time that it was tried"
+        return failed(run, reason, f"{reason}\n")
+    except RunFolderError as error:
+        raise OSError(str(error)) from error
+
+
+def _row(runs: CampaignRuns, answer: Answer) -> dict[str, Any]:
+    return {**runs.run(answer.run).cells(), **answer.row}

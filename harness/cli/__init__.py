@@ -1,0 +1,1 @@
+"""The command `wayproof`: its commands, and what a person sees of them on a terminal."""

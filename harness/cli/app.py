@@ -1,0 +1,124 @@
+"""The command `wayproof`. Each command is a few lines round functions that are imported when they are needed.
+
+Standard output carries results, standard error everything else. Exit status: 0 done, 1 flown but the goal was
+not reached safely, 2 bad input or usage, 3 the goal is proved unreachable, 130 interrupted by Ctrl-C, 143 by SIGTERM.
+"""
+
+from __future__ import annotations
+
+import errno
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Annotated, Final
+
+import typer
+
+from harness.cli.check import check
+from harness.cli.envelope import envelope
+from harness.cli.export import export
+from harness.cli.falsify import falsify
+from harness.cli.flights import bench, compare, fly
+from harness.cli.formats import list_names, schema, validate
+from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
+from harness.cli.review import report, view
+from harness.cli.standard_output import kept_up, to_nowhere
+from harness.cli.sweep import sweep
+from harness.flight.signals import taken_as_interrupt
+
+INTERRUPTED: Final = 130
+
+app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
+for command in (fly, check, compare, sweep, falsify, validate, schema, view, report, export, bench, envelope):
+    app.command(cls=Command)(command)
+app.command("list", cls=Command)(list_names)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            typer.echo(f"wayproof {version('wayproof')}")
+        except PackageNotFoundError:
+            typer.echo("wayproof, run from its sources without being installed")
+        raise typer.Exit
+
+
+@app.callback()
+def wayproof(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True),
+    ] = False,
+    debug: Annotated[bool, flag("--debug", "Show the traceback of an error.")] = False,
+) -> None:
+    """Flies a path planner's waypoints with a JSBSim aircraft, in a closed loop, in an unknown world.
+
+    For example: wayproof fly paper_circles
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line and returns its exit status.
+
+    Args:
+        arguments: without the program's name; default: those of the process.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in given
+    words = [word for word in given if word != "--debug"]
+    with taken_as_interrupt() as came:
+        status = _run(words, debug)
+    return 128 + came[0] if came and status == INTERRUPTED else status
+
+
+def _run(words: Sequence[str], debug: bool) -> int:
+    try:
+        with kept_up():
+            status = int(app(words, prog_name="wayproof", standalone_mode=False) or 0)
+            _flush()
+        return status
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except Exception as error:
+        if debug:
+            traceback.print_exc()
+        return _report(error)
+
+
+def _flush() -> None:
+    """Writes out what was printed."""
+    if sys.stdout is None:  # closed by whoever started us
+        return
+    try:
+        sys.stdout.flush()
+    except OSError:
+        to_nowhere(sys.stdout)
+        raise
+
+
+def _report(error: Exception) -> int:
+    """Says on standard error what went wrong and returns the exit status."""
+    from harness.files.crash import PlannerError, sentence
+    from harness.files.errors import WriteError
+    from harness.files.input_file import InputError
+
+    if isinstance(error, PlannerError):
+        typer.echo(f"wayproof: {error}", err=True)
+        return BAD_INPUT
+    if isinstance(error, InputError):
+        typer.echo(str(error), err=True)
+        return BAD_INPUT
+    if isinstance(error, typer.TyperException):
+        text = " ".join(error.format_message().split())
+        typer.echo(f"wayproof: {text} (see wayproof --help)", err=True)
+        return BAD_INPUT
+    if isinstance(error, WriteError):
+        typer.echo(f"wayproof: {error}", err=True)
+        return FAILED
+    if isinstance(error, OSError):
+        typer.echo(f"wayproof: {error}", err=True)
+        return FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
+    typer.echo(f"wayproof: internal error, {sentence(error)}; --debug shows where", err=True)
+    return FAILED

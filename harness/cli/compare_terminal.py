@@ -1,0 +1,78 @@
+"""What a person sees of a comparison on a terminal: progress while flying, a table in 80 columns after it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+
+from harness.analysis.rows import CRASHED, DASH, FIGURES, ON_TERMINAL, Row
+from harness.compare.flights import Progress as Report
+from harness.scenario.scenario import Scenario
+
+WIDTH = 80
+NAME_WIDTH = 14
+"""A longer name of a planner goes on in the next line."""
+
+_STYLE = {"reached": "bold green", "unreachable": "bold yellow"}
+
+
+@contextmanager
+def comparison_bar(scenarios: Sequence[Scenario]) -> Iterator[Report | None]:
+    """A progress bar on standard error, or None where that is not a terminal.
+
+    Args:
+        scenarios: one a flight, in the order of the flights' indices.
+    """
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    columns = (BarColumn(bar_width=20), MofNCompleteColumn(), TextColumn("flights  {task.description}"))
+    straight_m = [math.dist(each.mission.start_m, each.mission.goal_m) for each in scenarios]
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("", total=len(scenarios))
+
+        flown: dict[int, float] = {}
+
+        def report(index: int, time_s: float, to_go_m: float, state: str) -> None:
+            each = scenarios[index]
+            over = state not in ("waiting", "following", "holding")
+            flown[index] = 1.0 if over else min(max(1.0 - to_go_m / straight_m[index], 0.0), 0.99)
+            text = f"{each.name}, {each.planner.kind}: {time_s:.0f} s, {state}"
+            bar.update(task, completed=sum(flown.values()), description=escape(text))
+
+        yield report
+
+
+def print_comparison(rows: Sequence[Row]) -> None:
+    """One table a scenario on standard output, and why those that crashed did."""
+    console = Console()
+    shown = [next(figure for figure in FIGURES if figure.short == short) for short in ON_TERMINAL]
+    for name in dict.fromkeys(row.scenario for row in rows):
+        table = Table(
+            title=escape(name), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False
+        )
+        table.add_column("planner", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
+        for figure in shown:
+            table.add_column(
+                figure.short, justify="left" if figure.short == "outcome" else "right", no_wrap=True
+            )
+        own = [row for row in rows if row.scenario == name]
+        for row in own:
+            style = _STYLE.get(row.outcome, "bold red")
+            cells = [escape(figure.text(row)) or DASH for figure in shown]
+            cells[0] = f"[{style}]{cells[0]}[/]"
+            table.add_row(escape(row.planner), *cells)
+        console.print(table, width=min(WIDTH, console.width))
+        for row in own:
+            if row.outcome == CRASHED:
+                console.print(
+                    f"{escape(row.planner)} crashed: {escape(row.reason)}", highlight=False, soft_wrap=True
+                )

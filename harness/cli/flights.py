@@ -1,0 +1,282 @@
+"""The commands that fly: `fly`, `compare`, `bench`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from harness.cli.options import (
+    FAILED,
+    AircraftOption,
+    JsonOption,
+    OptionalScenario,
+    PlannerOption,
+    SeedOption,
+    SettingsOption,
+    bad_input,
+    chosen,
+    flag,
+    load,
+    print_json,
+    setting,
+    straight_m,
+)
+from harness.cli.review import open_viewer
+
+if TYPE_CHECKING:
+    from harness.scenario.scenario import Scenario
+
+FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
+"""Exit status of `fly` by outcome; FAILED for the others."""
+
+
+def fly(
+    scenario: OptionalScenario = None,
+    planner: PlannerOption = None,
+    aircraft: AircraftOption = None,
+    seed: SeedOption = None,
+    settings: SettingsOption = None,
+    results: Annotated[
+        Path | None,
+        typer.Option("--from", metavar="FILE", help="A campaign's results.parquet, instead of SCENARIO."),
+    ] = None,
+    run: Annotated[int | None, typer.Option(metavar="K", help="With --from: which run.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/PLANNER-AIRCRAFT-SEED.")
+    ] = None,
+    no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
+    view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
+    as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
+) -> int:
+    """One closed-loop flight, headless, into a run folder.
+
+    For example: wayproof fly paper_circles --seed 3 --set planner.clearance_m=400
+
+    Exit status:
+
+    0 goal reached with no collision and inside the area
+
+    1 flown, but not so; or with --from not as the campaign flew it
+
+    2 bad input or usage, nothing flown
+
+    3 the planner proved the goal unreachable and the aircraft is safe
+    """
+    if view and no_recording:
+        raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
+    given = [*chosen(planner, aircraft, seed), *map(setting, settings or ())]
+    loaded, digest = _asked(scenario, results, run, given)
+    folder = out or _default_folder(loaded)
+    metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
+    otherwise = bool(digest) and not given and metrics["digest"] != digest
+    if otherwise:
+        typer.echo(
+            f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
+            "aircraft is made of, have changed since",
+            err=True,
+        )
+    if as_json:
+        print_json(metrics)
+    elif not quiet:
+        from harness.cli.terminal import flight_rows, print_table
+
+        print_table(f"{loaded.name}: {loaded.planner.kind}, {loaded.aircraft.model}", flight_rows(metrics))
+        if digest and not given and not otherwise:
+            typer.echo("digest: as the campaign flew it")
+        typer.echo(f"run folder: {folder}")
+    if view:
+        open_viewer([folder])
+    return FAILED if otherwise else FLY_STATUS.get(metrics["outcome"], FAILED)
+
+
+def _asked(
+    scenario: str | None, results: Path | None, run: int | None, overrides: list[tuple[str, str]]
+) -> tuple[Scenario, str | None]:
+    """What to fly, and the digest that a campaign's results have of it."""
+    if (scenario is None) == (results is None):
+        raise typer.BadParameter("give either a SCENARIO or --from with --run")
+    if (results is None) != (run is None):
+        raise typer.BadParameter("--from and --run go together")
+    if scenario is not None:
+        return load(scenario, overrides), None
+    from harness.campaign.replay import flown_run
+
+    assert results is not None
+    assert run is not None
+    return flown_run(results, run, overrides)
+
+
+def compare(
+    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Files or shipped names.")],
+    planners: Annotated[str, typer.Option(metavar="A,B,...", help="Kinds of planners, in order.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The comparison's folder.")] = Path(
+        "runs/comparison"
+    ),
+    kinematic: Annotated[
+        bool, flag("--kinematic", "Fly a point that follows every plan exactly, not the aircraft.")
+    ] = False,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
+    ] = None,
+    no_recording: Annotated[bool, flag("--no-recording", "Write no recordings and no overlay.")] = False,
+    as_json: Annotated[bool, flag("--json", "Print comparison.json, and nothing else.")] = False,
+) -> int:
+    """Every planner on every scenario, side by side: table, figures, report, overlay recordings.
+
+    For example: wayproof compare paper_circles --planners rolling_window,bug2
+
+    Exit status:
+
+    0 every planner reached every goal
+
+    1 one did not, or crashed
+
+    2 bad input or usage, nothing flown
+    """
+    kinds = [kind.strip() for kind in planners.split(",")]
+    loaded = [load(scenario, chosen(kind)) for scenario in scenarios for kind in kinds]
+
+    from aircraft.airframes import AircraftError
+    from harness.cli.compare_terminal import comparison_bar, print_comparison
+    from harness.compare.comparison import compare as fly_and_compare
+    from harness.files.errors import RunFolderError, WriteError
+
+    try:
+        with comparison_bar(loaded) as report:
+            comparison = fly_and_compare(
+                loaded,
+                out,
+                recording=not no_recording,
+                kinematic=kinematic,
+                workers=workers or os.cpu_count() or 1,
+                progress=report,
+            )
+    except (RunFolderError, AircraftError) as error:
+        raise bad_input(error) from error
+    except OSError as error:
+        raise WriteError.of("the comparison", out, error) from error
+    except KeyboardInterrupt:
+        typer.echo(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
+        raise
+    if as_json:
+        print_json(comparison.plain())
+    else:
+        print_comparison(comparison.rows)
+        typer.echo(f"report: {out / 'report.html'}")
+    return 0 if comparison.all_reached else FAILED
+
+
+def bench(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            metavar="[SCENARIO]",
+            help="A file or shipped name; or the word tracking or worlds.",
+            show_default=True,
+        ),
+    ] = "paper_circles",
+    aircraft: Annotated[
+        str | None, typer.Option(metavar="NAME", help="With tracking: what flies. Default: aerosonde.")
+    ] = None,
+    seeds: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="With tracking: courses a case. Default: 20.")
+    ] = None,
+    most: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=10, help="With worlds: no more obstacles. Default: 100000."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> int:
+    """What the loop costs on this machine against bare JSBSim, block by block.
+
+    `bench tracking` measures how close an aircraft stays to random courses of 14 turns in calm air, wind and
+    turbulence, the worst of all courses of a case; its exit status is 1 if that is more than promised.
+    `bench worlds` measures the same flight in worlds of 10 to 100,000 obstacles at one density.
+
+    For example: wayproof bench aerosonde_forest --json
+    """
+    if most and scenario != "worlds":
+        raise typer.BadParameter("--most goes with `bench worlds`")
+    if scenario == "tracking":
+        return bench_tracking(aircraft or "aerosonde", seeds or 20, as_json)
+    if aircraft or seeds:
+        raise typer.BadParameter("--aircraft and --seeds go with `bench tracking`")
+    if scenario == "worlds":
+        return bench_worlds(most, as_json)
+    loaded = load(scenario)
+
+    from aircraft.airframes import AircraftError
+    from harness.bench.costs import bench as measure
+    from harness.cli.terminal import bench_rows, print_table, progress_bar
+
+    try:
+        with progress_bar(straight_m(loaded)) as report:
+            result = measure(loaded, report)
+    except AircraftError as error:
+        raise bad_input(error) from error
+    if as_json:
+        print_json(result)
+    else:
+        print_table(f"bench of {loaded.name}", bench_rows(result))
+    return 0
+
+
+def bench_tracking(name: str, seeds: int, as_json: bool) -> int:
+    """The table of tracking errors of an aircraft."""
+    from aircraft.airframes import AircraftError
+    from harness.bench import tracking
+    from harness.cli.terminal import print_grid, step_bar, tracking_rows
+
+    try:
+        with step_bar() as report:
+            result = tracking.bench_tracking(name, seeds, report)
+    except AircraftError as error:
+        raise bad_input(error) from error
+    if as_json:
+        print_json(result)
+    else:
+        title = f"{result['aircraft']} at {result['airspeed_mps']:g} m/s, worst of {seeds} courses a case"
+        print_grid(title, *tracking_rows(result))
+    return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
+
+
+def bench_worlds(most: int | None, as_json: bool) -> int:
+    """The table of what the number of obstacles costs."""
+    from harness.bench import worlds
+    from harness.cli.terminal import print_grid, step_bar, world_rows
+
+    with step_bar() as report:
+        result = worlds.bench_worlds(most or worlds.COUNTS[-1], report)
+    if as_json:
+        print_json({"worlds": result})
+    else:
+        print_grid("the same flight in worlds of one density", *world_rows(result))
+    return 0
+
+
+def _default_folder(scenario: Scenario) -> Path:
+    model = Path(scenario.aircraft.model).name
+    return Path("runs") / scenario.name / f"{scenario.planner.kind}-{model}-{scenario.seed}"
+
+
+def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:
+    """Flies into a folder, with a progress bar where a person looks on."""
+    from contextlib import nullcontext
+
+    from aircraft.airframes import AircraftError
+    from harness.cli.terminal import progress_bar
+    from harness.files.errors import RunFolderError
+    from harness.run.scenario_flight import fly_to_folder
+
+    try:
+        with nullcontext() if silent else progress_bar(straight_m(scenario)) as report:
+            return fly_to_folder(scenario, folder, recording, report)
+    except (AircraftError, RunFolderError) as error:
+        raise bad_input(error) from error
+    except KeyboardInterrupt:
+        typer.echo(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
+        raise

@@ -1,0 +1,132 @@
+"""What the commands share: their arguments, how they load a scenario, what they print, their exit status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+if TYPE_CHECKING:
+    from harness.scenario.scenario import Scenario
+
+FAILED: Final = 1
+BAD_INPUT: Final = 2
+
+
+class Command(TyperCommand):
+    """A command whose help shows no type for what takes no value."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Its parameters."""
+        return _tidied(super().get_params(ctx))
+
+
+class Group(TyperGroup):
+    """The same for the program itself."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """Its parameters."""
+        return _tidied(super().get_params(ctx))
+
+
+def _tidied(parameters: list[Any]) -> list[Any]:
+    for each in parameters:
+        if getattr(each, "is_flag", False):
+            each.metavar = " "
+    return parameters
+
+
+def flag(name: str, text: str) -> Any:
+    """An option without a value."""
+    return typer.Option(name, help=text)
+
+
+def _shipped(incomplete: str) -> list[str]:
+    """Names for the shell to complete a scenario with; files it finds itself."""
+    from harness.scenario.shipped import shipped_scenarios
+
+    return [name for name in shipped_scenarios() if name.startswith(incomplete)]
+
+
+def planners(incomplete: str) -> list[str]:
+    """Kinds for the shell to complete a planner with."""
+    from planner.registry import planner_kinds
+
+    return [kind for kind in planner_kinds() if kind.startswith(incomplete)]
+
+
+def aircraft(incomplete: str) -> list[str]:
+    """Names for the shell to complete an aircraft with."""
+    from aircraft.airframes import aircraft_names
+
+    return [name for name in aircraft_names() if name.startswith(incomplete)]
+
+
+_SCENARIO: Any = typer.Argument(
+    metavar="SCENARIO",
+    help="A file, or a name that `wayproof list scenarios` prints.",
+    autocompletion=_shipped,
+)
+ScenarioArgument = Annotated[str, _SCENARIO]
+OptionalScenario = Annotated[str | None, _SCENARIO]
+PlannerOption = Annotated[
+    str | None, typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=planners)
+]
+AircraftOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=aircraft)
+]
+SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]
+SettingsOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
+]
+JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
+
+
+def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """A scenario by file or shipped name, with keys replaced."""
+    from harness.scenario.scenario import load_scenario
+    from harness.scenario.shipped import scenario_path
+
+    return load_scenario(scenario_path(scenario), overrides)
+
+
+def chosen(
+    planner: str | None, aircraft: str | None = None, seed: int | None = None
+) -> list[tuple[str, str]]:
+    """What --planner, --aircraft and --seed replace; a name is text, whatever YAML takes it for."""
+    import json
+
+    given = {"planner.kind": planner, "aircraft.model": aircraft, "seed": seed}
+    return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
+
+
+def setting(text: str) -> tuple[str, str]:
+    """KEY.PATH=VALUE as its two parts."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
+    return name.strip(), value
+
+
+def straight_m(scenario: Scenario) -> float:
+    """From start to goal, m: what a progress bar counts off."""
+    import math
+
+    return math.dist(scenario.mission.start_m, scenario.mission.goal_m)
+
+
+def bad_input(error: ValueError) -> Exception:
+    """A fault of what was given, as the error that ends with BAD_INPUT."""
+    from harness.files.strict_yaml import InputError
+
+    return InputError(f"wayproof: {error}")
+
+
+def print_json(content: Any) -> None:
+    """Prints a result for scripts."""
+    import json
+
+    typer.echo(json.dumps(content, indent=2, ensure_ascii=False))

@@ -1,0 +1,106 @@
+"""The commands that show what was flown: `view`, `report`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from harness.cli.options import FAILED, bad_input, flag
+
+
+def view(
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders; several are overlaid.")
+    ],
+    web: Annotated[bool, flag("--web", "In a browser, served on 127.0.0.1, instead of a window.")] = False,
+) -> int:
+    """Opens recordings in the rerun viewer.
+
+    For example: wayproof view runs/paper_circles/rolling_window-aerosonde-1
+    """
+    return 0 if open_viewer(runs, web) else FAILED
+
+
+def report(
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN_DIR", help="The folder of a complete run, or of a campaign.")
+    ],
+    by: Annotated[
+        list[str] | None,
+        typer.Option(metavar="KEY[,KEY]", help="Of a campaign: a table by these keys; can be repeated."),
+    ] = None,
+) -> int:
+    """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
+
+    The figures of a run are there as SVG and PNG too, its table as CSV and Markdown.
+
+    For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
+    """
+    from harness.campaign.folder import INDEX, LOCK
+    from harness.campaign.results import RESULTS
+    from harness.files.errors import RunFolderError
+    from harness.files.folder_lock import is_held
+    from harness.files.input_file import InputError
+    from harness.report.run_report import write_report
+
+    if (run / RESULTS).is_file():
+        return _summary(run, by)
+    if (run / INDEX).is_file() and is_held(run / LOCK):
+        raise InputError(
+            f"{run}: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended"
+        )
+    if (run / INDEX).is_file():
+        raise InputError(
+            f"{run}: its campaign was stopped before the tables were written; `wayproof sweep` with --resume makes them"
+        )
+    if by:
+        raise typer.BadParameter(
+            f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
+        )
+    try:
+        typer.echo(f"report: {write_report(run)}")
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    return 0
+
+
+def _summary(folder: Path, by: Sequence[str] | None) -> int:
+    """The answers of a campaign once more, by other keys."""
+    from harness.campaign.report import write_summary
+    from harness.campaign.summary import summarise
+    from harness.cli.campaign_terminal import print_summary
+
+    chosen = [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
+    summary = summarise(folder, by=chosen)
+    page = write_summary(summary, folder)
+    print_summary(summary, all_tables=by is not None)
+    typer.echo(f"summary: {page}")
+    return 0
+
+
+def _column(key: str) -> str:
+    """The column of a key, which may be spelled as `--set` takes it: `obstacles.0.velocity_mps`."""
+    from harness.files.strict_yaml import InputError, as_spelt
+
+    try:
+        return as_spelt(key)
+    except ValueError as error:
+        raise InputError(f"command line: --by: {error}") from error
+
+
+def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
+    """Shows recordings until the viewer is closed; says on standard error why, if it cannot start."""
+    from harness.files.errors import RunFolderError
+    from harness.recording.viewer import ViewerError, open_viewer
+
+    try:
+        open_viewer(runs, web, lambda address: typer.echo(f"{address} (Ctrl-C ends it)", err=True))
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    except ViewerError as error:
+        typer.echo(f"wayproof: {error}", err=True)
+        return False
+    return True

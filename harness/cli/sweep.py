@@ -1,0 +1,134 @@
+"""The command `sweep`: a campaign."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from harness.cli.options import FAILED, bad_input, flag, print_json
+
+if TYPE_CHECKING:
+    from harness.campaign.runs import CampaignRuns
+
+
+def _campaigns(incomplete: str) -> list[str]:
+    """Names for the shell to complete a campaign with; files it finds itself."""
+    from harness.scenario.shipped import shipped_campaigns
+
+    return [name for name in shipped_campaigns() if name.startswith(incomplete)]
+
+
+def sweep(
+    campaign: Annotated[
+        str,
+        typer.Argument(
+            metavar="CAMPAIGN", help="A campaign file, or a shipped one's name.", autocompletion=_campaigns
+        ),
+    ],
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a Dask cluster that flies instead, as tcp://HOST:8786."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="The campaign's folder. Default: runs/NAME.")
+    ] = None,
+    resume: Annotated[bool, flag("--resume", "Fly only what is missing in DIR.")] = False,
+    dry_run: Annotated[bool, flag("--dry-run", "Print what would be flown; fly and write nothing.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
+    as_json: Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")] = False,
+) -> int:
+    """A campaign: many flights on all processors or a cluster, one row each in results.parquet.
+
+    For example: wayproof sweep forest_planners --workers 4
+
+    Exit status:
+
+    0 every run was flown to its end, wherever that was
+
+    1 a run crashed: its row has the traceback; or the disk was full, the cluster gone: --resume goes on
+
+    2 bad input or usage, nothing flown
+
+    130 interrupted; --resume goes on
+    """
+    if scheduler and workers:
+        raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
+    from harness.campaign.report import write_summary
+    from harness.campaign.summary import summarise
+    from harness.cli.campaign_terminal import print_summary
+    from harness.scenario.shipped import campaign_path
+
+    runs = checked(campaign_path(campaign))
+    if dry_run:
+        _print_runs(runs, as_json)
+        return 0
+    folder = out or Path("runs") / runs.campaign.name
+    told = _fly(runs, folder, workers or os.cpu_count() or 1, scheduler, resume=resume, silent=quiet)
+    summary = summarise(folder)
+    page = write_summary(summary, folder)
+    if as_json:
+        print_json({"results": str(folder / "results.parquet"), "runs": len(runs), "outcomes": told})
+    elif not quiet:
+        print_summary(summary)
+        typer.echo(f"results: {folder / 'results.parquet'}")
+        typer.echo(f"summary: {page}")
+    return FAILED if "error" in told else 0
+
+
+def checked(path: Path) -> CampaignRuns:
+    """The runs of a campaign file, every scenario of them made once."""
+    from harness.campaign.campaign_file import load_campaign
+    from harness.campaign.runs import CampaignRuns
+    from harness.cli.sweep_terminal import check_bar
+
+    runs = CampaignRuns(load_campaign(path))
+    with check_bar(len(runs)) as report:
+        runs.check(report)
+    return runs
+
+
+def _fly(
+    runs: CampaignRuns, path: Path, workers: int, scheduler: str | None, *, resume: bool, silent: bool
+) -> dict[str, int]:
+    """Flies what is missing; returns how many runs ended how."""
+    from contextlib import nullcontext
+
+    from harness.campaign.folder import CampaignFolder
+    from harness.campaign.sweep import sweep as fly_missing
+    from harness.campaign.workers import dask_workers, local_workers
+    from harness.cli.sweep_terminal import sweep_bar
+    from harness.files.errors import RunFolderError
+
+    try:
+        with (
+            dask_workers(scheduler) if scheduler else local_workers(workers) as flyers,
+            CampaignFolder(path, runs, resume=resume) as folder,
+            nullcontext() if silent else sweep_bar(len(runs), len(folder.done)) as report,
+        ):
+            fly_missing(runs, folder, flyers, report)
+            return folder.outcomes()
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    except OSError as error:
+        typer.echo(f"wayproof: {error}; what is done is in {path}, --resume goes on", err=True)
+        raise typer.Exit(FAILED) from error
+    except KeyboardInterrupt:
+        typer.echo(f"wayproof: interrupted; what is done is in {path}, --resume goes on", err=True)
+        raise
+
+
+def _print_runs(runs: CampaignRuns, as_json: bool) -> None:
+    if as_json:
+        from dataclasses import asdict
+
+        print_json([asdict(runs.run(number)) for number in range(len(runs))])
+    else:
+        from harness.cli.sweep_terminal import print_runs
+
+        print_runs(runs)

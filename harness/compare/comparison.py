@@ -1,0 +1,214 @@
+"""Planners side by side: flies every one on every scenario, writes tables, figures, overlays and a report.
+
+The folder of a comparison holds `comparison.csv`, `comparison.md`, `comparison.json` and `report.html`, and
+for each scenario a folder with its figures, `overlay.rrd` and a run folder for each planner. The index
+`comparison.json` is written first and last and says whether the comparison is complete.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from harness.analysis.rows import CRASHED, Row, to_csv, to_markdown
+from harness.compare.flights import Answer, Job, Progress, fly_all
+from harness.files.errors import RunFolderError
+from harness.files.folder_lock import FolderLock
+from harness.files.input_file import read_index
+from harness.files.strict_yaml import InputError
+from harness.files.whole_file import replace_text
+from harness.report.chapters import Entry, chapter, entry, optimum_of
+from harness.run_files.run_folder import RECORDING, REPORT, load_run
+from harness.scenario.scenario import Scenario
+from harness.world.optimum import Optimum
+
+if TYPE_CHECKING:
+    from harness.report.page import Chapter
+
+SCHEMA = "wayproof/comparison/1"
+INDEX, CSV, MARKDOWN = "comparison.json", "comparison.csv", "comparison.md"
+OVERLAY = "overlay.rrd"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was compared.
+
+    Attributes:
+        command: the command line.
+        started_utc: date and time, ISO 8601.
+        versions: what flew, by name; empty where nothing came to an end.
+        kinematic: a point flew instead of the aircraft.
+        rows: scenario after scenario, planner after planner.
+    """
+
+    command: str
+    started_utc: str
+    versions: Mapping[str, str]
+    kinematic: bool
+    rows: tuple[Row, ...]
+
+    @property
+    def all_reached(self) -> bool:
+        """Whether every planner reached every goal."""
+        return all(row.outcome == "reached" for row in self.rows)
+
+    def plain(self, complete: bool = True) -> dict[str, Any]:
+        """The content of `comparison.json`."""
+        return {"schema": SCHEMA, "complete": complete, **asdict(self)}
+
+
+def compare(
+    scenarios: Sequence[Scenario],
+    out: Path,
+    *,
+    recording: bool = True,
+    kinematic: bool = False,
+    workers: int = 1,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Flies scenarios that differ in name or planner and writes the folder of the comparison.
+
+    Args:
+        scenarios: one a flight, those of one name together; each names its planner.
+        out: the folder.
+        recording: whether to write recordings and overlays.
+        kinematic: a point that follows the plans exactly flies instead of the aircraft.
+        workers: flights at the same time.
+        progress: told of every flight, by its index, as it goes on.
+
+    Raises:
+        InputError: a scenario is there twice with the same planner, or has the name of a file of the comparison.
+        RunFolderError: the folder holds something else or cannot be written.
+    """
+    jobs = [
+        Job(each, out / each.name / each.planner.kind, recording, kinematic) for each in _distinct(scenarios)
+    ]
+    begun = Comparison(shlex.join(["wayproof", *sys.argv[1:]]), _now(), {}, kinematic, ())
+    lock = _claim(out, begun)
+    try:
+        return _compared(jobs, scenarios, out, begun, workers, progress)
+    finally:
+        lock.release()
+
+
+def _compared(
+    jobs: Sequence[Job],
+    scenarios: Sequence[Scenario],
+    out: Path,
+    begun: Comparison,
+    workers: int,
+    progress: Progress | None,
+) -> Comparison:
+    """Flies and writes everything, the folder being ours."""
+    kinematic = begun.kinematic
+    answers = fly_all(jobs, workers, progress)
+    by_name = _by_name(scenarios)
+    optima = {name: optimum_of(own[0]) for name, own in by_name.items()}
+    entries = [_entry(*each, optima) for each in zip(jobs, answers, strict=True)]
+    runs = [each.run for each in entries if each.run]
+    named = runs[0].manifest["versions"] if runs else {}
+    versions = {name: version for name, version in named.items() if version}
+    done = Comparison(begun.command, begun.started_utc, versions, kinematic, tuple(e.row for e in entries))
+    chapters = []
+    for name, own in by_name.items():
+        flights = [each for each in entries if each.row.scenario == name]
+        (out / name).mkdir(exist_ok=True)
+        _overlay(out / name, flights)
+        chapters.append(chapter(out / name, own[0], flights, optima[name]))
+    (out / CSV).write_text(to_csv(done.rows), encoding="utf-8")
+    (out / MARKDOWN).write_text(_markdown(done), encoding="utf-8")
+    (out / REPORT).write_text(_report(done, chapters), encoding="utf-8")
+    _write_index(out, done, complete=True)
+    return done
+
+
+def _by_name(scenarios: Sequence[Scenario]) -> dict[str, list[Scenario]]:
+    groups: dict[str, list[Scenario]] = {}
+    for each in scenarios:
+        groups.setdefault(each.name, []).append(each)
+    return groups
+
+
+def _distinct(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
+    seen = set()
+    for each in scenarios:
+        name, kind = flight = each.name, each.planner.kind
+        if flight in seen:
+            raise InputError(f"wayproof: {kind} is to fly {name} twice; leave one out or rename the scenario")
+        if name in (INDEX, CSV, MARKDOWN, REPORT):
+            raise InputError(f"wayproof: a scenario is called {name}, as a file of the comparison; rename it")
+        seen.add(flight)
+    return scenarios
+
+
+def _claim(out: Path, begun: Comparison) -> FolderLock:
+    """Makes `out` the folder of this comparison alone, or raises RunFolderError."""
+    if out.exists() and not out.is_dir():
+        raise RunFolderError(f"{out} is a file, not a folder for a comparison")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        lock = FolderLock(out)
+        if any(out.iterdir()) and read_index(out / INDEX, SCHEMA) is None:
+            lock.release()
+            raise RunFolderError(
+                f"{out} is not empty and not a comparison: choose another folder or empty it first"
+            )
+        _write_index(out, begun, complete=False)
+        for name in (CSV, MARKDOWN, REPORT):
+            (out / name).unlink(missing_ok=True)
+        return lock
+    except OSError as error:
+        raise RunFolderError(f"cannot write the comparison {out}: {error.strerror or error}") from error
+
+
+def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
+    replace_text(out / INDEX, json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n")
+
+
+def _entry(job: Job, answer: Answer, optima: Mapping[str, Optimum]) -> Entry:
+    name, planner = job.scenario.name, job.scenario.planner.kind
+    if answer.crash:
+        return Entry(Row(name, planner, CRASHED, answer.crash, optimum_m=optima[name].length_m))
+    return entry(job.scenario, load_run(job.folder), optima[name], job.kinematic)
+
+
+def _overlay(folder: Path, entries: Sequence[Entry]) -> None:
+    recorded = [each for each in entries if each.run and (each.run.folder / RECORDING).exists()]
+    (folder / OVERLAY).unlink(missing_ok=True)
+    if recorded:
+        from harness.recording.overlay import write_overlay
+
+        write_overlay(
+            [each.run.folder / RECORDING for each in recorded if each.run],
+            [each.row.planner for each in recorded],
+            folder / OVERLAY,
+        )
+
+
+def _markdown(comparison: Comparison) -> str:
+    versions = ", ".join(f"{name} {version}" for name, version in comparison.versions.items())
+    repeat = f"## How to repeat it\n\n    {comparison.command}\n\n{versions}\n"
+    return f"# Planners side by side\n\n{to_markdown(comparison.rows)}\n{repeat}"
+
+
+def _report(comparison: Comparison, chapters: Sequence[Chapter]) -> str:
+    from harness.report.page import report_html
+
+    return report_html(
+        chapters,
+        comparison.command,
+        comparison.versions,
+        comparison.started_utc,
+        comparison.kinematic,
+    )
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

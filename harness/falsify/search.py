@@ -1,0 +1,295 @@
+"""The search for the mildest condition that fails: pure, seeded, and bounded by a count of conditions.
+
+A condition is a point of the unit cube: each key's displacement from its mild end (0) to its hard end (1). Its
+mildness is the largest of them. Three steps:
+
+1. Along the diagonal, where all keys get harder together: both ends, evenly spaced points, then bisection of
+   the mildest change from passing to failing. Where every key only makes it harder, no condition milder than
+   the one found here fails: a failing point with largest displacement t makes (t, ..., t) fail too.
+2. With several keys, differential evolution (Storn and Price 1997) in the cube below that, for the failures
+   that this argument leaves out. It needs no gradient and no model of a yes or no, and its population is
+   seeded. What passes is ranked by how near it came to failing.
+3. With several keys, each key is taken back towards its mild end while the condition still fails.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from harness.files.strict_yaml import InputError
+from harness.flight.record import FloatArray
+
+Point: TypeAlias = tuple[float, ...]
+"""Displacement of each key, from 0 (mild) to 1 (hard)."""
+
+STEPS: Final = 8
+"""The diagonal is cut into so many parts."""
+
+POPULATION: Final = 8
+"""Of the differential evolution; a power of two, as its Sobol points want it."""
+
+NO_CONDITION: Final = 2.0
+"""The margin of a place away from the diagonal where there is no scenario: behind all that passed."""
+
+LEAST: Final = 2
+"""Fewer conditions than the two ends of the diagonal make no search."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a condition.
+
+    Attributes:
+        failed: whether it made the flight fail.
+        margin: where it did not, how far it was from it, from 0 (nearly) to 1.
+    """
+
+    failed: bool
+    margin: float = 0.0
+
+
+Judge: TypeAlias = Callable[[Point], Verdict]
+Snap: TypeAlias = Callable[[Point], Point]
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What a search found.
+
+    Attributes:
+        verdicts: of every condition tried, in order.
+        settled: whether the search came to its end within its conditions.
+        evolved: conditions that the differential evolution tried.
+    """
+
+    verdicts: Mapping[Point, Verdict]
+    settled: bool
+    evolved: int
+
+    @property
+    def mildest(self) -> Point | None:
+        """The mildest condition that failed; of equally mild ones, that with the smallest sum."""
+        failed = [point for point, verdict in self.verdicts.items() if verdict.failed]
+        return min(failed, key=lambda point: (max(point), sum(point), point), default=None)
+
+    @property
+    def passed_below(self) -> Point | None:
+        """The hardest condition that passed and is no harder than the mildest failure in any key."""
+        found = self.mildest
+        below = [
+            point
+            for point, verdict in self.verdicts.items()
+            if found is not None and not verdict.failed and _no_harder(point, found)
+        ]
+        return max(below, key=lambda point: (sum(point), point), default=None)
+
+    @property
+    def not_monotone(self) -> tuple[tuple[Point, Point], ...]:
+        """Pairs of a condition that failed and one that passed although it is no milder in any key."""
+        failed = [point for point, verdict in self.verdicts.items() if verdict.failed]
+        passed = [point for point, verdict in self.verdicts.items() if not verdict.failed]
+        return tuple(pair for pair in itertools.product(failed, passed) if _no_harder(*pair))
+
+
+def search(
+    keys: int, judge: Judge, conditions: int, tolerance: float, seed: int, snap: Snap = lambda point: point
+) -> Searched:
+    """Looks for the mildest condition that fails.
+
+    Args:
+        keys: how many, at least 1.
+        judge: tries a condition; called once for each. Where there is none it raises InputError: away from the
+            diagonal such a place is passed over.
+        conditions: at most so many are tried, at least LEAST.
+        tolerance: a displacement is narrowed down to this.
+        seed: of the differential evolution.
+        snap: the condition that is tried in place of a point, for keys that are whole numbers.
+
+    Raises:
+        ValueError: too few conditions, or a tolerance that is not between 0 and 1.
+    """
+    if conditions < LEAST or not 0.0 < tolerance < 1.0:
+        raise ValueError(
+            f"needs {LEAST} conditions or more and a tolerance between 0 and 1: {conditions}, {tolerance}"
+        )
+    tries = _Tries(judge, snap, conditions)
+    evolved, settled = 0, True
+    try:
+        reached = _along_the_diagonal(keys, tries, tolerance)
+        if keys > 1 and reached > 0.0:
+            before = len(tries.verdicts)
+            edge = 1.0 if math.isinf(reached) else reached - tolerance
+            tries.off_the_diagonal = True
+            settled = _anywhere_below(keys, tries, edge, tolerance, seed)
+            evolved = len(tries.verdicts) - before
+            _taken_back(tries, tolerance)
+    except _SpentError:
+        settled = False
+    return Searched(tries.verdicts, settled, evolved)
+
+
+class _SpentError(Exception):
+    """All conditions have been tried."""
+
+
+class _Tries:
+    """What has been tried, each condition once."""
+
+    def __init__(self, judge: Judge, snap: Snap, conditions: int) -> None:
+        self._judge, self._snap = judge, snap
+        self._none: set[Point] = set()
+        self.left = conditions
+        self.off_the_diagonal = False
+        """From then on a place where there is no scenario is passed over; before, that is an error."""
+        self.verdicts: dict[Point, Verdict] = {}
+
+    def snapped(self, point: Point) -> Point:
+        return self._snap(point)
+
+    def untried(self, points: Iterable[Point]) -> set[Point]:
+        """The new conditions among some points."""
+        return {self._snap(point) for point in points} - self.verdicts.keys()
+
+    def verdict(self, point: Point) -> Verdict:
+        """Raises _SpentError where a new condition is one too many."""
+        place = self._snap(point)
+        if place not in self.verdicts:
+            if self.left == 0:
+                raise _SpentError
+            if place in self._none:
+                return Verdict(False, NO_CONDITION)
+            try:
+                verdict = self._judge(place)
+            except InputError:
+                if not self.off_the_diagonal:
+                    raise
+                self._none.add(place)
+                return Verdict(False, NO_CONDITION)
+            self.left -= 1
+            self.verdicts[place] = verdict
+        return self.verdicts[place]
+
+    def mildest(self) -> Point | None:
+        return Searched(self.verdicts, True, 0).mildest
+
+
+def _along_the_diagonal(keys: int, tries: _Tries, tolerance: float) -> float:
+    """Where on the diagonal it fails first: 0 at its mild end, infinity if nowhere."""
+
+    def fails(along: float) -> bool:
+        return tries.verdict((along,) * keys).failed
+
+    if fails(0.0):
+        return 0.0
+    hard, reached = fails(1.0), math.inf
+    # Where the conditions are too few for eighths, coarser steps leave some to bisect with; what is left after
+    # that goes into the eighths.
+    for steps in dict.fromkeys((_affordable(keys, tries), STEPS)):
+        inner = [step / steps for step in range(1, steps)]
+        failed = [along for along in inner if fails(along)] + [1.0] * hard
+        if failed:
+            reached = _bisected(
+                tries, (0.0,) * keys, failed[0] - 1.0 / steps, failed[0], tolerance, range(keys)
+            )
+    return reached
+
+
+def _affordable(keys: int, tries: _Tries) -> int:
+    """The most steps, halved from STEPS down, for which there are conditions enough."""
+    steps = STEPS
+    while len(tries.untried((step / steps,) * keys for step in range(1, steps))) > tries.left:
+        steps //= 2
+    return steps
+
+
+def _bisected(
+    tries: _Tries, base: Point, passes: float, fails: float, tolerance: float, keys: range
+) -> float:
+    """Narrows some keys' common displacement down between one that passes and one that fails."""
+
+    def at(displacement: float) -> Point:
+        return tuple(displacement if key in keys else each for key, each in enumerate(base))
+
+    while fails - passes > tolerance:
+        middle = 0.5 * (passes + fails)
+        if tries.snapped(at(middle)) in (tries.snapped(at(passes)), tries.snapped(at(fails))):
+            break
+        if tries.verdict(at(middle)).failed:
+            fails = middle
+        else:
+            passes = middle
+    return fails
+
+
+def _anywhere_below(keys: int, tries: _Tries, edge: float, tolerance: float, seed: int) -> bool:
+    """Differential evolution in the cube from 0 to `edge`; leaves enough conditions for the last step.
+
+    Returns:
+        Whether there were conditions enough for it.
+    """
+    reserve = min(tries.left // 2, keys * (2 + math.ceil(math.log2(1.0 / tolerance))))
+    generations = (tries.left - reserve) // POPULATION
+    if edge <= 0.0:
+        return True
+    if generations < 1:
+        return False
+    from scipy.optimize import Bounds, differential_evolution
+    from scipy.stats import qmc
+
+    def objective(place: FloatArray) -> float:
+        point = tuple(float(each) for each in place)
+        verdict = tries.verdict(point)
+        return max(tries.snapped(point)) if verdict.failed else 1.0 + verdict.margin
+
+    differential_evolution(
+        objective,
+        bounds=Bounds(np.zeros(keys), np.full(keys, edge)),
+        maxiter=generations - 1,
+        init=edge * qmc.Sobol(keys, rng=np.random.default_rng(seed)).random(POPULATION),
+        rng=np.random.default_rng(seed),
+        polish=False,
+        tol=0.0,
+        updating="deferred",
+    )
+    return True
+
+
+def _taken_back(tries: _Tries, tolerance: float) -> None:
+    """Takes each key back towards its mild end while it still fails, until none gives way by the tolerance."""
+    point = tries.mildest()
+    for rounds in itertools.count():
+        before = point
+        if before is None:
+            return
+        for key in sorted(range(len(before)), key=lambda each: -before[each]):
+            assert point is not None
+            milder = tries.snapped(_with(point, key, max(0.0, point[key] - tolerance)))
+            if rounds == 0:
+                point = _least(tries, point, key, tolerance)
+            elif milder != point and tries.verdict(milder).failed:
+                point = _least(tries, milder, key, tolerance)
+        if rounds > 0 and point == before:
+            return
+
+
+def _least(tries: _Tries, point: Point, key: int, tolerance: float) -> Point:
+    """A condition that fails, one of its keys taken back as far as that goes."""
+    mild = tries.snapped(_with(point, key, 0.0))
+    if mild == point or tries.verdict(mild).failed:
+        return mild
+    least = _bisected(tries, point, 0.0, point[key], tolerance, range(key, key + 1))
+    return tries.snapped(_with(point, key, least))
+
+
+def _with(point: Point, key: int, displacement: float) -> Point:
+    return tuple(displacement if each == key else value for each, value in enumerate(point))
+
+
+def _no_harder(first: Point, second: Point) -> bool:
+    return all(ours <= theirs for ours, theirs in zip(first, second, strict=True))

@@ -1,0 +1,1 @@
+"""Files: strict YAML, locks, whole-file writes, errors, versions."""

@@ -1,0 +1,61 @@
+"""One writer at a time in a folder. A killed process leaves no lock."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+
+from harness.files.errors import RunFolderError
+
+
+class FolderLock:
+    """Holds a folder for this process (flock(2) on the folder itself, or on a file in it) until it is released.
+
+    Args:
+        path: the folder; it must exist.
+        name: of a file in it to hold in its place, made where missing: on a network file system (NFS) only what
+            is open for writing can be held.
+
+    Raises:
+        RunFolderError: another process, or another lock of this one, holds it.
+        OSError: the folder cannot be opened.
+    """
+
+    def __init__(self, path: Path, name: str | None = None) -> None:
+        self._descriptor = (
+            os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+            if name is None
+            else os.open(path / name, os.O_RDWR | os.O_CREAT, 0o666)
+        )
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            self.release()
+            raise RunFolderError(
+                f"another wayproof is writing to {path}: wait until it has ended or choose another folder"
+            ) from error
+        except OSError:
+            self.release()
+            raise
+
+    def release(self) -> None:
+        """Lets others write; again it does nothing."""
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)
+
+
+def is_held(path: Path) -> bool:
+    """Whether somebody holds a folder, or a file, as `FolderLock` does; it need not be writable, nor exist."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError as error:
+        return isinstance(error, BlockingIOError)
+    finally:
+        os.close(descriptor)
+    return False

@@ -1,0 +1,337 @@
+"""YAML as this project reads it: a strict subset, every value with its line.
+
+Plain scalars are resolved by the core schema of YAML 1.2 (https://yaml.org/spec/1.2.2/#103-core-schema):
+`1e3` is a number; `on`, `yes` and `1_000` are text. Duplicate keys, anchors, aliases, merge keys, tags and a
+second document are errors. Size, depth and number of values are bounded, so that no file takes memory or time
+without end.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, TypeAlias
+
+import yaml
+
+from harness.files.input_file import InputError as InputError
+from harness.files.input_file import read_text
+
+MAX_BYTES: Final = 32_000_000
+MAX_VALUES: Final = 2_000_000
+"""Enough for 100,000 obstacles with four corners each."""
+MAX_DEPTH: Final = 20
+MAX_KEYS: Final = 1000
+MAX_KEY_LENGTH: Final = 100
+COMMAND_LINE: Final = 0
+"""The `line` of a value that came from the command line."""
+
+Scalar: TypeAlias = str | int | float | bool | None
+Loc: TypeAlias = tuple[str | int, ...]
+
+_LOADER: Final = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
+_NULL: Final = frozenset(("", "~", "null", "Null", "NULL"))
+_BOOL: Final = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_INT: Final = re.compile(r"[-+]?[0-9]{1,18}")
+_BASED: Final = re.compile(r"0o[0-7]{1,18}|0x[0-9a-fA-F]{1,15}")
+_FLOAT: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_NOT_FINITE: Final = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_TAB_BEFORE: Final = re.compile(r"[ ?:-]*\t")
+_UNPRINTABLE: Final = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """A value and where it was written.
+
+    Attributes:
+        value: a scalar, a dict of nodes by key, or a tuple of nodes.
+        line: line of its key, or of the value itself in a list; from 1, or COMMAND_LINE.
+    """
+
+    value: Scalar | dict[str, Node] | tuple[Node, ...]
+    line: int
+
+    def plain(self) -> Any:
+        """The value without lines: dicts, tuples and scalars."""
+        if isinstance(self.value, dict):
+            return {key: node.plain() for key, node in self.value.items()}
+        if isinstance(self.value, tuple):
+            return tuple(node.plain() for node in self.value)
+        return self.value
+
+    def moved(self, line: int) -> Node:
+        """The same value, every part of it from `line`."""
+        if isinstance(self.value, dict):
+            return Node({key: node.moved(line) for key, node in self.value.items()}, line)
+        if isinstance(self.value, tuple):
+            return Node(tuple(node.moved(line) for node in self.value), line)
+        return Node(self.value, line)
+
+    def at(self, loc: Loc) -> Node | None:
+        """The value at `loc`; None where there is none."""
+        node: Node | None = self
+        for step in loc:
+            node = node.inner(step) if node else None
+        return node
+
+    def line_of(self, loc: Loc) -> int:
+        """Line of the value at `loc`, or of the innermost one on the way to it that exists."""
+        node = self
+        for step in loc:
+            inner = node.inner(step)
+            if inner is None:
+                break
+            node = inner
+        return node.line
+
+    def inner(self, step: str | int) -> Node | None:
+        """What a mapping has under a key, or a list at an index; None where there is nothing."""
+        if isinstance(self.value, dict):
+            return self.value.get(str(step)) if isinstance(step, str) else None
+        if isinstance(self.value, tuple) and isinstance(step, int) and step < len(self.value):
+            return self.value[step]
+        return None
+
+
+def node_of(plain: Any, line: int) -> Node:
+    """Plain values as a node, every part of it from `line`."""
+    if isinstance(plain, dict):
+        return Node({key: node_of(value, line) for key, value in plain.items()}, line)
+    if isinstance(plain, (list, tuple)):
+        return Node(tuple(node_of(value, line) for value in plain), line)
+    return Node(plain, line)
+
+
+def key_path(loc: Loc) -> str:
+    """`("obstacles", 2, "circle")` as `obstacles[2].circle`."""
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in loc).lstrip(".")
+
+
+def loc_of(path: str) -> Loc:
+    """`obstacles[2].circle` as `("obstacles", 2, "circle")`.
+
+    Raises:
+        ValueError: a step is empty, or no key; or there are too many.
+    """
+    steps = path.replace("[", ".").replace("]", "").split(".")
+    if not all(steps) or not all(map(is_key, steps)) or len(steps) > MAX_DEPTH:
+        raise ValueError(f"{path[:60]!r} is not a key path; write it as sensor.range_m")
+    return tuple(int(step) if step.isdecimal() else step for step in steps)
+
+
+def as_spelt(path: str) -> str:
+    """A key path as messages and tables spell it, however it was given: `obstacles.2.circle` as `obstacles[2].circle`.
+
+    Raises:
+        ValueError: as `loc_of`.
+    """
+    return key_path(loc_of(path))
+
+
+def fault_line(source: str, line: int, loc: Loc, sentence: str) -> str:
+    """One fault as a person reads it: `file:line: key.path: sentence`."""
+    where = "command line" if line == COMMAND_LINE else f"{source}:{line}"
+    return ": ".join(part for part in (where, key_path(loc), sentence) if part)
+
+
+def read(path: Path) -> Node:
+    """Reads one YAML file.
+
+    Raises:
+        InputError: the file cannot be opened, is too large, is not UTF-8 text or is not strict YAML.
+    """
+    return parse(read_text(path, MAX_BYTES, "a scenario, in YAML"), str(path))
+
+
+def parse(text: str, source: str) -> Node:
+    """Parses one YAML document.
+
+    Args:
+        text: the document.
+        source: what its faults name it, usually the path.
+
+    Raises:
+        InputError: it is not strict YAML.
+    """
+    if match := _UNPRINTABLE.search(text):
+        line = text.count("\n", 0, match.start()) + 1
+        raise InputError(
+            f"{source}:{line}: has the control character 0x{ord(match[0]):02x}; must be plain text"
+        )
+    return _Composer(text, source).document()
+
+
+def value_of(text: str) -> Scalar:
+    """What a plain (unquoted) scalar stands for."""
+    if text in _NULL:
+        return None
+    if text in _BOOL:
+        return _BOOL[text]
+    if _INT.fullmatch(text):
+        return int(text)
+    if _BASED.fullmatch(text):
+        return int(text, 0)
+    if _FLOAT.fullmatch(text):
+        return float(text)
+    if _NOT_FINITE.fullmatch(text):
+        return float(text.replace(".", ""))
+    return text
+
+
+class _Composer:
+    """Builds nodes from the events of one document."""
+
+    def __init__(self, text: str, source: str) -> None:
+        self.text = text
+        self.source = source
+        self.values = 0
+        self.events: Iterator[yaml.Event] = yaml.parse(text, Loader=_LOADER)
+
+    def document(self) -> Node:
+        self.next(())
+        if isinstance(self.next(()), yaml.StreamEndEvent):
+            raise self.fault(1, (), "is empty; must be a mapping that begins with `schema:`")
+        node = self.node(self.next(()), (), 1)
+        self.next(())
+        event = self.next(())
+        if not isinstance(event, yaml.StreamEndEvent):
+            raise self.fault(_line(event), (), "a second document begins here; must be one document a file")
+        return node
+
+    def fault(self, line: int, loc: Loc, sentence: str) -> InputError:
+        return InputError(fault_line(self.source, line, loc, sentence))
+
+    def next(self, loc: Loc) -> yaml.Event:
+        """The next event; `loc` says where we are in case the text is broken."""
+        try:
+            return next(self.events)
+        except yaml.MarkedYAMLError as error:
+            opened = (error.context or "").startswith(("while parsing a flow", "while scanning a quoted"))
+            mark = error.context_mark if opened and error.context_mark else error.problem_mark
+            lines = self.text.split("\n")
+            line = min(mark.line + 1, len(lines)) if mark else 1
+            if _TAB_BEFORE.match(lines[line - 1]):
+                sentence = "has a tab; indent with spaces"
+            else:
+                sentence = f"is not YAML ({error.problem}); check indentation, colons, brackets and quotes"
+            raise self.fault(line, loc, sentence) from error
+
+    def node(self, event: yaml.Event, loc: Loc, line: int) -> Node:
+        if isinstance(event, yaml.AliasEvent):
+            raise self.fault(_line(event), loc, f"is the alias *{event.anchor:.40}; write the value out")
+        self.check_bare(event, loc)
+        self.values += 1
+        if self.values > MAX_VALUES:
+            raise self.fault(_line(event), loc[:3], f"is value {MAX_VALUES + 1} of the file; must be fewer")
+        if len(loc) > MAX_DEPTH:
+            raise self.fault(
+                _line(event), loc[:3], f"is nested deeper than {MAX_DEPTH} levels; must be flatter"
+            )
+        if isinstance(event, yaml.MappingStartEvent):
+            return Node(self.mapping(loc), line)
+        if isinstance(event, yaml.SequenceStartEvent):
+            return Node(self.sequence(loc), line)
+        if not isinstance(event, yaml.ScalarEvent):
+            raise self.fault(_line(event), loc, "is not a value; must be a scalar, a list or a mapping")
+        plain_style = event.implicit[0]
+        return Node(value_of(event.value) if plain_style else event.value, line)
+
+    def check_bare(self, event: yaml.Event, loc: Loc) -> None:
+        """Refuses anchors and tags."""
+        if isinstance(event, yaml.NodeEvent) and event.anchor is not None:
+            raise self.fault(_line(event), loc, f"has the anchor &{event.anchor:.40}; write every value out")
+        if isinstance(event, (yaml.ScalarEvent, yaml.CollectionStartEvent)) and event.tag is not None:
+            raise self.fault(_line(event), loc, f"has the tag {event.tag:.60}; write the plain value")
+
+    def mapping(self, loc: Loc) -> dict[str, Node]:
+        nodes: dict[str, Node] = {}
+        while not isinstance(event := self.next(loc), yaml.MappingEndEvent):
+            line = _line(event)
+            if not isinstance(event, yaml.ScalarEvent):
+                raise self.fault(line, loc, "has a key that is not plain text; must be `key: value`")
+            key = str(event.value)
+            if not is_key(key):
+                raise self.fault(line, loc, f"has the key {key[:40]!r}; {KEY_RULE}")
+            self.check_bare(event, (*loc, key))
+            if key == "<<":
+                raise self.fault(line, loc, "has the merge key <<; write the keys out")
+            if key in nodes:
+                first = nodes[key].line
+                raise self.fault(line, (*loc, key), f"is given twice, first in line {first}; keep one")
+            if len(nodes) == MAX_KEYS:
+                raise self.fault(line, loc, f"has more than {MAX_KEYS} keys; must have fewer")
+            nodes[key] = self.node(self.next((*loc, key)), (*loc, key), line)
+        return nodes
+
+    def sequence(self, loc: Loc) -> tuple[Node, ...]:
+        nodes: list[Node] = []
+        while not isinstance(event := self.next((*loc, len(nodes))), yaml.SequenceEndEvent):
+            nodes.append(self.node(event, (*loc, len(nodes)), _line(event)))
+        return tuple(nodes)
+
+
+def _line(event: yaml.Event) -> int:
+    return event.start_mark.line + 1 if event.start_mark else 1
+
+
+def is_key(text: str) -> bool:
+    """Whether a key can be shown in a line."""
+    return len(text) <= MAX_KEY_LENGTH and text.isprintable()
+
+
+KEY_RULE: Final = f"a key must be printable and at most {MAX_KEY_LENGTH} characters long"
+
+
+def replaced(node: Node, loc: Loc, new: Node) -> Node:
+    """A copy of `node` with `new` at `loc`; mappings on the way are made where they are missing.
+
+    Raises:
+        InputError: a step of `loc` leads into a scalar or past the end of a list.
+    """
+    return _replaced(node, loc, 0, new)
+
+
+def _replaced(node: Node, loc: Loc, depth: int, new: Node) -> Node:
+    if depth == len(loc):
+        return new
+    step, value = loc[depth], node.value
+    if isinstance(value, tuple) and isinstance(step, int):
+        if step >= len(value):
+            sentence = f"does not exist; there are {len(value)}, counted from 0"
+            raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], sentence))
+        inner = _replaced(value[step], loc, depth + 1, new)
+        return Node((*value[:step], inner, *value[step + 1 :]), node.line)
+    if (value is None or isinstance(value, dict)) and isinstance(step, str):
+        entries = value or {}
+        inner = _replaced(entries.get(step, Node({}, COMMAND_LINE)), loc, depth + 1, new)
+        return Node({**entries, step: inner}, node.line)
+    raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], "no such key; see `wayproof schema`"))
+
+
+# Writes text in quotes wherever a YAML 1.2 reader would take it for something else, and no aliases: those are refused.
+_Dumper: Any = type(
+    "_Dumper",
+    (yaml.CSafeDumper if yaml.__with_libyaml__ else yaml.SafeDumper,),
+    {"ignore_aliases": lambda _dumper, _value: True},
+)
+
+
+def _represent_text(dumper: Any, text: str) -> yaml.ScalarNode:
+    style = None if isinstance(value_of(text), str) else "'"
+    node: yaml.ScalarNode = dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+    return node
+
+
+_Dumper.add_representer(str, _represent_text)
+_Dumper.add_representer(tuple, _Dumper.represent_list)
+
+
+def dump(value: Any) -> str:
+    """Plain values as YAML text that `parse` reads back to the same values, floats to the last bit."""
+    text = yaml.dump(
+        value, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=110, allow_unicode=True
+    )
+    return str(text)

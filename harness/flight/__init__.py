@@ -1,0 +1,1 @@
+"""The closed loop, how a flight ends, and the record of it."""

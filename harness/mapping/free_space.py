@@ -1,0 +1,155 @@
+"""Space that scans have looked through, on a grid."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from harness.mapping.cleared_space import through_cells
+from harness.mapping.edge_grid import MOST_CELLS
+from harness.mapping.scan import RangeScan, all_round
+from planner.compiled import BOOLS_OUT, FLOAT, GRID, ROWS, compiled
+from planner.interface import BoolArray, FloatArray
+
+NARROWEST_RAD = 1e-3
+"""What something hides is told by bearings no finer than this."""
+
+
+class FreeSpace:
+    """Cells of space that a scan has looked through: half a clearance wide, or wider where they would be too many."""
+
+    def __init__(
+        self,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        range_m: float,
+        noise_m: float = 0.0,
+    ) -> None:
+        xmin, ymin, xmax, ymax = bounds_m
+        span = max(xmax - xmin, ymax - ymin)
+        self._cell = max(clearance_m / 2.0, span / math.sqrt(MOST_CELLS))
+        self._x0, self._y0 = xmin, ymin
+        self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
+        self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
+        self._clearance, self._every, self._noise = clearance_m, range_m / 32.0, noise_m
+        self._last = (math.inf, math.inf)
+        self._reach = 0.0
+        self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
+
+    def update(self, scan: RangeScan) -> None:
+        """Marks what a scan looked through, if the sensor has moved on far enough since the last time."""
+        moved = math.hypot(scan.east_m - self._last[0], scan.north_m - self._last[1])
+        if moved < self._every or (moved < 1.5 * self._every and not scan.followed):
+            return
+        self._last = (scan.east_m, scan.north_m)
+        # Beyond this range the rays are further apart than what must not be missed between them.
+        reach = min(scan.max_range_m, self._clearance / scan.spacing_rad)
+        if self._reach != reach:
+            self._reach, self._disc = reach, _disc(math.ceil(reach / self._cell) + 1)
+        # The disc's corner lies at this cell; some of it may lie outside the area.
+        x_first, y_first, x_low, x_high, y_low, y_high = self._window(scan, len(self._disc) // 2)
+        if x_low >= x_high or y_low >= y_high:
+            return
+        through_cells(
+            self._seen[x_low:x_high, y_low:y_high],
+            self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first],
+            scan.ranges_m,
+            self._x0 + x_low * self._cell - scan.east_m,
+            self._y0 + y_low * self._cell - scan.north_m,
+            self._cell,
+            scan.start_rad,
+            scan.spacing_rad,
+            all_round(scan),
+            reach,
+            self._noise,
+        )
+
+    def take_back(self, scan: RangeScan, edges_m: FloatArray) -> bool:
+        """Something stands where space was seen to be free: it, and what it hides, is not known to be free any more.
+
+        Args:
+            scan: that it was seen with.
+            edges_m: (k, 2) its edge points.
+
+        Returns:
+            Whether any of it does: an edge point with free cells all about it.
+        """
+        free = np.zeros(len(edges_m), dtype=np.bool_)
+        if not self._count_free(free, edges_m):
+            return False
+        edges_m = edges_m[free]
+        if not self.surrounds(edges_m).any():
+            return False
+        _, _, x_low, x_high, y_low, y_high = self._window(scan, math.ceil(scan.max_range_m / self._cell) + 1)
+        seen = self._seen[x_low:x_high, y_low:y_high]
+        column, row = seen.nonzero()
+        x = (column + 0.5) * self._cell + (self._x0 + x_low * self._cell - scan.east_m)
+        y = (row + 0.5) * self._cell + (self._y0 + y_low * self._cell - scan.north_m)
+        # Bearings are told by slices; each is hidden from the nearest edge on.
+        width = max(scan.spacing_rad, NARROWEST_RAD)
+        hidden_from = self._hidden_from(edges_m - (scan.east_m, scan.north_m), width)
+        mine = np.floor(np.arctan2(x, y) / width).astype(np.int64) % len(hidden_from)
+        hidden = np.hypot(x, y) > hidden_from[mine] - self._cell
+        seen[column[hidden], row[hidden]] = False
+        self._last = (math.inf, math.inf)  # what the next scan looks through is free at once
+        return True
+
+    def _hidden_from(self, offsets_m: FloatArray, width_rad: float) -> FloatArray:
+        """(s,) the distance from which on edge points, (k, 2) from the sensor, hide each slice of the bearings."""
+        distance = np.hypot(offsets_m[:, 0], offsets_m[:, 1])
+        half_rad = np.arcsin(np.minimum(1.5 * self._cell / np.maximum(distance, self._cell), 1.0))
+        bearing = np.arctan2(offsets_m[:, 0], offsets_m[:, 1])
+        first = np.floor((bearing - half_rad) / width_rad).astype(np.int64)
+        last = np.ceil((bearing + half_rad) / width_rad).astype(np.int64)
+        hidden_from = np.full(math.ceil(math.tau / width_rad), math.inf)
+        for low, high, away in zip(first.tolist(), last.tolist(), distance.tolist(), strict=True):
+            which = np.arange(low, high + 1) % len(hidden_from)
+            hidden_from[which] = np.minimum(hidden_from[which], away)
+        return hidden_from
+
+    def _window(self, scan: RangeScan, across: int) -> tuple[int, int, int, int, int, int]:
+        """First column and row within so many cells of the sensor, and the spans of those on the grid."""
+        x_first = math.floor((scan.east_m - self._x0) / self._cell) - across
+        y_first = math.floor((scan.north_m - self._y0) / self._cell) - across
+        size = 2 * across + 1
+        x_low, x_high = max(x_first, 0), min(x_first + size, self._nx)
+        y_low, y_high = max(y_first, 0), min(y_first + size, self._ny)
+        return x_first, y_first, x_low, x_high, y_low, y_high
+
+    def surrounds(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) points lies in a free cell, with free ones to all four sides."""
+        around = self._cell * np.array(((0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)))
+        places = (points_m[:, None] + around).reshape(-1, 2)
+        surrounded: BoolArray = np.all(self.contains(places).reshape(-1, len(around)), axis=1)
+        return surrounded
+
+    def contains(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each point lies in a cell seen to be free."""
+        free = np.zeros(len(points_m), dtype=np.bool_)
+        self._count_free(free, points_m)
+        return free
+
+    def _count_free(self, free: BoolArray, points_m: FloatArray) -> int:
+        """How many of (k, 2) points lie in free cells; (k,) `free` becomes true for these."""
+        return _count_free(free, self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
+
+
+@compiled(BOOLS_OUT, GRID, ROWS, FLOAT, FLOAT, FLOAT)
+def _count_free(
+    free: BoolArray, seen: BoolArray, points: FloatArray, x0: float, y0: float, cell: float
+) -> int:
+    many = 0
+    for i in range(len(points)):
+        column, row = math.floor((points[i, 0] - x0) / cell), math.floor((points[i, 1] - y0) / cell)
+        if 0 <= column < seen.shape[0] and 0 <= row < seen.shape[1]:
+            free[i] = seen[column, row]
+            many += free[i]
+    return many
+
+
+def _disc(cells: int) -> BoolArray:
+    """(2 k + 1, 2 k + 1) which cells lie within k cells of the middle one."""
+    away = np.arange(-cells, cells + 1) ** 2
+    disc: BoolArray = away[:, None] + away <= cells * cells
+    return disc

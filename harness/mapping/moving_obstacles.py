@@ -1,0 +1,356 @@
+"""Which of what is seen moves, and how: by comparing scans.
+
+A return from a place that scans of some seconds before looked through tells of something that moves there, or that
+has just appeared; one from behind a place where something was, of something that draws back, or of what has gone
+(`harness.mapping.scan_comparison`). Scans of shortly before tell of what has just come out from behind something,
+those of long
+before of what is slow. The run of returns about it, up to the next step in range and without what stood there before
+beside it, is followed from scan to scan: the translation that lays the outline seen first upon the one seen now
+(`harness.mapping.scan_matching`) grows in proportion to time where it moves, and not at all where it only appeared.
+Assumed: obstacles that move do so without turning, no faster than `MOST_MPS`.
+
+Where ranges err much (`is_free`), what comes to a place that was ever seen to be free is told at once, as the map
+takes long to. A parabola is laid through its returns before it is followed; it is followed from more of them
+as it comes into view.
+
+Points are complex: east + i north, m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from harness.mapping.earlier_scans import NO_STEP, EarlierScans, Look
+from harness.mapping.followed_outline import (
+    FEWEST_SHIFTS,
+    LEAST_MPS,
+    MOST_MPS,
+    FollowedOutline,
+    bow,
+    extent_m,
+)
+from harness.mapping.scan import RangeScan, all_round, supported
+from harness.mapping.scan_comparison import cleared_space, grown, in_a_row, joined, near_any, runs_of
+from harness.mapping.scan_matching import FEWEST, STIFF, STIFF_IN_NOISE, Outline, ends_of, means, register
+from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray, MovingEdges
+
+NOWHERE = np.zeros((0, 2))
+DECIDED_S = 5.0
+"""Whether something moves is decided after so long at the soonest, and when it is sure."""
+UNDECIDED_S = 30.0
+"""What cannot be told to move for so long is taken to stand still."""
+LOST_S = 2.0
+"""What may move and is not seen for so long is not followed any more."""
+COASTS_S = 15.0
+"""What is known to move is believed to move on for so long."""
+NEW_OUTLINE_S = 12.0
+"""Outlines are compared with one no older than this."""
+GROWN = 1.3
+"""What comes into view is compared with a new outline whenever so many times as much is seen as the old one shows."""
+SLANT = 4.0
+"""Neighbouring returns of one face are no further apart than this many times what one broadside would show."""
+LATELY_S = 5.0
+"""What has been an edge so long is not what has come into view of something that moves."""
+NEAR = 1.5
+"""In standard deviations of ranges: returns so near to an outline may be its."""
+BENT = 14.0
+"""This times noise over spacing, to the power of two thirds, is how many points of a straight face a mean has to
+be of
+for the face not to look bent (`registration.FLAT`)."""
+NARROW = 4.0
+"""In standard deviations of ranges: what is narrower tells nothing of an outline; all about it is taken as well."""
+MEDIANS = 0.5
+"""In standard deviations of ranges: neighbouring medians, which have returns in common, differ by less."""
+FACES = 1.5
+"""What comes into view so many times as near as that is another face of what moves."""
+
+
+class MovingObstacles:
+    """Finds and follows what moves.
+
+    In a still world this costs a look at one scan every few seconds; ranges of others are not read.
+
+    Args:
+        clearance_m: wanted distance from obstacles; runs of returns break where they are further apart.
+        noise_m: standard deviation of ranges.
+        false_returns: the sensor is known to return ranges where nothing is.
+        is_free: tells which of (k, 2) places were surely seen to be free. With it, what comes there is told from all
+            that was ever seen, in every scan, and is found at once, standing until it is known to move.
+    """
+
+    def __init__(
+        self,
+        clearance_m: float,
+        noise_m: float,
+        false_returns: bool = True,
+        is_free: Callable[[FloatArray], BoolArray] | None = None,
+        stands: Callable[..., BoolArray] | None = None,
+    ) -> None:
+        self._noise, self._false_returns = noise_m, false_returns
+        self._is_free, self._stands = is_free, stands
+        self._clearance = clearance_m
+        self._apart = clearance_m + 6.0 * noise_m
+        self._sure = 4.0 * noise_m + 0.02 * clearance_m
+        exact, flawed = noise_m == 0.0, noise_m > 0.0 or false_returns
+        self._earlier = EarlierScans(clearance_m, self._sure, exact=exact, flawed=flawed)
+        self._gate = max(0.5 * clearance_m, 3.0 * noise_m)
+        self._tracks: list[FollowedOutline] = []
+        self._new: list[FollowedOutline] = []
+        self._time_s = 0.0
+
+    @property
+    def follows(self) -> bool:
+        """Whether anything may move."""
+        return len(self._tracks) > 0
+
+    @property
+    def found(self) -> tuple[MovingEdges, ...]:
+        """What is known to move, or has just appeared, as it was at the time of the last scan."""
+        return tuple(
+            MovingEdges(
+                self._time_s,
+                _pairs(track.shown_at(self._time_s)),
+                (track.velocity.real, track.velocity.imag) if track.moves else (0.0, 0.0),
+            )
+            for track in self._tracks
+            if track.moves or self._is_free
+        )
+
+    @property
+    def trail_m(self) -> FloatArray:
+        """(k, 2) places, one a gate, where what the last scan showed to move was before; mostly none."""
+        if not self._new:
+            return NOWHERE
+        step_s = [self._gate / max(abs(track.velocity), LEAST_MPS) for track in self._new]
+        compared_s = 0.0 if self._is_free else self._earlier.compared_s
+        past = [
+            track.at(time_s).points
+            for track, step in zip(self._new, step_s, strict=True)
+            for time_s in np.arange(self._time_s, track.begun_s - compared_s - step, -step)
+        ]
+        points = _pairs(np.concatenate(past))
+        return points[np.unique(np.floor(points / self._gate), axis=0, return_index=True)[1]]
+
+    def update(self, scan: RangeScan) -> BoolArray | None:
+        """Takes in one scan: (n,) which of its rays met something that moves; None where none did."""
+        self._time_s = scan.time_s
+        self._new = []
+        moving = self._follow(scan) if self._tracks else None
+        if self._is_free:
+            if scan.nearest_m < math.inf:
+                self._look_at_free(scan, moving, self._is_free)
+        elif self._earlier.due(scan.time_s):
+            now = Look(scan.kept(), *self._returns(scan))
+            self._look(now, moving)
+            self._earlier.keep(now)
+        return moving
+
+    def _look(self, now: Look, moving: BoolArray | None) -> None:
+        """Begins to follow what has come to places that were looked through before, or has drawn back."""
+        changed = self._earlier.changed(now)
+        if changed is None:
+            return
+        scan, hits, places = now
+        if moving is not None:
+            changed &= ~moving[hits]
+        if np.count_nonzero(changed) < FEWEST:
+            return
+        closed = all_round(scan) and hits[0] + len(scan.ranges_m) - hits[-1] <= 2
+        for run in runs_of(hits, places, self._step(scan, hits), closed):
+            if in_a_row(changed[run]) >= FEWEST:
+                self._begin(scan, changed[run], hits[run], places[run])
+
+    def _begin(self, scan: RangeScan, changed: BoolArray, hits: IntArray, places: ComplexArray) -> None:
+        """Begins to follow what has changed in a run of returns, without what stood there before beside it.
+
+        Of a straight face all is followed: where it slides along itself it only seems to have stood.
+        """
+        others = (changed | ~self._earlier.met(places)).nonzero()[0]
+        apart = np.abs(np.diff(places[others])) > self._clearance
+        for part in np.split(others, apart.nonzero()[0] + 1):
+            some = slice(int(part[0]), int(part[-1]) + 1)
+            if in_a_row(changed[some]) < FEWEST or self._is_followed(places[some], scan.time_s):
+                continue
+            outline = self._outline(scan, hits[some], places[some])
+            if not outline.is_definite:
+                some = _face(places, some, outline.along, self._earlier.own_m)
+                outline = self._outline(scan, hits[some], places[some])
+            self._tracks.append(FollowedOutline(outline, scan.time_s))
+
+    def _step(self, scan: RangeScan, hits: IntArray) -> FloatArray:
+        """(k,) returns of one face lie no further apart than this where they are so far away."""
+        step = np.maximum(
+            NO_STEP * self._clearance + 6.0 * self._noise, SLANT * scan.spacing_rad * scan.ranges_m[hits]
+        )
+        return np.minimum(step, self._apart)
+
+    def _look_at_free(
+        self, scan: RangeScan, moving: BoolArray | None, is_free: Callable[[FloatArray], BoolArray]
+    ) -> None:
+        """Begins to follow what has come to places that were seen to be free."""
+        hits, places = self._not_standing(*self._returns(scan))
+        appeared = is_free(_pairs(places))
+        if moving is not None:
+            appeared &= ~moving[hits]
+        come = appeared.nonzero()[0]
+        if len(come) < FEWEST:
+            return
+        closed = all_round(scan) and hits[come[0]] + len(scan.ranges_m) - hits[come[-1]] <= 2
+        for run in runs_of(hits[come], places[come], np.full(len(come), self._apart), closed):
+            if len(run) >= FEWEST and not self._is_followed(places[come[run]], scan.time_s):
+                whole = self._whole(come[run], hits, places, scan)
+                if extent_m(places[whole]) < NARROW * self._noise:
+                    whole = self._about(come[run], hits, places, scan)
+                self._tracks.append(
+                    FollowedOutline(self._outline(scan, hits[whole], places[whole]), scan.time_s)
+                )
+
+    def _not_standing(self, hits: IntArray, places: ComplexArray) -> tuple[IntArray, ComplexArray]:
+        """Rays that returned something, and where, but for those from where something has long stood."""
+        if not self._stands:
+            return hits, places
+        others = ~self._stands(_pairs(places))
+        return hits[others], places[others]
+
+    def _returns(self, scan: RangeScan) -> tuple[IntArray, ComplexArray]:
+        """Rays that returned something, but for false returns, and where."""
+        if not self._false_returns:
+            return scan.returned()
+        hits = supported(scan, self._apart).nonzero()[0]
+        return hits, scan.ends_m(hits)
+
+    def _outline(self, scan: RangeScan, hits: IntArray, places: ComplexArray) -> Outline:
+        """The outline that neighbouring returns show: where they lie closer than they err, means of several."""
+        if self._is_free:
+            return Outline(
+                bow(places, NO_STEP * self._clearance),
+                ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
+            )
+        away = np.abs(places - complex(scan.east_m, scan.north_m)).mean()
+        apart_m = max(scan.spacing_rad * float(away), 1e-9)
+        several = max(math.ceil(2.0 * self._noise / apart_m), 1)
+        points = places
+        if several > 1:
+            points = np.concatenate((places[:1], means(places, several), places[-1:]))
+        return Outline(
+            points,
+            ends_of(scan, int(hits[0]), int(hits[-1]), self._apart),
+            math.ceil((BENT * self._noise / apart_m) ** (2.0 / 3.0) / several),
+        )
+
+    def _is_followed(self, places: ComplexArray, time_s: float) -> bool:
+        """Whether a run of returns is of something that is followed: its middle, or any of it where that moves."""
+        middle = places[len(places) // 2 :][:1]
+        for track in self._tracks:
+            # What comes into view beside something that moves is another face of it.
+            of, within_m = (places, FACES * self._apart) if track.moves else (middle, self._gate)
+            if near_any(of, track.at(time_s).points, within_m).any():
+                return True
+        return False
+
+    def _follow(self, scan: RangeScan) -> BoolArray | None:
+        """Moves the tracks on; which rays met one that moves."""
+        hits, places = self._not_standing(*self._returns(scan))
+        moving = np.zeros(len(scan.ranges_m), dtype=np.bool_)
+        kept: list[FollowedOutline] = []
+        for track in self._tracks:
+            mine = self._found_again(track, hits, places, scan)
+            if scan.time_s - track.seen_s > (COASTS_S if track.moves else LOST_S):
+                continue
+            age_s, known = scan.time_s - track.begun_s, track.moves
+            if age_s >= DECIDED_S:
+                track.moves = track.moves or (
+                    track.seems_to_move(self._sure) and self._has_come_or_gone(track, places[mine], scan)
+                )
+                if track.surely_stands() or (age_s > UNDECIDED_S and not track.moves):
+                    continue
+            kept.append(track)
+            if track.moves:
+                moving[hits[mine]] = True
+                for end in mine[[0, -1]] if len(mine) else ():
+                    # What is seen at a glance beyond its ends is its, too.
+                    moving[hits[np.abs(places - places[end]) < self._gate]] = True
+                self._new += [] if known else [track]
+        self._tracks = kept
+        return moving if moving.any() else None
+
+    def _has_come_or_gone(self, track: FollowedOutline, places: ComplexArray, scan: RangeScan) -> bool:
+        """Whether it is seen where nothing was, or nothing where it was.
+
+        Where a corner is rounded, another face comes into view little by little, as if the first one moved.
+        """
+        if self._is_free:
+            return True
+        first = track.at(scan.time_s).points - track.moved
+        gone = np.count_nonzero(cleared_space(scan, first, self._sure)) >= FEWEST
+        return bool(gone) or self._earlier.have_come(places, FEWEST)
+
+    def _found_again(
+        self, track: FollowedOutline, hits: IntArray, places: ComplexArray, scan: RangeScan
+    ) -> IntArray:
+        """Finds an outline in a scan; which of the places belong to it."""
+        unknown_mps = 0.0 if len(track.shifts) >= FEWEST_SHIFTS else MOST_MPS
+        gate = self._gate + unknown_mps * (scan.time_s - track.outline_s)
+        stiff = STIFF_IN_NOISE if self._is_free else STIFF
+        some = np.arange(len(places))
+        if track.moves and not self._is_free:
+            some = self._earlier.of_it(track, places, scan)
+        own_hits, own = hits[some], places[some]
+        laid = register(
+            track.at(scan.time_s), own_hits, own, scan, gate, self._apart, stiff, NEAR * self._noise
+        )
+        if laid is None:
+            return np.zeros(0, dtype=np.intp)
+        track.note(scan.time_s, laid.shift)
+        mine = whole = laid.members
+        if len(mine) >= FEWEST:
+            track.seen_s = scan.time_s
+            if self._is_free or track.moves:
+                whole = self._whole(mine, own_hits, own, scan)
+            if self._is_free:
+                more = extent_m(own[whole]) > GROWN * extent_m(track.outline.points)
+            else:
+                more = len(whole) > GROWN * len(mine)
+            if more or scan.time_s - track.outline_s > NEW_OUTLINE_S:
+                new = whole if more or self._is_free else mine
+                track.renew(self._outline(scan, own_hits[new], own[new]), scan.time_s)
+            if track.moves and not self._is_free:
+                near = joined(own[whole], self._step(scan, own_hits[whole]))
+                track.shown = own[whole][near] if near.any() else None
+                mine = whole
+        return some[mine]
+
+    def _whole(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+        """Returns of something that moves, and those that go on from their ends, but for what was there before."""
+        may = np.ones(len(places), dtype=np.bool_)
+        if self._stands:
+            may = ~self._stands(_pairs(places), LATELY_S)
+            may[mine] = True
+        some = may.nonzero()[0]
+        step_m = NO_STEP * self._clearance + MEDIANS * self._noise
+        return some[grown(np.searchsorted(some, mine), hits[some], places[some], step_m, scan)]
+
+    def _about(self, mine: IntArray, hits: IntArray, places: ComplexArray, scan: RangeScan) -> IntArray:
+        """All returns about some, clockwise; these where they lie too far apart for any to be about their mean."""
+        near = (np.abs(places - places[mine].mean()) < self._gate).nonzero()[0]
+        if not len(near):
+            return mine
+        half = len(scan.ranges_m) // 2
+        about: IntArray = near[np.argsort((hits[near] - hits[mine[0]] + half) % len(scan.ranges_m))]
+        return about
+
+
+def _face(places: ComplexArray, some: slice, along: complex, within_m: float) -> slice:
+    """Some places of a run, and those that go on from their ends in a direction."""
+    off_m = ((places - places[some.start]) * along.conjugate()).imag
+    bent = (np.abs(off_m) > within_m).nonzero()[0]
+    before, after = bent[bent < some.start], bent[bent >= some.stop]
+    return slice(int(before[-1]) + 1 if len(before) else 0, int(after[0]) if len(after) else len(places))
+
+
+def _pairs(points: ComplexArray) -> FloatArray:
+    """(k, 2) east and north of points."""
+    return np.column_stack((points.real, points.imag))

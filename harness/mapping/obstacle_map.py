@@ -1,0 +1,269 @@
+"""The edges of obstacles that have been seen so far.
+
+Edges are points on a square grid of cells, at most one a cell, each where a ray hit or between two such
+places. Near by, where the edge of an obstacle stands out against what is behind it, finer grids keep more of
+them: paths bend about such places. Evidence decides: a cell that was hit in two scans holds an edge; one that
+several scans looked through, with neighbouring rays agreeing, does not. So one false return makes no wall and
+one lost return opens none. The grids cover the area with a border, so that the map cannot outgrow them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.mapping.edge_grid import EdgeGrid
+from harness.mapping.hit_counting import CONFIRMED, PARTS, count_hits, count_news, edges_after, ends, news
+from harness.mapping.scan import RangeScan, all_round, supported
+from harness.mapping.scan_comparison import count_looked_through, near_any
+from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
+
+SUPPORT = 0.5
+"""Where returns may be false, one is believed only if a ray beside it met something as far, but for this share of
+the clearance: a false return beside a wall seldom lies so near to its range."""
+DETAIL = ((5.0, 4), (2.0, 16))
+"""Outlines are kept in detail up to so many clearances away, in so many cells to one along a side."""
+SAME_PLACE = 1.0 / 4.0
+"""Hits that are seen from where others were seen, but for this share of the least range, tell little more,"""
+SAME_VIEW = 1.0 / 64.0
+"""nor further away, but for this share of the sensing range;"""
+FOLLOWED = 0.75
+"""this share of both where somebody has followed the rays already, and"""
+ASTIR = 0.25
+"""this one while something moves, comes or goes."""
+LOOK_THROUGH_EVERY = 6
+"""Every so many scans, from the first on, the points in range are asked whether they were looked through; every
+other time only where none was the last time."""
+
+
+class ObstacleMap:
+    """What stands still, as a sensor with exact ranges shows it (`harness.mapping.sensed_map.Edges`).
+
+    Args:
+        bounds_m: xmin, ymin, xmax, ymax of the area.
+        clearance_m: wanted distance from obstacles; hits nearer to each other than twice this leave no way
+            between them and are joined. Edge points lie about a quarter of it apart.
+        range_m: sensing range.
+        doubtful: the sensor may return what is not there: a single hit is not believed.
+    """
+
+    def __init__(
+        self,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        range_m: float,
+        doubtful: bool = True,
+    ) -> None:
+        grid = EdgeGrid.over(bounds_m, clearance_m)
+        self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
+        self._coarse = self._nx * self._ny
+        # Fine cells that were hit, numbered after the coarse ones.
+        self._fine: dict[tuple[int, int, int], int] = {}
+        self._score = np.zeros(self._coarse + 1024, dtype=np.int8)  # by cell
+        self._slot = np.full(self._coarse + 1024, -1, dtype=np.int32)  # by cell, -1 where there is no point
+        self._points = np.zeros(1024, dtype=np.complex128)  # by slot
+        self._key = np.zeros(1024, dtype=np.int64)  # by slot: its cell
+        self._since = np.zeros(1024, dtype=np.int64)  # by slot: revision at which it last became an edge
+        self._count = 0
+        self._join = 2.0 * clearance_m
+        self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
+        self._range = range_m
+        self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED
+        self.revision = 0
+        """Grows with every change of the set of edge points."""
+        self.last_removal_revision = 0
+        """The last revision at which edge points were taken away again."""
+        self._scans = 0
+        self._all_stands = True  # no point was looked through the last time
+        self._unconfirmed = False  # a cell was hit in the last scan taken in, and has yet to be believed
+        self._same_view = max(SAME_VIEW * range_m, self._cell)
+        self._taken_at, self._taken_nearest = complex(math.inf, math.inf), math.inf
+        self._near = np.zeros(0, dtype=np.int32)
+        self._near_at = complex(math.inf, math.inf)
+        self._near_count = 0
+
+    @property
+    def spacing_m(self) -> float:
+        """Edge points of one wall are about this far apart."""
+        return self._cell
+
+    def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
+        """Takes in one scan, but for some of its rays."""
+        nearest = scan.nearest_m
+        if nearest < math.inf:
+            sensor = complex(scan.east_m, scan.north_m)
+            moved = abs(sensor - self._taken_at)
+            same = min(SAME_PLACE * nearest, self._same_view)
+            same *= (
+                ASTIR if ignored is not None or not self._all_stands else FOLLOWED if scan.followed else 1.0
+            )
+            # What is nearer than the way flown explains has only just appeared.
+            if not moved < same or nearest < self._taken_nearest - 1.001 * moved or self._unconfirmed:
+                self._taken_at, self._taken_nearest = sensor, nearest
+                self._take_in(scan, nearest, ignored)
+        turn, between = divmod(self._scans, LOOK_THROUGH_EVERY)
+        if not between and self._count and (turn % 2 == 0 or not self._all_stands):
+            self._all_stands = not self._look_through(scan)
+        self._scans += 1
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) edge points that came in after `revision`, in the order in which they did."""
+        if revision >= self.revision:
+            return np.zeros((0, 2))
+        slots = np.empty(self._count, dtype=np.intp)
+        many = edges_after(slots, self._score, self._key, self._since, self._count, revision)
+        slots = slots[:many]
+        if revision < self.revision - 1:  # else all came in at once
+            slots = slots[np.argsort(self._since[slots], kind="stable")]
+        return _pairs(self._points[slots])
+
+    def forget(self, points_m: FloatArray, within_m: float) -> None:
+        """Forgets all that is no further from some points, (k, 2)."""
+        slots = near_any(
+            self._points[: self._count], points_m[:, 0] + 1j * points_m[:, 1], within_m
+        ).nonzero()[0]
+        slots = slots[self._score[self._key[slots]] > 0]
+        if len(slots):
+            self._score[self._key[slots]] = 0
+            self.revision += 1
+            self.last_removal_revision = self.revision
+
+    def _take_in(self, scan: RangeScan, nearest_m: float, ignored: BoolArray | None) -> None:
+        """Counts hits; where they are news, also what lies between them; and near outlines in detail.
+
+        Most of what is in sight has been seen so often that it is certain: that is found out first.
+        """
+        self._unconfirmed = False
+        hits, places = self._hits(scan, ignored)
+        if not len(hits):
+            return
+        if not self._holds(scan):
+            column, row = self._column_and_row(places)
+            on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
+            hits, places = hits[on_grid], places[on_grid]
+            if not len(hits):
+                return
+        rays, cell, join, first = len(scan.ranges_m), self._cell, self._join, self._first_score
+        closed = all_round(scan) and bool(hits[0] + rays - hits[-1] <= 2)
+        if nearest_m >= self._near_by:
+            self._grow(PARTS * len(hits))
+            self._take_over(count_news(cell, self._ny, rays, closed, join, hits, places, *self._counted()))
+            return
+        cells, found = news(hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first)
+        corners = nearest_m < DETAIL[-1][0] * self._clearance
+        near = ends(hits, places, scan.ranges_m, cell, closed, join, corners)
+        ranges, places = scan.ranges_m[hits[near]], places[near]
+        again: list[tuple[IntArray, ComplexArray]] = []
+        for reach, finer in DETAIL:
+            within = ranges < reach * self._clearance
+            at = places[within]
+            if len(at):
+                fine = self._fine_keys(at, finer)
+                cells, found = np.concatenate((cells, fine)), np.concatenate((found, at))
+                if first < CONFIRMED:
+                    # Where the wall is known, this only tells where it ends: once is enough.
+                    column, row = self._column_and_row(at)
+                    sure = self._score[column * self._ny + row] >= CONFIRMED
+                    again.append((fine[sure], at[sure]))
+        for each in ((cells, found), *again):
+            self._count_hits(*each)
+
+    def _hits(self, scan: RangeScan, ignored: BoolArray | None) -> tuple[IntArray, ComplexArray]:
+        """Rays that met an edge, and where they did, from the corner of the grid."""
+        if ignored is None and not self._doubtful:
+            return scan.returned(self._origin)
+        taken = supported(scan, SUPPORT * self._clearance) if self._doubtful else scan.ranges_m < math.inf
+        hits = (taken if ignored is None else taken & ~ignored).nonzero()[0]
+        return hits, scan.from_sensor_m(hits) + (complex(scan.east_m, scan.north_m) - self._origin)
+
+    def _column_and_row(self, places: ComplexArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Cells of places seen from the corner of the grid."""
+        cells = (places.view(np.float64) * (1.0 / self._cell)).astype(np.int64)
+        return cells[::2], cells[1::2]
+
+    def _holds(self, scan: RangeScan) -> bool:
+        """Whether all that a scan can reach lies on the grid."""
+        reach, x, y = scan.max_range_m, scan.east_m - self._origin.real, scan.north_m - self._origin.imag
+        width, height = self._nx * self._cell, self._ny * self._cell
+        return reach < x < width - reach and reach < y < height - reach
+
+    def _count_hits(self, cells: IntArray, places: ComplexArray) -> None:
+        self._grow(len(cells))
+        self._take_over(count_hits(cells, places, *self._counted()))
+
+    def _counted(self) -> tuple[Any, ...]:
+        """What hits are counted in, as `harness.mapping.hit_counting` takes it."""
+        return (
+            self._score,
+            self._slot,
+            self._points,
+            self._key,
+            self._since,
+            self._count,
+            self.revision,
+            self._first_score,
+            self._origin,
+        )
+
+    def _take_over(self, counted: tuple[int, int, bool]) -> None:
+        self._count, self.revision, unconfirmed = counted
+        self._unconfirmed |= unconfirmed
+
+    def _fine_keys(self, places: ComplexArray, finer: int) -> NDArray[np.int64]:
+        """Numbers of the cells of a finer grid at some places."""
+        cells = _pairs(places * (finer / self._cell)).astype(np.int64).tolist()
+        keys = [self._fine.setdefault((finer, x, y), self._coarse + len(self._fine)) for x, y in cells]
+        if self._coarse + len(self._fine) > len(self._score):
+            size = self._coarse + 2 * len(self._fine)
+            more = size - len(self._score)
+            self._score = np.concatenate((self._score, np.zeros(more, dtype=np.int8)))
+            self._slot = np.concatenate((self._slot, np.full(more, -1, dtype=np.int32)))
+        return np.array(keys, dtype=np.int64)
+
+    def _grow(self, more: int) -> None:
+        if self._count + more <= len(self._key):
+            return
+        size = max(2 * len(self._key), self._count + more)
+        self._points = np.resize(self._points, size)
+        self._key = np.resize(self._key, size)
+        self._since = np.resize(self._since, size)
+
+    def _look_through(self, scan: RangeScan) -> bool:
+        """Takes a point off every known point that three neighbouring rays looked past; whether any was."""
+        sensor = complex(scan.east_m, scan.north_m)
+        if not abs(sensor - self._near_at) < self._range / 8.0:
+            near = np.abs(self._points[: self._count] - sensor) < 1.125 * self._range
+            self._near = near.nonzero()[0].astype(np.int32)
+            self._near_at, self._near_count = sensor, self._count
+        if self._near_count < self._count:
+            more = np.arange(self._near_count, self._count, dtype=np.int32)
+            self._near, self._near_count = np.concatenate((self._near, more)), self._count
+        slots = self._near
+        through = np.zeros(len(slots), dtype=np.bool_)
+        # Only a ray that passes close by says anything about a point.
+        if not count_looked_through(
+            through,
+            scan,
+            self._points.take(slots),
+            1.5 * self._cell,
+            abreast=1,
+            aimed_m=0.25 * self._cell,
+            within_m=scan.max_range_m - 2.0 * self._cell,
+        ):
+            return False
+        weaker = self._key[slots[through]]
+        weaker = weaker[self._score[weaker] > 0]
+        if len(weaker):
+            self._score[weaker] -= 1
+            if (self._score[weaker] == CONFIRMED - 1).any():
+                self.revision += 1
+                self.last_removal_revision = self.revision
+        return len(weaker) > 0
+
+
+def _pairs(points: ComplexArray) -> FloatArray:
+    """(k, 2) east and north of points east + i north."""
+    return points.view(np.float64).reshape(-1, 2)

@@ -1,0 +1,206 @@
+"""What is other in one scan than in another: what has come to places looked through before, and what has gone.
+
+Places are complex: east + i north, m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from harness.mapping.cleared_space import through_places
+from harness.mapping.scan import RangeScan, all_round, clockwise_from
+from harness.mapping.scan_matching import FEWEST
+from planner.compiled import FLOAT, PLACES, compiled
+from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
+
+MISSING = 3
+"""A run of returns goes on where no more of them in a row are lost."""
+ABREAST = 2
+"""A place was looked through if so many rays to either side went further, too: one or two may be lost returns."""
+
+
+def come(before: RangeScan, places: ComplexArray, sure_m: float) -> BoolArray:
+    """(k,) which places were looked through by a scan before: what is there now has come."""
+    return cleared_space(before, places, sure_m) if any_come(before, places, sure_m) else _none_of(places)
+
+
+def any_come(before: RangeScan, places: ComplexArray, sure_m: float) -> bool:
+    """Whether `come` may hold for any of (k,) places: in a still world it mostly does not."""
+    return count_looked_through(_none_of(places), before, places, sure_m, every=FEWEST) > 0
+
+
+def drawn_back(were: ComplexArray, scan: RangeScan, sure_m: float, most_m: float) -> BoolArray:
+    """(n,) which rays of a scan look through where something was before: what they meet may have drawn back.
+
+    Args:
+        were: (k,) places where a scan before met something.
+        scan: as it is now.
+        sure_m: what lies further behind is surely another place.
+        most_m: nothing has drawn back by more.
+    """
+    gone = np.zeros(len(scan.ranges_m), dtype=np.bool_)
+    left = were[come(scan, were, sure_m)]
+    if len(left):
+        ray = rays_towards(scan, left)
+        back_m = scan.ranges_m[ray] - np.abs(left - complex(scan.east_m, scan.north_m))
+        ray = ray[back_m < most_m]
+        # From nearer by, places that were met by neighbouring rays lie further apart.
+        gone[(ray[:, None] + np.arange(-1, 2)) % len(gone)] = True
+    return gone
+
+
+def rays_towards(scan: RangeScan, places: ComplexArray) -> IntArray:
+    """(k,) the rays of a scan nearest to the bearings of places; of a narrow fan also what would be beyond."""
+    offsets = places - complex(scan.east_m, scan.north_m)
+    bearing = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy())
+    ray = np.rint(bearing / scan.spacing_rad).astype(np.int64)
+    return ray % len(scan.ranges_m) if all_round(scan) else ray
+
+
+def cleared_space(
+    scan: RangeScan,
+    places: ComplexArray,
+    sure_m: float,
+    abreast: int = ABREAST,
+    aimed_m: float = math.inf,
+    within_m: float = math.inf,
+) -> BoolArray:
+    """(k,) which places `count_looked_through` counts."""
+    through = _none_of(places)
+    count_looked_through(through, scan, places, sure_m, abreast, aimed_m, within_m)
+    return through
+
+
+def count_looked_through(
+    through: BoolArray,
+    scan: RangeScan,
+    places: ComplexArray,
+    sure_m: float,
+    abreast: int = ABREAST,
+    aimed_m: float = math.inf,
+    within_m: float = math.inf,
+    every: int = 1,
+) -> int:
+    """How many places a scan looked through, surely: with the ray towards each and some to either side.
+
+    Args:
+        through: (k,) all false; those that it looked through become true.
+        scan: the scan.
+        places: (k,) places.
+        sure_m: how much further than a place the rays went.
+        abreast: so many rays to either side.
+        aimed_m: how near the ray passes by a place, if it is to say anything about it.
+        within_m: how far away it says anything.
+        every: only so many places on is one asked: one is among as many in a row.
+    """
+    return through_places(
+        through,
+        places,
+        scan.ranges_m,
+        scan.east_m,
+        scan.north_m,
+        scan.start_rad,
+        scan.spacing_rad,
+        all_round(scan),
+        min(within_m, scan.max_range_m - sure_m),
+        sure_m,
+        abreast,
+        aimed_m,
+        every,
+    )
+
+
+def _none_of(places: ComplexArray) -> BoolArray:
+    return np.zeros(len(places), dtype=np.bool_)
+
+
+def runs_of(hits: IntArray, places: ComplexArray, apart_m: FloatArray, closed: bool) -> list[IntArray]:
+    """Returns of neighbouring rays that lie near to each other, run by run."""
+    breaks = ((np.abs(np.diff(places)) > apart_m[1:]) | (np.diff(hits) > MISSING + 1)).nonzero()[0] + 1
+    runs = np.split(np.arange(len(hits)), breaks)
+    if closed and len(runs) > 1 and abs(places[-1] - places[0]) <= apart_m[0]:
+        runs = [np.concatenate((runs[-1], runs[0])), *runs[1:-1]]
+    return runs
+
+
+def grown(mine: IntArray, hits: IntArray, places: ComplexArray, step_m: float, scan: RangeScan) -> IntArray:
+    """Some returns in clockwise order, and those that go on from their ends without a step.
+
+    Args:
+        mine: (k,) indices of the returns.
+        hits: (n,) rays of the scan that returned something.
+        places: (n,) where they did.
+        step_m: each is nearer to the one before.
+        scan: the scan.
+    """
+    next_hits, next_places = np.roll(hits, -1), np.roll(places, -1)
+    near = ((next_hits - hits) % len(scan.ranges_m) <= MISSING + 1) & (np.abs(next_places - places) < step_m)
+    near[-1] &= all_round(scan)
+    count = len(hits)
+    first, last = int(mine[0]), int(mine[-1])
+    more = count - 1 - (last - first) % count
+    while more and near[first - 1]:
+        first, more = (first - 1) % count, more - 1
+    while more and near[last]:
+        last, more = (last + 1) % count, more - 1
+    return (first + np.arange((last - first) % count + 1)) % count
+
+
+def joined(places: ComplexArray, apart_m: FloatArray) -> BoolArray:
+    """(k,) which places of a run are near to one before or after them: false returns are not."""
+    away = np.abs(np.diff(places, prepend=math.inf, append=math.inf))
+    near: BoolArray = np.minimum(away[:-1], away[1:]) < apart_m
+    return near
+
+
+def near_any(places: ComplexArray, others: ComplexArray, within_m: float) -> BoolArray:
+    """(k,) which of (k,) places lie no further than that from one of (m,) others."""
+    return near_line(places, others, within_m, 0.0)
+
+
+@compiled(PLACES, PLACES, FLOAT, FLOAT)
+def near_line(places: ComplexArray, line: ComplexArray, within_m: float, apart_m: float) -> BoolArray:
+    """(k,) which of (k,) places lie no further than that from a line through (m,) others, broken where it is apart."""
+    near = np.zeros(len(places), dtype=np.bool_)
+    if not len(line):
+        return near
+    west, east = line.real.min() - within_m, line.real.max() + within_m
+    south, north = line.imag.min() - within_m, line.imag.max() + within_m
+    for i in range(len(places)):
+        x, y = places[i].real, places[i].imag
+        if not (west <= x <= east and south <= y <= north):
+            continue
+        for j in range(len(line)):
+            ahead = line[min(j + 1, len(line) - 1)] - line[j]
+            dx, dy = x - line[j].real, y - line[j].imag
+            squared = ahead.real * ahead.real + ahead.imag * ahead.imag
+            if 0.0 < squared <= apart_m * apart_m:
+                share = min(max((dx * ahead.real + dy * ahead.imag) / squared, 0.0), 1.0)
+                dx, dy = dx - share * ahead.real, dy - share * ahead.imag
+            if dx * dx + dy * dy <= within_m * within_m:
+                near[i] = True
+                break
+    return near
+
+
+def in_a_row(flags: Sequence[bool] | BoolArray) -> int:
+    """The longest row of true ones."""
+    longest = row = 0
+    for flag in flags:
+        row = row + 1 if flag else 0
+        longest = max(longest, row)
+    return longest
+
+
+def in_all(flags: Iterable[BoolArray]) -> BoolArray:
+    """Which are true in all of some arrays; those after one without any are not asked for."""
+    common: BoolArray | None = None
+    for each in flags:
+        common = each if common is None else common & each
+        if not common.any():
+            break
+    assert common is not None
+    return common

@@ -1,0 +1,222 @@
+"""How far an outline has moved, told by the returns of a later scan.
+
+The translation is sought that lays the outline upon the returns (point-to-line registration; Y. Chen and G. Medioni,
+"Object modelling by registration of multiple range images", 1992). A flat face tells nothing of a shift along
+itself; there its ends do, where they are ends: what is hidden, out of range or out of view further on has none.
+
+Points are complex: east + i north, m.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.mapping.scan import RangeScan, all_round
+from planner.compiled import PLACES, compiled
+from planner.interface import ComplexArray, IntArray
+
+Ends = tuple[bool, bool]
+
+FEWEST = 3
+"""Neighbouring rays that must tell the same."""
+ROUNDS = 3
+"""Registrations in a row, each with the nearest points of the one before."""
+STRAIGHT = 0.9
+"""Cosine of the turn between neighbours: places that bend more than that are no good for registration."""
+CLOSER = 0.5
+"""Each round goes by returns so much nearer: what stands beside something that moves is not its."""
+FLAT = 0.99
+"""Mean of the tangents of an outline, each turned by twice its angle: 1 for a straight one."""
+BESIDE = 0.2
+"""So much of the gate a return may lie beyond the points of the outline, along it."""
+ENDS = 0.01
+"""Each end has this share of the weight of all that lies between."""
+STIFF, STIFF_IN_NOISE = 1e-4, 0.05
+"""So much holds the shift at the prediction; the more returns err, the less a bend in an outline tells."""
+BEYOND = 5
+"""So many rays beyond an end are looked at: that all of them are lost by chance is hardly possible."""
+FARTHEST = 0.95
+"""Share of the sensing range: an outline that is lost further away does not end there."""
+
+
+class Outline(NamedTuple):
+    """A run of returns from neighbouring rays.
+
+    Attributes:
+        points: (m,) places, clockwise as the sensor saw them.
+        ends: whether the first and the last of them are where the thing ends.
+        several: of so many points each the mean tells whether it is straight: the others err too much.
+    """
+
+    points: ComplexArray
+    ends: Ends
+    several: int = 1
+
+    @property
+    def is_definite(self) -> bool:
+        """Whether it tells of shifts in every direction: it shows both of its ends, or is not straight."""
+        if all(self.ends):
+            return True
+        return abs(self._turned) < FLAT
+
+    @property
+    def along(self) -> complex:
+        """Unit vector along a straight one, either way."""
+        return (self._turned / abs(self._turned)) ** 0.5
+
+    @property
+    def _turned(self) -> complex:
+        """Mean of its tangents, each turned by twice its angle; of its chord where it is straight nowhere."""
+        points = self.points
+        if self.several > 1 and len(points) >= FEWEST * self.several:
+            points = means(points, self.several)
+        along, straight = _tangents(points)
+        if straight.any():
+            return complex((along[straight] ** 2).mean())
+        chord = complex(self.points[-1] - self.points[0])
+        return (chord / abs(chord)) ** 2 if chord else 1.0 + 0j
+
+    def moved(self, by: complex) -> Outline:
+        """The outline elsewhere."""
+        return Outline(self.points + by, self.ends, self.several)
+
+
+def means(points: ComplexArray, several: int) -> ComplexArray:
+    """The mean of every so many points, in order; of what is left of them at the end."""
+    first = np.arange(0, len(points), several)
+    counts = np.diff(np.append(first, len(points)))
+    return (np.add.reduceat(points, first) / counts).astype(np.complex128)
+
+
+class Laid(NamedTuple):
+    """An outline laid upon returns.
+
+    Attributes:
+        shift: translation, east + i north, m.
+        members: (k,) which of the returns belong to it, clockwise.
+    """
+
+    shift: complex
+    members: IntArray
+
+
+def ends_of(scan: RangeScan, first_ray: int, last_ray: int, apart_m: float) -> Ends:
+    """Whether what neighbouring rays returned ends with them: those beyond go on, and end `apart_m` away or more."""
+    return _is_end(scan, first_ray, -1, apart_m), _is_end(scan, last_ray, 1, apart_m)
+
+
+def register(
+    outline: Outline,
+    hits: IntArray,
+    places: ComplexArray,
+    scan: RangeScan,
+    gate_m: float,
+    apart_m: float,
+    stiff: float = STIFF,
+    near_m: float = 0.0,
+) -> Laid | None:
+    """Lays an outline upon the returns of a scan.
+
+    Args:
+        outline: where it is expected.
+        hits: (n,) rays of the scan that returned something.
+        places: (n,) where they did.
+        scan: the scan.
+        gate_m: returns further from the outline are not its.
+        apart_m: beyond an end, rays go on, and end so far away or further.
+        stiff: share of the weight of all returns that holds the outline where it is expected.
+        near_m: returns no further off may be its in every round: they err so much.
+
+    Returns:
+        How; None where too few of the returns are near, or it would be laid further away than the gate.
+    """
+    near = _about(outline.points, places, gate_m)
+    if min(len(near), len(outline.points)) < FEWEST:
+        return None
+    sensor = complex(scan.east_m, scan.north_m)
+    ahead = (outline.points[len(outline.points) // 2] - sensor).conjugate()
+    near = near[np.argsort(-np.angle((places[near] - sensor) * ahead))]
+    along, straight = _tangents(outline.points)
+    reach = 1.5 * float(np.median(np.abs(np.diff(outline.points)))) + 1e-6
+    shift = 0j
+    for i in range(ROUNDS):
+        within_m = max(gate_m * CLOSER**i, near_m)
+        moved = outline.points + shift
+        own = nearest(places[near], moved)
+        off = (places[near] - moved[own]) * along[own].conj()  # along + i across
+        inside = (np.abs(off.imag) < within_m) & (np.abs(off.real) < reach + BESIDE * gate_m)
+        inner = inside & straight[own] & (np.abs(off.real) < reach)
+        if np.count_nonzero(inner) < FEWEST:
+            return None
+        members = near[inside]
+        seen_ends = ends_of(scan, int(hits[members[0]]), int(hits[members[-1]]), apart_m)
+        ends = [
+            places[members[end]] - outline.points[end] - shift
+            for end, was, still in zip((0, -1), outline.ends, seen_ends, strict=True)
+            if was and still
+        ]
+        # An end that is far off is another one: faces come into view and go out of it.
+        ends = [end for end in ends if abs(end) < reach + BESIDE * gate_m]
+        shift += _least_squares(1j * along[own[inner]], off.imag[inner], ends, shift, stiff)
+    if abs(shift) > gate_m:
+        return None
+    return Laid(shift, np.asarray(members, dtype=np.intp))
+
+
+@compiled(PLACES, PLACES)
+def nearest(places: ComplexArray, points: ComplexArray) -> IntArray:
+    """(k,) which of (m,) points each of (k,) places is nearest to; no table of all distances is laid."""
+    which = np.zeros(len(places), dtype=np.intp)
+    for i in range(len(places)):
+        least = math.inf
+        for j in range(len(points)):
+            dx, dy = points[j].real - places[i].real, points[j].imag - places[i].imag
+            if dx * dx + dy * dy < least:
+                least, which[i] = dx * dx + dy * dy, j
+    return which
+
+
+def _least_squares(
+    normals: ComplexArray, across: NDArray[np.float64], ends: list[complex], shift: complex, stiff: float
+) -> complex:
+    """The further shift that suits best: points to their lines, ends to ends, and not far from none at all."""
+    a, b, c = (normals.real**2).sum(), (normals.real * normals.imag).sum(), (normals.imag**2).sum()
+    hold, pull = stiff * (a + c), ENDS * (a + c)
+    right = complex((normals * across).sum()) + pull * sum(ends) - hold * shift
+    a, c = a + hold + pull * len(ends), c + hold + pull * len(ends)
+    return complex(c * right.real - b * right.imag, a * right.imag - b * right.real) / float(a * c - b * b)
+
+
+def _about(points: ComplexArray, places: ComplexArray, gate_m: float) -> IntArray:
+    """Which places lie in the upright box round some points, or no further off than the gate."""
+    inside = np.ones(len(places), dtype=np.bool_)
+    for of_points, of_places in ((points.real, places.real), (points.imag, places.imag)):
+        inside &= (of_places > of_points.min() - gate_m) & (of_places < of_points.max() + gate_m)
+    return inside.nonzero()[0]
+
+
+def _tangents(points: ComplexArray) -> tuple[ComplexArray, NDArray[np.bool_]]:
+    """(m,) unit vectors along an outline, and whether it is straight there; at its ends it is not."""
+    along = np.empty_like(points)
+    along[1:-1] = points[2:] - points[:-2]
+    along[0], along[-1] = points[1] - points[0], points[-1] - points[-2]
+    along /= np.maximum(np.abs(along), 1e-9)
+    straight = np.zeros(len(points), dtype=np.bool_)
+    straight[1:-1] = (along[2:] * along[:-2].conj()).real > STRAIGHT
+    return along, straight
+
+
+def _is_end(scan: RangeScan, ray: int, side: int, apart_m: float) -> bool:
+    steps = np.arange(1, BEYOND + 1)
+    beyond = ray + side * steps
+    rays = len(scan.ranges_m)
+    if not all_round(scan) and not ((beyond >= 0) & (beyond < rays)).all():
+        return False
+    own = float(scan.ranges_m[ray])
+    further = scan.ranges_m[beyond % rays] - own
+    away = np.hypot(further, own * scan.spacing_rad * steps)
+    return own < FARTHEST * scan.max_range_m and bool(((further > 0.0) & (away > apart_m)).all())

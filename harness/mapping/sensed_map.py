@@ -1,0 +1,132 @@
+"""All that the sensor has shown so far: edges of what stands still, what moves, and space seen to be free."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from harness.mapping.free_space import FreeSpace
+from harness.mapping.moving_obstacles import MovingObstacles
+from harness.mapping.obstacle_map import ObstacleMap
+from harness.mapping.reflection_map import ReflectionMap
+from harness.mapping.scan import RangeScan
+from harness.mapping.smoothed_scan import ERR, smoothed
+from planner.interface import BoolArray, FloatArray, MovingEdges
+
+NOISY = 0.1
+"""Ranges that err by more than this share of the clearance are weighed. What moves is then told by medians."""
+
+
+class Edges(Protocol):
+    """A map of the edges of what stands still; the members of `planner.interface.MapView` that concern it."""
+
+    @property
+    def spacing_m(self) -> float: ...  # noqa: D102
+
+    @property
+    def revision(self) -> int: ...  # noqa: D102
+
+    @property
+    def last_removal_revision(self) -> int: ...  # noqa: D102
+
+    def edges_since(self, revision: int) -> FloatArray: ...  # noqa: D102
+
+    def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
+        """Takes in one scan, but for some of its rays."""
+        ...
+
+    def forget(self, points_m: FloatArray, within_m: float) -> None:
+        """Forgets all that is no further from some points, (k, 2)."""
+        ...
+
+
+class SensedMap:
+    """The planner's only source of knowledge about obstacles (`planner.interface.MapView`).
+
+    Args:
+        bounds_m: xmin, ymin, xmax, ymax of the area.
+        clearance_m: wanted distance from obstacles.
+        range_m: sensing range.
+        noise_m: standard deviation of ranges, as the sensor's maker states it.
+        false_returns: the sensor is known to return ranges where nothing is.
+    """
+
+    def __init__(
+        self,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        range_m: float,
+        *,
+        noise_m: float = 0.0,
+        false_returns: bool = False,
+    ) -> None:
+        noisy = noise_m > NOISY * clearance_m
+        self._clearance = clearance_m
+        self._edges: Edges
+        self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
+        self._noisy = noisy
+        if noisy:
+            self._edges = edges = ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
+            self._moving = MovingObstacles(
+                clearance_m, ERR * noise_m, is_free=self._free.surrounds, stands=edges.stands
+            )
+        else:
+            self._edges = ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
+            self._moving = MovingObstacles(clearance_m, noise_m, false_returns)
+        self.moving: tuple[MovingEdges, ...] = ()
+        """What is known to move; its edges are not among the others."""
+        self.last_contradiction_s = -math.inf
+        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
+        self.revision = self._edges.revision
+        """Grows with every change of the set of edge points."""
+        self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
+
+    @property
+    def spacing_m(self) -> float:
+        """Edge points of one wall are about this far apart."""
+        return self._edges.spacing_m
+
+    @property
+    def last_removal_revision(self) -> int:
+        """The last revision at which edge points were taken away again."""
+        return self._edges.last_removal_revision
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) edge points that came in after `revision`, in the order in which they did."""
+        since, now, points = self._asked
+        if since != revision or now != self.revision:
+            points = self._edges.edges_since(revision)
+            self._asked = (revision, self.revision, points)
+        return points
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) points lies in space seen to be free."""
+        return self._free.contains(points_m)
+
+    def update(self, scan: RangeScan) -> None:
+        """Takes in one scan."""
+        ignored = self._moving.update(smoothed(scan, self._clearance) if self._noisy else scan)
+        before = self.revision
+        self._edges.update(scan, ignored)
+        self.revision = self._edges.revision
+        if self.revision != before:
+            self._take_back(scan, self.edges_since(before))
+        if self.moving or self._moving.follows:
+            self._note_moving(scan)
+        self._free.update(scan)
+
+    def _note_moving(self, scan: RangeScan) -> None:
+        """Where something moves, nothing stands, nor is it free."""
+        if len(trail_m := self._moving.trail_m):
+            self._edges.forget(trail_m, self._clearance)
+            self.revision = self._edges.revision
+        self.moving = self._moving.found
+        for each in self.moving:
+            self._take_back(scan, each.points_m)
+
+    def _take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
+        """What was seen to be free is not, where edges stand in it."""
+        if self._free.take_back(scan, edges_m):
+            self.last_contradiction_s = scan.available_s

@@ -1,0 +1,54 @@
+"""A noisy scan made quieter: medians of neighbouring rays.
+
+A median keeps steps in range where they are, and neither lost nor false returns count in it. Near by, where rays are
+dense, many of them are taken together.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from harness.mapping.scan import RangeScan, all_round
+from planner.interface import FloatArray, IntArray
+
+HALVES = (2, 4, 8, 16)
+"""So many rays to either side are taken together: the most of these that lie within the width, or the first."""
+ERR = 0.55
+"""Standard deviation of the median of five over that of each, for normal errors."""
+
+
+def smoothed(scan: RangeScan, width_m: float) -> RangeScan:
+    """A scan whose ranges are medians.
+
+    Args:
+        scan: as the sensor gave it.
+        width_m: rays that meet something broadside no further apart than this may be taken together.
+
+    Returns:
+        The same with other ranges; none where most of the rays about one returned nothing.
+    """
+    most = HALVES[-1]
+    ring = np.pad(scan.ranges_m, most, mode="wrap" if all_round(scan) else "reflect")
+    rough = _medians(ring, np.arange(len(scan.ranges_m)), HALVES[0])
+    ranges = rough.copy()
+    # As rays that met something nearer than this lie within the width, so many to either side.
+    reach_m = [0.5 * width_m / (scan.spacing_rad * half) for half in HALVES] + [0.0]
+    for half, (further, nearer) in zip(HALVES[1:], pairwise(reach_m[1:]), strict=True):
+        rays = ((rough <= further) & (rough > nearer)).nonzero()[0]
+        ranges[rays] = _medians(ring, rays, half)
+    return replace(scan.kept(), ranges_m=ranges)
+
+
+def _medians(ring: FloatArray, rays: IntArray, half: int) -> FloatArray:
+    """(k,) medians of what so many rays to either side of each of (k,) returned; infinite where most did not."""
+    width = 2 * half + 1
+    around = np.lib.stride_tricks.sliding_window_view(ring, width)[rays + (HALVES[-1] - half)]
+    around = np.sort(around, axis=1)
+    returned = np.count_nonzero(around < math.inf, axis=1)
+    middle = np.where(2 * returned > width, (returned - 1) // 2, width - 1)
+    medians: FloatArray = around[np.arange(len(rays)), middle]
+    return np.where(2 * returned > width, medians, math.inf)

@@ -1,0 +1,127 @@
+"""The file of a recording, written in a way that a full disk cannot stop.
+
+rerun's own file sink gives up for ever at the first write that fails: whoever flushes or ends the recording then
+waits without end. So rerun writes into a pipe, and a thread of ours moves what comes out into the file.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import threading
+from pathlib import Path
+
+import rerun as rr
+
+from harness.recording.blueprint import Layout
+
+_AT_ONCE_BYTES = 1 << 20
+_HEADER_BYTES = 12
+"""What an .rrd file begins with."""
+_MESSAGE = struct.Struct("<QQ")
+"""What each message in it begins with: its kind, and the number of bytes that follow."""
+
+
+def recording_stream(recording_id: str) -> rr.RecordingStream:
+    """What a recording is logged to. Threads and memory of those that were ended before are set free.
+
+    In the fork of a process that has recorded rerun cannot do that: there they stay.
+    """
+    try:
+        rr.init("wayproof", init_logging=False)
+    except RuntimeError as error:
+        if "fork" not in str(error).lower():
+            raise
+    rec = rr.RecordingStream("wayproof", recording_id=recording_id)
+    rec.set_log_time_enabled(False)
+    rec.set_log_tick_enabled(False)
+    return rec
+
+
+class RecordingFile:
+    """Where a recording goes. `end` must be called, also when the flight breaks off.
+
+    Args:
+        rec: the recording, before anything is logged.
+        path: the file; its folder must exist.
+        default_blueprint: the layout that the file carries.
+
+    Raises:
+        OSError: the file cannot be made.
+    """
+
+    def __init__(self, rec: rr.RecordingStream, path: Path, default_blueprint: Layout) -> None:
+        self._rec, self._path = rec, path
+        self._file = path.open("wb", buffering=0)
+        self._out, into = os.pipe()
+        self._fault: OSError | None = None
+        self._mover = threading.Thread(target=self._move, name="recording", daemon=True)
+        self._mover.start()
+        try:
+            rec.save(f"/dev/fd/{into}", default_blueprint=default_blueprint)
+            default_blueprint.let_go()
+        finally:
+            os.close(into)  # rerun has opened the pipe for itself
+
+    def flush(self) -> None:
+        """Has rerun write out what was logged.
+
+        Raises:
+            OSError: some of the recording could not be written.
+        """
+        self._rec.flush()
+        self._check()
+
+    def end(self) -> None:
+        """Ends the recording; again it does nothing.
+
+        Raises:
+            OSError: some of it could not be written.
+        """
+        if not self._file.closed:
+            self._rec.disconnect()
+            self._mover.join()
+            self._file.close()
+        self._check()
+
+    def _move(self) -> None:
+        waiting = bytearray()
+        begin = _HEADER_BYTES
+        while data := os.read(self._out, _AT_ONCE_BYTES):
+            waiting += data
+            # Whole messages only: a recording that ends in the middle of one cannot be read.
+            end = end_of_whole(waiting, begin)
+            self._write(waiting[:end])
+            del waiting[:end]
+            begin = max(begin - end, 0)
+        self._write(waiting)
+        os.close(self._out)
+
+    def _write(self, data: bytearray) -> None:
+        """Writes to the file; after a fault nothing more, but what rerun sends is taken: it must never wait."""
+        while data and self._fault is None:
+            try:
+                data = data[self._file.write(data) :]
+            except OSError as error:
+                self._fault = error
+
+    def _check(self) -> None:
+        if self._fault is not None:
+            raise OSError(self._fault.errno, self._fault.strerror, str(self._path))
+
+
+def end_of_whole(data: bytearray, begin: int) -> int:
+    """Where the last whole message ends.
+
+    Args:
+        data: part of a recording.
+        begin: where its first message begins.
+    """
+    end = 0
+    while begin + _MESSAGE.size <= len(data):
+        _, length = _MESSAGE.unpack_from(data, begin)
+        begin += _MESSAGE.size + length
+        if begin > len(data):
+            break
+        end = begin
+    return end

@@ -1,0 +1,348 @@
+"""The recording of a flight for the rerun viewer: an observer of the loop that writes while it flies.
+
+Coordinates are the local ENU plane throughout (the viewer holds them as float32: exact to a centimetre in 100
+km). Everything is on the timeline `sim_time`. What happens is kept until the block of the track that it
+belongs to, and then sent as columns, so that a recording that stops shows everything up to the same moment.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import rerun as rr
+
+from aircraft.interface import AircraftState
+from harness.flight.record import AcceptedPlan, FloatArray, Track
+from harness.recording import blueprint as look
+from harness.recording.file import RecordingFile, recording_stream
+from harness.recording.moving import Tracked, log_tracked_style
+from harness.recording.plans import log_plan_style, send_plans
+from harness.recording.scene import lines_2d, log_moving, log_obstacle, log_scene, log_summary, quaternions
+from harness.recording.sensed import News, Sensed, returns_m
+from harness.recording.states import (
+    AT_LIMIT,
+    FREE,
+    TRACKABLE,
+    States,
+    log_colours,
+    send_changes,
+    tracking_changes,
+)
+from harness.recording.strips import strips_2d, strips_3d
+
+if TYPE_CHECKING:
+    from harness.mapping.scan import RangeScan
+    from planner.interface import MovingEdges
+
+SCAN_SHARE = 0.004
+"""A scan is drawn after every flight of this share of the area, and before every plan."""
+LEAST_PERIOD_S = 2.0
+"""Scans are not drawn more often than this, but before plans: an hour has to stay small in any area."""
+CELL_SHARE = 0.0015
+"""Side of the cells in which sensed places are kept, as a share of the area."""
+PIECE_SHARE = 0.001
+"""Length of a piece of the trail, which has one colour, as a share of the area."""
+MARKER_STEP_ROWS = 5
+MOTION_STEP_ROWS = 10
+
+
+class RerunLog:
+    """Writes one recording. A process that is killed leaves it readable up to the last block.
+
+    Args:
+        path: the file; its folder must exist.
+        scene: what is known before the flight.
+        recording_id: identity of the recording; the same run gives the same one.
+        moving: tells what the map takes to move.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        scene: look.Scene,
+        recording_id: str,
+        moving: Callable[[], Sequence[MovingEdges]] = tuple,
+    ) -> None:
+        if not path.parent.is_dir():
+            raise FileNotFoundError(f"no folder {path.parent} for the recording")
+        self._scene = scene
+        self._rec = recording_stream(recording_id)
+        self._file = RecordingFile(self._rec, path, look.blueprint(scene.frame))
+        self._rec.send_recording_name(scene.name)
+        span_m = scene.frame.span_m
+        self._chord_error_m = 1e-5 * span_m
+        self._scan_period_s = max(SCAN_SHARE * span_m / scene.mission.speed_mps, LEAST_PERIOD_S)
+        self._piece_rows = min(max(round(10 * PIECE_SHARE * span_m / scene.mission.speed_mps), 10), 100)
+        self._scan: RangeScan | None = None
+        self._scan_drawn_s = -math.inf
+        self._scans: list[RangeScan] = []
+        self._plans: list[AcceptedPlan] = []
+        self._events: list[tuple[float, str, look.Colour]] = []
+        self._sensed = Sensed(scene.obstacles, CELL_SHARE * span_m)
+        self._states = States(math.degrees(scene.limits.bank_limit_rad))
+        self._last_point: FloatArray = np.zeros((0, 3))
+        self._whole: list[FloatArray] = []
+        self._shown_until_s = -math.inf
+        self._known_to_move, self._tracked = moving, Tracked()
+        self._moving = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
+        log_scene(self._rec, scene)
+        log_plan_style(self._rec)
+        log_tracked_style(self._rec)
+        self._log_style()
+        self.flush()
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        """Takes a scan; keeps it when one is due to be drawn."""
+        self._scan = scan
+        self._tracked.take(scan.time_s, self._known_to_move())
+        if scan.time_s - self._scan_drawn_s >= self._scan_period_s:
+            self._draw(scan)
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        """Takes a plan as it takes effect; keeps the scan before it."""
+        if self._scan is not None and self._scan.time_s > self._scan_drawn_s:
+            self._draw(self._scan)
+        self._plans.append(accepted)
+        self._states.on_plan(accepted)
+        text = f"{accepted.plan.reason} (plan {accepted.plan_index}, {accepted.compute_ms:.1f} ms)"
+        self._events.append((accepted.time_s, text, look.TOLD_PLAN))
+
+    def on_event(self, time_s: float, text: str) -> None:
+        """Adds a line to the log of events."""
+        self._events.append((time_s, text, look.TOLD))
+
+    def on_block(self, block: Track) -> None:
+        """Draws consecutive rows of the track, and what happened meanwhile."""
+        self._send_happened()
+        times = look.time_column(block.time_s)
+        position = np.column_stack((block.east_m, block.north_m, block.up_m))
+        self._rec.send_columns(
+            f"{look.WORLD}/aircraft",
+            [times],
+            rr.Transform3D.columns(
+                translation=position,
+                quaternion=quaternions(block.heading_deg, block.pitch_deg, block.roll_deg),
+            ),
+        )
+        self._send_marker(block)
+        self._send_trail(block, position)
+        self._log_motion(block)
+        for lane, changes in self._states.changes(block).items():
+            send_changes(self._rec, lane, changes)
+        log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
+        self._send_series(block, times)
+
+    def flush(self) -> None:
+        """Writes out all that has been logged; a process killed afterwards leaves about that.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        self._file.flush()
+
+    def end(self) -> None:
+        """Ends the file as it is, without summary; after `close` it does nothing."""
+        self._file.end()
+
+    def close(self, metrics: Mapping[str, Any] | None = None) -> None:
+        """Draws the whole track, writes verdicts and summary where there are metrics, and ends the file."""
+        self._send_happened()
+        if self._whole:
+            whole = np.concatenate(self._whole)
+            track = lines_2d([whole], look.WHOLE_TRACK, 1.5, 15)
+            self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
+            style: dict[str, Any] = {"colors": [look.WHOLE_TRACK], "radii": rr.Radius.ui_points(0.75)}
+            self._rec.log(
+                f"{look.WORLD}/{look.WHOLE}", rr.LineStrips3D(strips_3d([whole]), **style), static=True
+            )
+        if metrics is not None:
+            changes = tracking_changes(metrics["trackability"])
+            send_changes(self._rec, look.TRACKING_LANE, changes)
+            causes = dict.fromkeys((state for _, state in changes), look.HIT)
+            log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM})
+            log_summary(self._rec, self._scene, metrics)
+            self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
+        self._file.flush()
+        self._file.end()
+
+    def _set_time(self, time_s: float) -> None:
+        self._rec.set_time(look.TIMELINE, duration=np.timedelta64(round(time_s * 1e9), "ns"))
+
+    def _draw(self, scan: RangeScan) -> None:
+        self._scan_drawn_s = scan.time_s
+        self._scans.append(scan)
+
+    def _log_style(self) -> None:
+        width = rr.Radius.ui_points(1.25)
+        for entity, style in (
+            (f"{look.PLAN}/{look.FLOWN}", rr.LineStrips2D.from_fields(radii=width, draw_order=50)),
+            (f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D.from_fields(radii=width)),
+            (
+                f"{look.PLAN}/scan",
+                rr.Points2D.from_fields(colors=[look.HIT], radii=rr.Radius.ui_points(1.5), draw_order=25),
+            ),
+            (
+                f"{look.PLAN}/{look.SENSED}",
+                rr.Points2D.from_fields(colors=[look.EDGE], radii=rr.Radius.ui_points(1.25), draw_order=12),
+            ),
+            (
+                f"{look.WORLD}/{look.SENSED}",
+                rr.LineStrips3D.from_fields(colors=[look.EDGE], radii=rr.Radius.ui_points(0.75)),
+            ),
+        ):
+            self._rec.log(entity, style, static=True)
+        log_colours(self._rec, look.BANK_LANE, {FREE: look.CALM, AT_LIMIT: look.HIT})
+
+    def _send_happened(self) -> None:
+        """Sends scans, plans and events since the last time."""
+        scans, plans = self._scans, self._plans
+        self._scans, self._plans = [], []
+        self._tracked.send(self._rec)
+        send_plans(self._rec, plans, self._scene.altitude_m, self._chord_error_m)
+        if scans:
+            points = [returns_m(scan) for scan in scans]
+            self._rec.send_columns(
+                f"{look.PLAN}/scan",
+                [look.time_column(np.array([scan.time_s for scan in scans]))],
+                rr.Points2D.columns(positions=np.concatenate(points)).partition(
+                    [len(each) for each in points]
+                ),
+            )
+            self._send_news(scans, self._sensed.take(scans, points))
+        events, self._events = sorted(self._events, key=lambda event: event[0]), []
+        if events:
+            times, texts, colours = zip(*events, strict=True)
+            self._rec.send_columns(
+                look.EVENTS,
+                [look.time_column(np.array(times))],
+                rr.TextLog.columns(
+                    text=[f"t = {at:.0f} s: {text}" for at, text in zip(times, texts, strict=True)],
+                    level=[rr.TextLogLevel.INFO] * len(events),
+                    color=colours,
+                ),
+            )
+
+    def _send_news(self, scans: list[RangeScan], news: News) -> None:
+        """Shows obstacles from their first sight on, and the parts of them that were sensed."""
+        for index, (number, away_m) in news.first.items():
+            time_s = scans[number].time_s
+            self._set_time(time_s)
+            log_obstacle(self._rec, self._scene, index)
+            text = f"obstacle {index} comes into view, {away_m / 1e3:.1f} km away"
+            self._events.append((time_s, text, look.TOLD))
+        rows, counts = np.unique(news.scans, return_counts=True)
+        if not len(rows):
+            return
+        times = [look.time_column(np.array([scans[row].time_s for row in rows]))]
+        self._rec.send_columns(
+            f"{look.PLAN}/{look.SENSED}",
+            times,
+            rr.Points2D.columns(positions=news.points_m).partition(counts),
+        )
+        posts = np.zeros((len(news.points_m), 2, 3))
+        posts[:, :, :2] = news.points_m[:, None]
+        posts[:, 1, 2] = self._scene.obstacle_top_m
+        self._rec.send_columns(
+            f"{look.WORLD}/{look.SENSED}",
+            times,
+            rr.LineStrips3D.columns(strips=strips_3d(list(posts))).partition(counts),
+        )
+
+    def _send_series(self, block: Track, times: rr.TimeColumn) -> None:
+        clearance = np.where(np.isfinite(block.clearance_m), block.clearance_m, np.nan)
+        for entity, values in {
+            "cross_track/flown": block.cross_track_m,
+            "clearance/flown": clearance,
+            "bank/commanded": block.roll_command_deg,
+            "bank/flown": block.roll_deg,
+            "bank/pitch": block.pitch_deg,
+            "speed/ground": block.groundspeed_mps,
+            "speed/flown": block.airspeed_mps,
+            "altitude_error/flown": block.up_m - self._scene.altitude_m,
+        }.items():
+            self._rec.send_columns(f"{look.SERIES}/{entity}", [times], rr.Scalars.columns(scalars=values))
+        limit_deg = math.degrees(self._scene.limits.bank_limit_rad)
+        ends = [look.time_column(block.time_s[[0, -1]])]
+        for entity, value in {
+            "clearance/wanted": self._scene.mission.clearance_m,
+            "bank/limit_right": limit_deg,
+            "bank/limit_left": -limit_deg,
+        }.items():
+            self._rec.send_columns(
+                f"{look.SERIES}/{entity}", ends, rr.Scalars.columns(scalars=[value, value])
+            )
+
+    def _send_marker(self, block: Track) -> None:
+        rows = slice(None, None, MARKER_STEP_ROWS)
+        level = np.zeros(len(block.time_s[rows]))
+        times = [look.time_column(block.time_s[rows])]
+        self._rec.send_columns(
+            f"{look.PLAN}/aircraft",
+            times,
+            rr.Transform3D.columns(
+                translation=np.column_stack((block.east_m[rows], block.north_m[rows], level)),
+                quaternion=quaternions(block.heading_deg[rows], level, level),
+            ),
+        )
+        attitude = quaternions(level, block.pitch_deg[rows], block.roll_deg[rows])
+        self._rec.send_columns(
+            f"{look.ATTITUDE}/aircraft", times, rr.Transform3D.columns(quaternion=attitude)
+        )
+
+    def _send_trail(self, block: Track, position_m: FloatArray) -> None:
+        """Sends the trail in pieces, each at the time of its last point and joined to the one before."""
+        last_row = len(block) - 1
+        ends = np.append(np.arange(self._piece_rows - 1, last_row, self._piece_rows), last_row)
+        step = max(self._piece_rows // 4, 1)
+        pieces = []
+        first = 0
+        for last in ends.tolist():
+            rows = np.append(np.arange(first, last, step), last)
+            pieces.append(np.concatenate((self._last_point, position_m[rows])))
+            self._last_point = position_m[last : last + 1]
+            first = last + 1
+        self._whole.append(np.concatenate(pieces))
+        starts = np.append(0, ends[:-1] + 1)
+        off = np.maximum.reduceat(np.nan_to_num(np.abs(block.cross_track_m)), starts)
+        colours = look.error_colours(off / self._scene.limits.cross_track_threshold_m)
+        times = [look.time_column(block.time_s[ends])]
+        for entity, strips in (
+            (
+                look.PLAN,
+                rr.LineStrips2D.columns(strips=strips_2d([piece[:, :2] for piece in pieces]), colors=colours),
+            ),
+            (look.WORLD, rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=colours)),
+        ):
+            self._rec.send_columns(f"{entity}/{look.FLOWN}", times, strips)
+
+    def _log_motion(self, block: Track) -> None:
+        """Shows, moves and hides the obstacles that do so during a block."""
+        until = float(block.time_s[-1])
+        for index, obstacle in self._moving:
+            start, stop = obstacle.interval_s
+            if self._shown_until_s < start <= until or (start == -math.inf == self._shown_until_s):
+                self._set_time(max(start, 0.0))
+                log_moving(self._rec, self._scene, index)
+            if self._shown_until_s < stop <= until:
+                self._set_time(stop)
+                for entity in (look.PLAN, look.WORLD):
+                    self._rec.log(f"{entity}/moving/{index}", rr.Clear(recursive=True))
+            times = block.time_s[::MOTION_STEP_ROWS]
+            times = times[(times >= start) & (times <= stop)]
+            if obstacle.velocity_mps != (0.0, 0.0) and len(times):
+                moved = np.outer(times - obstacle.epoch_s, (*obstacle.velocity_mps, 0.0))
+                for entity in (look.PLAN, look.WORLD):
+                    self._rec.send_columns(
+                        f"{entity}/moving/{index}",
+                        [look.time_column(times)],
+                        rr.Transform3D.columns(translation=moved),
+                    )
+        self._shown_until_s = until

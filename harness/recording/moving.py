@@ -1,0 +1,63 @@
+"""What the map takes to move, in a recording: outlines as they were seen last, and arrows of where they go."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from harness.recording import blueprint as look
+from harness.recording.strips import strips_2d
+from planner.interface import MovingEdges
+
+EVERY_S = 1.0
+"""It is drawn no more often than this."""
+AHEAD_S = 30.0
+"""Arrows end where an obstacle will be after so long."""
+TRACKED = "tracked"
+"""Below PLAN: outlines; below that `velocity`, the arrows."""
+
+
+class Tracked:
+    """Gathers what is known to move, and draws it."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[float, tuple[MovingEdges, ...]]] = []
+        self._drawn_s, self._shown = -EVERY_S, False
+
+    def take(self, time_s: float, moving: Sequence[MovingEdges]) -> None:
+        """Takes what is known at a time; keeps it when it is due to be drawn, or gone."""
+        if (moving and time_s - self._drawn_s >= EVERY_S) or (self._shown and not moving):
+            self._rows.append((time_s, tuple(moving)))
+            self._drawn_s, self._shown = time_s, bool(moving)
+
+    def send(self, rec: rr.RecordingStream) -> None:
+        """Sends what was gathered since the last time."""
+        rows, self._rows = self._rows, []
+        if not rows:
+            return
+        times = [look.time_column(np.array([time_s for time_s, _ in rows]))]
+        counts = [len(moving) for _, moving in rows]
+        every = [each for _, moving in rows for each in moving]
+        outlines = [each.points_m for each in every]
+        rec.send_columns(
+            f"{look.PLAN}/{TRACKED}",
+            times,
+            rr.LineStrips2D.columns(strips=strips_2d(outlines)).partition(counts),
+        )
+        middles = np.array([outline.mean(axis=0) for outline in outlines]).reshape(-1, 2)
+        vectors = AHEAD_S * np.array([each.velocity_mps for each in every]).reshape(-1, 2)
+        rec.send_columns(
+            f"{look.PLAN}/{TRACKED}/velocity",
+            times,
+            rr.Arrows2D.columns(origins=middles, vectors=vectors).partition(counts),
+        )
+
+
+def log_tracked_style(rec: rr.RecordingStream) -> None:
+    """Logs what all of it has in common."""
+    outline = rr.LineStrips2D.from_fields(colors=[look.MOVES], radii=rr.Radius.ui_points(1.5), draw_order=26)
+    rec.log(f"{look.PLAN}/{TRACKED}", outline, static=True)
+    arrow = rr.Arrows2D.from_fields(colors=[look.MOVES], radii=rr.Radius.ui_points(1.0), draw_order=27)
+    rec.log(f"{look.PLAN}/{TRACKED}/velocity", arrow, static=True)

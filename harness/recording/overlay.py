@@ -1,0 +1,205 @@
+"""Several recordings in one: the world of the first, tracks and series of all, a colour for each."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from harness.analysis.rows import escaped, number
+from harness.files.errors import RunFolderError
+from harness.recording import blueprint as look
+from harness.recording.file import RecordingFile, recording_stream
+
+SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
+"""Below PLAN and WORLD: what all runs of a scenario have in common."""
+OWN = (look.FLOWN, look.WHOLE, "aircraft")
+"""Below PLAN and WORLD: what is drawn of every run."""
+
+COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
+"""Of `rerun_blueprint.OVERLAY`, for the summary."""
+
+FLOWN_LINE = "/flown"
+"""Ends the entities of the time series that are drawn of every run."""
+
+
+def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> None:
+    """Writes the overlay of recordings to `path`.
+
+    Args:
+        recordings: recordings of one scenario; incomplete ones may be among them.
+        names: name of each, for the legends.
+        path: the file to write.
+
+    Raises:
+        RunFolderError: a recording cannot be read.
+        OSError: the overlay cannot be written.
+    """
+    chunks = [_chunks(recording) for recording in recordings]
+    runs = [f"runs/{place}/" for place in range(len(recordings))]
+    title = ", ".join(names)
+    with recording_stream(f"overlay: {title}") as rec:
+        file = RecordingFile(rec, path, look.blueprint(_frame(chunks[0], recordings[0]), runs))
+        rec.send_recording_name(title)
+        rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
+        for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
+            rec.send_chunks(_renamed(own, run, place, rr.escape_entity_path_part(name)))
+            _send_events(rec, own, place, name)
+            _style(rec, run, place, name)
+        summary = _summary(names, [_metrics(own) for own in chunks])
+        rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
+        file.end()
+
+
+def send_recording(recording: Path, runs: int, address: str) -> None:
+    """Sends a recording, or an overlay, with its layout to a viewer that listens.
+
+    Args:
+        recording: the file.
+        runs: how many it overlays; 1 for the recording of a run.
+        address: of the viewer, `rerun+http://...`.
+
+    Raises:
+        RunFolderError: the recording cannot be read.
+    """
+    chunks = _chunks(recording)
+    names = [f"runs/{place}/" for place in range(runs)] if runs > 1 else [""]
+    with recording_stream(str(recording)) as rec:
+        layout = look.blueprint(_frame(chunks, recording), names)
+        rec.connect_grpc(address, default_blueprint=layout)
+        layout.let_go()
+        rec.send_chunks(chunks)
+        rec.flush()
+        rec.disconnect()
+
+
+def _chunks(recording: Path) -> list[rr.chunk.Chunk]:
+    try:
+        with warnings.catch_warnings():
+            # A recording of a killed run has no footer; it is read all the same.
+            warnings.simplefilter("ignore", rr.error_utils.RerunWarning)
+            return rr.chunk.RrdReader(str(recording)).stream().to_chunks()
+    except (OSError, RuntimeError, ValueError) as error:
+        raise RunFolderError(f"cannot read the recording {recording}: {error}") from error
+
+
+def _frame(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
+    for chunk in chunks:
+        if chunk.entity_path == f"/__properties/{look.FRAME}":
+            values = chunk.to_record_batch().to_pydict()
+            bounds, altitude, clearance = (
+                next(column[0] for name, column in values.items() if name.endswith(key))
+                for key in ("bounds_m", "altitude_m", "clearance_m")
+            )
+            return look.Frame(tuple(bounds), altitude[0], clearance[0])
+    raise RunFolderError(f"{recording} is not a recording of a flight")
+
+
+def _is_shared(entity: str) -> bool:
+    if entity == f"/__properties/{look.FRAME}":
+        return True
+    parts = entity.strip("/").split("/")
+    if parts[0] not in (look.PLAN, look.WORLD) or look.SENSED in parts:
+        return False
+    return len(parts) == 1 or parts[1] in SHARED
+
+
+def _renamed(chunks: Sequence[rr.chunk.Chunk], run: str, place: int, name: str) -> Iterator[rr.chunk.Chunk]:
+    """Tracks, aircraft, series, states and events of one run, below entities of its own."""
+    for chunk in chunks:
+        top, _, below = chunk.entity_path.strip("/").partition("/")
+        if top in (look.PLAN, look.WORLD) and below.split("/")[0] in OWN:
+            if below not in ("aircraft/sensing", "aircraft/axes"):
+                yield chunk.with_entity_path(f"/{top}/{run}{below}")
+        elif top == look.SERIES and below.endswith(FLOWN_LINE) and not chunk.is_static:
+            yield chunk.with_entity_path(f"/{look.SERIES}/{below}/{place}")
+        elif top == look.STATES and below in (look.PLANNER_LANE, look.TRACKING_LANE):
+            yield chunk.with_entity_path(f"/{look.STATES}/{place + 1}-{name}/{below}")
+
+
+def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], place: int, name: str) -> None:
+    """The events of one run, in its colour and after its name."""
+    for chunk in chunks:
+        if chunk.entity_path == f"/{look.EVENTS}":
+            columns = chunk.to_record_batch().to_pydict()
+            texts = next(cells for key, cells in columns.items() if key.endswith("text"))
+            times = [at.total_seconds() for at in columns[look.TIMELINE]]
+            rec.send_columns(
+                look.EVENTS,
+                [look.time_column(np.array(times))],
+                rr.TextLog.columns(
+                    text=[f"{name}, {text}" for (text,) in texts],
+                    level=[rr.TextLogLevel.INFO] * len(texts),
+                    color=[look.OVERLAY[place % len(look.OVERLAY)]] * len(texts),
+                ),
+            )
+
+
+def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
+    """Gives the lines of one run its colour, over the colours it was recorded with."""
+    colour = look.OVERLAY[place % len(look.OVERLAY)]
+    dim = tuple(part // 2 for part in colour)
+    for entity, shade in ((look.FLOWN, colour), (look.WHOLE, dim)):
+        plan, world = f"{look.PLAN}/{run}{entity}", f"{look.WORLD}/{run}{entity}"
+        rec.log(plan, rr.LineStrips2D.from_fields(colors=[shade]), static=True)
+        rec.log(world, rr.LineStrips3D.from_fields(colors=[shade]), static=True)
+    shapes = (
+        (look.PLAN, rr.LineStrips2D.from_fields(colors=[colour])),
+        (look.WORLD, rr.Mesh3D.from_fields(albedo_factor=colour)),
+    )
+    for entity, shape in shapes:
+        rec.log(f"{entity}/{run}aircraft/shape", shape, static=True)
+    for line in look.SERIES_STYLE:
+        if line.endswith(FLOWN_LINE):
+            style = rr.SeriesLines(names=[name], colors=[colour], widths=[1.5])
+            rec.log(f"{look.SERIES}/{line}/{place}", style, static=True)
+    points = rr.SeriesPoints(names=[name], colors=[colour], marker_sizes=[2.0])
+    rec.log(f"{look.SERIES}/{look.SEARCH}/{place}", points, static=True)
+
+
+def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:
+    """The figures that a recording carries; empty where its run did not end."""
+    for chunk in chunks:
+        if chunk.entity_path == "/__properties/metrics":
+            columns = chunk.to_record_batch().to_pydict()
+            found: dict[str, Any] = json.loads(
+                next(cells[0][0] for name, cells in columns.items() if name.endswith("json"))
+            )
+            return found
+    return {}
+
+
+def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]]) -> str:
+    """What came out of every run, side by side, as Markdown."""
+    labels: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        "outcome": lambda m: m["outcome"],
+        "flown, km": lambda m: number(m["flown_length_m"], 1e-3),
+        "time, s": lambda m: number(m["flight_time_s"]),
+        "least clearance, m": lambda m: number(m["min_clearance_m"]),
+        "cross-track max, m": lambda m: number(m["cross_track_m"]["max"]),
+        "heading change flown, deg": lambda m: number(m["smoothness"]["flown"]["heading_change_deg"]),
+        "trackable": lambda m: "yes" if m["trackable"] else "no",
+        "replans": lambda m: str(m["replans"]),
+        "search p99, ms": lambda m: number(m["compute_ms"]["p99"]),
+    }
+    rows = [
+        " | ".join([label, *((of(each) or "none") if each else "unfinished" for each in figures)])
+        for label, of in labels.items()
+    ]
+    colours = [COLOUR_NAMES[place % len(COLOUR_NAMES)] for place in range(len(names))]
+    return "\n".join(
+        [
+            f"| | {' | '.join(map(escaped, names))} |",
+            f"|---{'|---' * len(names)}|",
+            f"| colour | {' | '.join(colours)} |",
+            *(f"| {row} |" for row in rows),
+            "",
+            "Solid grey: the true obstacles. Dimmed: track still ahead of the time cursor.",
+            "",
+        ]
+    )

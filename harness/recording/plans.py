@@ -1,0 +1,113 @@
+"""Plans in a recording: the path, its waypoints and how it came about, as columns with one row a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from harness.flight.polylines import polylines
+from harness.flight.record import AcceptedPlan, FloatArray
+from harness.recording import blueprint as look
+from harness.recording.scene import circle, fan
+from harness.recording.strips import strips_2d, strips_3d
+
+MET = "met"
+"""Below PLAN: edges of what moves, where the planner expects to meet them."""
+
+STYLES = (
+    # Entity below PLAN, colour, width in points of the screen, order of drawing.
+    ("window", look.WINDOW, 1.5, 22),
+    ("sectors", look.SECTOR, 1.5, 23),
+    ("candidates", look.CANDIDATE, 1.0, 30),
+    ("chosen", look.CHOSEN, 3.0, 40),
+)
+
+
+def log_plan_style(rec: rr.RecordingStream) -> None:
+    """Logs what all plans have in common."""
+    for entity, colour, width, order in STYLES:
+        style = rr.LineStrips2D.from_fields(
+            colors=[colour], radii=rr.Radius.ui_points(0.5 * width), draw_order=order
+        )
+        rec.log(f"{look.PLAN}/{entity}", style, static=True)
+    rec.log(
+        f"{look.PLAN}/waypoints",
+        rr.Points2D.from_fields(colors=[look.CHOSEN], radii=rr.Radius.ui_points(3.5), draw_order=41),
+        static=True,
+    )
+    rec.log(
+        f"{look.PLAN}/{MET}",
+        rr.Points2D.from_fields(colors=[look.MET], radii=rr.Radius.ui_points(1.0), draw_order=24),
+        static=True,
+    )
+    rec.log(
+        f"{look.PLAN}/guide",
+        rr.Arrows2D.from_fields(colors=[look.GUIDE], radii=rr.Radius.ui_points(1.0), draw_order=35),
+        static=True,
+    )
+    rec.log(
+        f"{look.WORLD}/chosen",
+        rr.LineStrips3D.from_fields(colors=[look.CHOSEN], radii=rr.Radius.ui_points(1.25)),
+        static=True,
+    )
+    rec.log(
+        f"{look.SERIES}/{look.SEARCH}",
+        rr.SeriesPoints(names=["search"], colors=[look.CHOSEN], marker_sizes=[2.0]),
+        static=True,
+    )
+
+
+def send_plans(
+    rec: rr.RecordingStream, plans: Sequence[AcceptedPlan], altitude_m: float, chord_error_m: float
+) -> None:
+    """Draws plans, each from the time on at which it takes effect.
+
+    Args:
+        rec: where to.
+        plans: in order of time; none draws nothing.
+        altitude_m: of the path in the 3-D view.
+        chord_error_m: how far a drawn path may be off the true one.
+    """
+    if not plans:
+        return
+    times = [look.time_column(np.array([each.time_s for each in plans]))]
+    pictures = [each.plan.picture() if each.plan.picture else None for each in plans]
+    paths = polylines([each.segments for each in plans], chord_error_m)
+    waypoints = [each.plan.waypoints_m for each in plans]
+    guides = np.array([p.guide_m for p in pictures if p]).reshape(-1, 2, 2)
+    strips: dict[str, list[list[FloatArray]]] = {
+        "chosen": [[path] for path in paths],
+        "window": [[circle(p.guide_m[0], p.window_m)] if p else [] for p in pictures],
+        "sectors": [
+            [fan(p.guide_m[0], edges, p.window_m) for edges in p.sectors] if p else [] for p in pictures
+        ],
+        "candidates": [list(p.candidates[1:]) if p else [] for p in pictures],
+    }
+    for entity, rows in strips.items():
+        flat = [strip for row in rows for strip in row]
+        columns = rr.LineStrips2D.columns(strips=strips_2d(flat)).partition([len(row) for row in rows])
+        rec.send_columns(f"{look.PLAN}/{entity}", times, columns)
+    rec.send_columns(
+        f"{look.PLAN}/waypoints",
+        times,
+        rr.Points2D.columns(positions=np.concatenate(waypoints)).partition([len(each) for each in waypoints]),
+    )
+    rec.send_columns(
+        f"{look.PLAN}/guide",
+        times,
+        rr.Arrows2D.columns(origins=guides[:, 0], vectors=guides[:, 1] - guides[:, 0]).partition(
+            [1 if p else 0 for p in pictures]
+        ),
+    )
+    met = [p.met_m if p else np.zeros((0, 2)) for p in pictures]
+    rec.send_columns(
+        f"{look.PLAN}/{MET}",
+        times,
+        rr.Points2D.columns(positions=np.concatenate(met)).partition([len(each) for each in met]),
+    )
+    level = [np.column_stack((path, np.full(len(path), altitude_m))) for path in paths]
+    rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(level)))
+    searches = np.array([each.compute_ms for each in plans])
+    rec.send_columns(f"{look.SERIES}/{look.SEARCH}", times, rr.Scalars.columns(scalars=searches))

@@ -1,0 +1,304 @@
+"""What stays the same in a recording: area, standing obstacles, shape of the aircraft, summary.
+
+Frame: local ENU plane, metres. Shapes here are drawings: an obstacle is a column without end in the simulated
+world and is cut off somewhat above the flight altitude.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from harness.flight.record import FloatArray
+from harness.recording import blueprint as look
+from harness.recording.blueprint import Colour, Scene
+from harness.recording.strips import strips_2d, strips_3d
+from harness.recording.summary import summary
+from harness.world.obstacle import Circle, Polygon
+
+CIRCLE_POINTS = 72
+LEAST_CIRCLE_POINTS, POINTS_OF_ALL = 12, 400_000
+"""Thousands of circles are drawn with fewer points each, so that their recording fits into memory."""
+AIRCRAFT_SHARE = 0.022
+"""Wing span of the drawn aircraft as a share of the area: its true size could not be seen."""
+
+SHAPE = np.array(
+    [
+        [(1.1, 0, 0), (-1.1, 0.10, 0), (-1.1, -0.10, 0)],
+        [(0.35, 0, 0.06), (-0.05, 1, 0.06), (-0.30, 0, 0.06)],
+        [(0.35, 0, 0.06), (-0.30, 0, 0.06), (-0.05, -1, 0.06)],
+        [(-0.8, 0, 0), (-1.1, 0.40, 0), (-1.1, -0.40, 0)],
+        [(-0.75, 0, 0), (-1.15, 0, 0), (-1.15, 0, 0.35)],
+    ]
+)
+"""(5, 3, 3) triangles of the drawn aircraft, of half span 1: body, wings, tailplane, fin."""
+
+
+def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
+    """Logs all that never changes."""
+    frame = scene.frame
+    rec.send_property(
+        look.FRAME,
+        rr.AnyValues(bounds_m=frame.bounds_m, altitude_m=frame.altitude_m, clearance_m=frame.clearance_m),
+    )
+    rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
+    _log_area(rec, scene)
+    standing = [obstacle.shape for obstacle in scene.obstacles if obstacle.stands_for_ever]
+    if standing:
+        points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
+        rings = [_outline(shape, points) for shape in standing]
+        # Of many obstacles each of these is large: none is kept while the next is made.
+        rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
+        rec.log(f"{look.WORLD}/outlines", _rims(rings, scene.obstacle_top_m, look.OUTLINE), static=True)
+        del rings
+        log_solids(rec, f"{look.WORLD}/{look.TRUE}", standing, scene.obstacle_top_m, look.OBSTACLE)
+    _log_aircraft(rec, scene)
+    for entity, (name, colour, width) in look.SERIES_STYLE.items():
+        style = rr.SeriesLines(names=[name], colors=[colour], widths=[width])
+        rec.log(f"{look.SERIES}/{entity}", style, static=True)
+    log_summary(rec, scene, None)
+
+
+def log_obstacle(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
+    """Shows an obstacle that has come into view: a solid from the current time on."""
+    obstacle = scene.obstacles[index]
+    top_m = scene.obstacle_top_m
+    if obstacle.stands_for_ever:
+        log_solids(
+            rec, f"{look.WORLD}/obstacles/{index}", [obstacle.shape], top_m, look.OBSTACLE, static=False
+        )
+        return
+    place = f"moving/{index}/{look.SENSED}"
+    rec.log(f"{look.PLAN}/{place}", lines_2d([_outline(obstacle.shape)], look.MOVING, 2.5, 11))
+    log_solids(rec, f"{look.WORLD}/{place}", [obstacle.shape], top_m, look.MOVING, static=False)
+
+
+def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
+    """Outlines a moving or timed obstacle from the current time on, where it is at its epoch."""
+    shape = scene.obstacles[index].shape
+    rec.log(f"{look.PLAN}/moving/{index}", lines_2d([_outline(shape)], look.MOVING_DIM, 1.5, 10))
+    rec.log(f"{look.WORLD}/moving/{index}", _rims([_outline(shape)], scene.obstacle_top_m, look.MOVING_DIM))
+
+
+def log_solids(
+    rec: rr.RecordingStream,
+    entity: str,
+    shapes: Sequence[Circle | Polygon],
+    top_m: float,
+    colour: Colour,
+    static: bool = True,
+) -> None:
+    """Logs shapes as solids up to `top_m`: circles as cylinders, polygons as one mesh of prisms."""
+    circles = [shape for shape in shapes if isinstance(shape, Circle)]
+    if circles:
+        rec.log(
+            f"{entity}/circles",
+            rr.Cylinders3D(
+                lengths=[top_m] * len(circles),
+                radii=[circle.radius_m for circle in circles],
+                centers=[(*circle.center_m, 0.5 * top_m) for circle in circles],
+                colors=[colour],
+                fill_mode="solid",
+            ),
+            static=static,
+        )
+    prisms = [_prism(shape, top_m) for shape in shapes if isinstance(shape, Polygon)]
+    if prisms:
+        counts = np.cumsum([0, *(len(vertices) for vertices, _, _ in prisms)])
+        rec.log(
+            f"{entity}/polygons",
+            rr.Mesh3D(
+                vertex_positions=np.concatenate([vertices for vertices, _, _ in prisms]),
+                vertex_normals=np.concatenate([normals for _, normals, _ in prisms]),
+                triangle_indices=np.concatenate(
+                    [faces + first for (_, _, faces), first in zip(prisms, counts[:-1], strict=True)]
+                ),
+                albedo_factor=colour,
+            ),
+            static=static,
+        )
+
+
+def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
+    """Logs the summary: what was asked, what came out (if known), what the colours mean."""
+    rec.log(
+        look.SUMMARY,
+        rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN),
+        static=True,
+    )
+
+
+def lines_2d(
+    polylines: Sequence[FloatArray], colours: Colour | Sequence[Colour], width: float, order: float
+) -> rr.LineStrips2D:
+    """Polylines (k, 2) in the plan view, `width` in points of the screen."""
+    several = colours if polylines and isinstance(colours[0], tuple) else [colours]
+    return rr.LineStrips2D(
+        strips_2d([points[:, :2] for points in polylines]),
+        colors=several,
+        radii=rr.Radius.ui_points(0.5 * width),
+        draw_order=order,
+    )
+
+
+def circle(
+    center_m: Sequence[float] | FloatArray, radius_m: float, points: int = CIRCLE_POINTS
+) -> FloatArray:
+    """(points + 1, 2) closed polygon on a circle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, points + 1)
+    return np.asarray(center_m) + radius_m * np.column_stack((np.cos(angle), np.sin(angle)))
+
+
+def fan(center_m: FloatArray, edges: FloatArray, radius_m: float) -> FloatArray:
+    """Outline of a sector from its right edge anticlockwise to its left edge.
+
+    Args:
+        center_m: (2,) its corner.
+        edges: (4,) unit vectors of the right and the left edge.
+        radius_m: its radius.
+    """
+    right = math.atan2(edges[1], edges[0])
+    width = (math.atan2(edges[3], edges[2]) - right) % math.tau or math.tau
+    angle = right + np.linspace(0.0, width, max(int(width / 0.1), 1) + 1)
+    arc = center_m + radius_m * np.column_stack((np.cos(angle), np.sin(angle)))
+    return np.concatenate(([center_m], arc, [center_m]))
+
+
+def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatArray) -> FloatArray:
+    """(n, 4) xyzw rotations from body axes (x forward, y left, z up) to ENU.
+
+    Heading is clockwise from north and turns about -z, pitch is nose up and turns about -y, roll is right
+    wing down and turns about x: q = q_z(90 deg - heading) q_y(-pitch) q_x(roll) (Diebel, Representing
+    Attitude, 2006).
+    """
+    yaw, pitch, roll = (0.5 * np.radians(angle) for angle in (90.0 - heading_deg, -pitch_deg, roll_deg))
+    cy, sy, cp, sp, cr, sr = (f(angle) for angle in (yaw, pitch, roll) for f in (np.cos, np.sin))
+    return np.column_stack(
+        (
+            cy * cp * sr - sy * sp * cr,
+            cy * sp * cr + sy * cp * sr,
+            sy * cp * cr - cy * sp * sr,
+            cy * cp * cr + sy * sp * sr,
+        )
+    )
+
+
+def _rims(outlines: Sequence[FloatArray], top_m: float, colour: Colour) -> rr.LineStrips3D:
+    """Outlines on the ground and at the top."""
+    rims = [
+        np.column_stack((ring, np.full(len(ring), height))) for ring in outlines for height in (0.0, top_m)
+    ]
+    return rr.LineStrips3D(strips_3d(rims), colors=[colour], radii=rr.Radius.ui_points(0.5))
+
+
+def _outline(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> FloatArray:
+    if isinstance(shape, Circle):
+        return circle(shape.center_m, shape.radius_m, points)
+    return np.array([*shape.vertices_m, shape.vertices_m[0]], dtype=np.float64)
+
+
+def _prism(
+    polygon: Polygon, top_m: float
+) -> tuple[FloatArray, FloatArray, np.ndarray[Any, np.dtype[np.int64]]]:
+    """Vertices, normals and triangles of an upright prism without a floor, with sharp edges."""
+    import shapely
+
+    ring = np.array(shapely.geometry.polygon.orient(shapely.Polygon(polygon.vertices_m)).exterior.coords)
+    begin, along = ring[:-1], np.diff(ring, axis=0)
+    outward = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, None]
+    vertices: list[tuple[float, ...]] = []
+    normals: list[tuple[float, ...]] = []
+    faces: list[tuple[int, int, int]] = []
+    for corner, edge, normal in zip(begin, along, outward, strict=True):
+        first = len(vertices)
+        end = corner + edge
+        vertices += [(*corner, 0.0), (*end, 0.0), (*end, top_m), (*corner, top_m)]
+        normals += [(*normal, 0.0)] * 4
+        faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
+    for triangle in shapely.constrained_delaunay_triangles(shapely.Polygon(ring)).geoms:
+        first = len(vertices)
+        corners = shapely.geometry.polygon.orient(triangle).exterior.coords[:3]
+        vertices += [(*corner, top_m) for corner in corners]
+        normals += [(0.0, 0.0, 1.0)] * 3
+        faces.append((first, first + 1, first + 2))
+    return np.array(vertices), np.array(normals), np.array(faces, dtype=np.int64)
+
+
+def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
+    xmin, ymin, xmax, ymax = scene.mission.bounds_m
+    bounds = np.array([(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax), (xmin, ymin)])
+    goal = circle(scene.mission.goal_m, scene.mission.goal_radius_m)
+    rec.log(f"{look.PLAN}/bounds", lines_2d([bounds], look.BOUNDS, 1.5, 5), static=True)
+    rec.log(f"{look.PLAN}/goal", lines_2d([goal], look.GOAL, 2.0, 45), static=True)
+    rec.log(
+        f"{look.PLAN}/ends",
+        rr.Points2D(
+            [scene.start_m, scene.mission.goal_m],
+            colors=[look.START, look.GOAL],
+            radii=rr.Radius.ui_points(5.0),
+            labels=["start", "goal"],
+            show_labels=True,
+            draw_order=46,
+        ),
+        static=True,
+    )
+    ground = [np.column_stack((points, np.zeros(len(points)))) for points in (bounds, goal)]
+    rec.log(
+        f"{look.WORLD}/area",
+        rr.LineStrips3D(ground, colors=[look.BOUNDS, look.GOAL], radii=rr.Radius.ui_points(0.75)),
+        static=True,
+    )
+    poles = [
+        [(*point, 0.0), (*point, 1.5 * scene.obstacle_top_m)]
+        for point in (scene.start_m, scene.mission.goal_m)
+    ]
+    rec.log(
+        f"{look.WORLD}/ends",
+        rr.LineStrips3D(
+            poles,
+            colors=[look.START, look.GOAL],
+            radii=rr.Radius.ui_points(1.5),
+            labels=["start", "goal"],
+            show_labels=True,
+        ),
+        static=True,
+    )
+
+
+def _log_aircraft(rec: rr.RecordingStream, scene: Scene) -> None:
+    """The aircraft as a mesh (x forward, y left, z up), and as an arrowhead within the sensing range."""
+    half = 0.5 * AIRCRAFT_SHARE * scene.frame.span_m
+    for entity, size in ((f"{look.WORLD}/aircraft", half), (f"{look.ATTITUDE}/aircraft", 1.0)):
+        corners = size * SHAPE.reshape(-1, 3)
+        rec.log(
+            f"{entity}/shape",
+            rr.Mesh3D(
+                vertex_positions=corners,
+                triangle_indices=np.arange(len(corners)).reshape(-1, 3),
+                albedo_factor=look.AIRCRAFT,
+                face_rendering="DoubleSided",
+            ),
+            static=True,
+        )
+        rec.log(
+            f"{entity}/axes",
+            rr.Arrows3D(vectors=1.5 * size * np.eye(3), colors=look.AXES, radii=rr.Radius.ui_points(1.0)),
+            static=True,
+        )
+    level = np.column_stack((circle((0.0, 0.0), 1.6), np.zeros(CIRCLE_POINTS + 1)))
+    horizon = rr.LineStrips3D(
+        [level, [(-1.6, 0.0, 0.0), (1.6, 0.0, 0.0)]], colors=[look.BOUNDS], radii=rr.Radius.ui_points(0.75)
+    )
+    rec.log(f"{look.ATTITUDE}/level", horizon, static=True)
+    arrowhead = half * np.array([(1.0, 0.0), (-0.8, 0.65), (-0.4, 0.0), (-0.8, -0.65), (1.0, 0.0)])
+    rec.log(f"{look.PLAN}/aircraft/shape", lines_2d([arrowhead], look.AIRCRAFT, 2.5, 60), static=True)
+    rec.log(
+        f"{look.PLAN}/aircraft/sensing",
+        lines_2d([circle((0.0, 0.0), scene.mission.sensor_range_m)], look.SENSING, 1.0, 20),
+        static=True,
+    )

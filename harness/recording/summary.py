@@ -1,0 +1,86 @@
+"""The summary page of a recording, in Markdown: what was asked, what came out, what the colours mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from harness.analysis.rows import escaped, number
+
+if TYPE_CHECKING:
+    from harness.recording.blueprint import Scene
+
+LEGEND = """\
+| colour | meaning |
+|---|---|
+| yellow to red | flown track: on the plan, to {error} m off it, where it is no longer tracked; brown: still ahead |
+| blue | plan in effect with its waypoints; dark blue: the candidates it was compared with |
+| pink | guide vector |
+| green, violet | free sectors, planning window |
+| grey circle | sensing range |
+| red dots | what the last scan returned |
+| white | sensed so far; dark grey: the true outline |
+| brown | obstacles that move or come and go |
+| orange | what the map takes to move, with where it will be in 30 s; violet dots: where the plan expects to meet it |
+
+Axes of the aircraft: red ahead, green left, blue up. It is drawn larger than it is; obstacles have no top.
+"""
+
+
+def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
+    """The page as Markdown.
+
+    Args:
+        scene: what is known before the flight.
+        metrics: content of `metrics.json`; None while flying.
+    """
+    mission = scene.mission
+    lines = [f"### {escaped(scene.name)}", ""]
+    if metrics is None:
+        lines += ["Still flying, or stopped before the end.", ""]
+    else:
+        rows = [f"| {name} | {escaped(value)} |" for name, value in figures(scene, metrics).items()]
+        lines += [rows[0], "|---|---|", *rows[1:], ""]
+    lines += [
+        f"Straight line {math.dist(scene.start_m, mission.goal_m):.0f} m at {mission.speed_mps:g} m/s and "
+        f"{scene.altitude_m:g} m above sea level; smallest turn radius {mission.turn_radius_m:.0f} m; sensing "
+        f"range {mission.sensor_range_m:g} m.",
+        "",
+        LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:g}"),
+        "### Scenario",
+        "",
+        "```yaml",
+        scene.scenario_yaml.rstrip(),
+        "```",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
+    """What came out, name and value."""
+    cross, altitude, compute = metrics["cross_track_m"], metrics["altitude_error_m"], metrics["compute_ms"]
+    planned, flown = metrics["smoothness"]["planned"], metrics["smoothness"]["flown"]
+    causes = [leg["cause"] for leg in metrics["trackability"] if not leg["trackable"]]
+    return {
+        "outcome": f"{metrics['outcome']}: {metrics['reason']}",
+        "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
+        "least clearance": f"{number(metrics['min_clearance_m']) or 'none'} m of {scene.mission.clearance_m:g} m; "
+        f"{_text(metrics['clearance_violation_s'], 1)} s below",
+        "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
+        "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
+        "trackable": "yes"
+        if metrics["trackable"]
+        else f"no: {', '.join(dict.fromkeys(causes)) or 'no plan'}",
+        "bank at its limit": f"{100 * metrics['bank_saturation_fraction']:.1f} % of the time",
+        "heading change": f"planned {_text(planned['heading_change_deg'], 0)}°, "
+        f"flown {_text(flown['heading_change_deg'], 0)}°",
+        "replans": str(metrics["replans"]),
+        "search p50, p99, max": ", ".join(_text(compute[name], 1) for name in ("p50", "p99", "max")) + " ms",
+        "digest": metrics["digest"][:16],
+    }
+
+
+def _text(value: float | None, digits: int) -> str:
+    return "none" if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,244 @@
+"""Looking at recordings: the rerun viewer of the installed wheel, in a window, a browser or without a screen.
+
+The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics. The page that it
+serves to a browser asks rerun.io and others for fonts, examples and versions, and needs none of their answers.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import quote
+
+from harness.recording.blueprint import TIMELINE
+from harness.recording.overlay import send_recording, write_overlay
+from harness.run_files.run_folder import RECORDING, recording_of
+
+LOCALHOST = "127.0.0.1"
+START_TIMEOUT_S = 30.0
+SETTLE_S = 1.5
+"""The viewer draws a new time within a few frames; a software renderer needs about a second for them."""
+
+
+LOG = "viewer.log"
+NO_SCREEN = (
+    "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); "
+    f"copy the run's {RECORDING} to a machine that has one and open it there with: rerun {RECORDING}"
+)
+NO_DRIVER = (
+    "the headless viewer did not start: it needs a Vulkan driver "
+    "(on Debian: apt-get install mesa-vulkan-drivers)"
+)
+
+
+class ViewerError(RuntimeError):
+    """The viewer cannot be run; the message says why and what helps."""
+
+
+def open_viewer(
+    run_dirs: Sequence[Path], web: bool = False, tell: Callable[[str], None] = lambda address: None
+) -> None:
+    """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
+
+    Args:
+        run_dirs: run folders; incomplete ones may be looked at too.
+        web: in a browser instead of a window; served until interrupted.
+        tell: is told the address for the browser.
+
+    Raises:
+        RunFolderError: a folder has no recording.
+        ViewerError: there is no screen, or the viewer does not start.
+    """
+    recordings = [recording_of(folder) for folder in run_dirs]
+    if not web and sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
+        raise ViewerError(NO_SCREEN)
+    with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
+        shown = recordings[0]
+        if len(recordings) > 1:
+            shown = Path(scratch) / "overlay.rrd"
+            write_overlay(recordings, run_names(run_dirs), shown)
+        if web:
+            with (
+                contextlib.suppress(KeyboardInterrupt),
+                served(shown, len(recordings), Path(scratch)) as (viewer, address),
+            ):
+                tell(address)
+                webbrowser.open(address)
+                viewer.wait()
+            return
+        command = [_executable(), str(shown), "--bind", LOCALHOST, "--port", str(_free_port())]
+        with _viewer(command, Path(scratch)) as viewer:
+            if viewer.wait() != 0:
+                raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_words(scratch)}")
+
+
+@contextlib.contextmanager
+def served(rrd: Path, runs: int, scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Serves a recording to browsers of this machine; gives the server and the address to open.
+
+    Args:
+        rrd: the recording.
+        runs: how many it overlays.
+        scratch: an empty folder for the viewer's settings.
+
+    Raises:
+        ViewerError: the server does not start.
+    """
+    port, web_port = _free_port(), _free_port()
+    # A viewer that serves a file keeps a processor busy; one that is sent it does not.
+    command = [_executable(), "--serve-web", "--bind", LOCALHOST]
+    command += ["--port", str(port), "--web-viewer-port", str(web_port)]
+    source = f"rerun+http://{LOCALHOST}:{port}/proxy"
+    with _viewer(command, scratch) as viewer:
+        for each in (port, web_port):
+            if not _answers(each, viewer):
+                raise ViewerError(f"the viewer does not start: {_last_words(str(scratch))}")
+        send_recording(rrd, runs, source)
+        yield viewer, f"http://{LOCALHOST}:{web_port}/?url={quote(source, safe='')}"
+
+
+def _last_words(scratch: str) -> str:
+    lines = (Path(scratch) / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1] if lines else "it gave no reason"
+
+
+def run_names(run_dirs: Sequence[Path]) -> list[str]:
+    """Names of runs: as much of the end of each path as tells them apart, and a number where nothing does."""
+    paths = [folder.resolve().parts for folder in run_dirs]
+    longest = max(map(len, paths))
+    length = next((n for n in range(1, longest) if len({path[-n:] for path in paths}) == len(paths)), 1)
+    names = ["/".join(path[-length:]) for path in paths]
+    return [
+        name if names.count(name) == 1 else f"{name} ({place})" for place, name in enumerate(names, start=1)
+    ]
+
+
+def screenshot(
+    rrd: Path, png: Path, time_s: float | None = None, size: tuple[int, int] = (1920, 1080)
+) -> list[str]:
+    """Draws a recording as its viewer would show it, without a screen.
+
+    Needs a Vulkan driver; Debian's package `mesa-vulkan-drivers` has one that does without graphics hardware.
+
+    Args:
+        rrd: the recording.
+        png: picture to write.
+        time_s: simulated time of the cursor; None: where the recording opens.
+        size: width and height in pixels.
+
+    Returns:
+        What the views complained about; empty for a sound recording.
+
+    Raises:
+        ViewerError: no such recording, or no driver.
+    """
+    if not rrd.is_file():
+        raise ViewerError(f"no recording {rrd}")
+    from rerun.experimental import ViewerClient
+
+    port = _free_port()
+    command = [_executable(), "--headless", "--bind", LOCALHOST, "--port", str(port)]
+    command += ["--hide-welcome-screen", "--window-size", f"{size[0]}x{size[1]}"]
+    with (
+        tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch,
+        _viewer(command, Path(scratch)) as viewer,
+    ):
+        if not _answers(port, viewer):
+            raise ViewerError(NO_DRIVER)
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
+            client.open(str(rrd.resolve()))
+            if time_s is not None:
+                client.set_time(TIMELINE, duration=time_s, play_state="paused")
+            time.sleep(SETTLE_S)
+            client.save_screenshot(str(png.resolve()))
+            return [str(report) for view in client.get_state().views for report in view.reports]
+        except ConnectionError as error:
+            # Without a driver it listens for a moment before it gives up.
+            raise ViewerError(NO_DRIVER) from error
+
+
+def _executable() -> str:
+    """The viewer's own program; the wheel's `rerun` command only wraps it and would leave it behind."""
+    spec = find_spec("rerun_cli")
+    folder = Path(spec.origin).parent if spec is not None and spec.origin else Path()
+    for name in ("rerun", "Rerun.app/Contents/MacOS/Rerun", "rerun.exe"):
+        if (folder / name).is_file():
+            return str(folder / name)
+    raise ViewerError(
+        "the installed rerun-sdk has no viewer; install it with: pip install 'rerun-sdk>=0.41,<0.42'"
+    )
+
+
+@contextlib.contextmanager
+def _viewer(command: list[str], scratch: Path) -> Iterator[subprocess.Popen[str]]:
+    """Runs a viewer that is ended with the block; settings that allow no statistics lie in `scratch`."""
+    settings = scratch / "rerun" / "analytics.json"
+    settings.parent.mkdir()
+    settings.write_text(
+        json.dumps(
+            {
+                "analytics_enabled": False,
+                "analytics_id": "",
+                "metadata": {},
+                "config_file_path": str(settings),
+                "data_dir_path": str(scratch),
+            }
+        ),
+        encoding="utf-8",
+    )
+    environment = {**os.environ, "XDG_CONFIG_HOME": str(scratch), "RUST_LOG": "error"}
+    with (
+        (scratch / LOG).open("w+", encoding="utf-8") as log,
+        subprocess.Popen(
+            command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log, text=True
+        ) as viewer,
+    ):
+        try:
+            with _terminated_as_interrupted():
+                yield viewer
+        finally:
+            if viewer.poll() is None:
+                viewer.kill()
+
+
+@contextlib.contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """Lets SIGTERM end the block like Ctrl-C, so that no viewer is left behind."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((LOCALHOST, 0))
+        port: int = probe.getsockname()[1]
+        return port
+
+
+def _answers(port: int, viewer: subprocess.Popen[str]) -> bool:
+    """Whether a viewer comes to listen on a port."""
+    until = time.monotonic() + START_TIMEOUT_S
+    while time.monotonic() < until and viewer.poll() is None:
+        with contextlib.suppress(OSError), socket.create_connection((LOCALHOST, port), timeout=1.0):
+            return True
+        time.sleep(0.05)
+    return False

@@ -1,0 +1,167 @@
+"""A scenario's part of a report: its figures, written as files and kept for the page, its facts and its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from harness.analysis.planned import PlannedRows, planned_rows
+from harness.analysis.rows import Row, number, row_of
+from harness.run_files.given_path import GIVEN
+from harness.run_files.run_folder import Run
+from harness.scenario.scenario import Scenario, performance_of
+from harness.world.optimum import Optimum, shortest_path
+from harness.world.world import World
+
+if TYPE_CHECKING:
+    from harness.report.figures import DrawnRun, Scene
+    from harness.report.page import Chapter, Picture
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """One planner on one scenario and what came of it.
+
+    Attributes:
+        row: its figures.
+        run: what was flown; None if it crashed.
+        planned: the plans row by row of the track; None if it crashed.
+    """
+
+    row: Row
+    run: Run | None = None
+    planned: PlannedRows | None = None
+
+
+def entry(scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = False) -> Entry:
+    """A flight that came to an end.
+
+    Args:
+        scenario: what was flown.
+        run: the run folder, read back.
+        optimum: the scenario's.
+        kinematic: a point flew instead of the aircraft.
+    """
+    planned = planned_rows(run.track, run.plans)
+    row = row_of(
+        scenario.name,
+        GIVEN if "check" in run.metrics else scenario.planner.kind,
+        run.metrics,
+        optimum_m=optimum.length_m,
+        turn_radius_m=performance_of(scenario).turn_radius_m,
+        tightest_1pm=planned.tightest_1pm,
+        kinematic=kinematic,
+    )
+    return Entry(row, run, planned)
+
+
+def optimum_of(scenario: Scenario) -> Optimum:
+    """The shortest path of a point that knows the whole world and keeps the wanted clearance."""
+    world, mission = World.from_scenario(scenario), scenario.mission
+    return shortest_path(
+        world.obstacles, world.bounds_m, mission.start_m, mission.goal_m, scenario.planner.clearance_m
+    )
+
+
+def chapter(folder: Path, scenario: Scenario, entries: Sequence[Entry], optimum: Optimum) -> Chapter:
+    """Writes the figures of planners side by side; returns the scenario's part of the report.
+
+    Args:
+        folder: where the figures go.
+        scenario: with any of the planners.
+        entries: one a planner.
+        optimum: the scenario's.
+    """
+    from harness.report import figures
+    from harness.report.page import Chapter
+
+    scene = _scene(scenario, optimum)
+    numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn(each))]
+    pictures: list[Picture] = []
+    if numbered:
+        tracks = figures.overview(scene, numbered)
+        pictures.append(
+            _picture(folder / "map", tracks, f"{scene.name}: the tracks of all planners, from S to G.")
+        )
+        for place, drawn in numbered:
+            path = figures.planner_figure(scene, drawn, place)
+            pictures.append(
+                _picture(folder / f"path-{drawn.planner}", path, f"{drawn.planner} on {scene.name}, alone.")
+            )
+        pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
+    rows = [each.row for each in entries]
+    return Chapter(scene.name, _facts(scene, optimum), rows, pictures, optimum.reason)
+
+
+def run_chapter(scenario: Scenario, flight: Entry, optimum: Optimum) -> Chapter:
+    """Writes the figures of a single run into its folder; returns its part of the report."""
+    from harness.report import figures
+    from harness.report.page import Chapter
+
+    scene, drawn = _scene(scenario, optimum), _drawn(flight)
+    assert drawn is not None
+    assert flight.run is not None
+    folder = flight.run.folder
+    path = figures.planner_figure(scene, drawn, 0)
+    strips = figures.profiles(scene, [(0, drawn)])
+    turn = ", and its tightest planned turn" if drawn.planned.tightest is not None else ""
+    pictures = [
+        _picture(folder / "path", path, f"The track from S to G in {scene.name}{turn}."),
+        _picture(folder / "profiles", strips, PROFILES),
+    ]
+    return Chapter(scene.name, _facts(scene, optimum), [flight.row], pictures, optimum.reason)
+
+
+PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
+
+
+def _scene(scenario: Scenario, optimum: Optimum) -> Scene:
+    from harness.report.figures import Scene
+
+    mission = scenario.mission
+    return Scene(
+        name=scenario.name,
+        bounds_m=scenario.area.bounds_m,
+        obstacles=World.from_scenario(scenario).obstacles,
+        start_m=mission.start_m,
+        goal_m=mission.goal_m,
+        goal_radius_m=mission.goal_radius_m,
+        clearance_m=scenario.planner.clearance_m,
+        turn_radius_m=performance_of(scenario).turn_radius_m,
+        optimum_m=optimum.points_m,
+    )
+
+
+def _drawn(flight: Entry) -> DrawnRun | None:
+    from harness.report.figures import DrawnRun
+
+    if flight.run is None or flight.planned is None:
+        return None
+    return DrawnRun(flight.row.planner, flight.row.outcome, flight.run.track, flight.planned)
+
+
+def _picture(stem: Path, figure: Any, caption: str) -> Picture:
+    """Writes a figure as SVG and PNG."""
+    from harness.report.figure_style import png, svg
+    from harness.report.page import Picture
+
+    content = svg(figure)
+    stem.with_name(f"{stem.name}.svg").write_bytes(content)
+    stem.with_name(f"{stem.name}.png").write_bytes(png(figure))
+    return Picture(content, caption, caption)
+
+
+def _facts(scene: Scene, optimum: Optimum) -> dict[str, str]:
+    def km(value_m: float | None) -> str:
+        return f"{number(value_m, 1e-3)} km" if value_m is not None else "none"
+
+    (east, north), (goal_east, goal_north) = scene.start_m, scene.goal_m
+    return {
+        "straight line": km(((goal_east - east) ** 2 + (goal_north - north) ** 2) ** 0.5),
+        "clairvoyant optimum": km(optimum.length_m),
+        "obstacles": str(len(scene.obstacles)),
+        "wanted clearance": f"{number(scene.clearance_m)} m",
+        "turn radius R": f"{number(scene.turn_radius_m)} m",
+    }

@@ -1,0 +1,330 @@
+"""Figures of a comparison for papers and reports: the paper's Figures 2 and 3 from our own runs.
+
+Drawn without a screen. The same values give the same files: SVG carries no date and its ids no chance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from matplotlib import patches
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from harness.analysis.planned import PlannedRows
+from harness.analysis.smoothness import flown_lengths, flown_profile
+from harness.report.figure_style import DASHES, WIDTH_IN, colour, styled
+from harness.world.obstacle import Circle
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from harness.flight.record import FloatArray, Track
+    from harness.world.obstacle import Obstacle
+
+PLANNED_DASHES: Any = (0, (4, 2))
+SOLID: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}
+CHANGING = SOLID | {"ls": "--"}
+"""Obstacles that stand for the whole flight, and others where they are at first."""
+
+LEGEND_ROW_IN = 0.19
+CLOSE_UP_IN = 2.3
+TALLEST_MAP_IN = 6.0
+
+BEHIND_TEXT = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
+DRAWN_ROWS = 1500
+CLOSE_UP_RADII = 4.0
+SPARE = 1.35
+"""A curvature plot reaches this much further than the turn limit or, where that is more, the flown curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnRun:
+    """One planner's flight, ready to be drawn.
+
+    Attributes:
+        planner: its kind.
+        outcome: how it ended.
+        track: what was flown.
+        planned: the plans row by row.
+    """
+
+    planner: str
+    outcome: str
+    track: Track
+    planned: PlannedRows
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What all flights of a scenario have in common.
+
+    Attributes:
+        name: the scenario's.
+        bounds_m: xmin, ymin, xmax, ymax.
+        obstacles: the true ones.
+        start_m: (east, north).
+        goal_m: (east, north).
+        goal_radius_m: of the goal circle.
+        clearance_m: wanted.
+        turn_radius_m: smallest radius of the aircraft.
+        optimum_m: (k, 2) the clairvoyant shortest path; empty where there is none.
+    """
+
+    name: str
+    bounds_m: tuple[float, float, float, float]
+    obstacles: tuple[Obstacle, ...]
+    start_m: tuple[float, float]
+    goal_m: tuple[float, float]
+    goal_radius_m: float
+    clearance_m: float
+    turn_radius_m: float
+    optimum_m: FloatArray
+
+
+Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
+"""Flights with the numbers of their planners, which give their colours in every figure."""
+
+
+def overview(scene: Scene, runs: Numbered) -> Figure:
+    """The map with the tracks of all planners."""
+    keys = _keys(scene, [run for _, run in runs])
+    with styled(_map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(keys)) / 2)) as figure:
+        axes = figure.add_subplot()
+        legend = _map(axes, scene)
+        for index, run in runs:
+            legend.append(_flown(axes, scene, run, index, DASHES[index % len(DASHES)]))
+        axes.set_title(scene.name)
+        figure.legend(handles=legend + keys, loc="outside lower center", ncols=2, frameon=False)
+    return figure
+
+
+def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
+    """One planner's path as in the paper's Figures 2 and 3, and the place where its plan bends most.
+
+    Args:
+        scene: the scenario.
+        run: the flight.
+        index: number of the planner, for its colour.
+    """
+    row = run.planned.tightest
+    below_in = [] if row is None else [CLOSE_UP_IN]
+    map_in, keys = _map_height_in(scene), _keys(scene, [run])
+    with styled(map_in + sum(below_in) + LEGEND_ROW_IN * math.ceil((4 + len(keys)) / 2)) as figure:
+        rows = figure.add_gridspec(1 + len(below_in), 2, height_ratios=[map_in, *below_in])
+        axes = figure.add_subplot(rows[0, :])
+        legend = _map(axes, scene)
+        legend.append(_flown(axes, scene, run, index))
+        axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
+        if row is not None:
+            planned = Line2D([], [], color="black", lw=0.9, ls=PLANNED_DASHES, label="planned (below)")
+            legend.append(planned)
+            close_up, curvature = figure.add_subplot(rows[1, 0]), figure.add_subplot(rows[1, 1])
+            _close_up(close_up, scene, run, index, row)
+            _curvature_near(curvature, scene, run, index, row)
+        figure.legend(handles=legend + keys, loc="outside lower center", ncols=2, frameon=False)
+    return figure
+
+
+def profiles(scene: Scene, runs: Numbered) -> Figure:
+    """Curvature and cross-track error along the way, two strips a planner."""
+    with styled(0.9 + 2.1 * len(runs)) as figure:
+        strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
+        for place, (index, run) in enumerate(runs):
+            bend, cross = strips[2 * place], strips[2 * place + 1]
+            distance = _distance_m(run.track) / 1e3
+            planned = run.planned.curvature_1pm * scene.turn_radius_m
+            flown = _flown_curvature(run.track) * scene.turn_radius_m
+            most = float(np.nanmax(np.abs(planned), initial=0.0))
+            bend.plot(*_extremes(distance, planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
+            bend.plot(*_extremes(distance, flown), color=colour(index), lw=0.9, label="flown")
+            _limits(bend, flown)
+            bend.set_ylabel("curvature · R")
+            bend.set_title(run.planner, loc="left", color=colour(index))
+            bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
+            cross.axhline(0.0, color="0.8", lw=0.6)
+            cross.plot(*_extremes(distance, run.track.cross_track_m), color=colour(index), lw=0.9)
+            cross.set_ylabel("cross-\ntrack, m")
+        strips[-1].set_xlabel("distance flown, km")
+        figure.align_ylabels()
+    return figure
+
+
+def _map_height_in(scene: Scene) -> float:
+    """What a map as wide as a figure needs, title and axis labels included."""
+    xmin, ymin, xmax, ymax = scene.bounds_m
+    return 0.8 + min((WIDTH_IN - 0.6) * (ymax - ymin) / (xmax - xmin), TALLEST_MAP_IN)
+
+
+def _map(axes: Axes, scene: Scene) -> list[Any]:
+    """Obstacles, area, start, goal, straight line and optimum; returns what the legend begins with."""
+    xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
+    for obstacle in scene.obstacles:
+        for grown, style in (
+            (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.5, "ls": ":"}),
+            (0.0, SOLID if obstacle.stands_for_ever else CHANGING),
+        ):
+            axes.add_patch(_outline(obstacle, grown, **style))
+    (east, north), (goal_east, goal_north) = np.array(scene.start_m) / 1e3, np.array(scene.goal_m) / 1e3
+    straight = axes.plot(
+        [east, goal_east], [north, goal_north], color="0.3", lw=0.7, ls="--", label="straight line"
+    )
+    legend: list[Any] = [*straight]
+    if len(scene.optimum_m):
+        legend += axes.plot(
+            *scene.optimum_m.T / 1e3, color="black", lw=0.9, ls=":", label="clairvoyant optimum", zorder=4
+        )
+    axes.add_patch(patches.Circle((goal_east, goal_north), scene.goal_radius_m / 1e3, fill=False, lw=0.8))
+    for place, name in (((east, north), "S"), ((goal_east, goal_north), "G")):
+        axes.plot(*place, "o", color="black", ms=3.5, zorder=6)
+        low = place[1] < ymin + 0.9 * (ymax - ymin)
+        axes.annotate(
+            name, place, (0, 6 if low else -6), textcoords="offset points", ha="center",
+            va="bottom" if low else "top", weight="bold", zorder=7,
+        )  # fmt: skip
+    axes.set(xlim=(xmin, xmax), ylim=(ymin, ymax), aspect="equal", xlabel="east, km", ylabel="north, km")
+    return legend
+
+
+def _outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
+    """An obstacle, moving ones where they appear, grown by a distance."""
+    shape = obstacle.shape
+    if isinstance(shape, Circle):
+        return patches.Circle(
+            (shape.center_m[0] / 1e3, shape.center_m[1] / 1e3), (shape.radius_m + grown_m) / 1e3, **style
+        )
+    vertices = np.array(shape.vertices_m)
+    if grown_m > 0:
+        import shapely
+
+        vertices = np.array(shapely.Polygon(vertices).buffer(grown_m).exterior.coords)
+    return patches.Polygon(vertices / 1e3, **style)
+
+
+def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
+    """Draws a track and the place of its tightest planned turn; the first planner's lies on top."""
+    points = _thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
+    style: dict[str, Any] = {"color": colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
+    (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
+    if run.outcome != "reached":
+        axes.plot(*points[-1] / 1e3, "X", color=colour(index), ms=7, mec="white", mew=0.6, zorder=7)
+    row = run.planned.tightest
+    if row is not None:
+        place = run.planned.east_m[row] / 1e3, run.planned.north_m[row] / 1e3
+        axes.plot(*place, "o", mfc="none", mec=colour(index), mew=1.2, ms=9, zorder=8)
+    return line
+
+
+def _keys(scene: Scene, runs: Sequence[DrawnRun]) -> list[Any]:
+    """What the legend says of marks that are there for some flights only."""
+    keys: list[Any] = []
+    if not all(obstacle.stands_for_ever for obstacle in scene.obstacles):
+        keys.append(patches.Patch(**CHANGING, label="moves, or stands for a time"))
+    if any(run.outcome != "reached" for run in runs):
+        keys.append(
+            Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
+        )
+    if any(run.planned.tightest is not None for run in runs):
+        ring: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 8}
+        keys.append(Line2D([], [], ls="", label="tightest planned turn", **ring))
+    return keys
+
+
+def _thinned(points: FloatArray, scene: Scene) -> FloatArray:
+    """A track without the points that no one could see on the map."""
+    import shapely
+
+    xmin, ymin, xmax, ymax = scene.bounds_m
+    drawn: FloatArray = np.array(
+        shapely.LineString(points).simplify(max(xmax - xmin, ymax - ymin) / 5000).coords
+    )
+    return drawn
+
+
+def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> None:
+    """Planned and flown path round the tightest planned turn."""
+    half = CLOSE_UP_RADII * scene.turn_radius_m
+    middle = np.array((run.planned.east_m[row], run.planned.north_m[row]))
+    for obstacle in scene.obstacles:
+        for grown, style in (
+            (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.6, "ls": ":"}),
+            (0.0, SOLID),
+        ):
+            axes.add_patch(_outline(obstacle, grown, **style))
+    planned = np.column_stack((run.planned.east_m, run.planned.north_m))
+    flown = np.column_stack((run.track.east_m, run.track.north_m))
+    for points, ink, width, dashes in (
+        (flown, colour(index), 1.8, "-"),
+        (planned, "black", 0.9, PLANNED_DASHES),
+    ):
+        near = (np.abs(points - middle) < 2 * half).all(axis=1)
+        axes.plot(*np.where(near[:, None], points, np.nan).T / 1e3, color=ink, lw=width, ls=dashes)
+    (east, north), half_km = middle / 1e3, half / 1e3
+    axes.set(xlim=(east - half_km, east + half_km), ylim=(north - half_km, north + half_km), aspect="equal")
+    axes.set_xticks([])
+    axes.set_yticks([])
+    bar_m = _round_length_m(half)
+    left, low = east - 0.9 * half_km, north - 0.88 * half_km
+    axes.plot([left, left + bar_m / 1e3], [low, low], color="black", lw=2, solid_capstyle="butt")
+    text = axes.annotate(f"{bar_m:g} m", (left, low), (0, 4), textcoords="offset points", fontsize=8)
+    text.set_bbox(BEHIND_TEXT)
+    axes.set_title("its tightest planned turn")
+
+
+def _curvature_near(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> None:
+    """Planned and flown curvature a few turn radii before and behind a row."""
+    distance = _distance_m(run.track)
+    near = np.abs(distance - distance[row]) < 2 * CLOSE_UP_RADII * scene.turn_radius_m
+    along = distance[near] - distance[row]
+    flown = (_flown_curvature(run.track) * scene.turn_radius_m)[near]
+    planned = (run.planned.curvature_1pm * scene.turn_radius_m)[near]
+    axes.plot(along, flown, color=colour(index), lw=1.5)
+    axes.plot(along, planned, color="black", lw=0.9, ls=PLANNED_DASHES)
+    _limits(axes, flown)
+    most = float(np.nanmax(np.abs(planned), initial=0.0))
+    text = axes.annotate(f"planned up to {most:.3g}", (0.03, 0.04), xycoords="axes fraction", fontsize=8)
+    text.set_bbox(BEHIND_TEXT)
+    axes.set_xlabel("along the path, m")
+    axes.set_title("curvature · turn radius")
+
+
+def _limits(axes: Axes, flown: FloatArray) -> None:
+    """The aircraft's turn limit, and a scale on which the flown curve can be read; corners may leave it."""
+    for limit in (-1.0, 1.0):
+        axes.axhline(limit, color="0.35", lw=0.7, ls="--")
+    axes.axhline(0.0, color="0.8", lw=0.6)
+    reach = SPARE * max(1.0, float(np.abs(flown).max(initial=0.0)))
+    axes.set_ylim(-reach, reach)
+
+
+def _distance_m(track: Track) -> FloatArray:
+    """(n,) distance flown up to each row."""
+    return np.append(0.0, np.cumsum(flown_lengths(track)))
+
+
+def _flown_curvature(track: Track) -> FloatArray:
+    """(n,) curvature flown from each row to the next."""
+    pieces = flown_profile(track).curvature_1pm
+    return np.append(pieces, pieces[-1:]) if len(pieces) else np.zeros(len(track))
+
+
+def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A curve thinned to its least and greatest value in each of many bins, so that no peak is lost."""
+    kept = np.isfinite(y)
+    x, y = x[kept], y[kept]
+    if len(x) <= DRAWN_ROWS:
+        return x, y
+    bins = np.array_split(np.arange(len(x)), DRAWN_ROWS // 2)
+    chosen = np.unique([part[pick] for part in bins for pick in (y[part].argmin(), y[part].argmax())])
+    return x[chosen], y[chosen]
+
+
+def _round_length_m(half_m: float) -> float:
+    """A round length of about a third of a picture."""
+    third = 2 * half_m / 3
+    size = 10.0 ** np.floor(np.log10(third))
+    return float(max(step * size for step in (1, 2, 5) if step * size <= third))

@@ -1,0 +1,127 @@
+"""Reports, of a comparison and of a single run: one HTML file that needs nothing but itself."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import jinja2
+
+from harness.analysis.rows import DASH, FIGURES, Row
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure in the report.
+
+    Attributes:
+        svg: the file's content.
+        alt: what it shows, for those who cannot see it.
+        caption: a sentence below it.
+    """
+
+    svg: bytes
+    alt: str
+    caption: str
+
+    @property
+    def uri(self) -> str:
+        """The figure as a data URI; as an image of its own, its ids cannot meet those of another."""
+        return "data:image/svg+xml;base64," + base64.b64encode(self.svg).decode("ascii")
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """One scenario.
+
+    Attributes:
+        name: the scenario's.
+        facts: what was asked, name and value.
+        rows: one a planner.
+        pictures: in order.
+        note: a sentence where something is missing, else empty.
+    """
+
+    name: str
+    facts: Mapping[str, str]
+    rows: Sequence[Row]
+    pictures: Sequence[Picture]
+    note: str = ""
+
+
+def report_html(
+    chapters: Sequence[Chapter], command: str, versions: Mapping[str, str], written: str, kinematic: bool
+) -> str:
+    """The text of `report.html`.
+
+    Args:
+        chapters: the scenarios in order.
+        command: the command line that made the comparison.
+        versions: what it was made with, by name.
+        written: date and time.
+        kinematic: a point flew instead of the aircraft.
+    """
+    return rendered(
+        "comparison.html",
+        chapters=chapters,
+        command=command,
+        versions=versions,
+        written=written,
+        kinematic=kinematic,
+    )
+
+
+def run_html(
+    chapter: Chapter,
+    legs: Sequence[Mapping[str, Any]],
+    corners: Sequence[Mapping[str, Any]] | None,
+    *,
+    aircraft: str,
+    scenario_yaml: str,
+    command: str,
+    versions: Mapping[str, str],
+    platform: str,
+    written: str,
+) -> str:
+    """The text of a single run's `report.html`.
+
+    Args:
+        chapter: with one row, and the figures of the path and of its profiles.
+        legs: `trackability` of `metrics.json`.
+        corners: of a path that was given, `check.corners` in there; None where a planner made the path.
+        aircraft: its name.
+        scenario_yaml: the scenario as flown.
+        command: the command line that flew it.
+        versions: what flew, by name.
+        platform: what it flew on.
+        written: date and time of the flight.
+    """
+    return rendered(
+        "run.html",
+        chapter=chapter,
+        row=chapter.rows[0],
+        legs=legs,
+        lost=[leg for leg in legs if not leg["trackable"]],
+        corners=corners,
+        aircraft=aircraft,
+        scenario_yaml=scenario_yaml,
+        command=command,
+        versions=versions,
+        platform=platform,
+        written=written,
+    )
+
+
+def rendered(template: str, **values: Any) -> str:
+    """A page from one of our templates, with values by the names that it uses."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("harness.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    shown = [figure for figure in FIGURES if figure.short != "digest"]
+    return environment.get_template(template).render(figures=shown, dash=DASH, **values)

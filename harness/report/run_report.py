@@ -1,0 +1,62 @@
+"""The report of a single run, written into its folder: page, figures as SVG and PNG, table as CSV and Markdown."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+
+from harness.analysis.rows import to_csv, to_markdown
+from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
+from harness.files.whole_file import replace_text
+from harness.report.chapters import entry, optimum_of, run_chapter
+from harness.report.page import run_html
+from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
+from harness.scenario.scenario import parse_scenario
+
+
+def write_report(folder: Path) -> Path:
+    """Writes the report of a complete run and returns the path of its page.
+
+    Raises:
+        InputError: the scenario in the folder is none.
+        RunFolderError: the folder holds no complete run, or cannot be written.
+    """
+    run = load_run(folder)
+    try:
+        return _written(run, folder)
+    except InputError:
+        raise
+    except OSError as error:
+        raise RunFolderError(f"cannot write the report in {folder}: {error.strerror or error}") from error
+    except WRONG_CONTENT as error:
+        raise damaged(folder, error) from error
+
+
+def _written(run: Run, folder: Path) -> Path:
+    scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO))
+    optimum = optimum_of(scenario)
+    flight = entry(scenario, run, optimum)
+    page, manifest = folder / REPORT, run.manifest
+    line, *_ = manifest["command"]
+    if not isinstance(line, str):
+        raise TypeError(f"command: must be text; got {type(line).__name__}")
+    _, *arguments = shlex.split(line)
+    command = shlex.join(["wayproof", *arguments])
+    versions = {name: version for name, version in manifest["versions"].items() if version}
+    text = run_html(
+        run_chapter(scenario, flight, optimum),
+        run.metrics["trackability"],
+        run.metrics["check"]["corners"] if "check" in run.metrics else None,
+        aircraft=Path(scenario.aircraft.model).name,
+        scenario_yaml=run.scenario_yaml,
+        command=command,
+        versions=versions,
+        platform=manifest["platform"]["system"],
+        written=manifest["started_utc"],
+    )
+    page.with_suffix(".csv").write_text(to_csv([flight.row]), encoding="utf-8")
+    repeat = f"## How to repeat it\n\n    {command}\n\nDigest of the track: `{flight.row.digest}`\n"
+    page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
+    replace_text(page, text)
+    return page

@@ -1,0 +1,1 @@
+"""From a scenario to a flight, and from a flight to a run folder."""

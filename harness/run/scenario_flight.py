@@ -1,0 +1,238 @@
+"""From a scenario to a flight, and from a flight to a run folder."""
+
+from __future__ import annotations
+
+import math
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from aircraft.airframes import airframe
+from aircraft.frames import LocalPlane
+from aircraft.guidance import PathFollower
+from aircraft.guidance_law import GRAVITY_MPS2
+from aircraft.interface import FlightModel
+from aircraft.kinematic_point import KinematicPoint
+from aircraft.start import Atmosphere, Gust, StartConditions
+from harness.analysis.metrics import metrics
+from harness.analysis.trackability import FlightLimits
+from harness.files.errors import WriteError
+from harness.flight.closed_loop import Loop, Observer, Progress, fly
+from harness.flight.record import Flight
+from harness.mapping.sensed_map import SensedMap
+from harness.run.compiled_guidance import path_follower
+from harness.run_files.run_folder import RunFolder
+from harness.scenario.planner_keys import planner_of
+from harness.scenario.scenario import Scenario, dump_scenario, mission_of, performance_of
+from harness.scenario.sections import Environment
+from harness.world.range_sensor import RangeSensor
+from harness.world.world import World
+
+SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
+"""Numbers of the random streams that derive from the scenario's seed."""
+
+
+Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
+
+
+def make_loop(
+    scenario: Scenario, make_model: Callable[[StartConditions, Atmosphere], FlightModel] | None = None
+) -> Loop:
+    """All parts of a scenario's flight.
+
+    Args:
+        scenario: a complete scenario.
+        make_model: makes the flight model; default: the scenario's JSBSim aircraft.
+
+    Raises:
+        AircraftError: the aircraft cannot be loaded or trimmed.
+    """
+    # From here on all is compiled.
+    follower = path_follower(airframe(scenario.aircraft.model).guidance_limits)
+    mission = mission_of(scenario)
+    world = World.from_scenario(scenario)
+    start, air = start_conditions(scenario), atmosphere(scenario)
+    return Loop(
+        world=world,
+        sensor=RangeSensor(world, scenario.sensor, _stream(scenario.seed, SENSOR_STREAM)),
+        seen=SensedMap(
+            mission.bounds_m,
+            mission.clearance_m,
+            mission.sensor_range_m,
+            noise_m=scenario.sensor.range_noise_m,
+            false_returns=scenario.sensor.false_return > 0.0,
+        ),
+        planner=planner_of(scenario.planner, mission),
+        model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
+        follower=follower,
+        mission=mission,
+        altitude_m=scenario.mission.altitude_m,
+        time_limit_s=_given(scenario.mission.time_limit_s),
+        scan_rate_hz=scenario.sensor.rate_hz,
+    )
+
+
+def kinematic_loop(scenario: Scenario) -> Loop:
+    """The same loop with a point that flies every path exactly in place of aircraft and guidance."""
+    loop = make_loop(scenario, KinematicPoint)
+    return replace(loop, follower=cast(PathFollower, loop.model))
+
+
+def start_conditions(scenario: Scenario) -> StartConditions:
+    """Where and how a scenario's flight begins."""
+    east, north = scenario.mission.start_m
+    course = math.radians(_given(scenario.mission.course_deg))
+    return StartConditions(
+        east, north, scenario.mission.altitude_m, course, _given(scenario.aircraft.airspeed_mps)
+    )
+
+
+def atmosphere(scenario: Scenario) -> Atmosphere:
+    """The air of a scenario."""
+    air = scenario.environment
+    east, north = _towards(air.wind.speed_mps, air.wind.from_deg) if air.wind else (0.0, 0.0)
+    turbulence, front = air.turbulence, air.gust
+    return Atmosphere(
+        wind_east_mps=east,
+        wind_north_mps=north,
+        turbulence=turbulence.model if turbulence else None,
+        intensity=turbulence.intensity if turbulence else None,
+        seed=int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF,
+        gust=Gust(
+            front.shape,
+            *_towards(front.speed_mps, front.from_deg),
+            front.start_s,
+            math.inf if front.duration_s is None else front.duration_s,
+        )
+        if front
+        else None,
+    )
+
+
+def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
+    """East and north of a wind that blows from a direction."""
+    blows = math.radians(from_deg) + math.pi
+    return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
+
+
+def jsbsim_aircraft(scenario: Scenario, start: StartConditions, air: Atmosphere) -> FlightModel:
+    """The scenario's aircraft, trimmed and in the air."""
+    from aircraft.jsbsim_model import JsbsimModel
+
+    origin = scenario.area.origin
+    plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
+    return JsbsimModel(scenario.aircraft.model, start, plane, air)
+
+
+def flight_limits(scenario: Scenario) -> FlightLimits:
+    """What a scenario's flight is measured against."""
+    performance, limits = performance_of(scenario), scenario.trackability
+    calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
+    guidance = airframe(scenario.aircraft.model).guidance_limits
+    speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
+    wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
+    sensor = scenario.sensor
+    blind_s = scenario.planner.compute_latency_s + sensor.latency_s + 1.0 / sensor.rate_hz
+    return FlightLimits(
+        altitude_m=scenario.mission.altitude_m,
+        clearance_m=clearance,
+        bank_limit_rad=guidance.bank_limit_rad,
+        turn_radius_m=performance.turn_radius_m,
+        tracking_error_m=performance.tracking_error_m,
+        airspeed_mps=speed,
+        calm_radius_m=calm.turn_radius_m,
+        tightest_radius_m=speed * speed / (GRAVITY_MPS2 * math.tan(guidance.bank_limit_rad)),
+        roll_rate_radps=guidance.roll_rate_radps,
+        sensor_range_m=_given(sensor.range_m),
+        horizon_m=performance.turn_radius_m + clearance + (speed + wind) * (blind_s + performance.roll_in_s),
+        max_cross_track_m=_given(limits.cross_track_m),
+        max_altitude_error_m=_given(limits.altitude_m),
+        max_airspeed_error_mps=_given(limits.airspeed_mps),
+        max_load_factor=_given(limits.load_factor),
+    )
+
+
+def fly_to_folder(
+    scenario: Scenario,
+    out: Path,
+    recording: bool,
+    progress: Progress | None = None,
+    *,
+    make: Callable[[Scenario], Loop] = make_loop,
+    watching: Sequence[Observer] = (),
+    pilot: str | None = None,
+    flown_by: Fly = fly,
+    measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
+) -> dict[str, Any]:
+    """Flies a scenario into a run folder and returns the content of its `metrics.json`.
+
+    Args:
+        scenario: a complete scenario.
+        out: the run folder, made or written anew.
+        recording: whether to write `flight.rrd`.
+        progress: told of the flight as it goes on.
+        make: makes the parts of the flight.
+        watching: look on besides those that write the folder.
+        pilot: stands in the recording's name; default: the planner's kind.
+        flown_by: flies the parts to an end.
+        measured_by: gives the content of `metrics.json`.
+
+    Raises:
+        AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
+        RunFolderError: the folder holds something else or cannot be written.
+        WriteError: it could not be written to the end, a full disk perhaps.
+    """
+    loop = make(scenario)
+    text = dump_scenario(scenario)
+    try:
+        with ExitStack() as stack:
+            folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
+            observers = [*watching]
+            log = (
+                _recording(scenario, text, loop, folder, pilot or scenario.planner.kind)
+                if recording
+                else None
+            )
+            if log is not None:
+                stack.callback(log.end)
+                observers.append(log)
+            flight = flown_by(loop, observers, progress)
+            figures = measured_by(flight, flight_limits(scenario))
+            if log is not None:
+                log.close(figures)
+            folder.finish(flight.track, flight.plans, figures)
+    except OSError as error:
+        raise WriteError.of("the run", out, error) from error
+    return figures
+
+
+def _recording(scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pilot: str) -> Any:
+    from harness.recording.blueprint import Scene
+    from harness.recording.log import RerunLog
+
+    title = f"{scenario.name}, {pilot}, {scenario.aircraft.model}, seed {scenario.seed}"
+    scene = Scene(
+        title,
+        loop.mission,
+        scenario.mission.start_m,
+        flight_limits(scenario),
+        tuple(loop.world.obstacles),
+        text,
+    )
+    return RerunLog(folder.recording_path, scene, title, moving=lambda: loop.seen.moving)
+
+
+def _stream(seed: int, number: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=(number,))
+
+
+def _given(value: float | None) -> float:
+    """A key that a complete scenario always has."""
+    assert value is not None
+    return value

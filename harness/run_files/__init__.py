@@ -1,0 +1,1 @@
+"""The run folder, and paths in and out of other tools' files."""

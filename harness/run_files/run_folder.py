@@ -1,0 +1,265 @@
+"""The folder of one run: complete only when the manifest says so.
+
+The order of writing carries the meaning. The manifest comes first and says `complete: false`; every other
+file is written under a temporary name and renamed when it is whole; the manifest that says `complete: true`
+replaces the first one last of all, with checksums of tables and recording. A process killed at any point leaves
+a folder that cannot be taken for a complete run, and one that was damaged afterwards is found out. One process
+at a time writes to a folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final
+
+from harness.files.errors import RunFolderError
+from harness.files.folder_lock import FolderLock
+from harness.files.input_file import MAX_JSON_BYTES, read_index, read_text
+from harness.files.versions import FLOWN_WITH, versions
+from harness.files.whole_file import PARTIAL, replace_text
+from harness.flight.record import TRACK_FIELDS, AcceptedPlan, Track
+from harness.run_files.plans_table import PlanRow, plan_rows, plans_table
+
+SCENARIO = "scenario.yaml"
+MANIFEST = "manifest.json"
+TRACK = "track.parquet"
+PLANS = "plans.parquet"
+METRICS = "metrics.json"
+RECORDING = "flight.rrd"
+REPORT = "report.html"
+REPORT_FILES = tuple(
+    f"{stem}.{kind}"
+    for stem, kinds in {
+        "report": ("html", "csv", "md"),
+        "path": ("svg", "png"),
+        "profiles": ("svg", "png"),
+    }.items()
+    for kind in kinds
+)
+"""What `wayproof report` adds to a run folder."""
+MAX_BYTES = 64_000_000
+"""Of a scenario and of a JSON file in the folder."""
+
+SCHEMA = "wayproof/run/1"
+DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
+COMPRESSION = "lz4"
+SPLIT = [name for name in TRACK_FIELDS if name != "plan_index"]
+"""Columns whose bytes are written first bytes first: half the size and half the time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A complete run, read back.
+
+    Attributes:
+        folder: where it lies.
+        scenario_yaml: the scenario as flown, YAML text.
+        manifest: versions, platform, command, start time.
+        track: the flown track.
+        plans: the accepted plans, in order.
+        metrics: the content of `metrics.json`.
+    """
+
+    folder: Path
+    scenario_yaml: str
+    manifest: Mapping[str, Any]
+    track: Track
+    plans: tuple[PlanRow, ...]
+    metrics: Mapping[str, Any]
+
+
+class RunFolder:
+    """A run folder being written. Use as a context manager; `finish` makes it complete.
+
+    Left without `finish` (an error, Ctrl-C), the folder stays marked incomplete.
+    """
+
+    def __init__(self, path: Path, manifest: dict[str, Any], lock: FolderLock) -> None:
+        self.path = path
+        self._manifest = manifest
+        self._lock = lock
+
+    @classmethod
+    def create(cls, path: Path, scenario_yaml: str, command: Sequence[str]) -> RunFolder:
+        """Makes the folder, marked incomplete, with scenario and manifest; removes a former run's files.
+
+        Args:
+            path: the folder; made with its parents where missing.
+            scenario_yaml: the scenario as flown, all defaults filled in.
+            command: command line, for the manifest.
+
+        Raises:
+            RunFolderError: the path is a file, a folder with other things in it or that another process is
+                writing to, or cannot be written.
+        """
+        manifest = {
+            "schema": SCHEMA,
+            "complete": False,
+            "command": list(command),
+            "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            "versions": versions(DISTRIBUTIONS),
+            "platform": {
+                "system": platform.platform(),
+                "machine": platform.machine(),
+                "byte_order": sys.byteorder,
+                "cpus": os.cpu_count(),
+            },
+        }
+        try:
+            lock = _claim(path)
+            replace_text(path / MANIFEST, _json(manifest))
+            for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, *REPORT_FILES):
+                (path / name).unlink(missing_ok=True)
+                (path / (name + PARTIAL)).unlink(missing_ok=True)
+            replace_text(path / SCENARIO, scenario_yaml)
+        except OSError as error:
+            raise RunFolderError(f"cannot write the run folder {path}: {error.strerror or error}") from error
+        return cls(path, manifest, lock)
+
+    @property
+    def recording_path(self) -> Path:
+        """Where the recording belongs."""
+        return self.path / RECORDING
+
+    def finish(self, track: Track, plans: Sequence[AcceptedPlan], metrics: Mapping[str, Any]) -> None:
+        """Writes track, plans and metrics, then marks the run complete.
+
+        Call it last: after the recording is closed.
+
+        Raises:
+            RunFolderError: the track has no rows.
+            ValueError: a metric is not finite (JSON has no such number).
+        """
+        if not len(track):
+            raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        text = _json(metrics)
+        # At once: whatever is written while flying costs the flight its place in the caches.
+        rows = pa.table({name: getattr(track, name) for name in TRACK_FIELDS})
+        split = {"use_dictionary": False, "use_byte_stream_split": SPLIT}
+        for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
+            pq.write_table(table, self.path / (name + PARTIAL), compression=COMPRESSION, **how)
+            os.replace(self.path / (name + PARTIAL), self.path / name)
+        replace_text(self.path / METRICS, text)
+        tables = (TRACK, PLANS, RECORDING)
+        sums = {name: _sha256(self.path / name) for name in tables if (self.path / name).exists()}
+        replace_text(self.path / MANIFEST, _json({**self._manifest, "complete": True, "sha256": sums}))
+
+    def __enter__(self) -> RunFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._lock.release()
+
+
+def load_run(path: Path) -> Run:
+    """Reads a complete run back.
+
+    Raises:
+        RunFolderError: `path` is not a run folder, its run is incomplete, or a file of it is missing or
+            damaged.
+    """
+    manifest = read_index(path / MANIFEST, SCHEMA)
+    if manifest is None:
+        raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
+    if manifest.get("complete") is not True:
+        raise RunFolderError(f"the run in {path} is incomplete: it was stopped before its end; fly it again")
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        for name in (TRACK, PLANS):
+            _check(path / name, manifest)
+        table = pq.read_table(path / TRACK, columns=list(TRACK_FIELDS))
+        return Run(
+            folder=path,
+            scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),
+            manifest=manifest,
+            track=Track(**{name: table[name].to_numpy() for name in TRACK_FIELDS}),
+            plans=plan_rows(pq.read_table(path / PLANS)),
+            metrics=json.loads(read_text(path / METRICS, MAX_JSON_BYTES, "metrics, in JSON")),
+        )
+    except (OSError, pa.ArrowException, *WRONG_CONTENT) as error:
+        raise damaged(path, error) from error
+
+
+WRONG_CONTENT: Final = (
+    RecursionError,
+    AttributeError,
+    LookupError,
+    TypeError,
+    ValueError,
+    ArithmeticError,
+    MemoryError,
+)
+"""What reading values raises that are not what they should be."""
+
+
+def damaged(path: Path, error: BaseException) -> RunFolderError:
+    """Says that a run folder's content is not that of a run."""
+    text = " ".join(str(error).split())[:200]
+    reason = text if isinstance(error, OSError | ValueError) else f"{type(error).__name__} {text}"
+    return RunFolderError(f"the run in {path} is damaged: {reason}; fly it again")
+
+
+def recording_of(path: Path) -> Path:
+    """The recording in a run folder, whose run may be incomplete.
+
+    Raises:
+        RunFolderError: there is none, or it is not the one that the run wrote.
+    """
+    recording = path / RECORDING
+    if not recording.is_file():
+        raise RunFolderError(f"{path} has no {RECORDING}: not a run folder, or flown with --no-recording")
+    try:
+        _check(recording, read_index(path / MANIFEST, SCHEMA) or {})
+    except (OSError, *WRONG_CONTENT) as error:
+        raise damaged(path, error) from error
+    return recording
+
+
+def _check(path: Path, manifest: Mapping[str, Any]) -> None:
+    """Raises ValueError if a file is not the one that the manifest knows, if it knows one."""
+    if not path.is_file():
+        raise ValueError(f"{path.name} is missing or not a file")
+    if manifest.get("sha256", {}).get(path.name) not in (None, _sha256(path)):
+        raise ValueError(f"{path.name} is not what was written")
+
+
+def _claim(path: Path) -> FolderLock:
+    """Makes `path` a folder that this process alone may write to, or raises RunFolderError."""
+    if not str(path).isprintable():  # the libraries that write tables take names in UTF-8 only
+        raise RunFolderError(f"cannot write the run folder {str(path)!r}: its name must be printable")
+    if path.exists() and not path.is_dir():
+        raise RunFolderError(f"{path} is a file, not a folder for a run")
+    path.mkdir(parents=True, exist_ok=True)
+    lock = FolderLock(path)
+    others = {entry.name for entry in path.iterdir()} - {MANIFEST + PARTIAL}
+    if others and read_index(path / MANIFEST, SCHEMA) is None:
+        lock.release()
+        raise RunFolderError(
+            f"{path} is not empty and not a run folder: choose another folder or empty it first"
+        )
+    return lock
+
+
+def _json(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,307 @@
+"""Scenario files: the type that is the file format, reading and writing it, and what a planner is told of it.
+
+A loaded scenario is complete: defaults that depend on other keys are filled in, and keys that contradict each
+other have been refused.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+from pydantic import FailFast, Strict, ValidationError, ValidationInfo, model_validator
+
+from harness.files import strict_yaml
+from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node
+from harness.files.yaml_pieces import dump_in_pieces
+from harness.scenario import planner_keys
+from harness.scenario.checks import check_start_and_goal
+from harness.scenario.obstacles import Obstacle
+from harness.scenario.sections import (
+    AircraftSpec,
+    Area,
+    Environment,
+    MissionSpec,
+    PlannerSpec,
+    Section,
+    Sensor,
+    TrackabilitySpec,
+    key,
+)
+from harness.scenario.validation import KeyFault, input_error
+
+if TYPE_CHECKING:
+    from aircraft.interface import Performance
+    from planner.interface import Mission
+
+LEAST_CLEARANCE: Final = 0.02
+"""Share of the turn radius that planners keep from obstacles at the least, where less is wanted."""
+MAX_WIND_FRACTION: Final = 0.9
+"""Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
+
+POUND_KG: Final = 0.45359237
+
+
+class Scenario(Section):
+    """One flight, completely described; flying it twice gives the same track bit for bit.
+
+    Attributes equal the keys of the file, except `schema_`, which is `schema` there.
+    """
+
+    schema_: Literal["wayproof/scenario/1"] = key("Format and version.", alias="schema")
+    name: str = key("Names the run folder.", pattern=r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$", max_length=100)
+    seed: int = key("Root seed; every random stream derives from it.", unit="1", default=1, ge=0, le=2**53)
+    area: Area = key("The area of operations.")
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(
+        "Unknown to the planner until sensed.", default=()
+    )
+    mission: MissionSpec = key("From where to where.")
+    aircraft: AircraftSpec = key("What flies.", default_factory=AircraftSpec)
+    sensor: Sensor = key("What it senses with.", default_factory=Sensor)
+    planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
+    environment: Environment = key("The air.", default_factory=Environment)
+    trackability: TrackabilitySpec = key(
+        "What a leg may be off before it counts as not trackable.", default_factory=TrackabilitySpec
+    )
+
+    @model_validator(mode="after")
+    def _complete(self, info: ValidationInfo) -> Scenario:
+        """Fills in derived defaults, each after those it depends on, and checks across sections."""
+        found = model_or_folder(self.aircraft.model, (info.context or {}).get("folder"))
+        object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))
+        self._set("aircraft", airspeed_mps=_cruise_mps(self.aircraft))
+        performance = performance_of(self)
+        radius_m = performance.turn_radius_m
+        (x0, y0), (x1, y1) = self.mission.start_m, self.mission.goal_m
+        wind_mps = self.environment.wind.speed_mps if self.environment.wind else 0.0
+        slowest_s = math.hypot(x1 - x0, y1 - y0) / (self.aircraft.airspeed_mps - wind_mps)
+        self._set("sensor", range_m=_rounded_up(10 * radius_m, 100))
+        self._set(
+            "mission",
+            course_deg=math.degrees(math.atan2(x1 - x0, y1 - y0)) % 360,
+            goal_radius_m=_rounded_up(radius_m, 10),
+            time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
+        )
+        self._set("planner", clearance_m=_rounded_up(radius_m, 10))
+        self._set("trackability", cross_track_m=self._cross_track_m(performance.tracking_error_m))
+        self._set(
+            "trackability",
+            altitude_m=max(10.0, self.trackability.cross_track_m),
+            airspeed_mps=0.1 * self.aircraft.airspeed_mps,
+            load_factor=_limit_load_factor(self.aircraft),
+        )
+        check_start_and_goal(self.area, self.obstacles, self.mission, self.planner.clearance_m)
+        object.__setattr__(self, "planner", planner_keys.resolved(self.planner, mission_of(self)))
+        return self
+
+    def _cross_track_m(self, tracking_error_m: float) -> float:
+        return max(0.1 * self.planner.clearance_m, 2.0 * tracking_error_m)
+
+    def _set(self, name: str, **defaults: float) -> None:
+        """Fills in those keys of a section that the file leaves out."""
+        section: Section = getattr(self, name)
+        missing = {key: value for key, value in defaults.items() if getattr(section, key) is None}
+        object.__setattr__(self, name, section.model_copy(update=missing))
+
+
+def load_scenario(path: Path, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """Reads a scenario file, every default filled in.
+
+    Args:
+        path: the file.
+        overrides: keys to replace before anything is checked, as (`"sensor.range_m"`, `"5000"`): key path and
+            value as YAML; `obstacles[0].circle.radius_m` reaches into a list. A new `planner.kind` drops
+            the own keys of the planner that the file names.
+
+    Raises:
+        InputError: the file cannot be read or is not a scenario; a line of its text names file, line and key.
+    """
+    root = strict_yaml.read(path)
+    return _validated(overridden(root, overrides), str(path), path.parent)
+
+
+def parse_scenario(text: str, source: str = "scenario") -> Scenario:
+    """Reads a scenario from text; `source` is what faults name it.
+
+    Raises:
+        InputError: it is not a scenario.
+    """
+    return _validated(strict_yaml.parse(text, source), source)
+
+
+def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """A scenario from keys that a command has put together, every default filled in.
+
+    Args:
+        keys: as in a file; plain values.
+        overrides: as `load_scenario` takes them.
+
+    Raises:
+        InputError: it is not a scenario; its faults name the command line.
+    """
+    root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
+    return _validated(overridden(root, overrides), "command line")
+
+
+def dump_scenario(scenario: Scenario) -> str:
+    """The YAML text of a scenario, all defaults written out; it loads back to an equal one, bit for bit."""
+    return dump_in_pieces(scenario.model_dump(by_alias=True, exclude_none=True))
+
+
+def packed(scenario: Scenario) -> bytes:
+    """A complete scenario in few bytes, to be kept or sent; to make it again takes a millisecond."""
+    return zlib.compress(scenario.model_dump_json(by_alias=True).encode(), level=1)
+
+
+def unpacked(kept: bytes) -> Scenario:
+    """What `packed` was given."""
+    return Scenario.model_validate_json(zlib.decompress(kept))
+
+
+def mission_of(scenario: Scenario) -> Mission:
+    """What a planner is told before the flight.
+
+    The clearance is no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size.
+    """
+    from planner.interface import Mission
+
+    performance = performance_of(scenario)
+    return Mission(
+        goal_m=scenario.mission.goal_m,
+        goal_radius_m=scenario.mission.goal_radius_m,
+        bounds_m=scenario.area.bounds_m,
+        clearance_m=max(scenario.planner.clearance_m, LEAST_CLEARANCE * performance.turn_radius_m),
+        turn_radius_m=performance.turn_radius_m,
+        speed_mps=performance.airspeed_mps,
+        roll_in_s=performance.roll_in_s,
+        tracking_error_m=performance.tracking_error_m,
+        sensor_range_m=scenario.sensor.range_m,
+        compute_latency_s=scenario.planner.compute_latency_s,
+        sensor_latency_s=scenario.sensor.latency_s,
+        wind_mps=_wind_mps(scenario.environment),
+    )
+
+
+def performance_of(scenario: Scenario) -> Performance:
+    """What the scenario's aircraft can do at its airspeed, in its wind, gust and turbulence.
+
+    Raises:
+        KeyFault: there is no such aircraft, it cannot hold the airspeed, or the wind is too strong for it.
+    """
+    from aircraft.airframes import AircraftError, airframe
+    from aircraft.envelope import performance
+
+    spec, air = scenario.aircraft, scenario.environment
+    wind_mps = _wind_mps(air)
+    if wind_mps >= MAX_WIND_FRACTION * spec.airspeed_mps:
+        raise KeyFault(
+            ("environment", "wind", "speed_mps"),
+            f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s",
+        )
+    try:
+        gusts = air.turbulence.intensity if air.turbulence else None
+        front_mps = air.gust.speed_mps if air.gust else 0.0
+        return performance(airframe(spec.model), spec.airspeed_mps, wind_mps, gusts, front_mps)
+    except AircraftError as error:
+        raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
+
+
+def _wind_mps(air: Environment) -> float:
+    return air.wind.speed_mps if air.wind else 0.0
+
+
+def scenario_schema() -> dict[str, Any]:
+    """JSON Schema of the format, the own keys of every known planner included."""
+    schema = Scenario.model_json_schema()
+    schema["properties"]["planner"] = planner_keys.json_schema(schema["$defs"].pop("PlannerSpec"))
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _validated(root: Node, source: str, folder: Path | None = None) -> Scenario:
+    try:
+        return Scenario.model_validate(root.plain(), context={"folder": folder})
+    except ValidationError as error:
+        raise input_error(error, Scenario, root, source) from error
+
+
+def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
+    """A scenario's keys with some replaced, as `load_scenario` takes them.
+
+    Raises:
+        InputError: one is not a key path, has no value or leads nowhere.
+    """
+    for name, text in overrides:
+        root = _overridden(root, name, text)
+    return root
+
+
+def _overridden(root: Node, name: str, text: str) -> Node:
+    try:
+        loc = strict_yaml.loc_of(name)
+    except ValueError as error:
+        raise InputError(f"command line: {error}") from error
+    if not text.strip():
+        raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
+    return with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
+
+
+def with_key(root: Node, loc: Loc, new: Node) -> Node:
+    """A scenario's keys with one replaced; a new `planner.kind` drops the own keys of the planner before.
+
+    Raises:
+        InputError: there is no such key, as far as it can be told without the scenario's types.
+    """
+    if loc == ("planner", "kind"):
+        root = _without_own_keys(root, new)
+    return strict_yaml.replaced(root, loc, new)
+
+
+def _without_own_keys(root: Node, kind: Node) -> Node:
+    """`root` without the keys that only the planner it names knows, unless `kind` is that planner."""
+    planner = root.value.get("planner") if isinstance(root.value, dict) else None
+    if planner is None or not isinstance(planner.value, dict) or planner.plain().get("kind") == kind.value:
+        return root
+    common = {name: node for name, node in planner.value.items() if name in PlannerSpec.model_fields}
+    return strict_yaml.replaced(root, ("planner",), Node(common, planner.line))
+
+
+def model_or_folder(model: str, folder: Path | None) -> str:
+    """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
+    if "/" not in model and model in _aircraft_names():
+        return model
+    for place in (Path() if folder is None else folder, Path()):
+        try:
+            if (place / model).expanduser().is_dir():
+                return str((place / model).expanduser().resolve())
+        except (OSError, RuntimeError):  # too long, not allowed, or the home of nobody: no folder
+            continue
+    return model
+
+
+def _aircraft_names() -> tuple[str, ...]:
+    from aircraft.airframes import aircraft_names
+
+    return aircraft_names()
+
+
+def _cruise_mps(spec: AircraftSpec) -> float:
+    from aircraft.airframes import AircraftError, airframe
+
+    try:
+        return airframe(spec.model).cruise_mps
+    except AircraftError as error:
+        raise KeyFault(("aircraft", "model"), str(error)) from error
+
+
+def _limit_load_factor(spec: AircraftSpec) -> float:
+    from aircraft.airframes import airframe
+
+    weight_lb = airframe(spec.model).mass_kg / POUND_KG
+    return min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0))
+
+
+def _rounded_up(value: float, step: int) -> float:
+    return float(math.ceil(value / step) * step)

@@ -1,0 +1,163 @@
+"""Faults of a scenario as sentences with file, line and key path."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from harness.files.strict_yaml import InputError, Loc, Node, fault_line
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel, ValidationError
+    from pydantic_core import ErrorDetails
+
+MAX_FAULTS: Final = 2
+"""Lines of an error."""
+
+MOST_WHOLE: Final = 2**53
+"""Beyond this a number is not read as a whole one."""
+
+_WANTED: Final = {
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "string_type": "text; put it in quotes",
+    "bool_type": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "model_type": "a mapping `key: value`",
+    "dict_type": "a mapping `key: value`",
+    "model_attributes_type": "a mapping `key: value`",
+}
+_BOUNDS: Final = {
+    "greater_than": ("greater than", "gt"),
+    "greater_than_equal": ("at least", "ge"),
+    "less_than": ("less than", "lt"),
+    "less_than_equal": ("at most", "le"),
+}
+
+
+class KeyFault(ValueError):
+    """A key that contradicts others.
+
+    Attributes:
+        loc: the key.
+    """
+
+    def __init__(self, loc: Loc, sentence: str) -> None:
+        super().__init__(sentence)
+        self.loc = loc
+
+
+def input_error(error: ValidationError, model: type[BaseModel], root: Node, source: str) -> InputError:
+    """What is wrong with a file, at most MAX_FAULTS lines of it.
+
+    Args:
+        error: what pydantic says of the values of `root`.
+        model: what they should have been.
+        root: the file.
+        source: its name.
+    """
+    found = faults(error, model)
+    return in_lines([fault_line(source, root.line_of(loc), loc, sentence) for loc, sentence in found], source)
+
+
+def faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[Loc, str]]:
+    """Key and sentence of every fault."""
+    return [_located(details, model) for details in error.errors(include_url=False)]
+
+
+def in_lines(every: Sequence[str], source: str) -> InputError:
+    """Faults of a file as one error, each once, at most MAX_FAULTS lines."""
+    lines = list(dict.fromkeys(every))
+    if len(lines) > MAX_FAULTS:
+        lines[MAX_FAULTS - 1 :] = [f"{source}: and {len(lines) - MAX_FAULTS + 1} more"]
+    return InputError("\n".join(lines))
+
+
+def first_fault(error: ValidationError) -> KeyFault:
+    """The first fault, for values that have no file of their own."""
+    details = error.errors(include_url=False)[0]
+    return KeyFault(details["loc"], sentence(details))
+
+
+def _located(details: ErrorDetails, model: type[BaseModel]) -> tuple[Loc, str]:
+    """Key and sentence of one fault."""
+    loc: Loc = details["loc"]
+    cause = details.get("ctx", {}).get("error")
+    if isinstance(cause, KeyFault):
+        return (*loc, *cause.loc), str(cause)
+    if details["type"] == "missing" and isinstance(loc[-1], int):
+        given = str(list(details["input"]))
+        short = given if len(given) <= 80 else f"{given[:77]}..."
+        return loc[:-1], f"is {short}; must have more numbers, see `wayproof schema`"
+    known = _known_keys(model, loc[:-1]) if details["type"] == "extra_forbidden" else ()
+    return loc, sentence(details, known)
+
+
+def _known_keys(model: type[BaseModel], loc: Loc) -> tuple[str, ...]:
+    """Keys of the section at `loc`, as they are spelt in a file."""
+    schema = model.model_json_schema()
+    part: Mapping[str, Any] = schema
+    for step in loc:
+        inner = part.get("properties", {})
+        part = part["items"] if isinstance(step, int) else inner.get(step) or part["additionalProperties"]
+        for choice in part.get("anyOf", [part]):
+            if "$ref" in choice:
+                part = schema["$defs"][choice["$ref"].rpartition("/")[2]]
+    return tuple(part["properties"])
+
+
+def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
+    """What is wrong, and what would be right."""
+    kind, value, context = details["type"], details["input"], details.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
+    if kind == "missing":
+        return "is missing; it is required"
+    if kind == "extra_forbidden":
+        return unknown_key(str(details["loc"][-1]), known)
+    if kind == "finite_number" or (isinstance(value, float) and not math.isfinite(value)):
+        return f"is {value}; must be a finite number"
+    if kind == "int_type" and isinstance(value, float):
+        wanted = "without a point" if abs(value) < MOST_WHOLE else f"of at most {MOST_WHOLE}"
+        return f"is {value!r}; must be a whole number {wanted}"
+    if kind in _WANTED:
+        return f"is {shown(value)}; must be {_WANTED[kind]}"
+    if kind in _BOUNDS:
+        words, name = _BOUNDS[kind]
+        return f"is {shown(value)}; must be {words} {context[name]:.12g}"
+    if kind == "literal_error":
+        return f"is {shown(value)}; must be {context['expected']}"
+    if kind == "string_pattern_mismatch":
+        return f"is {shown(value)}; must match {context['pattern']}"
+    if kind == "too_long":
+        return f"has {context['actual_length']} items; must have {context['max_length']}"
+    if kind == "too_short":
+        return f"has {context['actual_length']} items; must have at least {context['min_length']}"
+    if kind == "string_too_short":
+        return "is empty text; must be a name"
+    return f"is {shown(value)}: {details['msg'][0].lower()}{details['msg'][1:]}"
+
+
+def unknown_key(name: str, known: tuple[str, ...]) -> str:
+    """Sentence on a key that does not exist."""
+    close = difflib.get_close_matches(name, known, n=1)
+    meant = f"did you mean {close[0]}? " if close else ""
+    return f"unknown key; {meant}known here: {', '.join(known)}"
+
+
+def shown(value: Any) -> str:
+    """A value as a sentence may show it: its kind where that helps, never longer than a line."""
+    if value is None:
+        return "empty"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, (tuple, list)):
+        return f"a list of {len(value)}"
+    if isinstance(value, str):
+        return f"the text {value!r}" if len(value) <= 40 else f"the text {value[:37]!r}..."
+    return f"{value:.12g}" if isinstance(value, float) else f"{value}"

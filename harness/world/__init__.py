@@ -1,0 +1,1 @@
+"""The true world: obstacles, motion, the range sensor, the clairvoyant optimum."""

@@ -1,0 +1,72 @@
+"""Straight-line motion and presence of many things at once, and how far their boxes are from a place.
+
+Frame: local ENU plane, x = east, y = north, metres; times are simulated seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from harness.world.obstacle import Obstacle
+from planner.interface import BoolArray, FloatArray
+
+
+class LinearMotions:
+    """Straight-line motion and presence of n things, one column each.
+
+    Args:
+        rows: (5, n): velocity east, velocity north, epoch, first and last time of presence.
+    """
+
+    def __init__(self, rows: FloatArray) -> None:
+        self._rows = rows
+        self.speeds_mps: FloatArray = np.hypot(rows[0], rows[1])
+        self.matter = bool(self.speeds_mps.any() or np.isfinite(rows[3:]).any())
+
+    @classmethod
+    def of(cls, obstacles: Iterable[Obstacle]) -> LinearMotions:
+        """Those of some obstacles."""
+        rows = [(*o.velocity_mps, o.epoch_s, *o.interval_s) for o in obstacles]
+        return cls(np.array(rows, dtype=np.float64).reshape(-1, 5).T.copy())
+
+    def shifts(self, time_s: float) -> FloatArray:
+        """(2, n) displacement since the epoch."""
+        shifts: FloatArray = self._rows[:2] * (time_s - self._rows[2])
+        return shifts
+
+    def present(self, start_s: float, stop_s: float) -> BoolArray:
+        """(n,) whether there at some time of an interval."""
+        present: BoolArray = (self._rows[3] <= stop_s) & (start_s <= self._rows[4])
+        return present
+
+    def gaps(self, boxes: FloatArray, east: float, north: float, time_s: float) -> FloatArray:
+        """(n,) lower bound of the distance to each thing, there or not, by its rounded box (5, n) at the epoch."""
+        if self.matter:
+            boxes = np.vstack((boxes[:2] + self.shifts(time_s), boxes[2:]))
+        return gaps_to(boxes, east, north)
+
+    def next_start(self, time_s: float) -> float:
+        """First time after `time_s` at which something appears, else +inf."""
+        starts = self._rows[3]
+        return float(starts[starts > time_s].min(initial=math.inf))
+
+    def changes(self, start_s: float, stop_s: float) -> list[float]:
+        """Times within an interval at which something appears or goes, in order."""
+        times = self._rows[3:]
+        within: list[float] = np.unique(times[(start_s < times) & (times < stop_s)]).tolist()
+        return within
+
+
+def gaps_to(boxes: FloatArray, east: float, north: float) -> FloatArray:
+    """(n,) signed distances from a point to rounded boxes (5, n).
+
+    A shape inside a box is never nearer than the box (formula: Quilez, "2D distance functions").
+    """
+    beside = np.abs(boxes[0] - east) - boxes[2]
+    above = np.abs(boxes[1] - north) - boxes[3]
+    outside = np.sqrt(np.maximum(beside, 0.0) ** 2 + np.maximum(above, 0.0) ** 2)
+    gaps: FloatArray = outside + np.minimum(np.maximum(beside, above), 0.0) - boxes[4]
+    return gaps

@@ -1,0 +1,141 @@
+"""The clairvoyant optimum: the shortest way for a point that knows the whole world and keeps a clearance.
+
+A shortest path among discs is a sequence of straight bitangents and arcs (the tangent graph; Liu and Arimoto,
+Path planning using a tangent graph, IJRR 11, 1992). A circle grown by the clearance C is a disc of radius
+r + C, a convex corner of a polygon one of radius C that can be touched only between the normals of its two
+edges, start and goal are discs of radius 0. A path keeps a disc on its left (side +1) or its right (side -1).
+The graph (`harness.world.tangent_graph`) is searched with A*; the tangents of a disc are made when the search first
+comes to it.
+
+Frame: local ENU plane, metres; angles are mathematical (counter-clockwise from east), radians.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.world.obstacle import Obstacle
+from harness.world.tangent_graph import ANGLE_SLACK_RAD, Scene, Tangents
+from planner.interface import FloatArray
+
+DRAWN_STEP_RAD = math.radians(1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """A shortest path, or why there is none.
+
+    Attributes:
+        length_m: its length; None where there is none.
+        points_m: (k, 2) the path for drawing, arcs in steps of at most a degree; its chords cut arcs short.
+        reason: a sentence where there is none, else empty.
+    """
+
+    length_m: float | None
+    points_m: FloatArray
+    reason: str = ""
+
+
+def shortest_path(
+    obstacles: Sequence[Obstacle],
+    bounds_m: tuple[float, float, float, float],
+    start_m: tuple[float, float],
+    goal_m: tuple[float, float],
+    clearance_m: float,
+) -> Optimum:
+    """The shortest path of a point from start to goal.
+
+    Args:
+        obstacles: the whole world.
+        bounds_m: xmin, ymin, xmax, ymax; a path may touch them.
+        start_m: (east, north).
+        goal_m: (east, north).
+        clearance_m: distance kept from every obstacle edge, at least 0.
+    """
+    if any(each.velocity_mps != (0.0, 0.0) or each.active_s is not None for each in obstacles):
+        return _none("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
+    scene = Scene([each.shape for each in obstacles], bounds_m, start_m, goal_m, clearance_m)
+    free = scene.free_points(np.array([start_m, goal_m]))
+    if not free.all():
+        end = "goal" if free[0] else "start"
+        return _none(f"the {end} is outside the area or nearer than the clearance to an obstacle")
+    return _search(scene)
+
+
+def _none(reason: str) -> Optimum:
+    return Optimum(None, np.zeros((0, 2)), reason)
+
+
+class _Arrival(NamedTuple):
+    """A path so far: it has come to the rim of a disc."""
+
+    disc: int
+    side: int
+    angle: float
+    before: _Arrival | None
+    left_at: float
+    """Angle at which it left the disc before."""
+
+
+def _search(scene: Scene) -> Optimum:
+    """A* over arrivals; the straight distance to the goal never exceeds the way that is left."""
+    tangents: dict[tuple[int, int], Tangents] = {}
+    blocked: dict[int, FloatArray] = {}
+    arrivals = [_Arrival(scene.start, 1, 0.0, None, 0.0)]
+    queue = [(0.0, 0, 0.0)]
+    while queue:
+        _, number, way_m = heapq.heappop(queue)
+        arrival = arrivals[number]
+        disc, side = arrival.disc, arrival.side
+        if disc == scene.goal:
+            return Optimum(way_m, _drawn(scene, arrival))
+        if (disc, side) not in tangents:
+            tangents[disc, side] = scene.tangents(disc, side)
+        if disc not in blocked:
+            blocked[disc] = scene.blocked_arcs(disc)
+        out = tangents[disc, side]
+        sweep = _sweep(arrival, out.leaves_at)
+        way = way_m + sweep * scene.radii[disc] + out.length_m
+        open_ = (sweep <= _free_sweep(arrival, blocked[disc]) + ANGLE_SLACK_RAD) | (disc == scene.start)
+        for k in np.flatnonzero(open_ & (way < out.best_m - ANGLE_SLACK_RAD)).tolist():
+            out.best_m[k] = way[k]
+            heapq.heappush(queue, (float(way[k] + out.to_go_m[k]), len(arrivals), float(way[k])))
+            arrivals.append(
+                _Arrival(
+                    int(out.disc[k]), int(out.side[k]), float(out.arrives_at[k]), arrival, out.leaves_at[k]
+                )
+            )
+    return _none("there is no way that keeps the clearance inside the area")
+
+
+def _sweep(arrival: _Arrival, leaves_at: FloatArray) -> FloatArray:
+    """(k,) angles from an arrival on along the rim; a backward one of the size of rounding is none."""
+    sweep = (arrival.side * (leaves_at - arrival.angle)) % math.tau
+    return np.where(sweep > math.tau - ANGLE_SLACK_RAD, 0.0, sweep)
+
+
+def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
+    """How far round the rim is free from an arrival on; one just inside a blocked arc may turn back only."""
+    first, width = blocked.T
+    entry = first if arrival.side > 0 else first + width
+    into = (arrival.side * (arrival.angle - entry)) % math.tau
+    return float(np.where(into < width / 2, 0.0, math.tau - into).min(initial=math.inf))
+
+
+def _drawn(scene: Scene, last: _Arrival) -> FloatArray:
+    """Points along the path that ends with an arrival at the goal."""
+    pieces = [scene.centres[[scene.goal]]]
+    here = last
+    while here.before is not None:
+        before, left_at = here.before, here.left_at
+        sweep = 0.0 if before.disc == scene.start else float(_sweep(before, np.array([left_at]))[0])
+        angles = left_at - before.side * np.linspace(sweep, 0.0, math.ceil(sweep / DRAWN_STEP_RAD) + 1)
+        pieces.append(scene.contacts(np.full(len(angles), before.disc), angles))
+        here = before
+    return np.vstack(pieces[::-1])

@@ -1,0 +1,145 @@
+"""Simulated scanning range sensor: rays against the true world, with its imperfections.
+
+Frame: local ENU plane, x = east, y = north, metres. Bearings are radians clockwise from north. Rays are followed
+in `harness.world.ray_casting`: a face that is not hit cannot change any bit of a scan.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from harness.mapping.scan import RangeScan
+from harness.world.ray_casting import Fan, nearest_face_m
+from harness.world.world import Surroundings, World
+from planner.interface import FloatArray
+
+if TYPE_CHECKING:
+    from harness.scenario.sections import Sensor
+
+
+# The neighbour list reaches this part of the range further, and this far into the future.
+_SKIN = 0.25
+_HORIZON_S = 30.0
+
+
+class _Unread(RangeScan):
+    """A scan whose rays are followed when somebody first reads their ranges: few scans are news to anybody."""
+
+    @classmethod
+    def of(cls, attributes: dict[str, Any]) -> _Unread:
+        """A scan of which all is known but the ranges.
+
+        Args:
+            attributes: by name; either the ranges are among them or, as `_follow`, what gives them.
+        """
+        scan = cls.__new__(cls)
+        # At once: a frozen dataclass would set them one by one, and that is most of the cost of a scan.
+        scan.__dict__.update(attributes)
+        return scan
+
+    def __getattr__(self, name: str) -> FloatArray:
+        """The ranges, when they are first read."""
+        if name != "ranges_m":
+            raise AttributeError(name)
+        ranges: FloatArray = self.__dict__.pop("_follow")()
+        ranges.setflags(write=False)
+        self.__dict__[name] = ranges
+        return ranges
+
+
+class RangeSensor:
+    """A fan of rays, centred on the nose of the aircraft.
+
+    A ray returns the nearest crossing of an obstacle edge not further than the range; inside an obstacle that
+    is the way out. Then, in this order:
+
+    1. Noise: a Gaussian error is added to each range; a negative one becomes 0, one beyond the range is lost.
+    2. Dropout: the ray returns nothing.
+    3. False return: the ray returns a range uniform in (0, range], whatever there was.
+
+    Each imperfection draws from a stream of its own, for every ray of every scan, so that neither what is
+    seen nor another imperfection shifts its draws; one that is off draws nothing.
+
+    Args:
+        world: the truth.
+        config: the `sensor` part of a scenario.
+        seed_sequence: root of the three streams; it is not changed.
+    """
+
+    def __init__(self, world: World, config: Sensor, seed_sequence: np.random.SeedSequence) -> None:
+        self._world = world
+        self._config = config
+        self._fan = Fan(math.radians(config.field_of_view_deg), config.rays, config.range_m)
+        self._always: dict[str, Any] = {
+            "spacing_rad": self._fan.spacing_rad,
+            "fan": self._fan.rays,
+            "max_range_m": config.range_m,
+        }
+        self._noise, self._dropout, self._false_return = (
+            _stream(seed_sequence, number) for number in range(3)
+        )
+        self._flawed = config.range_noise_m > 0 or config.dropout > 0 or config.false_return > 0
+        self._surroundings: Surroundings | None = None
+        self._listed_at = (math.nan, math.nan, math.nan)
+
+    def scan(self, east_m: float, north_m: float, heading_rad: float, time_s: float) -> RangeScan:
+        """Looks around from a place, at a time."""
+        faces = self._near(east_m, north_m, time_s).faces(time_s)
+        seen = {
+            **self._always,
+            "time_s": time_s,
+            "available_s": time_s + self._config.latency_s,
+            "east_m": east_m,
+            "north_m": north_m,
+            "heading_rad": heading_rad,
+            "start_rad": (heading_rad + self._fan.first_rad) % math.tau,
+        }
+        if self._flawed:  # what is drawn at random is drawn now, scan by scan
+            ranges = self._fan.ranges_m(faces, east_m, north_m, heading_rad)
+            return RangeScan(ranges_m=self._degraded(ranges), **seen)
+        face_m = nearest_face_m(faces.circles_m, faces.edges_m, east_m, north_m)
+        if face_m > self._config.range_m:  # nothing to follow rays to
+            seen["nearest_m"], seen["ranges_m"] = math.inf, self._fan.nothing
+        else:
+            seen["nearest_m"] = face_m
+            seen["_follow"] = partial(self._fan.ranges_m, faces, east_m, north_m, heading_rad)
+        return _Unread.of(seen)
+
+    def _near(self, east: float, north: float, time: float) -> Surroundings:
+        """All that is in range, from the neighbour list; this renews the list when it runs out."""
+        skin = _SKIN * self._config.range_m
+        listed_east, listed_north, listed_s = self._listed_at
+        moved = math.hypot(east - listed_east, north - listed_north)
+        listed = self._surroundings
+        if listed is None or not (moved <= skin and listed_s <= time <= listed.until_s):
+            reach = self._config.range_m + skin
+            self._surroundings = listed = self._world.surroundings(
+                east, north, reach, time, time + _HORIZON_S
+            )
+            self._listed_at = (east, north, time)
+        return listed
+
+    def _degraded(self, ranges: FloatArray) -> FloatArray:
+        """Ranges with the imperfections of the sensor."""
+        config, n = self._config, len(ranges)
+        if config.range_noise_m > 0:
+            ranges = np.maximum(ranges + config.range_noise_m * self._noise.standard_normal(n), 0.0)
+            ranges[ranges > config.range_m] = math.inf
+        if config.dropout > 0:
+            ranges[self._dropout.random(n) < config.dropout] = math.inf
+        if config.false_return > 0:
+            chance, share = self._false_return.random((2, n))
+            ranges = np.where(chance < config.false_return, config.range_m * (1.0 - share), ranges)
+        return ranges
+
+
+def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
+    """The numbered child stream of a root, whatever was spawned from the root before."""
+    key = (*root.spawn_key, number)
+    return np.random.default_rng(
+        np.random.SeedSequence(root.entropy, spawn_key=key, pool_size=root.pool_size)
+    )

@@ -1,0 +1,313 @@
+"""The true world: obstacles, area bounds, contact. Only the sensor and the judges of a flight may see it.
+
+Frame: local ENU plane, x = east, y = north, metres; times are simulated seconds. A world never changes: every
+answer is a function of its arguments alone. Exact geometry is asked only of obstacles that their bounds cannot rule
+out.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from harness.world.linear_motion import LinearMotions, gaps_to
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from planner.interface import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from shapely import STRtree
+
+    from harness.scenario.scenario import Scenario
+
+__all__ = ["Circle", "Faces", "Fix", "Obstacle", "Polygon", "Surroundings", "World"]
+
+Fix = tuple[float, float, float]
+"""East and north (m), and when (s)."""
+
+TOUCH_M = 1e-3
+"""What is thinner along a way is no contact."""
+
+NO_EDGES = np.zeros((4, 0))
+
+# A track is judged in blocks of this many rows: short enough for few candidates, long enough for numpy.
+_BLOCK_ROWS = 256
+# What bounds are given to spare, for rounding.
+_ROUNDING_M = 1e-6
+# The boxes of no more obstacles than these are compared all at once, which is sooner done than to ask the tree.
+_FEW = 512
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """What a ray can hit, at one instant.
+
+    Attributes:
+        circles_m: (3, c): centre east, centre north, radius.
+        edges_m: (4, e) polygon edges: start east, start north, end east, end north. The end of an edge is,
+            bit for bit, the start of the next one of its polygon.
+    """
+
+    circles_m: FloatArray
+    edges_m: FloatArray
+
+
+class Surroundings:
+    """Every face that comes near a place during an interval of time; made by `World.surroundings`.
+
+    Args:
+        still: those of what stands for ever.
+        changing: those of what moves or comes and goes, as they are at its epoch.
+        motions: of the circles among these, and of the edges.
+        until_s: the end of that interval; +inf in a world where nothing ever moves, comes or goes.
+    """
+
+    def __init__(
+        self,
+        still: Faces,
+        changing: Faces | None = None,
+        motions: tuple[LinearMotions, LinearMotions] | None = None,
+        until_s: float = math.inf,
+    ) -> None:
+        self.until_s = until_s
+        self._still, self._changing, self._motions = still, changing, motions
+
+    def faces(self, time_s: float) -> Faces:
+        """Those that are there at a time of the interval, where they are then."""
+        if self._changing is None or self._motions is None:
+            return self._still
+        of_circles, of_edges = self._motions
+        circles, edges = self._changing.circles_m.copy(), self._changing.edges_m.copy()
+        circles[:2] += of_circles.shifts(time_s)
+        edges += np.tile(of_edges.shifts(time_s), (2, 1))
+        return Faces(
+            np.hstack((self._still.circles_m, circles[:, of_circles.present(time_s, time_s)])),
+            np.hstack((self._still.edges_m, edges[:, of_edges.present(time_s, time_s)])),
+        )
+
+
+class World:
+    """Obstacles in a rectangular area, as they truly are.
+
+    Those that stand for ever are found through a tree of their boxes, if they are many, so that an answer costs the
+    same in a world of a thousand and of a hundred thousand; those that move or come and go are all looked at every
+    time.
+
+    Args:
+        obstacles: their order gives their index.
+        bounds_m: xmin, ymin, xmax, ymax of the area.
+    """
+
+    def __init__(self, obstacles: Iterable[Obstacle], bounds_m: tuple[float, float, float, float]) -> None:
+        self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
+        self.bounds_m = bounds_m
+        self._boxes = np.array([o.shape.rounded_box for o in self.obstacles]).reshape(-1, 5).T.copy()
+        self._discs = self._boxes[[0, 1, 4]]
+        self._circular = np.array([isinstance(o.shape, Circle) for o in self.obstacles], dtype=np.bool_)
+        stands = np.array([o.stands_for_ever for o in self.obstacles], dtype=np.bool_)
+        self._standing, self._changing = np.flatnonzero(stands), np.flatnonzero(~stands)
+        self._motions = LinearMotions.of(self.obstacles[index] for index in self._changing.tolist())
+        self._standing_boxes = self._boxes[:, self._standing]
+        self._tree = None if len(self._standing) <= _FEW else _tree(self._standing_boxes)
+
+    @classmethod
+    def from_scenario(cls, scenario: Scenario) -> World:
+        """The world that a scenario describes."""
+        obstacles = []
+        for each in scenario.obstacles:
+            shape: Circle | Polygon
+            if each.circle is not None:
+                shape = Circle(each.circle.center_m, each.circle.radius_m)
+            elif each.polygon is not None:
+                shape = Polygon(each.polygon.vertices_m)
+            else:
+                raise ValueError(f"an obstacle needs a circle or a polygon; got {each}")
+            obstacles.append(Obstacle(shape, each.velocity_mps or (0.0, 0.0), each.active_s))
+        return cls(obstacles, scenario.area.bounds_m)
+
+    @cached_property
+    def max_obstacle_speed_mps(self) -> float:
+        """Speed of the fastest obstacle.
+
+        Until an obstacle appears, clearance shrinks no faster than by this and one's own speed together.
+        """
+        return float(self._motions.speeds_mps.max(initial=0.0))
+
+    def next_appearance(self, time_s: float) -> float:
+        """First time after `time_s` at which an obstacle appears, +inf if none does."""
+        return self._motions.next_start(time_s)
+
+    def inside_bounds(self, east_m: float, north_m: float) -> bool:
+        """Whether a point is in the area; its boundary belongs to it."""
+        xmin, ymin, xmax, ymax = self.bounds_m
+        return xmin <= east_m <= xmax and ymin <= north_m <= ymax
+
+    def clearance_at(self, east_m: float, north_m: float, time_s: float) -> float:
+        """`clearance` of one point, in metres."""
+        point, time = np.array([[east_m, north_m]]), np.array([time_s])
+        best = math.inf
+        for index in self._nearest(east_m, north_m, 0.0):
+            best = min(best, float(self.obstacles[index].distance(point, time)[0]))
+        if len(self._changing):
+            gaps = self._motions.gaps(self._boxes[:, self._changing], east_m, north_m, time_s)
+            for index in self._changing[gaps <= best].tolist():
+                best = min(best, float(self.obstacles[index].distance(point, time)[0]))
+        return best
+
+    def contact_between(self, begin: Fix, before_m: float, end: Fix, after_m: float) -> float:
+        """Clearance at a contact on the straight way between two fixes; +inf if there surely is none.
+
+        While nothing appears or goes, clearance changes no faster than the way is long: parts of it that are too
+        short for a contact are left out, down to `TOUCH_M` (Piyavskii 1972, doi:10.1016/0041-5553(72)90115-2).
+
+        Args:
+            begin: where and when the way begins.
+            before_m: clearance there, or less.
+            end: where it ends.
+            after_m: clearance there, or less.
+        """
+        known = [(begin, before_m)]
+        for time_s in self._motions.changes(begin[2], end[2]) if len(self._changing) else ():
+            share = (time_s - begin[2]) / (end[2] - begin[2])
+            there = begin[0] + share * (end[0] - begin[0]), begin[1] + share * (end[1] - begin[1]), time_s
+            known.append((there, self.clearance_at(*there)))
+            if known[-1][1] < 0.0:
+                return known[-1][1]
+        known.append((end, after_m))
+        ways = [(*first, *second) for first, second in itertools.pairwise(known)]
+        while ways:
+            begin, before_m, end, after_m = ways.pop()
+            way_m = math.dist(begin[:2], end[:2]) + self.max_obstacle_speed_mps * (end[2] - begin[2])
+            if before_m + after_m <= way_m and way_m > TOUCH_M:
+                middle = (0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1]), 0.5 * (begin[2] + end[2]))
+                between_m = self.clearance_at(*middle)
+                if between_m < 0.0:
+                    return between_m
+                ways += [(middle, between_m, end, after_m), (begin, before_m, middle, between_m)]
+        return math.inf
+
+    def clearance(self, points_m: FloatArray, times_s: FloatArray) -> FloatArray:
+        """True distance from points to the nearest obstacle edge, each at its own time.
+
+        Quick where neighbouring rows are near one another in place and time, as they are on a track.
+
+        Args:
+            points_m: (k, 2).
+            times_s: (k,).
+
+        Returns:
+            (k,) metres: negative inside an obstacle, +inf without obstacles, NaN where a row is not finite.
+        """
+        result = np.full(len(points_m), math.nan)
+        rows = np.flatnonzero(np.isfinite(points_m).all(axis=1) & np.isfinite(times_s))
+        for first in range(0, len(rows), _BLOCK_ROWS):
+            block = rows[first : first + _BLOCK_ROWS]
+            result[block] = self._block_clearance(points_m[block], times_s[block])
+        return result
+
+    def near(self, east_m: float, north_m: float, radius_m: float, time_s: float) -> tuple[int, ...]:
+        """Indices of the obstacles there at a time that come within a radius of a point, in rising order."""
+        point, time = np.array([[east_m, north_m]]), np.array([time_s])
+        close = np.union1d(self._listed(east_m, north_m, radius_m + _ROUNDING_M), self._changing)
+        return tuple(i for i in close.tolist() if self.obstacles[i].distance(point, time)[0] <= radius_m)
+
+    def surroundings(
+        self, east_m: float, north_m: float, radius_m: float, start_s: float, stop_s: float
+    ) -> Surroundings:
+        """Every face that comes within a radius of a point at some time of an interval.
+
+        A few more may be among them: boxes are compared, not shapes. A caller that moves keeps the answer as
+        long as it stays in a smaller circle (a neighbour list; Verlet 1967, doi:10.1103/PhysRev.159.98).
+        """
+        reach = radius_m + _ROUNDING_M
+        still = self._faces(self._listed(east_m, north_m, reach))
+        if still.edges_m.size:
+            starts, ends = still.edges_m[:2], still.edges_m[2:]
+            boxes = np.vstack(((starts + ends) / 2, np.abs(ends - starts) / 2, np.zeros(starts.shape[1])))
+            still = Faces(still.circles_m, still.edges_m[:, gaps_to(boxes, east_m, north_m) <= reach])
+        if not len(self._changing):
+            return Surroundings(still)
+        gaps = self._motions.gaps(self._boxes[:, self._changing], east_m, north_m, (start_s + stop_s) / 2)
+        near = gaps <= reach + self._motions.speeds_mps * (stop_s - start_s) / 2
+        listed = self._changing[near & self._motions.present(start_s, stop_s)]
+        obstacles = [self.obstacles[index] for index in listed.tolist()]
+        circles = [each for each in obstacles if isinstance(each.shape, Circle)]
+        edges = [each for each in obstacles for _ in range(each.shape.edges_m.shape[1])]
+        return Surroundings(
+            still, self._faces(listed), (LinearMotions.of(circles), LinearMotions.of(edges)), stop_s
+        )
+
+    def _faces(self, listed: IntArray) -> Faces:
+        """Faces of some obstacles, each at its epoch, in the order in which they are listed."""
+        circular = self._circular[listed]
+        edges = [self.obstacles[index].shape.edges_m for index in listed[~circular].tolist()]
+        return Faces(self._discs[:, listed[circular]], np.hstack(edges) if edges else NO_EDGES)
+
+    def _listed(self, east: float, north: float, reach: float) -> IntArray:
+        """Indices of the standing obstacles that may come within a reach of a point, and some more."""
+        if self._tree is None:
+            return self._standing[gaps_to(self._standing_boxes, east, north) <= reach]
+        import shapely
+
+        corners = east - reach, north - reach, east + reach, north + reach
+        listed: IntArray = self._standing[np.sort(self._tree.query(shapely.box(*corners)))]
+        return listed
+
+    def _nearest(self, east: float, north: float, slack: float) -> list[int]:
+        """Indices of the standing obstacles that may be the nearest one to a point within a slack of a place."""
+        if not len(self._standing):
+            return []
+        if self._tree is None:
+            gaps = gaps_to(self._standing_boxes, east, north)
+            near: list[int] = self._standing[
+                gaps <= self._reach(int(gaps.argmin()), east, north, slack)
+            ].tolist()
+            return near
+        import shapely
+
+        some = self._tree.query_nearest(shapely.Point(east, north), all_matches=False)[0]
+        near = self._listed(east, north, self._reach(some, east, north, slack)).tolist()
+        return near
+
+    def _reach(self, some: int, east: float, north: float, slack: float) -> float:
+        """So near to a place are all standing obstacles that may be the nearest to a point within a slack of it.
+
+        Args:
+            some: any of the standing obstacles; the nearer, the less.
+            east: of the place, m.
+            north: of the place, m.
+            slack: m.
+        """
+        probe = self.obstacles[self._standing[some]]
+        nearest = float(probe.distance(np.array([[east, north]]), np.zeros(1))[0])
+        return max(nearest, 0.0) + 2.0 * slack + _ROUNDING_M
+
+    def _block_clearance(self, points: FloatArray, times: FloatArray) -> FloatArray:
+        """`clearance` for finite rows near one another."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        (east, north), half_m = ((low + high) / 2).tolist(), math.hypot(*(high - low)) / 2
+        result = np.full(len(points), math.inf)
+        for index in self._nearest(east, north, half_m):
+            np.minimum(result, self.obstacles[index].distance(points, times), out=result)
+        if len(self._changing):
+            start, stop = float(times.min()), float(times.max())
+            gaps = self._motions.gaps(self._boxes[:, self._changing], east, north, (start + stop) / 2)
+            gaps -= half_m + self._motions.speeds_mps * (stop - start) / 2
+            near = (gaps <= result.max() + _ROUNDING_M) & self._motions.present(start, stop)
+            for index in self._changing[near].tolist():
+                np.minimum(result, self.obstacles[index].distance(points, times), out=result)
+        return result
+
+
+def _tree(boxes: FloatArray) -> STRtree:
+    """The bounds of rounded boxes (5, n), to be asked for those near a place."""
+    import shapely
+
+    east, north, half_width, half_height, rounding = boxes
+    width, height = half_width + rounding, half_height + rounding
+    return shapely.STRtree(shapely.box(east - width, north - height, east + width, north + height))

@@ -1,0 +1,1 @@
+"""Planners to compare with: the BUG family, VFH+, a tree of Dubins curves."""

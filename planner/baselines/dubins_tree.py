@@ -1,0 +1,340 @@
+"""A tree of Dubins curves, grown anew whenever the way is blocked: RRT* of the Open Motion Planning Library.
+
+S. Karaman and E. Frazzoli, "Sampling-based algorithms for optimal motion planning", International Journal of
+Robotics Research 30(7), 2011 (RRT*); L. E. Dubins, "On curves of minimal length with a constraint on average
+curvature, and with prescribed initial and terminal positions and tangents", American Journal of
+Mathematics 79, 1957; I. A. Sucan, M. Moll and L. E. Kavraki, "The Open Motion Planning Library", IEEE Robotics and
+Automation Magazine 19(4), 2012.
+
+What has not been seen is taken to be free. The tree is grown for a number of iterations, not for a time, from a
+seed, so that the same flight is planned the same way. Its path is shortened by Dubins curves between its poses
+that keep the distance. OMPL is an optional dependency: `pip install wayproof[ompl]`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from importlib.util import find_spec
+
+import numpy as np
+
+from planner.baselines.joining import departure, stuck
+from planner.compiled import COUNTS, FLOAT, ROWS, compiled
+from planner.geometry.clearance import first_breach
+from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, along
+from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.interface import FloatArray, IntArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.memory import ObstacleMemory
+from planner.rolling_window.route_optimisation import Terrain
+
+GOAL_COURSES = 8
+"""The goal may be reached on this many courses."""
+
+ROLLS = 16.0
+"""A plan that is blocked further ahead, or holds, is dropped after this share of the sensing range."""
+
+PATH_SHARE = 0.125
+"""Share of the margin that a path keeps."""
+
+ATTEMPTS = ((1.0, 1), (0.5, 4))
+"""Share of the margin that a tree keeps, and how many times as often it is grown."""
+
+NEAR = 1.5
+"""Within so many of the distances that the tree keeps about start and goal it keeps no more than the path."""
+
+LOOK_SHARE = 0.5
+"""A branch of the tree is looked at every so many of the distances that it keeps."""
+
+WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
+
+
+@dataclass(frozen=True)
+class DubinsTreeConfig:
+    """Keys of `planner.kind: dubins_tree`."""
+
+    iterations: int = field(
+        default=300,
+        metadata={"doc": "how many times the tree is grown", "unit": "1", "minimum": 1, "maximum": 1_000_000},
+    )
+    tree_seed: int = field(
+        default=1, metadata={"doc": "seed of the samples", "unit": "1", "minimum": 1, "maximum": 1_000_000}
+    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+
+    def resolved(self, mission: Mission) -> DubinsTreeConfig:
+        """This config with every None replaced by its default for the mission.
+
+        Raises:
+            ValueError: OMPL is not installed.
+        """
+        if find_spec("ompl") is None:
+            raise ValueError(
+                "kind dubins_tree needs OMPL, which is not installed: pip install wayproof[ompl]"
+            )
+        return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
+
+
+class DubinsTree:
+    """The planner for one flight."""
+
+    def __init__(self, config: DubinsTreeConfig, mission: Mission) -> None:
+        config = config.resolved(mission)
+        assert config.margin_m is not None
+        self._config, self._mission, self._margin_m = config, mission, config.margin_m
+        self._memory = ObstacleMemory(mission.clearance_m)
+        late_s = 4.0 + mission.compute_latency_s
+        self._urgent_m = 8.0 * mission.turn_radius_m + mission.ground_speed_mps * late_s
+        self._searches = 0
+        self._gone = 0
+        self._flown: Plan | None = None
+        self._searched_at_m = 0.0
+        self._breach_m = (
+            math.inf
+        )  # where the plan in effect comes too near to something seen since it was made
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Keeps the plan in effect while nothing seen blocks it; grows a tree where something does."""
+        fresh, gone = self._memory.take_in(request.seen), self._memory.gone
+        changed = len(fresh) > 0 or gone != self._gone
+        self._gone = gone
+        path = request.flown.path if request.flown else None
+        keep = self._mission.clearance_m + PATH_SHARE * self._margin_m
+        if request.flown is not self._flown:
+            self._flown, self._breach_m, self._searched_at_m = request.flown, math.inf, 0.0
+        station = request.arc_length_m
+        rolled = station - self._searched_at_m >= self._mission.sensor_range_m / ROLLS
+        if path is not None and path.loiter and not (changed or rolled):
+            return Plan(PlanStatus.KEPT, "holding; nothing new is known")
+        if path is not None and not path.loiter and path.length_m > station:
+            room = self._room(fresh, Pose(*path.segments[0, :4].tolist()), keep)
+            self._breach_m = min(self._breach_m, first_breach(path, fresh, room, station))
+            if math.isinf(self._breach_m) or not (rolled or self._breach_m - station < self._urgent_m):
+                return Plan(PlanStatus.KEPT, "nothing near blocks the plan in effect")
+        self._searched_at_m = station
+        pose, prefix = departure(request, self._mission)
+        poses, ways = self._ways(pose, self._terrain(pose, keep))
+        if not ways:
+            return stuck("the tree found no way", request, self._mission, self._memory.points_m)
+        segments = [segment for way in ways for segment in way]
+        nodes = [way[-1] for way in ways]
+        return Plan(
+            PlanStatus.FOUND,
+            f"tree {self._searches}, {len(ways)} Dubins curves to the goal"
+            if len(ways) > 1
+            else "way to the goal in view",
+            np.array([request.position_m, *(along(node, node[5])[:2] for node in nodes)]),
+            Path(np.array([*prefix, *segments])),
+            partial(
+                PlanPicture,
+                np.array([request.position_m, self._mission.goal_m]),
+                self._mission.sensor_range_m,
+                np.zeros((0, 4)),
+                (np.array([each[:2] for each in poses]),),
+            ),
+        )
+
+    def _room(self, points: FloatArray, pose: Pose, keep: float) -> FloatArray:
+        room = [
+            np.hypot(points[:, 0] - x, points[:, 1] - y) - 1e-3 for x, y in (pose[:2], self._mission.goal_m)
+        ]
+        return np.minimum(keep, np.minimum(*room))
+
+    def _terrain(self, pose: Pose, keep: float) -> Terrain:
+        points = self._memory.points_m
+        return Terrain(points, self._room(points, pose, keep), self._mission.bounds_m)
+
+    def _free(self, pose: Pose, terrain: Terrain, share: float) -> Terrain:
+        """Where a tree may grow that keeps a share of the margin."""
+        keep_m = self._mission.clearance_m + share * self._margin_m
+        away_m = self._room(terrain.points_m, pose, math.inf)
+        return replace(terrain, keep_m=np.where(away_m < NEAR * keep_m, terrain.keep_m, keep_m))
+
+    def _ways(self, pose: Pose, terrain: Terrain) -> tuple[list[Pose], list[list[Segment]]]:
+        """The poses of a way to the goal, and Dubins curves that lead along it; none where there is none.
+
+        The tree is grown to where the line to the goal is free beyond the sensing range; where no curve leads on from
+        there past all that is known, to the goal itself.
+        """
+        goals, radius = self._goals(pose, self._mission.goal_m), self._mission.turn_radius_m
+        direct = [([pose, goal], joined([pose, goal], radius, terrain)) for goal in goals]
+        found = [(poses, ways) for poses, ways in direct if ways]
+        if found:
+            return min(found, key=lambda each: sum(segment[5] for segment in each[1][0]))
+        frees = [(self._free(pose, terrain, share), times) for share, times in ATTEMPTS]
+        beyond = self._beyond(pose, frees[0][0])
+        nearer = [] if beyond == self._mission.goal_m else [self._goals(pose, beyond)]
+        for ends in (*nearer, goals):
+            for free, times in frees:
+                self._searches += 1
+                grown = self._grown(pose, ends, free, times * self._config.iterations)
+                if grown is None:
+                    continue
+                for onward in [[]] if ends is goals else [[goal] for goal in goals]:
+                    ways = joined([*grown, *onward], radius, terrain)
+                    if ways:
+                        return [*grown, *onward], ways
+                break
+        return [], []
+
+    def _beyond(self, pose: Pose, free: Terrain) -> Point:
+        """The first free place on the line to the goal that lies beyond the sensing range; else the goal."""
+        (x, y), (to_x, to_y) = pose[:2], self._mission.goal_m
+        whole, step = math.dist((x, y), (to_x, to_y)), self._mission.turn_radius_m
+        for i in range(math.ceil(self._mission.sensor_range_m / step), math.floor(whole / step) - 2):
+            share = i * step / whole
+            place = x + share * (to_x - x), y + share * (to_y - y)
+            if is_free(free, *place):
+                return place
+        return self._mission.goal_m
+
+    def _goals(self, pose: Pose, place: Point) -> list[Pose]:
+        """A place to reach on several courses, the straight one first."""
+        x, y = place
+        straight = math.atan2(y - pose.north_m, x - pose.east_m)
+        courses = [straight + math.tau * i / GOAL_COURSES for i in range(GOAL_COURSES)]
+        return [Pose(x, y, math.cos(course), math.sin(course)) for course in courses]
+
+    def _grown(self, pose: Pose, goals: list[Pose], free: Terrain, iterations: int) -> list[Pose] | None:
+        """The best path of a tree grown for some iterations."""
+        from ompl import base, geometric, util
+
+        util.setLogLevel(util.LogLevel.LOG_NONE)
+        util.RNG.setSeed(self._config.tree_seed + self._searches)
+        reach = self._mission.sensor_range_m
+        xmin, ymin, xmax, ymax = self._mission.bounds_m
+        (x, y), (to_x, to_y) = pose[:2], goals[0][:2]
+        space, box = base.DubinsStateSpace(self._mission.turn_radius_m), base.RealVectorBounds(2)
+        box.setLow(0, max(xmin, min(x, to_x) - reach))
+        box.setLow(1, max(ymin, min(y, to_y) - reach))
+        box.setHigh(0, min(xmax, max(x, to_x) + reach))
+        box.setHigh(1, min(ymax, max(y, to_y) + reach))
+        space.setBounds(box)
+        space.setup()
+        setup = base.SpaceInformation(space)
+        setup.setStateValidityChecker(lambda state: is_free(free, state.getX(), state.getY()))
+        keep = self._mission.clearance_m + self._margin_m
+        setup.setStateValidityCheckingResolution(LOOK_SHARE * keep / space.getMaximumExtent())
+        setup.setup()
+
+        def state(place: Pose) -> object:
+            made = setup.allocState()
+            made.setXY(place.east_m, place.north_m)
+            made.setYaw(math.atan2(place.tangent_north, place.tangent_east))
+            return made
+
+        problem, goal = base.ProblemDefinition(setup), base.GoalStates(setup)
+        problem.addStartState(state(pose))
+        for each in goals:
+            goal.addState(state(each))
+        problem.setGoal(goal)
+        tree = geometric.RRTstar(setup)
+        tree.setRange(0.5 * reach)
+        tree.setProblemDefinition(problem)
+        tree.setup()
+        grown = 0
+
+        def enough() -> bool:
+            nonlocal grown
+            grown += 1
+            return grown > iterations
+
+        tree.solve(base.PlannerTerminationCondition(enough))
+        if not problem.hasExactSolution():
+            return None
+        states = problem.getSolutionPath().getStates()
+        return [pose] + [
+            Pose(s.getX(), s.getY(), math.cos(s.getYaw()), math.sin(s.getYaw())) for s in states[1:]
+        ]
+
+
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT)
+def _too_near(places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float) -> bool:
+    """Whether a place is nearer to a point, of those by squares, than is to be kept from it."""
+    for block in range(len(first) - 1):
+        dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
+        if dx * dx + dy * dy >= reach * reach:
+            continue
+        for k in range(first[block], first[block + 1]):
+            dx, dy, keep = places[0, k] - east, places[1, k] - north, places[2, k]
+            if dx * dx + dy * dy < keep * keep:
+                return True
+    return False
+
+
+def is_free(terrain: Terrain, east_m: float, north_m: float) -> bool:
+    """Whether a place is in the area and keeps its distance from all that is known."""
+    xmin, ymin, xmax, ymax = terrain.bounds_m
+    inside = xmin <= east_m <= xmax and ymin <= north_m <= ymax
+    return inside and not _too_near(*terrain.squares, east_m, north_m)
+
+
+def joined(poses: Sequence[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]] | None:
+    """Dubins curves from pose to pose, each on to the furthest that one leads to; None where none leads on."""
+    ways: list[list[Segment]] = []
+    i = 0
+    while i < len(poses) - 1:
+        for k in range(len(poses) - 1, i, -1):
+            way = dubins(poses[i], poses[k], radius_m)
+            if way and terrain.admits(Path(np.array(way))):
+                ways.append(way)
+                i = k
+                break
+        else:
+            return None
+    return ways
+
+
+def dubins(start: Pose, end: Pose, radius_m: float) -> list[Segment]:
+    """The shortest curve from pose to pose whose radius is nowhere smaller than a given one."""
+    best: list[Segment] = []
+    shortest = math.inf
+    for word in WORDS:
+        lengths = _word(word, start, end, radius_m)
+        if lengths is None or sum(lengths) >= shortest:
+            continue
+        shortest = sum(lengths)
+        best, pose = [], start
+        for letter, length in zip(word, lengths, strict=True):
+            curvature = {"L": 1.0, "S": 0.0, "R": -1.0}[letter] / radius_m
+            if length > SHORTEST_M:
+                best.append((*pose, curvature, length))
+                pose = along(best[-1], length)
+    return best
+
+
+def _word(word: str, start: Pose, end: Pose, radius: float) -> tuple[float, float, float] | None:
+    """Lengths of the three parts of a Dubins word; None where it does not join the poses."""
+    first, last = (1.0 if letter == "L" else -1.0 for letter in (word[0], word[2]))
+    (x, y, tx, ty), (ex, ey, etx, ety) = start, end
+    cx, cy = x - first * radius * ty, y + first * radius * tx
+    dx, dy = ex - last * radius * ety - cx, ey + last * radius * etx - cy
+    distance, bearing = math.hypot(dx, dy), math.atan2(dy, dx)
+    leaving, arriving = math.atan2(ty, tx), math.atan2(ety, etx)
+    if word[1] == "S":
+        if first != last and distance < 2.0 * radius:
+            return None
+        course = bearing + (first * math.asin(2.0 * radius / distance) if first != last else 0.0)
+        straight = math.sqrt(max(distance**2 - (2.0 * radius) ** 2, 0.0)) if first != last else distance
+        return _turn(first, leaving, course) * radius, straight, _turn(last, course, arriving) * radius
+    if distance >= 4.0 * radius:
+        return None
+    # Three circles that touch: the middle one's centre lies off the line between the others'.
+    off = math.acos(distance / (4.0 * radius))
+    to_middle = bearing + first * off
+    at_first = to_middle + first * 0.5 * math.pi
+    at_last = bearing - first * off + first * 0.5 * math.pi
+    middle = _turn(-first, at_first, at_last + math.pi)
+    return (
+        _turn(first, leaving, at_first) * radius,
+        middle * radius,
+        _turn(last, at_last + math.pi, arriving) * radius,
+    )
+
+
+def _turn(side: float, course: float, to_course: float) -> float:
+    """The angle by which a turn to one side leads from one course to another."""
+    turn = side * (to_course - course) % math.tau
+    return 0.0 if math.tau - turn < 1e-9 else turn

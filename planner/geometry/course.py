@@ -1,0 +1,59 @@
+"""The whole way that a plan in effect is the beginning of, and on which side of things it passes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.geometry.clearance import distances
+from planner.geometry.curves import Point, between
+from planner.geometry.fans import encircled
+from planner.interface import FloatArray, Path
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A path to the goal through what is known, unknown space taken as free.
+
+    Attributes:
+        path: from where the aircraft was when it was found.
+        nodes: its track points, the goal last.
+        known: how many of the remembered edge points, of what stands still, it was found with.
+        shortest: none shorter was known. That stays so while nothing cuts it: more obstacles shorten no way.
+        to_goal: it leads to the goal, not only into a turn.
+    """
+
+    path: Path
+    nodes: tuple[Point, ...]
+    known: int
+    shortest: bool
+    to_goal: bool = True
+
+    def ahead(self, arc_length_m: float) -> Course:
+        """What is left of it from a station on."""
+        segments = between(self.path, arc_length_m, self.path.length_m)
+        if not segments:
+            return self
+        _, stations = distances(self.path, np.array(self.nodes))
+        left = tuple(
+            node
+            for node, at in zip(self.nodes[:-1], stations[:-1].tolist(), strict=True)
+            if at > arc_length_m
+        )
+        return Course(
+            Path(np.array(segments)), (*left, self.nodes[-1]), self.known, self.shortest, self.to_goal
+        )
+
+    def same_side(self, nodes: Sequence[Point], points_m: FloatArray) -> bool:
+        """Whether another way from here to the goal passes all that was known on the same side.
+
+        That is so where the two ways together go round none of it.
+
+        Args:
+            nodes: the other way, from the present track point to the goal.
+            points_m: all remembered edge points.
+        """
+        loop = np.array([*nodes, *self.nodes[-2::-1]])
+        return not encircled(loop, points_m[: self.known]).any()

@@ -1,0 +1,295 @@
+"""Paths of bounded curvature: building them from poses and nodes, measuring, cutting, sampling.
+
+A segment is one row of `planner.interface.Path.segments`: start east, start north, unit tangent east, unit
+tangent north, curvature (1/m, positive = left turn), length (m).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.interface import FloatArray, Mission, Path
+
+Point = tuple[float, float]
+Segment = tuple[float, float, float, float, float, float]
+
+SHORTEST_M = 1e-6
+"""Segments shorter than this are left out of a path."""
+
+
+ON_TURN = 1e-6
+"""A place is on a turn that is no further from it than this share of its radius."""
+
+
+class Pose(NamedTuple):
+    """A place (metres, ENU) and the unit vector of the direction of travel."""
+
+    east_m: float
+    north_m: float
+    tangent_east: float
+    tangent_north: float
+
+
+def along(segment: Sequence[float], distance_m: float) -> Pose:
+    """The pose `distance_m` after the start of a segment."""
+    x, y, tx, ty, curvature, _ = segment
+    if abs(curvature) < 1e-12:
+        return Pose(x + tx * distance_m, y + ty * distance_m, tx, ty)
+    turn = curvature * distance_m
+    sine, versine = math.sin(turn) / curvature, (1.0 - math.cos(turn)) / curvature
+    c, s = math.cos(turn), math.sin(turn)
+    return Pose(x + tx * sine - ty * versine, y + ty * sine + tx * versine, tx * c - ty * s, ty * c + tx * s)
+
+
+def end_of(path: Path) -> Pose:
+    """The pose at the end of a path."""
+    last = path.segments[-1]
+    return along(last, float(last[5]))
+
+
+def place_on(path: Path, arc_length_m: float) -> tuple[Pose, float]:
+    """The pose `arc_length_m` along a path, clamped to its ends, and the curvature (1/m) there."""
+    left = max(arc_length_m, 0.0)
+    *before, last = path.segments.tolist()
+    for row in before:
+        if left <= row[5]:
+            return along(row, left), row[4]
+        left -= row[5]
+    return along(last, min(left, last[5])), last[4]
+
+
+def pose_at(path: Path, arc_length_m: float) -> Pose:
+    """The pose `arc_length_m` along a path, clamped to its ends."""
+    return place_on(path, arc_length_m)[0]
+
+
+def on_loiter(path: Path, arc_length_m: float) -> float:
+    """A station with whole turns of a closing loiter circle taken off."""
+    if not path.loiter or arc_length_m <= path.length_m:
+        return arc_length_m
+    turn = float(path.segments[-1, 5])
+    return path.length_m - turn + (arc_length_m - path.length_m) % turn
+
+
+def between(path: Path, start_m: float, stop_m: float) -> list[Segment]:
+    """The segments of the stretch of a path from one station to another."""
+    out: list[Segment] = []
+    begin = 0.0
+    for row in path.segments.tolist():
+        lower, upper = max(start_m - begin, 0.0), min(stop_m - begin, row[5])
+        if upper - lower > SHORTEST_M:
+            out.append((*along(row, lower), row[4], upper - lower))
+        begin += row[5]
+    return out
+
+
+def sample(path: Path, spacing_m: float, deviation_m: float = math.inf) -> FloatArray:
+    """(k, 2) points along a path, both ends included.
+
+    Args:
+        path: the path.
+        spacing_m: largest distance between neighbours, along the path.
+        deviation_m: largest distance of an arc from the chord between neighbours.
+    """
+    pieces = [path.segments[:1, :2]]
+    for x, y, tx, ty, curvature, length in path.segments.tolist():
+        step = spacing_m
+        if curvature:
+            step = min(step, math.sqrt(8.0 * deviation_m / abs(curvature)))
+        elif math.isfinite(deviation_m) and math.isinf(spacing_m):
+            step = length
+        s = np.linspace(0.0, length, max(2, math.ceil(length / step) + 1))[1:]
+        if abs(curvature) < 1e-12:
+            pieces.append(np.column_stack((x + tx * s, y + ty * s)))
+            continue
+        sine, versine = np.sin(curvature * s) / curvature, (1.0 - np.cos(curvature * s)) / curvature
+        pieces.append(np.column_stack((x + tx * sine - ty * versine, y + ty * sine + tx * versine)))
+    return np.concatenate(pieces)
+
+
+def turns_onto(pose: Pose, target: Point, radius_m: float) -> list[list[Segment]]:
+    """Turns from a pose onto a straight line that ends at a point, each with that line, the shorter first.
+
+    There is one to the left and one to the right, except where the point lies inside the turning circle.
+    """
+    ways: list[tuple[float, list[Segment]]] = []
+    for side in (1.0, -1.0):  # left, right
+        cx, cy = (
+            pose.east_m - side * radius_m * pose.tangent_north,
+            pose.north_m + side * radius_m * pose.tangent_east,
+        )
+        dx, dy = target[0] - cx, target[1] - cy
+        distance = math.hypot(dx, dy)
+        if distance <= radius_m:
+            continue
+        straight = math.sqrt(distance * distance - radius_m * radius_m)
+        # Direction of the tangent line that leaves the circle towards the target.
+        heading = math.atan2(dy, dx) + side * math.asin(radius_m / distance)
+        turn = side * (heading - math.atan2(pose.tangent_north, pose.tangent_east)) % math.tau
+        if math.tau - turn < 1e-9:
+            turn = 0.0
+        arc: Segment = (*pose, side / radius_m, turn * radius_m)
+        way = [arc] if arc[5] > SHORTEST_M else []
+        if straight > SHORTEST_M:
+            way.append((*along(arc, arc[5]), 0.0, straight))
+        if way:
+            ways.append((turn * radius_m + straight, way))
+    return [way for _, way in sorted(ways, key=lambda each: each[0])]
+
+
+def turn_onto(pose: Pose, target: Point, radius_m: float) -> list[Segment] | None:
+    """The shorter of the turns from a pose onto a straight line that ends at a point, and that line.
+
+    Returns:
+        The segments; None for a point at the pose itself.
+    """
+    ways = turns_onto(pose, target, radius_m)
+    return ways[0] if ways else None
+
+
+class Limits(NamedTuple):
+    """How a curve may bend.
+
+    Attributes:
+        radius_m: smallest radius.
+        roll_m: distance flown while rolling into a turn; kept straight between a left and a right turn.
+    """
+
+    radius_m: float
+    roll_m: float
+
+    @classmethod
+    def of(cls, mission: Mission) -> Limits:
+        """Those of a mission."""
+        return cls(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
+
+
+def fillet(
+    start: Pose,
+    nodes: Sequence[Point],
+    limits: Limits,
+    cut_m: float,
+    start_curvature: float = 0.0,
+    longer_turn: bool = False,
+    first_radius_m: float | None = None,
+) -> Path | None:
+    """A path from a pose through the corners of a polyline, each corner rounded by one arc.
+
+    The first turn has the smallest radius, if none is given. Every corner gets the largest arc that its legs have
+    room for and that passes the corner within a given distance, so that curvature is no larger than it has to be.
+
+    Args:
+        start: where the path begins.
+        nodes: corners and, last, the end; all ahead of `start` in the order of flight.
+        limits: smallest radius and room to roll.
+        cut_m: how far from a corner its arc may pass, where the smallest radius leaves the choice.
+        start_curvature: curvature (1/m) flown on arrival at the start.
+        longer_turn: begin with the longer of the two turns towards the first corner.
+        first_radius_m: radius of that turn.
+
+    Returns:
+        The path, or None where a corner cannot be rounded.
+    """
+    radius_m = first_radius_m or limits.radius_m
+    ways = turns_onto(start, nodes[0], radius_m)[longer_turn:]
+    segments: list[Segment] = []
+    if ways and ways[0][0][4] * start_curvature < 0.0:
+        if limits.roll_m > SHORTEST_M:
+            segments.append((*start, 0.0, limits.roll_m))
+            start = along(segments[0], limits.roll_m)
+        ways = turns_onto(start, nodes[0], radius_m)[longer_turn:]
+    if not ways:
+        return None
+    first = ways[0]
+    last_turn = 0.0 if segments else start_curvature
+    segments += [segment for segment in first if segment[4]]
+    corner = along(segments[-1], segments[-1][5]) if segments else start
+    last_turn = segments[-1][4] if segments and segments[-1][4] else last_turn
+    used = 0.0  # how much of the present leg the corner before it has taken
+    for i, node in enumerate(nodes):
+        leg = math.dist(corner[:2], node)
+        if leg <= SHORTEST_M:
+            return None
+        ux, uy = (node[0] - corner[0]) / leg, (node[1] - corner[1]) / leg
+        trim, turn, radius = 0.0, 0.0, math.inf
+        if i + 1 < len(nodes):
+            out = math.dist(node, nodes[i + 1])
+            if out <= SHORTEST_M:
+                return None
+            vx, vy = (nodes[i + 1][0] - node[0]) / out, (nodes[i + 1][1] - node[1]) / out
+            turn = math.atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+            tangent = math.tan(0.5 * abs(turn))
+            if tangent > 1e-9:
+                free = leg - used - (limits.roll_m if turn * last_turn < 0.0 else 0.0)
+                need = limits.radius_m * tangent
+                if need > min(free, out):
+                    return None
+                # An arc of radius r passes the corner at r (1 / cos(turn / 2) - 1).
+                widest = cut_m * tangent / max(1.0 / math.cos(0.5 * turn) - 1.0, 1e-12)
+                wanted = min(widest, 0.5 * leg, out if i + 2 == len(nodes) else 0.5 * out)
+                trim = min(max(need, wanted), free)
+                radius = trim / tangent
+        straight = leg - used - trim
+        if straight > SHORTEST_M:
+            segments.append((corner[0] + ux * used, corner[1] + uy * used, ux, uy, 0.0, straight))
+        if math.isfinite(radius) and radius * abs(turn) > SHORTEST_M:
+            last_turn = turn
+            at = (node[0] - ux * trim, node[1] - uy * trim)
+            segments.append((*at, ux, uy, math.copysign(1.0 / radius, turn), radius * abs(turn)))
+        corner = Pose(node[0], node[1], ux, uy)
+        used = trim
+    return Path(np.array(segments)) if segments else None
+
+
+def onward(path: Path, arc_length_m: float, length_m: float) -> list[Segment]:
+    """The segments of a stretch of a path; where that ends in a loiter circle, round it as often as need be."""
+    stretch = between(path, arc_length_m, arc_length_m + length_m)
+    left = arc_length_m + length_m - max(path.length_m, arc_length_m)
+    turn = path.segments[-1].tolist()
+    while path.loiter and left > SHORTEST_M:
+        stretch.append((*turn[:5], min(left, turn[5])))
+        left -= turn[5]
+    return stretch
+
+
+def full_turn(pose: Pose, radius_m: float, side: float) -> Segment:
+    """A full circle from a pose, to the left (`side` = 1) or to the right (-1)."""
+    return (*pose, side / radius_m, math.tau * radius_m)
+
+
+def moved(segments: Sequence[Segment], to: Pose) -> list[Segment]:
+    """Segments as a whole brought to where they begin at another pose."""
+    x, y, tx, ty = segments[0][:4]
+    turn = complex(to.tangent_east, to.tangent_north) * complex(tx, -ty)
+    turn /= abs(turn)  # else what is moved again and again shrinks or grows: the error doubles each time
+    out: list[Segment] = []
+    for east, north, tangent_east, tangent_north, curvature, length in segments:
+        place = complex(to.east_m, to.north_m) + turn * complex(east - x, north - y)
+        tangent = turn * complex(tangent_east, tangent_north)
+        out.append((place.real, place.imag, tangent.real, tangent.imag, curvature, length))
+    return out
+
+
+def onward_in_turn(pose: Pose, curvature: float, to: Pose) -> list[Segment] | None:
+    """The arc of a turn from one pose to another on it; None where that is not on it, with its tangent.
+
+    Args:
+        pose: in the turn.
+        curvature: of the turn, 1/m; 0: none.
+        to: the other pose.
+    """
+    if not curvature:
+        return None
+    turned = math.atan2(
+        pose.tangent_east * to.tangent_north - pose.tangent_north * to.tangent_east,
+        pose.tangent_east * to.tangent_east + pose.tangent_north * to.tangent_north,
+    )
+    turn = math.copysign(1.0, curvature) * turned % math.tau
+    arc: Segment = (*pose, curvature, turn / abs(curvature))
+    if math.dist(along(arc, arc[5])[:2], to[:2]) > ON_TURN / abs(curvature):
+        return None
+    return [arc] if SHORTEST_M < arc[5] < math.tau / abs(curvature) - SHORTEST_M else []

@@ -1,0 +1,257 @@
+"""What obstacles look like from a track point: where their fans end, and how far lines lead past their edge points.
+
+Metres, ENU. Points are (3, m): east, north and the distance to be kept from each, which gives the processor one row
+after the other. Compiled: see `planner.compiled`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planner.compiled import COUNT, COUNTS, FLOAT, ROWS, compiled
+from planner.interface import BoolArray, FloatArray, IntArray
+
+EDGE_OFF_RAD = 1e-7
+"""Edges are turned this much into the free sector, clear of rounding errors."""
+
+
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+def first_met(
+    places: FloatArray,
+    first: IntArray,
+    circles: FloatArray,
+    east: float,
+    north: float,
+    ux: float,
+    uy: float,
+) -> tuple[float, int]:
+    """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does.
+
+    Args:
+        places: all edge points by squares, as `planner.geometry.blocks.blocks` has them,
+        first: where each square begins among them,
+        circles: and the circle about it.
+        east: where the ray begins.
+        north: where the ray begins.
+        ux: along the ray.
+        uy: along the ray.
+    """
+    nearest, met = math.inf, 0
+    for block in range(len(first) - 1):
+        dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
+        ahead = dx * ux + dy * uy
+        if abs(dx * uy - dy * ux) >= reach or ahead <= -reach or ahead - reach >= nearest:
+            continue
+        for k in range(first[block], first[block + 1]):
+            dx, dy = places[0, k] - east, places[1, k] - north
+            ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+            room = places[2, k] * places[2, k] - beside * beside
+            if room > 0.0 and ahead > 0.0:
+                entry = ahead - math.sqrt(room)
+                if entry < nearest:
+                    nearest, met = entry, k
+    return max(nearest, 0.0), met
+
+
+@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+def hugged(
+    own: FloatArray, east: float, north: float, ux: float, uy: float, outer: float, touch: float
+) -> float:
+    """How far along a ray an outer distance from an obstacle, which it touches, is reached again; 0: it never is.
+
+    Args:
+        own: (3, m) east and north of the obstacle's points, and what is not asked for here.
+        east: where the ray begins.
+        north: where the ray begins.
+        ux: along the ray.
+        uy: along the ray.
+        outer: that distance.
+        touch: distance along the ray at which it touches.
+    """
+    begin, end, count = np.empty(len(own[0])), np.empty(len(own[0])), 0
+    for j in range(len(own[0])):
+        dx, dy = own[0, j] - east, own[1, j] - north
+        ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+        reach = outer * outer - beside * beside
+        if reach > 0.0 and ahead > -outer:
+            half = math.sqrt(reach)
+            begin[count], end[count] = ahead - half, ahead + half
+            count += 1
+    furthest = 0.0
+    for i, k in enumerate(np.argsort(begin[:count])):
+        if i and begin[k] > furthest > touch:
+            return furthest
+        furthest = max(furthest, end[k]) if i else end[k]
+    return furthest
+
+
+@compiled(ROWS, COUNTS, ROWS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT)
+def fan_edges(
+    places: FloatArray,
+    block: IntArray,
+    circles: FloatArray,
+    labels: IntArray,
+    own: FloatArray,
+    first: IntArray,
+    counts: IntArray,
+    one: IntArray,
+    other: IntArray,
+    east: float,
+    north: float,
+    outer: float,
+) -> tuple[FloatArray, IntArray, int]:
+    """The tangents to the ends of an obstacle's fan that are free as far as they touch, and what hides the others.
+
+    Args:
+        places: all edge points by squares, as `planner.geometry.blocks.blocks` has them,
+        block: where each square begins among them,
+        circles: and the circle about it.
+        labels: the obstacle of each of these points.
+        own: (3, m) east, north and the distance to be kept of the obstacle's points, those of a cell next to each
+            other.
+        first: where each cell begins in `own`.
+        counts: how many points it has.
+        one: a cell,
+        other: and one that touches it; each pair once.
+        east: of the track point.
+        north: of the track point.
+        outer: distance from the obstacle of interest on a tangent.
+
+    Returns:
+        (k, 6) unit vector, distance at which it touches, distance up to which it is free, side (1 for M, -1 for N),
+        distance at which the outer distance is reached again (`hugged`);
+        (h,) the obstacles that hide a tangent, or close it right behind the place where it touches;
+        how many tangents were looked along.
+    """
+    cells, count = len(first), 0
+    tangents = np.empty((4, len(own[0])))
+    for j in range(len(own[0])):
+        # The direction towards a point, turned to its tangents; from too near they lead square past it.
+        dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
+        away2 = max(dx * dx + dy * dy, 1e-12)
+        cos = math.sqrt(max(away2 - keep * keep, 0.0)) / away2
+        sin = 1.0 / math.sqrt(away2) if away2 <= keep * keep else keep / away2
+        tangents[0, j], tangents[1, j] = dx * cos - dy * sin, dy * cos + dx * sin
+        tangents[2, j], tangents[3, j] = dx * cos + dy * sin, dy * cos - dx * sin
+    outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
+    x, y = np.empty(cells), np.empty(cells)
+    edges, hiding, hides, looked = np.empty((2 * cells, 6)), np.empty(2 * cells, dtype=np.intp), 0, 0
+    for left in (True, False):
+        side, u, v = 1.0 if left else -1.0, tangents[0 if left else 2], tangents[1 if left else 3]
+        for cell in range(cells):
+            begin = furthest = first[cell]
+            ux, uy, most = u[begin], v[begin], 0.0
+            for j in range(begin + 1, begin + counts[cell]):
+                beyond = side * (ux * v[j] - uy * u[j])
+                if beyond > 0.0 and ux * u[j] + uy * v[j] < 0.0:
+                    beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
+                if beyond > most:
+                    furthest, most = j, beyond
+            outmost[cell], x[cell], y[cell], ends[cell] = furthest, u[furthest], v[furthest], True
+        # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
+        for pair in range(len(one)):
+            j, k = one[pair], other[pair]
+            beyond = side * (x[j] * y[k] - y[j] * x[k])
+            ends[j] &= not beyond > 0.0
+            ends[k] &= not beyond < 0.0
+        for cell in range(cells):
+            if not ends[cell]:
+                continue
+            j = outmost[cell]
+            dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
+            touch2 = dx * dx + dy * dy - keep * keep
+            if touch2 <= 0.0:
+                continue
+            off = side * EDGE_OFF_RAD
+            towards, aside = x[cell] - off * y[cell], y[cell] + off * x[cell]
+            touch = math.sqrt(touch2)
+            clear, met = first_met(places, block, circles, east, north, towards, aside)
+            looked += 1
+            if clear >= touch:
+                again = hugged(own, east, north, towards, aside, outer, touch)
+                edges[count] = (towards, aside, touch, clear, side, again)
+                count += 1
+            if clear < touch + places[2, met] and not (hides and hiding[hides - 1] == labels[met]):
+                hiding[hides] = labels[met]
+                hides += 1
+    return edges[:count], hiding[:hides], looked
+
+
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, COUNT)
+def entered(
+    places: FloatArray,
+    first: IntArray,
+    circles: FloatArray,
+    ax: float,
+    ay: float,
+    bx: float,
+    by: float,
+    most: int,
+) -> tuple[FloatArray, IntArray]:
+    """The discs about points by squares that the line from a to b enters: distances from a, and their indices.
+
+    A disc that holds `a` counts only when the line leads deeper into it. So many at most are looked for.
+    """
+    most = min(most, len(places[0]))
+    entry, which, count = np.empty(most), np.empty(most, dtype=np.intp), 0
+    length = math.hypot(bx - ax, by - ay)
+    if length < 1e-9:
+        return entry[:0], which[:0]
+    ux, uy = (bx - ax) / length, (by - ay) / length
+    for block in range(len(first) - 1):
+        dx, dy, reach = circles[0, block] - ax, circles[1, block] - ay, circles[2, block]
+        ahead = dx * ux + dy * uy
+        if abs(dx * uy - dy * ux) >= reach or ahead <= -reach or ahead - reach >= length:
+            continue
+        for k in range(first[block], first[block + 1]):
+            dx, dy = places[0, k] - ax, places[1, k] - ay
+            ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+            past = max(ahead - length, 0.0)
+            room = places[2, k] * places[2, k] - beside * beside
+            if room > past * past and ahead > 0.0:
+                entry[count], which[count] = ahead - math.sqrt(room), k
+                count += 1
+                if count == most:
+                    return entry, which
+    return entry[:count], which[:count]
+
+
+@compiled(ROWS, COUNTS, ROWS, ROWS)
+def shortcuts(
+    places: FloatArray, first: IntArray, circles: FloatArray, nodes: FloatArray
+) -> tuple[IntArray, int]:
+    """Which of (n, 2) track points are left where each is followed by the furthest that it sees, or by the next.
+
+    Returns:
+        (k,) indices, the first and the last among them; how many lines were looked along.
+    """
+    kept, count, here, lines = np.zeros(len(nodes), dtype=np.intp), 1, 0, 0
+    while here < len(nodes) - 1:
+        there = len(nodes) - 1
+        while there > here + 1:
+            a, b = nodes[here], nodes[there]
+            lines += 1
+            if not len(entered(places, first, circles, a[0], a[1], b[0], b[1], 1)[1]):
+                break
+            there -= 1
+        here = there
+        kept[count] = here
+        count += 1
+    return kept[:count], lines
+
+
+@compiled(ROWS, ROWS)
+def encircled(loop: FloatArray, points: FloatArray) -> BoolArray:
+    """(m,) whether a closed polyline (k, 2) goes round each point an odd number of times."""
+    odd = np.zeros(len(points), dtype=np.bool_)
+    before = len(loop) - 1
+    for corner in range(len(loop)):
+        x0, y0, x1, y1 = loop[before, 0], loop[before, 1], loop[corner, 0], loop[corner, 1]
+        for i in range(len(points)):
+            y = points[i, 1]
+            if (y0 <= y) != (y1 <= y) and points[i, 0] < x0 + (y - y0) * (x1 - x0) / (y1 - y0):
+                odd[i] = not odd[i]
+        before = corner
+    return odd

@@ -1,0 +1,1 @@
+"""The rolling-window planner of the paper, made safe and convergent."""

@@ -1,0 +1,139 @@
+"""Thinking about the way to the goal in portions of work, while the plan in effect is flown.
+
+The plan in effect ends in a turn that is seen to be free, so that there is time to think: a search that is not done
+within its portion goes on when the planner is asked next. How much is done in a portion is counted, never timed. What
+is found is fitted to where the aircraft has got to by then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.geometry.course import Course
+from planner.interface import FloatArray, Path
+from planner.rolling_window.local_planning import DOUBTED, Attempt, LocalPlanning, Start
+from planner.rolling_window.multi_step_search import Track
+from planner.rolling_window.route_optimisation import Route
+
+
+class _Found(NamedTuple):
+    """A route, where it begins, how far from obstacles it was searched, and among which points."""
+
+    route: Route
+    start: Start
+    attempt: Attempt
+    points_m: FloatArray
+    known: int
+    shortest: bool
+
+
+class AnytimeSearch:
+    """One search for ways to the goal, those that are wanted most first.
+
+    Args:
+        local: does the work.
+        known: number of edge points, of what stands still, that it begins with.
+        effort: how often the work of a wide search is doubled.
+        closed: asked before more work than usual: whether it is proved that there is no way.
+        roomy: the widest ways are looked for first, however long.
+
+    Attributes:
+        known: number of edge points, of what stands still, that it began with.
+        done: whether all ways have been looked for.
+        stuck: the first way that was found and could not be taken.
+        tracks: candidates looked at so far.
+    """
+
+    def __init__(
+        self, local: LocalPlanning, known: int, effort: int, closed: Callable[[], bool], roomy: bool = False
+    ) -> None:
+        self._local, self._effort, self._closed, self._roomy = local, effort, closed, roomy
+        self._start: Start | None = None
+        self._flown: Course | None = None
+        self._thoughts = self._think()
+        self.known = known
+        self.done = False
+        self.stuck: Course | None = None
+        self.tracks: list[Track] = []
+
+    def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
+        """Ways found with one more portion of work.
+
+        Args:
+            start: where a plan would begin now.
+            flown: what is flown now.
+            work: how much may be done, as the tally of the local planning has it.
+        """
+        enough = self._local.tally.done + work
+        self._start, self._flown = start, flown
+        for thought in self._thoughts:
+            if thought is not None:
+                yield thought
+            elif self._local.tally.done >= enough:
+                return
+        self.done = True
+
+    def _now(self) -> tuple[Start, Course | None]:
+        assert self._start is not None
+        return self._start, self._flown
+
+    def _think(self) -> Generator[Course | None, None, None]:
+        """Ways as they are found; None after each step of work."""
+        found = False
+        waiting: list[_Found] = []
+        closed_m = math.inf
+        attempts = self._local.attempts()
+        if self._effort or self._roomy:
+            # In vain so far: what is closed to the narrowest way is closed to all.
+            attempts.sort(key=lambda each: each.distance_m + each.margin_m, reverse=self._roomy)
+        for i, attempt in enumerate(attempts):
+            if attempt.distance_m + attempt.margin_m >= closed_m:
+                continue  # what is closed to a narrow way is closed to a wide one
+            before, known, points = len(self.tracks), self._local.known, self._local.points_m
+            route = yield from self._local.route(attempt, self._effort, self._now, self.tracks, self._closed)
+            if len(self.tracks) == before:
+                closed_m = attempt.distance_m + attempt.margin_m
+            if route is not None:
+                found = True
+                waiting.append(_Found(route, self._now()[0], attempt, points, known, shortest=i == 0))
+            narrower_may_lead_on = i == 0 and route is not None and self._switches(route)
+            if narrower_may_lead_on or self._passed_over(waiting):
+                continue
+            yield from self._courses(waiting)
+            waiting = []
+        yield from self._courses(waiting)
+        if not found:
+            route = yield from self._local.tight_route(self._now)
+            if route is None and self.tracks:
+                route = yield from self._local.beginning(self._now, self.tracks[0])
+            if route is not None:
+                yield self._course(route, self._local.known, shortest=False)
+
+    def _courses(self, found: list[_Found]) -> Iterator[Course]:
+        """Courses along routes, the shorter first, from where a plan would begin now."""
+        for each in sorted(found, key=lambda each: each.route.path.length_m):
+            start, _ = self._now()
+            route: Route | None = each.route
+            if start is not each.start:
+                route = self._local.fitted(start, each.attempt, each.route, each.points_m)
+            if route is not None:
+                yield self._course(route, each.known, each.shortest)
+
+    def _passed_over(self, found: list[_Found]) -> bool:
+        """Whether a much shorter way could not be flown: further from obstacles it may have room for its turns."""
+        least_m = min((each.route.path.length_m for each in found), default=0.0)
+        return least_m > (1.0 + DOUBTED) * min((track.cost_m for track in self.tracks), default=math.inf)
+
+    def _switches(self, route: Route) -> bool:
+        """Whether a way leaves obstacles on the other side than what is flown."""
+        start, flown = self._now()
+        nodes = (start.pose[:2], *route.nodes)
+        return flown is not None and not flown.same_side(nodes, self._local.points_m)
+
+    def _course(self, route: Route, known: int, shortest: bool) -> Course:
+        path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
+        return Course(path, route.nodes, known, shortest)

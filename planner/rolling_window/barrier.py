@@ -1,0 +1,246 @@
+"""Proof that no way exists: a closed chain of seen edges between start and goal.
+
+Two edge points nearer to each other than twice the clearance let nothing through between them: no point of the
+line that joins them is as far as the clearance from both. Nor is there a way between an edge point and the border of
+the area that is nearer to it than the clearance; what has to keep a distance from the border, too, like the middle of
+a turn, finds none where both together are more than what lies between. A closed chain of such lines, where the border
+closes chains outside of the area, that crosses the straight line from start to goal an odd number of times parts the
+two (Jordan curve theorem, modulo 2). Chains are kept as a forest with the parity of their crossings, so that the first
+link that closes an odd one is noticed: union-find with parity.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planner.compiled import (
+    BOOL,
+    BOOLS_OUT,
+    COUNT,
+    COUNTS_OUT,
+    FLOAT,
+    FLOATS,
+    ROWS,
+    compiled,
+)
+from planner.geometry.curves import Point
+from planner.interface import BoolArray, FloatArray, IntArray, Mission
+from planner.memory import ObstacleMemory
+
+OUTSIDE = 0
+"""Node of the world outside of the area."""
+
+PROVED_AT_ONCE = 500
+"""So many edge points at most are taken into a proof in one call; all at once where a proof is to be held against what
+is left after some were let go of (a millisecond for every 2,000 of them)."""
+
+THIN = 0.1
+"""Points nearer to one that was taken in than this share of the clearance are left out. Fewer points prove less,
+but nothing that is not so."""
+
+
+SQUARES = 4096
+"""Into so many lists nodes are put, by where they lie."""
+
+
+@compiled(COUNTS_OUT, BOOLS_OUT, COUNT)
+def _root(parent: IntArray, parity: BoolArray, node: int) -> tuple[int, bool]:
+    """The root of a node's tree and the parity of crossings on the way there; shortens the way."""
+    root, odd = node, False
+    while parent[root] != root:
+        odd ^= parity[root]
+        root = parent[root]
+    left = odd
+    while parent[node] != root and node != root:
+        after, crosses = parent[node], parity[node]
+        parent[node], parity[node] = root, left
+        node, left = after, left ^ crosses
+    return root, odd
+
+
+@compiled(FLOAT, FLOAT, FLOAT, FLOAT, ROWS)
+def _crosses(ax: float, ay: float, bx: float, by: float, ends: FloatArray) -> bool:
+    """Whether the line from a to b crosses that from start to goal."""
+    sx, sy, dx, dy = ends[0, 0], ends[0, 1], ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
+    side_a = dx * (ay - sy) - dy * (ax - sx)
+    side_b = dx * (by - sy) - dy * (bx - sx)
+    if (side_a > 0.0) == (side_b > 0.0):
+        return False
+    share = side_a / (side_a - side_b)
+    x, y = ax + share * (bx - ax), ay + share * (by - ay)
+    return bool(0.0 <= (x - sx) * dx + (y - sy) * dy < dx * dx + dy * dy)
+
+
+@compiled(COUNTS_OUT, BOOLS_OUT, COUNT, COUNT, BOOL)
+def _link(parent: IntArray, parity: BoolArray, a: int, b: int, crosses: bool) -> bool:
+    """Links two nodes; whether that closes a chain that parts start and goal."""
+    root_a, parity_a = _root(parent, parity, a)
+    root_b, parity_b = _root(parent, parity, b)
+    odd = parity_a ^ parity_b ^ crosses
+    if root_a == root_b:
+        return odd
+    parent[root_a], parity[root_a] = root_b, odd
+    return False
+
+
+@compiled(ROWS, COUNT, COUNTS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, ROWS, FLOATS, FLOAT, FLOAT)
+def _link_all(
+    places: FloatArray,
+    first: int,
+    parent: IntArray,
+    parity: BoolArray,
+    last: IntArray,
+    before: IntArray,
+    ends: FloatArray,
+    bounds: FloatArray,
+    clearance: float,
+    border: float,
+) -> bool:
+    """Links nodes, from the first one on, with all before that are near enough; whether that closes a chain.
+
+    Args:
+        places: of each node but that of the outside, which is the first.
+        first: the first one to be linked.
+        parent: of each node in its tree.
+        parity: whether the chain to it crosses the line from start to goal an odd number of times.
+        last: by where they lie, told by squares: the last node there.
+        before: of each node the one before it there.
+        ends: start and goal.
+        bounds: xmin, ymin, xmax, ymax.
+        clearance: distance that a way keeps,
+        border: and from the border, but for what of that is nearer to start or goal.
+    """
+    closed, reach = False, 2.0 * clearance
+    xmin, ymin, xmax, ymax = bounds
+    for node in range(first, len(places)):
+        x, y = places[node]
+        parent[node] = node
+        for border_x, border_y in ((xmin, y), (xmax, y), (x, ymin), (x, ymax)):
+            if math.hypot(border_x - x, border_y - y) >= clearance + border:
+                continue
+            from_start = math.hypot(border_x - ends[0, 0], border_y - ends[0, 1])
+            from_goal = math.hypot(border_x - ends[1, 0], border_y - ends[1, 1])
+            if min(from_start, from_goal) >= border:
+                closed |= _link(parent, parity, node, OUTSIDE, _crosses(x, y, border_x, border_y, ends))
+        column, row = math.floor(x / reach), math.floor(y / reach)
+        for i in range(column - 1, column + 2):
+            for j in range(row - 1, row + 2):
+                other = last[(i * 7919 + j) % len(last)]
+                while other > 0:
+                    other_x, other_y = places[other]
+                    if (other_x - x) ** 2 + (other_y - y) ** 2 < reach * reach:
+                        closed |= _link(parent, parity, node, other, _crosses(x, y, other_x, other_y, ends))
+                    other = before[other]
+        square = (column * 7919 + row) % len(last)
+        before[node], last[square] = last[square], node
+    return closed
+
+
+class Barrier:
+    """Watches for a closed chain of edge points between two places.
+
+    Args:
+        start: a place that keeps the clearance from all points.
+        goal: another.
+        bounds_m: xmin, ymin, xmax, ymax of the area, which is never left.
+        clearance_m: distance that a way keeps from every point,
+        border_m: and from the border, but for those places of it that are nearer to start or goal.
+    """
+
+    def __init__(
+        self,
+        start: Point,
+        goal: Point,
+        bounds_m: tuple[float, float, float, float],
+        clearance_m: float,
+        border_m: float = 0.0,
+    ) -> None:
+        self._ends, self._bounds = np.array((start, goal)), np.array(bounds_m)
+        self._clearance, self._border = clearance_m, border_m
+        self._thinned: set[tuple[int, int]] = set()
+        self._places = np.zeros((1, 2))
+        self._parent, self._before = np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp)
+        self._parity = np.zeros(1, dtype=np.bool_)
+        self._last = np.zeros(SQUARES, dtype=np.intp)
+        self.closed = False
+
+    def add(self, points_m: FloatArray) -> None:
+        """Takes in edge points, (k, 2)."""
+        known, fresh = len(self._places), []
+        places = np.floor(points_m / (THIN * self._clearance)).astype(np.int64).tolist()
+        for i, (column, row) in enumerate(places):
+            if (column, row) not in self._thinned:
+                self._thinned.add((column, row))
+                fresh.append(i)
+        if not fresh:
+            return
+        more = np.zeros(len(fresh), dtype=np.intp)
+        self._places = np.concatenate((self._places, points_m[fresh]))
+        self._parent = np.concatenate((self._parent, more))
+        self._before = np.concatenate((self._before, more))
+        self._parity = np.concatenate((self._parity, more.astype(np.bool_)))
+        nodes = (self._parent, self._parity, self._last, self._before)
+        keeps = (self._clearance, self._border)
+        self.closed |= _link_all(self._places, known, *nodes, self._ends, self._bounds, *keeps)
+
+
+class Proof:
+    """Asks what a planner remembers, again and again, whether it leaves no way to the goal.
+
+    Args:
+        mission: goal and bounds.
+        memory: the edge points.
+        keeps_m: what a way has to keep from every point, but for those that are nearer than this to the goal or to
+            where the aircraft is at first: they prove nothing.
+        border_m: what it has to keep from the border of the area.
+        with_refused: count what was refused: asks whether it leaves no way but through that. Else it proves
+            nothing either.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        memory: ObstacleMemory,
+        keeps_m: float,
+        border_m: float = 0.0,
+        with_refused: bool = False,
+    ) -> None:
+        self._mission, self._memory = mission, memory
+        self._keeps_m, self._border_m = keeps_m, border_m
+        self._with_refused = with_refused
+        self._ends: tuple[Point, Point] | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._barrier: Barrier | None = None
+        self._taken = 0
+        self._begun_at = self._gone = self._memory.gone
+
+    def closed(self, position: Point) -> bool:
+        """Takes in some more of the points and says whether they close all ways from the first position given."""
+        # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
+        self._ends = self._ends or (position, self._mission.goal_m)
+        closed = self._taken_in(self._ends, PROVED_AT_ONCE)
+        if closed and self._begun_at != self._memory.gone:
+            # Some of what closes it may have been let go of since: what is left has to close it as well.
+            self._begin()
+            return self._taken_in(self._ends, self._memory.known)
+        return closed
+
+    def _taken_in(self, ends: tuple[Point, Point], most: int) -> bool:
+        """Whether the ways are closed with so many more points."""
+        memory, keeps_m = self._memory, self._keeps_m
+        if self._barrier is None:
+            self._barrier = Barrier(*ends, self._mission.bounds_m, keeps_m, self._border_m)
+        self._taken = max(self._taken - (memory.gone - self._gone), 0)
+        self._gone = memory.gone
+        more = memory.genuine_m[self._taken :][:most]
+        self._taken += len(more)
+        if self._with_refused:
+            more = np.concatenate((memory.refused_m, more))
+        for east, north in ends:
+            more = more[np.hypot(more[:, 0] - east, more[:, 1] - north) >= keeps_m]
+        self._barrier.add(more)
+        return self._barrier.closed

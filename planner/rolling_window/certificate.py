@@ -1,0 +1,196 @@
+"""Safety by construction: how far a path may be committed to.
+
+Invariant: the path in effect ends in a full turn at the minimum radius, and path and turn lie in space that has been
+seen to be free, with the clearance kept from every edge seen. Whatever the unseen part of the world holds, the
+aircraft can fly the path it has into that turn and go on planning from there, for ever. Where no such turn leads on,
+the path may end in the goal circle instead, if it can be flown up to there: then the flight is over, and needs no
+turn. (Schouwenaars et al., "Receding horizon path planning with implicit safety guarantees", ACC 2004.) The turn is
+certified as a disc, not as a circle: a circle can enclose the tip of a wall. The disc is larger than the turn by a
+share of the clearance, for beside what is seen to its edge the hidden flank of something may begin.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from planner.geometry.clearance import inside_bounds
+from planner.geometry.curves import (
+    Limits,
+    Segment,
+    along,
+    between,
+    full_turn,
+    place_on,
+)
+from planner.geometry.stations import places_along, poses_at, turn_centres
+from planner.interface import BoolArray, FloatArray, MapView, Path
+from planner.rolling_window.route_optimisation import Terrain
+
+DISC, BEYOND = 1.04, 0.5
+"""The certified disc is so many times as large as the turn, for tracking error and rolling in, and reaches beyond it
+by this share of the clearance at the least. With all of the clearance forests become ways round: trees hide each other
+until one is among them."""
+
+MOST_STATIONS = 32
+
+AT_ONCE = 4
+"""So many stations are looked at together: mostly one of the first serves."""
+
+SIDES = (1.0, -1.0)
+"""Left, right."""
+
+
+class CertificateBroken(RuntimeError):
+    """Something was seen where the plan in effect was certified to be free, and there is no way out.
+
+    Args:
+        time_s: when it was seen.
+    """
+
+    def __init__(self, time_s: float) -> None:
+        super().__init__(
+            f"something was seen at {time_s:.1f} s where the plan in effect was certified to be free, "
+            "and there is no room to turn away"
+        )
+
+
+@dataclass(frozen=True)
+class Certified:
+    """The part of a path that may be flown.
+
+    Attributes:
+        path: up to the turn, and the turn; or all of it, to the goal.
+        loiter_entry_m: station at which the turn begins, or the flight is over.
+    """
+
+    path: Path
+    loiter_entry_m: float
+
+
+class Certifier:
+    """Looks for the last safe turn off a path.
+
+    Args:
+        limits: smallest radius and room to roll.
+        clearance_m: wanted distance from obstacles.
+        horizon_m: nothing further along a path than this is looked at.
+        spacing_m: distance between the places at which space is asked to be free.
+    """
+
+    def __init__(self, limits: Limits, clearance_m: float, horizon_m: float, spacing_m: float) -> None:
+        self._limits, self._horizon, self._spacing = limits, horizon_m, spacing_m
+        self._beside = BEYOND * clearance_m
+        self._disc = _disc(disc_radius_m(limits.radius_m, clearance_m), spacing_m)
+
+    def seen_free_to_m(self, path: Path, seen: MapView) -> float:
+        """Station up to which a path lies in space seen to be free: that of the first place that does not."""
+        end = min(path.length_m, self._horizon)
+        pieces = max(math.ceil(end / self._spacing), 1)
+        free = seen.seen_free(places_along(path, end, pieces))
+        hidden = int(free.argmin())  # the first
+        return end if free[hidden] else min(hidden * (end / pieces), end)
+
+    def certify(
+        self, path: Path, seen: MapView, terrain: Terrain, to_m: float = math.inf
+    ) -> Certified | None:
+        """The longest part of a path that ends in a turn which is seen to be free.
+
+        Args:
+            path: a path that keeps its distance from all edges seen, up to `to_m`.
+            seen: what has been seen to be free.
+            terrain: the edges, and the distance that the turn has to keep from each.
+            to_m: station before which the turn begins.
+        """
+        free_to = min(self.seen_free_to_m(path, seen), to_m)
+        step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
+        stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
+        for some in (stations[i : i + AT_ONCE] for i in range(0, len(stations), AT_ONCE)):
+            free = self._discs_free(path, some, seen).tolist()
+            for station, sides_free in zip(some.tolist(), free, strict=True):
+                for side, disc_free in zip(SIDES, sides_free, strict=True):
+                    if disc_free:
+                        turn = self._turn(path, station, side)
+                        if terrain.admits(Path(np.array(turn))):
+                            way = between(path, 0.0, station)
+                            return Certified(Path(np.array([*way, *turn]), loiter=True), station)
+        return None
+
+    def certify_up_to(
+        self, over_m: float, path: Path, seen: MapView, bounds_m: tuple[float, float, float, float]
+    ) -> Certified | None:
+        """All of a path, where it is seen to be free and stays within bounds until the flight is over.
+
+        There is no turn to leave it for: what lies beside it has to be seen to be free as well, as beyond a turn.
+
+        Args:
+            over_m: station from which on nothing is flown.
+            path: a path that keeps its distance from all edges seen, up to there.
+            seen: what has been seen to be free.
+            bounds_m: xmin, ymin, xmax, ymax.
+        """
+        flown = between(path, 0.0, over_m)
+        if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
+            return None
+        stations: FloatArray = np.linspace(0.0, over_m, max(math.ceil(over_m / self._spacing), 1) + 1)
+        poses = poses_at(path, stations)
+        aside = self._beside * np.column_stack((-poses[:, 3], poses[:, 2]))
+        places = np.concatenate([poses[:, :2] + side * aside for side in (0.0, *SIDES)])
+        if not seen.seen_free(np.clip(places, bounds_m[:2], bounds_m[2:])).all():
+            return None
+        return Certified(path, over_m)
+
+    def _discs_free(self, path: Path, stations: FloatArray, seen: MapView) -> BoolArray:
+        """(k, 2) whether the disc of a turn to each side, at each of (k,) stations, has been seen to be free."""
+        centres = turn_centres(path, stations, self._limits.radius_m, self._limits.roll_m)
+        places = (centres.reshape(-1, 1, 2) + self._disc).reshape(-1, 2)
+        free: BoolArray = np.all(seen.seen_free(places).reshape(len(stations), len(SIDES), -1), axis=2)
+        return free
+
+    def _turn(self, path: Path, arc_length_m: float, side: float) -> list[Segment]:
+        """A full turn off a path, after a straight to roll where the path turns the other way."""
+        pose, curvature = place_on(path, arc_length_m)
+        if side * curvature >= 0.0:
+            return [full_turn(pose, self._limits.radius_m, side)]
+        roll: Segment = (*pose, 0.0, self._limits.roll_m)
+        return [roll, full_turn(along(roll, self._limits.roll_m), self._limits.radius_m, side)]
+
+
+@lru_cache(maxsize=8)
+def _disc(radius_m: float, spacing_m: float) -> FloatArray:
+    """(k, 2) places of a disc about the origin, no further apart than the spacing."""
+    count = max(math.ceil(radius_m / spacing_m), 2)
+    axis = np.linspace(-radius_m, radius_m, 2 * count + 1)
+    x, y = (each.ravel() for each in np.meshgrid(axis, axis))
+    inside = x * x + y * y <= radius_m * radius_m
+    disc = np.column_stack((x[inside], y[inside]))
+    disc.setflags(write=False)
+    return disc
+
+
+def disc_radius_m(radius_m: float, clearance_m: float) -> float:
+    """Radius of the disc that has to be seen to be free for a turn to be certified.
+
+    Args:
+        radius_m: turn radius.
+        clearance_m: wanted distance from obstacles.
+    """
+    return max(DISC * radius_m, radius_m + BEYOND * clearance_m)
+
+
+def least_sensor_range_m(radius_m: float, clearance_m: float, speed_mps: float, reaction_s: float) -> float:
+    """Sensing range without which not even a turn can be certified.
+
+    A turn beside the course reaches two radii to the side; beyond it lie the clearance, more than what is certified
+    of it, and what is flown until a plan takes effect.
+
+    Args:
+        radius_m: turn radius.
+        clearance_m: wanted distance from obstacles.
+        speed_mps: speed over the ground.
+        reaction_s: latency of sensor and planner, and the time to roll.
+    """
+    return 2.0 * DISC * radius_m + clearance_m + speed_mps * reaction_s

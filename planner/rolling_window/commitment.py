@@ -1,0 +1,102 @@
+"""What of a course is put into effect: as much as ends in a turn seen to be free, or in the goal circle."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from planner.geometry.course import Course
+from planner.geometry.curves import Pose, place_on
+from planner.interface import MapView, Mission, Plan, PlanRequest, PlanStatus
+from planner.memory import ObstacleMemory
+from planner.rolling_window.certificate import Certified, Certifier
+from planner.rolling_window.committed_plan import CommittedPlan
+from planner.rolling_window.explanations import picture, sentence
+from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.rolling_window.multi_step_search import Track
+
+
+class Commitment:
+    """Certifies courses.
+
+    Args:
+        mission: goal and limits.
+        memory: what is remembered.
+        local: limits of curves, and where they may lie.
+        least_m: a plan that leaves its course for a turn before this station leads nowhere.
+    """
+
+    def __init__(
+        self, mission: Mission, memory: ObstacleMemory, local: LocalPlanning, least_m: float
+    ) -> None:
+        self._mission, self._memory, self._local, self._least_m = mission, memory, local, least_m
+
+    def effect(
+        self,
+        request: PlanRequest,
+        start: Start,
+        course: Course,
+        tracks: list[Track],
+        cut_m: float,
+        wants_more_time: bool = False,
+    ) -> CommittedPlan | None:
+        """The part of a course that ends in a turn seen to be free, or in the goal circle where no turn leads on.
+
+        Args:
+            request: what was asked.
+            start: where the course begins.
+            course: the course.
+            tracks: candidates that were looked at.
+            cut_m: station at which it comes too near to something.
+            wants_more_time: as the plan has it.
+        """
+        certifier = self._certifier(1.5 * request.seen.spacing_m)
+        turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
+        terrain = self._local.terrain(turn_keeps)
+        certified = certifier.certify(course.path, request.seen, terrain, cut_m)
+        if certified is None or not self._leads_on(certified.loiter_entry_m, course):
+            certified = self._to_goal(certifier, course, request.seen, cut_m) or certified
+        if certified is None:
+            return None
+        goal, nodes, keep_m = self._mission.goal_m, course.nodes, self._mission.clearance_m
+        points, met = self._memory.points_m, self._memory.met_m
+        plan = Plan(
+            PlanStatus.FOUND,
+            sentence(request.position_m, goal, nodes),
+            waypoints_m=np.array([start.position, *nodes]),
+            path=certified.path,
+            picture=partial(
+                picture, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
+            ),
+            wants_more_time=wants_more_time,
+        )
+        return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
+
+    def leads_on(self, found: CommittedPlan) -> bool:
+        """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
+        return self._leads_on(found.loiter_entry_m, found.course)
+
+    def unseen(self, course: Course, seen: MapView) -> Pose:
+        """The first place of a course that has not been seen to be free."""
+        free_to_m = self._certifier(seen.spacing_m).seen_free_to_m(course.path, seen)
+        return place_on(course.path, free_to_m)[0]
+
+    def _leads_on(self, loiter_entry_m: float, course: Course) -> bool:
+        return loiter_entry_m >= min(self._least_m, course.path.length_m - self._mission.goal_radius_m)
+
+    def _to_goal(self, certifier: Certifier, course: Course, seen: MapView, cut_m: float) -> Certified | None:
+        """All of a course that can be flown into the goal circle, however far off it the aircraft may be."""
+        mission = self._mission
+        if not course.to_goal or course.nodes[-1] != mission.goal_m:
+            return None
+        off_m, (xmin, ymin, xmax, ymax) = mission.tracking_error_m, mission.bounds_m
+        over_m = course.path.length_m - (mission.goal_radius_m - off_m)
+        if not over_m <= min(cut_m, course.path.length_m):
+            return None
+        bounds_m = (xmin + off_m, ymin + off_m, xmax - off_m, ymax - off_m)
+        return certifier.certify_up_to(over_m, course.path, seen, bounds_m)
+
+    def _certifier(self, spacing_m: float) -> Certifier:
+        mission = self._mission
+        return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)

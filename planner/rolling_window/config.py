@@ -1,0 +1,87 @@
+"""The keys of the rolling-window planner, and what they default to for a mission."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.interface import Mission
+from planner.rolling_window.certificate import least_sensor_range_m
+
+LEAD_S = 1.0
+"""A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
+
+
+@dataclass(frozen=True)
+class RollingWindowConfig:
+    """Keys of `planner.kind: rolling_window`."""
+
+    planning_window_m: float | None = field(
+        default=None,
+        metadata={
+            "doc": "radius r1 of the planning window, at most the sensor range; default: the sensor range. The "
+            "recording shows it, and the rolling step is a share of it; the search goes through all that is "
+            "remembered",
+            "unit": "m",
+            "above": 0.0,
+        },
+    )
+    steps: int = field(
+        default=16,
+        metadata={
+            "doc": "N, how many steps the search looks ahead",
+            "unit": "1",
+            "minimum": 1,
+            "maximum": 100,
+        },
+    )
+    candidates: int = field(
+        default=12,
+        metadata={
+            "doc": "n, how many tracks are kept at every step",
+            "unit": "1",
+            "minimum": 1,
+            "maximum": 100,
+        },
+    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+    rolling_step_m: float | None = field(
+        default=None,
+        metadata={
+            "doc": "distance flown before the window rolls, unless the plan is cut near by; "
+            "default: 1/16 of the planning window",
+            "unit": "m",
+            "above": 0.0,
+        },
+    )
+
+    def resolved(self, mission: Mission) -> RollingWindowConfig:
+        """This config with every None replaced by its default for the mission.
+
+        Raises:
+            ValueError: the planning window is larger than the sensing range, or that is too short for the turn
+                radius.
+        """
+        reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
+        least = least_sensor_range_m(
+            mission.turn_radius_m, mission.clearance_m, mission.ground_speed_mps, reaction_s
+        )
+        if mission.sensor_range_m < least:
+            raise ValueError(
+                f"sensor.range_m is {mission.sensor_range_m:g}, too short for a turn radius of "
+                f"{mission.turn_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
+                f"no safe turn could be seen ahead: at least {math.ceil(least)} is needed"
+            )
+        window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
+        if window > mission.sensor_range_m:
+            raise ValueError(
+                f"planning_window_m is {window:g}, more than sensor.range_m {mission.sensor_range_m:g}; "
+                "the planner cannot plan beyond what is sensed"
+            )
+        return replace(
+            self,
+            planning_window_m=window,
+            margin_m=margin_of(mission) if self.margin_m is None else self.margin_m,
+            rolling_step_m=window / 16.0 if self.rolling_step_m is None else self.rolling_step_m,
+        )

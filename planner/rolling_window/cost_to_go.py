@@ -1,0 +1,175 @@
+"""How far it is to the goal from every place, round all that is known: guides a wide search and tells it when to end.
+
+A wave that spreads from the goal through a grid (a navigation function, as in Barraquand, Langlois and Latombe, 1992).
+A cell is closed only where no place in it keeps the distance wanted: every way that there is leads through open
+cells that touch each other. Where the wave does not get to, there is no way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from planner.compiled import (
+    BOOLS_OUT,
+    COUNT,
+    COUNTS_OUT,
+    FLOAT,
+    FLOATS,
+    FLOATS_OUT,
+    ROWS,
+    compiled,
+)
+from planner.geometry.curves import Point
+from planner.interface import BoolArray, FloatArray, IntArray
+from planner.rolling_window.window import Tally
+
+CELLS = 5.0
+"""Cells along the distance that is kept."""
+
+MOST_CELLS = 250_000
+"""A grid of more is made coarser: it then closes less, but nothing that is open."""
+
+LEAST_M = 1.0
+"""Where less is kept, as where start or goal lie at an edge, the grid is made for this."""
+
+EIGHT = (2, 4)
+"""Of five levels of the wave these go on to all 8 neighbours of a cell, the others to 4: what is counted is between the
+length of a way and 0.92 of it, so that what looks shortest on the grid seldom is not."""
+
+AT_ONCE = 20_000
+"""So many pairs of a point and a cell, or cells that the wave comes to, make one step of work."""
+
+CLOSED, REACHED = 0.002, 0.012
+"""Work of a pair of a point and a cell near it, and of each cell that the wave comes to."""
+
+
+@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT)
+def _close(
+    open_: BoolArray,
+    points: FloatArray,
+    keep: FloatArray,
+    west: float,
+    south: float,
+    cell: float,
+    columns: int,
+    rows: int,
+) -> None:
+    """Closes the cells that lie as a whole within what is to be kept from one of some points."""
+    for i in range(len(points)):
+        x, y, within = points[i, 0] - west, points[i, 1] - south, keep[i] - math.sqrt(0.5) * cell
+        if within <= 0.0:
+            continue
+        for column in range(max(int((x - within) / cell), 0), min(int((x + within) / cell) + 1, columns - 2)):
+            east = (column + 0.5) * cell - x
+            for row in range(max(int((y - within) / cell), 0), min(int((y + within) / cell) + 1, rows - 2)):
+                north = (row + 0.5) * cell - y
+                if east * east + north * north < within * within:
+                    open_[(column + 1) * rows + row + 1] = False
+
+
+@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT)
+def _spread(
+    levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
+) -> None:
+    """Lets the wave go on, by so many cells and to the end of a level.
+
+    Args:
+        levels: of each cell.
+        open_: whether the wave may go there, and has not.
+        order: cells in the order in which it came there.
+        state: the level; from which one in that order on cells have yet to go on to what touches them at a corner;
+            where the last level begins; where it ends.
+        rows: cells side by side.
+        most: how many.
+    """
+    level, cornered, begin, end = state
+    enough = end + most
+    while cornered < end < enough:
+        level += 1
+        corners = level % 5 in EIGHT
+        # What touches only at a corner is come to later, from all that was new since the last time.
+        front, begin = (cornered if corners else begin), end
+        for i in range(front, begin):
+            for across in (-rows, 0, rows):
+                for up in (-1, 0, 1):
+                    cell = order[i] + across + up
+                    if open_[cell] and (corners or not (across and up)):
+                        open_[cell] = False
+                        levels[cell] = level
+                        order[end] = cell
+                        end += 1
+        if corners:
+            cornered = begin
+    state[:] = (level, cornered, begin, end)
+
+
+class CostToGo:
+    """Distances to the goal on a grid.
+
+    Args:
+        start: where ways begin; it and the goal lie in cells that are open.
+        goal: where they end.
+        bounds_m: xmin, ymin, xmax, ymax of the area, which is never left.
+        points_m: (m, 2) edge points.
+        keep_m: (m,) distance to be kept from each.
+        tally: work is counted here.
+    """
+
+    def __init__(
+        self,
+        start: Point,
+        goal: Point,
+        bounds_m: tuple[float, float, float, float],
+        points_m: FloatArray,
+        keep_m: FloatArray,
+        tally: Tally,
+    ) -> None:
+        self._goal, self._points, self._keep, self._tally = goal, points_m, keep_m, tally
+        # Beyond all that is known, and a way round it, nothing is nearer to anything.
+        most = max(float(keep_m.max(initial=0.0)), LEAST_M)
+        places = np.vstack((points_m, start, goal))
+        low = np.maximum(places.min(axis=0) - 2.0 * most, np.minimum(bounds_m[:2], places.min(axis=0)))
+        high = np.minimum(places.max(axis=0) + 2.0 * most, np.maximum(bounds_m[2:], places.max(axis=0)))
+        self._cell = max(most / CELLS, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
+        self._low = low
+        self._columns, self._rows = (int(each) + 3 for each in (high - low) / self._cell)
+        self._levels = np.full(self._columns * self._rows, math.inf)
+
+    def __call__(self, place: Point) -> float:
+        """Distance to the goal, m; infinite where there is no way."""
+        column = int((place[0] - self._low[0]) / self._cell) + 1
+        row = int((place[1] - self._low[1]) / self._cell) + 1
+        if not (0 < column < self._columns - 1 and 0 < row < self._rows - 1):
+            return math.dist(place, self._goal)
+        levels = float(self._levels[column * self._rows + row])
+        return max(self._cell * levels, math.dist(place, self._goal))
+
+    def spread(self) -> Iterator[None]:
+        """Finds the distances; None after each step of work."""
+        grid = np.zeros((self._columns, self._rows), dtype=np.bool_)
+        grid[1:-1, 1:-1] = True
+        open_ = grid.ravel()
+        width = 2 * int(float(self._keep.max(initial=0.0)) / self._cell) + 3
+        some = max(AT_ONCE // width**2, 1)
+        west, south = self._low.tolist()
+        for i in range(0, len(self._points), some):
+            points, keep = self._points[i : i + some], self._keep[i : i + some]
+            _close(open_, points, keep, west, south, self._cell, self._columns, self._rows)
+            self._tally.add(1, CLOSED, len(points) * width**2)
+            yield
+        goal = self._index(self._goal)
+        order = np.zeros(len(open_), dtype=np.intp)
+        order[0], open_[goal], self._levels[goal] = goal, False, 0.0
+        state = np.array((0, 0, 0, 1))
+        while state[1] < state[3]:
+            before = int(state[3])
+            _spread(self._levels, open_, order, state, self._rows, AT_ONCE)
+            self._tally.add(1, REACHED, int(state[3]) - before)
+            yield
+
+    def _index(self, place: Point) -> int:
+        column = int((place[0] - self._low[0]) / self._cell) + 1
+        return column * self._rows + int((place[1] - self._low[1]) / self._cell) + 1

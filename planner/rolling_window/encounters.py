@@ -1,0 +1,76 @@
+"""Where obstacles that move will be met.
+
+To an aircraft that flies at a steady speed, an obstacle that moves is in the way where both arrive at the same
+time: its outline, moved on by the time that the aircraft needs to get there, is planned around as if it stood
+still. (The collision cone of A. Chakravarthy and D. Ghose, "Obstacle avoidance in a dynamic environment", IEEE
+Trans. SMC 28, 1998, seen from the place of the encounter.) Each point of the outline has its own time. A way round
+takes longer than the straight line, and wind changes when one arrives: so each is drawn out over all the times in
+question. As the aircraft comes nearer these draw together. Assumed: an obstacle keeps its velocity, and it is no
+faster than `FASTEST` of the aircraft.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planner.geometry.curves import Point
+from planner.interface import FloatArray, Mission, MovingEdges, PlanRequest
+
+FASTEST = 0.8
+"""Share of the aircraft's speed: faster obstacles may be met anywhere."""
+EARLIEST, LATEST = 0.85, 1.3
+"""Shares of the time in a straight line at the aircraft's airspeed."""
+LATER_S = 3.0
+"""And so much later, to turn and pass by."""
+
+
+def encounters(request: PlanRequest, mission: Mission) -> list[FloatArray]:
+    """The outline of each obstacle that moves, (k, 2), drawn out over the places where it can be met."""
+    here, spacing_m = request.position_m, 0.5 * mission.clearance_m
+    return [met_at(each, here, request.time_s, mission.speed_mps, spacing_m) for each in request.seen.moving]
+
+
+def met_at(
+    moving: MovingEdges, position: Point, time_s: float, speed_mps: float, spacing_m: float
+) -> FloatArray:
+    """The outline of an obstacle, drawn out over the places where it can be met.
+
+    Args:
+        moving: the obstacle.
+        position: (east, north) of the aircraft, m.
+        time_s: time now.
+        speed_mps: of the aircraft.
+        spacing_m: the outline is drawn again and again no further apart than this.
+
+    Returns:
+        (k, 2) points, m; no two in one cell of half the spacing.
+    """
+    velocity = np.array(moving.velocity_mps)
+    now = moving.points_m + velocity * (time_s - moving.time_s)
+    after_s = meeting_s(now - position, velocity, speed_mps)
+    first_s, last_s = EARLIEST * after_s, LATEST * after_s + LATER_S
+    longest_m = math.hypot(*moving.velocity_mps) * float((last_s - first_s).max())
+    share = np.linspace(0.0, 1.0, max(math.ceil(longest_m / spacing_m), 1) + 1)
+    times = first_s + share[:, None] * (last_s - first_s)
+    drawn = (now + times[..., None] * velocity).reshape(-1, 2)
+    _, chosen = np.unique(np.floor(drawn / (0.5 * spacing_m)), axis=0, return_index=True)
+    kept: FloatArray = drawn[np.sort(chosen)]
+    return kept
+
+
+def meeting_s(offsets_m: FloatArray, velocity_mps: FloatArray, speed_mps: float) -> FloatArray:
+    """(k,) how long an aircraft takes straight to points that move: |offset + velocity t| = speed t.
+
+    Args:
+        offsets_m: (k, 2) the points now, from the aircraft.
+        velocity_mps: (2,) their velocity; what is faster than `FASTEST` of the aircraft is taken to be that fast.
+        speed_mps: of the aircraft.
+    """
+    pace = float(np.hypot(*velocity_mps))
+    velocity = velocity_mps * min(1.0, FASTEST * speed_mps / max(pace, 1e-9))
+    along = offsets_m @ velocity
+    gain = speed_mps * speed_mps - float(velocity @ velocity)
+    after_s: FloatArray = (along + np.sqrt(along * along + gain * (offsets_m**2).sum(axis=1))) / gain
+    return after_s

@@ -1,0 +1,213 @@
+"""A way into a turn where none is seen to be safe: the plan in effect goes on, or is left for a turn, or evades."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.geometry.course import Course
+from planner.geometry.curves import Segment, onward
+from planner.interface import MapView, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.memory import ObstacleMemory
+from planner.rolling_window.certificate import CertificateBroken, Certifier
+from planner.rolling_window.committed_plan import CommittedPlan
+from planner.rolling_window.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
+from planner.rolling_window.local_planning import LocalPlanning
+from planner.rolling_window.loiter import hold
+from planner.rolling_window.route_optimisation import Terrain
+
+HOLD_SHARES = (1.0, 0.5, 0.25)
+"""Shares of what paths keep: a turn is sought with one after the other."""
+
+CLEARER = 0.2
+"""Another way evades what is in the way if it keeps further from it by this share of what paths keep."""
+
+EVADING_S = 60.0
+"""The certificate holds for a world that stands still: so long after something appeared it may be broken."""
+
+
+GOES_ON = "the plan in effect goes on to its end, nearer to something than wanted"
+IN_THE_WAY = "something is in the way; turning away"
+
+
+class _Option(NamedTuple):
+    """A way to go on: what is asked to keep clear of all that stands, why, and what it would put into effect."""
+
+    path: Path
+    standing: Path | None = None
+    reason: str = ""
+    effect: CommittedPlan | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Escape:
+    """What to do where nothing is certified.
+
+    Attributes:
+        plan: the answer.
+        effect: what it would put into effect, where it is a new plan.
+        broken: the plan in effect comes too near to something.
+    """
+
+    plan: Plan
+    effect: CommittedPlan | None = None
+    broken: bool = True
+
+
+class Escapes:
+    """Finds escapes.
+
+    Args:
+        mission: goal and limits.
+        memory: what is remembered.
+        local: limits of curves, and distances kept.
+    """
+
+    def __init__(self, mission: Mission, memory: ObstacleMemory, local: LocalPlanning) -> None:
+        self._mission, self._memory, self._local = mission, memory, local
+        self._certifier = Certifier(local.limits, mission.clearance_m, math.inf, step_along_m(mission))
+
+    def threats(self, request: PlanRequest) -> Threats | None:
+        """What is near, while something moves or has just appeared: then what was certified may be met all the same."""
+        lately = (
+            len(request.seen.moving) > 0 or request.time_s - request.seen.last_contradiction_s < EVADING_S
+        )
+        return self._near(request) if lately else None
+
+    def at_start(self, request: PlanRequest, threats: Threats | None, lead_m: float) -> Escape:
+        """A turn before the first plan."""
+        straight = Path(np.array([(*request.position_m, *request.direction, 0.0, lead_m)]))
+        for share in HOLD_SHARES:
+            standing = self._standing(share)
+            turn = hold(straight, 0.0, lead_m, self._local.limits, standing)
+            if turn is not None and self._best([_Option(turn)], standing, None, threats, share)[0]:
+                return self._away(request, turn, "no way on can be seen to be safe; turning away")
+        return Escape(Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start"))
+
+    def from_plan(
+        self,
+        request: PlanRequest,
+        threats: Threats | None,
+        effect: CommittedPlan,
+        here: float,
+        *,
+        until_m: float,
+        prefix: Sequence[Segment],
+        certain: bool,
+        nearer: CommittedPlan | None = None,
+    ) -> Escape:
+        """A turn that only keeps away from what is known, or a way that evades what moves or has appeared.
+
+        Args:
+            request: what was asked.
+            threats: what is near, if that is to be feared.
+            effect: the plan in effect.
+            here: station of the aircraft on it.
+            until_m: station up to which it can be flown.
+            prefix: what of it is flown in any case.
+            certain: nothing has changed so far, nor been taken back by the sensor.
+            nearer: a certified course that would come nearer than wanted to what moves or has appeared.
+
+        Raises:
+            CertificateBroken: there is no room for a turn, though all is certain.
+        """
+        left = left_of(effect, here, self._mission)
+        ways: list[Path] = []  # made when they are first asked for: most plans in effect will do
+
+        def options(terrain: Terrain) -> Iterator[_Option]:
+            if nearer is not None:
+                yield _Option(nearer.path, None, "", nearer)
+            yield _Option(left, effect.left(here), GOES_ON)
+            turn = hold(effect.path, here, until_m, self._local.limits, terrain)
+            if turn is not None:
+                yield _Option(turn, None, "no way on can be seen to be safe; turning away")
+            if threats is not None:
+                ways.extend(() if ways else rolled_out(prefix, self._local.limits))
+                yield from (_Option(way, way, IN_THE_WAY) for way in ways)
+
+        # What hides behind something that moves or has appeared is no better than that: space seen to be free first.
+        seen, best, unseen = request.seen if threats else None, None, None
+        for share in HOLD_SHARES:
+            # A turn that keeps so much of all that stands can be flown for ever.
+            terrain = self._standing(share)
+            best, other = self._best(options(terrain), terrain, seen, threats, share)
+            unseen = unseen or other
+            if best is not None:
+                break
+        best = best or unseen
+        if best is not None and best.path is left:
+            return Escape(Plan(PlanStatus.NO_PATH, best.reason), broken=False)
+        if best is not None and best.effect is not None:
+            return Escape(best.effect.plan, best.effect)
+        if best is not None:
+            return self._away(request, best.path, best.reason)
+        if certain:
+            raise CertificateBroken(request.time_s)
+        threats = threats or self._near(request)
+        more_than_m = threats.room_m(left) + CLEARER * self._local.path_keeps_m
+        ways = ways or list(rolled_out(prefix, self._local.limits))
+        clear = clearest(ways, self._mission.bounds_m, threats, more_than_m)
+        if clear is not None:
+            return self._away(request, clear, IN_THE_WAY)
+        reason = "something is in the way; the plan in effect keeps as clear of it as any other"
+        return Escape(Plan(PlanStatus.NO_PATH, reason))
+
+    def _best(
+        self,
+        options: Iterable[_Option],
+        terrain: Terrain,
+        seen: MapView | None,
+        threats: Threats | None,
+        share: float,
+    ) -> tuple[_Option | None, _Option | None]:
+        """The option that keeps furthest from what is near, of those that keep a share of what is wanted.
+
+        More than what is wanted is no better; each must be clearer than those before it. What is met is met, be it far
+        ahead: with less to be kept, being far ahead counts for less.
+
+        Returns:
+            Of those in space that was `seen` to be free; of all. Without `seen` they are the same.
+        """
+        keeps_m = self._local.path_keeps_m
+        best: list[_Option | None] = [None, None]
+        least_m = [share * keeps_m] * 2
+        for each in options:
+            room = room_m(each.path, threats, min(least_m), share * LATER)
+            if room < min(least_m) or not (each.standing is None or terrain.admits(each.standing)):
+                continue
+            free = seen is None or self._certifier.seen_free_to_m(each.path, seen) >= each.path.length_m
+            for i in (0, 1) if free else (1,):
+                if room >= least_m[i]:
+                    best[i], least_m[i] = each, room + CLEARER * keeps_m
+            if least_m[0] > keeps_m:
+                break
+        return best[0], best[1]
+
+    def _standing(self, share: float) -> Terrain:
+        """Where a curve keeps a share of what is wanted from what stands: what was only refused is in nobody's way."""
+        return self._local.terrain(share * self._local.path_keeps_m, standing=True)
+
+    def _near(self, request: PlanRequest) -> Threats:
+        return Threats.about(request, self._memory.genuine_m, self._mission)
+
+    @staticmethod
+    def _away(request: PlanRequest, path: Path, reason: str) -> Escape:
+        """A plan that leads nowhere but into its turn."""
+        waypoints = np.array([request.position_m, path.segments[-1, :2]])
+        plan = Plan(PlanStatus.FOUND, reason, waypoints, path)
+        course = Course(path, (request.position_m,), 0, shortest=False, to_goal=False)
+        return Escape(plan, CommittedPlan(plan, path, course, path.length_m - float(path.segments[-1, 5])))
+
+
+def room_m(path: Path, threats: Threats | None, least_m: float = -math.inf, later: float = LATER) -> float:
+    """How far a path keeps from what is near; infinite where nothing is to be feared. See `Threats.room_m`."""
+    return math.inf if threats is None else threats.room_m(path, least_m, later)
+
+
+def left_of(effect: CommittedPlan, here: float, mission: Mission) -> Path:
+    """What of a plan in effect is flown within `AHEAD_S`."""
+    return Path(np.array(onward(effect.path, here, AHEAD_S * mission.speed_mps)))

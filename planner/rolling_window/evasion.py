@@ -1,0 +1,233 @@
+"""Evading: the way on that keeps clear longest, of what stands and of what moves, where none is safe.
+
+Ways are rolled out from a little ahead: a turn at the least radius to one side, one back to the other, straight on,
+and a full turn at the end. Each is judged by how near it comes to what was seen: to what moves where that will be when
+the aircraft is there. (The rollouts of D. Fox, W. Burgard and S. Thrun, "The dynamic window approach to collision
+avoidance", IEEE Robotics & Automation Magazine 4, 1997.) What is far ahead counts less, for it can be evaded later. The
+next scan asks anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.compiled import COUNTS, FLOAT, ROWS, compiled
+from planner.geometry.blocks import Blocks, blocks
+from planner.geometry.clearance import inside_bounds
+from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_turn
+from planner.geometry.stations import poses_at
+from planner.interface import FloatArray, IntArray, Mission, Path, PlanRequest
+from planner.rolling_window.encounters import EARLIEST, LATEST
+
+AHEAD_S = 30.0
+"""So far ahead what moves is taken to keep its velocity, and ways are judged."""
+
+LATER = 0.05
+"""For every metre that something is met later along a way, the way counts as if it kept so many metres more from it."""
+
+UNKNOWN_MPS, UNKNOWN_S = 10.0, 8.0
+"""What has just appeared may come nearer so fast, for so long: of what is told to stand the velocity is not known."""
+
+STEP_SHARE, LEAST_STEP = 0.25, 0.02
+"""Ways are looked at every so much of the clearance, and no more often than every so much of the turn radius."""
+
+SQUARE_STEPS = 8.0
+"""What stands is looked at by squares of so many steps."""
+
+FIRST_DEG, BACK_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0), (0.0, 20.0, 45.0, 75.0, 110.0)
+"""Turns to one side, and back to the other."""
+
+WAYS = [
+    (first, back, straight)
+    for first in FIRST_DEG
+    for back in BACK_DEG
+    if back <= first
+    for straight in (2.0, 0.0)
+    if straight or not first or back == BACK_DEG[1]
+]
+"""Both, and how far straight on then, in turn radii; without that the last turn is the same however far was turned."""
+
+
+@dataclass(frozen=True, eq=False)
+class Threats:
+    """What is near: edges of what stands, and of what moves.
+
+    Attributes:
+        still_m: (n, 2) edge points.
+        moving: (k, 5) edge points now, and what is taken to lie behind them, their velocity, east, north, and how fast
+            they may come nearer beyond that.
+        speed_mps: of the aircraft.
+        step_m: ways are looked at so often.
+    """
+
+    still_m: FloatArray
+    moving: FloatArray
+    speed_mps: float
+    step_m: float
+
+    @classmethod
+    def about(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
+        """What can be met within `AHEAD_S`; still_m: (n, 2) all edge points that stand still."""
+        east, north = request.position_m
+        reach_m = AHEAD_S * LATEST * mission.speed_mps + mission.clearance_m
+        near = np.hypot(still_m[:, 0] - east, still_m[:, 1] - north) < reach_m
+        moving = [np.zeros((0, 5))]
+        for each in request.seen.moving:
+            seen = each.points_m + np.array(each.velocity_mps) * (request.time_s - each.time_s)
+            now = np.concatenate((seen, far_side(seen, request.position_m)))
+            told = (*each.velocity_mps, 0.0 if any(each.velocity_mps) else UNKNOWN_MPS)
+            moving.append(np.column_stack((now, np.broadcast_to(told, (len(now), 3)))))
+        return cls(still_m[near], np.concatenate(moving), mission.speed_mps, step_along_m(mission))
+
+    def room_m(self, path: Path, least_m: float = -math.inf, later: float = LATER) -> float:
+        """How far a way keeps from all, what is far along it counted as further away; m.
+
+        Args:
+            path: the way, from where the aircraft is.
+            least_m: with less it is not looked at to its end.
+            later: see `LATER`.
+        """
+        stations = np.arange(0.0, AHEAD_S * self.speed_mps, self.step_m)
+        if path.loiter:
+            turn = float(path.segments[-1, 5])
+            begin = path.length_m - turn
+            stations = np.where(stations > begin, begin + (stations - begin) % turn, stations)
+        places = np.ascontiguousarray(poses_at(path, stations)[:, :2])
+        return _room(places, *self._still, self.moving, self.step_m, self.speed_mps, least_m, later)
+
+    @cached_property
+    def _still(self) -> Blocks:
+        """What stands by squares."""
+        return blocks(self.still_m, np.zeros(len(self.still_m)), SQUARE_STEPS * self.step_m)[1]
+
+
+def step_along_m(mission: Mission) -> float:
+    """Ways are looked at so often, m."""
+    return max(STEP_SHARE * mission.clearance_m, LEAST_STEP * mission.turn_radius_m)
+
+
+def far_side(face_m: FloatArray, position_m: Point) -> FloatArray:
+    """What of a body is taken to lie behind its face: half a circle from one end of that to the other.
+
+    Args:
+        face_m: (k, 2) edge points in order.
+        position_m: from where they are seen.
+
+    Returns:
+        (k, 2) points.
+    """
+    middle, half = 0.5 * (face_m[0] + face_m[-1]), 0.5 * (face_m[-1] - face_m[0])
+    away = np.array((-half[1], half[0]))
+    away *= np.copysign(1.0, away @ (middle - position_m))
+    angle = np.linspace(0.0, np.pi, len(face_m))[:, None]
+    behind: FloatArray = middle - half * np.cos(angle) + away * np.sin(angle)
+    return behind
+
+
+@compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+def _room(
+    places: FloatArray,
+    still: FloatArray,
+    first: IntArray,
+    circles: FloatArray,
+    moving: FloatArray,
+    step: float,
+    speed: float,
+    least: float,
+    farther: float,
+) -> float:
+    room, i, fastest, beside = math.inf, 0, 0.0, 0
+    for j in range(len(moving)):
+        fastest = max(fastest, math.hypot(moving[j, 2], moving[j, 3]) + moving[j, 4])
+    # So much nearer at most something comes from one place to the next.
+    closer = step * (1.0 + LATEST * fastest / speed)
+    while i < len(places) and room >= least:
+        x, y, later = places[i, 0], places[i, 1], farther * step * i
+        nearest, squared, begin = math.inf, math.inf, beside
+        for k in range(len(first) - 1):
+            block = (begin + k) % (len(first) - 1)
+            dx, dy, reach = circles[0, block] - x, circles[1, block] - y, circles[2, block] + nearest
+            if dx * dx + dy * dy >= reach * reach:
+                continue
+            for j in range(first[block], first[block + 1]):
+                dx, dy = still[0, j] - x, still[1, j] - y
+                if dx * dx + dy * dy < squared:
+                    squared, beside = dx * dx + dy * dy, block
+            nearest = math.sqrt(squared)
+        begins = EARLIEST * step * i / speed
+        lasts = LATEST * step * i / speed - begins
+        for j in range(len(moving)):
+            # To the line along which the point moves while the aircraft may be here.
+            vx, vy = moving[j, 2] * lasts, moving[j, 3] * lasts
+            dx, dy = moving[j, 0] + moving[j, 2] * begins - x, moving[j, 1] + moving[j, 3] * begins - y
+            share = 0.0
+            if vx != 0.0 or vy != 0.0:
+                share = min(max(-(dx * vx + dy * vy) / (vx * vx + vy * vy), 0.0), 1.0)
+            away = math.hypot(dx + share * vx, dy + share * vy)
+            nearest = min(nearest, away - moving[j, 4] * min(begins + lasts, UNKNOWN_S))
+        if nearest == math.inf:
+            break
+        here = nearest + later
+        room = min(room, here)
+        i += max(int((here - room) / closer), 1)
+    return room
+
+
+def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:
+    """Ways on: a turn, one back, straight on or not, and a full turn on to the same side; the gentlest first.
+
+    Args:
+        prefix: what is flown before.
+        limits: smallest radius and room to roll.
+    """
+    last = prefix[-1]
+    pose, curvature = along(last, last[5]), last[4]
+    sides = (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0)
+    for first_deg, back_deg, straight in WAYS:
+        for side in sides:
+            onto, straight_m = -side if back_deg else side, straight * limits.radius_m
+            turns = ((side, first_deg, 0.0), (-side, back_deg, straight_m), (onto, 360.0, 0.0))
+            yield Path(np.array([*prefix, *_chain(pose, curvature, turns, limits)]), loiter=True)
+
+
+def clearest(
+    ways: Iterable[Path],
+    bounds_m: tuple[float, float, float, float],
+    threats: Threats,
+    more_than_m: float,
+) -> Path | None:
+    """The way with the most room of those that stay in the area and have more than so much; None without one."""
+    best: Path | None = None
+    for way in ways:
+        if not inside_bounds(way, bounds_m):
+            continue
+        room_m = threats.room_m(way, more_than_m)
+        if room_m > more_than_m:
+            best, more_than_m = way, room_m
+    return best
+
+
+def _chain(
+    pose: Pose, curvature: float, turns: tuple[tuple[float, float, float], ...], limits: Limits
+) -> list[Segment]:
+    """Turns one after the other, each with so much straight after it; straight on too to roll to the other side."""
+    out: list[Segment] = []
+    for side, degrees, straight_m in turns:
+        if degrees > 0.0:
+            if side * curvature < 0.0:
+                out.append((*pose, 0.0, limits.roll_m))
+                pose = along(out[-1], limits.roll_m)
+            curvature = side / limits.radius_m
+            turn = full_turn(pose, limits.radius_m, side)
+            arc = (*turn[:5], turn[5] * degrees / 360.0)
+            out.append(arc)
+            pose = along(arc, arc[5])
+        if straight_m > 0.0:
+            out.append((*pose, 0.0, straight_m))
+            pose, curvature = along(out[-1], straight_m), 0.0
+    return out

@@ -1,0 +1,331 @@
+"""One rolling step of local planning: n-best search, route optimisation, the shortest of the n."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.geometry.clearance import to_nearer
+from planner.geometry.course import Course
+from planner.geometry.curves import Limits, Point, Pose, Segment, onward_in_turn
+from planner.interface import FloatArray, Mission, Path
+from planner.memory import ObstacleMemory
+from planner.rolling_window.cost_to_go import CostToGo
+from planner.rolling_window.multi_step_search import Track, search
+from planner.rolling_window.pose_search import search_poses
+from planner.rolling_window.route_optimisation import Route, Terrain, optimise
+from planner.rolling_window.trail import Trail
+from planner.rolling_window.window import PLACE, Tally, Window
+
+SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
+"""Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
+
+LEAST_HUG = 0.005
+"""Share of the clearance: track points lie so much further out than straight steps, even without a margin, for a step
+along an edge ends where that distance is reached again."""
+
+LEAST_MARGIN = 0.4
+"""Share of the margin that is kept where there is no room for all of it."""
+
+MOST_TRACKS = 300
+"""So many tracks at most are looked at in one search."""
+
+WIDER, FURTHER = 4, 60
+"""Where n tracks at every one of N steps find no way, this many times as many are tried, led by the cost to go: so that
+the best come first, and after the first only so many steps more are looked at."""
+
+DOUBTED, MOST_AROUND = 0.1, 8
+"""A way that is longer by this share than the one flown is doubtful: so many of the obstacles nearest to the start are
+looked at as well."""
+
+SWITCH = 0.03
+"""The other way round is taken only where it saves this share of the distance left."""
+
+RETRACE = 0.25
+"""And this share of what it leads back along where the aircraft has been."""
+
+TRAIL_CLEARANCES = 4.0
+"""So many clearances is as good as the same place for that."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """How far from obstacles to search.
+
+    Attributes:
+        distance_m: kept from every edge point.
+        margin_m: more of it, of which shares are given up for straight steps and for curves.
+    """
+
+    distance_m: float
+    margin_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a new plan begins.
+
+    Attributes:
+        position: of the aircraft.
+        pose: where the new plan leaves the old one.
+        curvature: of the old one there, 1/m.
+        prefix: the stretch of the old one up to there.
+    """
+
+    position: Point
+    pose: Pose
+    curvature: float = 0.0
+    prefix: list[Segment] = field(default_factory=list)
+
+
+Now = Callable[[], tuple[Start, Course | None]]
+"""Tells where a plan would begin now, and the course that is flown."""
+
+
+class LocalPlanning:
+    """Looks for the shortest flyable way to the goal through what is remembered.
+
+    Args:
+        mission: goal and limits.
+        memory: the edge points.
+        window_m: r_1.
+        margin_m: planned distance beyond the clearance.
+        steps: N.
+        candidates: n.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        memory: ObstacleMemory,
+        *,
+        window_m: float,
+        margin_m: float,
+        steps: int,
+        candidates: int,
+    ) -> None:
+        self._mission, self._memory = mission, memory
+        self.window_m, self._margin_m = window_m, margin_m
+        self._steps, self._candidates = steps, candidates
+        self.tally = Tally()
+        self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
+        self._hug_m = LEAST_HUG * mission.clearance_m
+        self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
+        self.limits = Limits.of(mission)
+
+    @property
+    def path_keeps_m(self) -> float:
+        """What paths keep from every edge point where there is room."""
+        return self._mission.clearance_m + PATH_SHARE * self._margin_m
+
+    @property
+    def least_keeps_m(self) -> float:
+        """What a way has to keep from every edge point to be found at all."""
+        return self._mission.clearance_m + SEARCH_SHARE * LEAST_MARGIN * self._margin_m
+
+    def attempts(self) -> list[Attempt]:
+        """Distances to search with, in order of preference.
+
+        First as wanted. Then with what of the margin there is room for. Then wide enough for a turn about the end of
+        a wall at the turn radius. Last so wide that a turn can be flown everywhere on the way: a way that
+        leads through no gap that would have to be entered before it can be seen to have an end.
+        """
+        clearance, margin, radius = self._mission.clearance_m, self._margin_m, self._mission.turn_radius_m
+        attempts = [Attempt(clearance, margin), self._tight]
+        if radius > clearance:
+            attempts.append(Attempt(radius, margin))
+        return [*attempts, Attempt(clearance + radius, margin)]
+
+    @property
+    def known(self) -> int:
+        """How many edge points are remembered that stand still."""
+        return self._memory.known
+
+    @property
+    def points_m(self) -> FloatArray:
+        """(m, 2) the edge points that are remembered."""
+        return self._memory.points_m
+
+    def route(
+        self,
+        attempt: Attempt,
+        effort: int,
+        now: Now,
+        tracks: list[Track],
+        closed: Callable[[], bool],
+    ) -> Generator[None, None, Route | None]:
+        """The shortest of the n best tracks, after route optimisation.
+
+        What comes in while this goes on is left for the next search: else the shortest way round something that is
+        just coming into view would be dropped, again and again, for a long one that leads away.
+
+        Args:
+            attempt: how far from obstacles.
+            effort: how often the work of a wide search is doubled.
+            now: tells where a plan would begin, and what is flown: the other side of something is taken only for
+                a shorter way.
+            tracks: the candidates that were looked at are added to it.
+            closed: whether it is proved that there is no way; asked before a wider search.
+
+        Yields:
+            None after each step of work.
+        """
+        start, _ = now()
+        points = self._memory.points_m
+        room = self._room(start, points)
+        keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
+        labels = self._memory.labels.copy()
+        window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.tally)
+        begun = start
+        fitted: list[tuple[float, Route]] = []
+
+        def doubtful() -> bool:
+            _, course = now()
+            least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
+            return course is None or least_m > (1.0 + DOUBTED) * course.path.length_m
+
+        for search_on in self._searches(window, attempt, effort, tracks, doubtful, closed):
+            for track in search_on:
+                if track is None:
+                    yield
+                    continue
+                start, course = now()
+                least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
+                if track.cost_m >= least_m:
+                    break
+                tracks.append(track)
+                reluctance_m = self._reluctance_m(track, course)
+                if track.cost_m + reluctance_m >= least_m:
+                    continue
+                route = self._fit(start, attempt, track.nodes, points)
+                if route is not None:
+                    fitted.append((route.path.length_m + reluctance_m, route))
+                yield
+        fitted.sort(key=lambda each: each[0])
+        start, _ = now()
+        if start is begun:
+            return fitted[0][1] if fitted else None
+        routes = (self.fitted(start, attempt, route, points) for _, route in fitted)
+        return next((route for route in routes if route is not None), None)
+
+    def fitted(self, start: Start, attempt: Attempt, route: Route, points: FloatArray) -> Route | None:
+        """A route found among (m, 2) points, from where the aircraft has got to; None where it cannot be flown."""
+        return self._fit(start, attempt, (start.pose[:2], *route.nodes), points)
+
+    def _reluctance_m(self, track: Track, course: Course | None) -> float:
+        """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
+        if course is not None:
+            self.tally.add(4, PLACE, 4 * len(track.nodes) * course.known)
+            if course.same_side(track.nodes, self._memory.points_m):
+                return 0.0
+        switching = 0.0 if course is None else SWITCH * track.cost_m
+        return switching + RETRACE * self.trail.retraced_m(track.nodes)
+
+    def _fit(
+        self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
+    ) -> Route | None:
+        """The curve along a track, from where a plan would begin now."""
+        cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
+        terrain = self._terrain(start, attempt, points)
+        return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
+
+    def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
+        """A way found by search over poses, where none through the free sectors can be flown.
+
+        While this goes on the aircraft flies the turn that it is in, so that it comes by where the way begins again.
+        """
+        start, _ = now()
+        terrain = self._terrain(start, self._tight, self._memory.points_m)
+        goal, points = self._mission.goal_m, (terrain.points_m, terrain.keep_m)
+        to_go = CostToGo(start.pose[:2], goal, self._mission.bounds_m, *points, self.tally)
+        yield from to_go.spread()
+        route = yield from search_poses(start.pose, start.curvature, goal, self.limits, terrain, to_go)
+        begins, _ = now()
+        if route is None or begins is start:
+            return route
+        on = onward_in_turn(begins.pose, begins.curvature, start.pose)
+        if on is None:
+            return None
+        path = Path(np.array([*on, *route.path.segments.tolist()]))
+        # What has come in meanwhile may be in its way.
+        terrain = self._terrain(begins, self._tight, self._memory.points_m)
+        return Route(route.nodes, path) if terrain.admits(path) else None
+
+    def beginning(self, now: Now, track: Track) -> Generator[None, None, Route | None]:
+        """As much of a track as can be flown, where all of it cannot: from there the rest may look otherwise."""
+        for end in range(len(track.nodes) - 1, 1, -1):
+            start, _ = now()
+            nodes = (start.pose[:2], *track.nodes[1:end])
+            route = self._fit(start, self._tight, nodes, self._memory.points_m)
+            if route is not None:
+                return route
+            yield
+        return None
+
+    def terrain(self, keep_m: float, standing: bool = False) -> Terrain:
+        """Where a curve may lie that keeps one distance from all edge points, or from those that were seen to stand."""
+        points = self._memory.genuine_m if standing else self._memory.points_m
+        return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m, self.tally)
+
+    def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
+        keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
+        room = self._room(start, points)
+        return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.tally)
+
+    def _room(self, start: Start, points: FloatArray) -> FloatArray:
+        """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
+        return to_nearer(points, *start.pose[:2], *self._mission.goal_m) - 1e-3
+
+    def _searches(
+        self,
+        window: Window,
+        attempt: Attempt,
+        effort: int,
+        tracks: Sequence[Track],
+        doubtful: Callable[[], bool],
+        closed: Callable[[], bool],
+    ) -> Iterator[Iterator[Track | None]]:
+        """Searches for the n best tracks, each where those before have not found enough.
+
+        Where what was found is doubtful the obstacles around the start are looked at as well: a way out of a pocket
+        may lead past what does not lie towards the goal. Where nothing was found a wider search follows.
+        """
+        before = len(tracks)
+        yield self._searched(window, attempt, 1)
+        if len(tracks) > before:
+            if doubtful():
+                yield self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
+        elif not closed():
+            around = window.nearest_obstacles(MOST_AROUND)
+            yield self._searched(window, attempt, WIDER * 2**effort, around)
+
+    def _searched(
+        self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
+    ) -> Iterator[Track | None]:
+        """The n best tracks of one search. None after each step of work."""
+        to_go: CostToGo | None = None
+        if widening > 1:
+            ends = window.center_m, self._mission.goal_m
+            to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.tally)
+            yield from to_go.spread()
+        found = steps_since = 0
+        for track in search(
+            window,
+            self._mission.goal_m,
+            self._mission.bounds_m,
+            steps=self._steps * widening,
+            keep_best=self._candidates * widening,
+            outer_m=attempt.distance_m + max(attempt.margin_m, SEARCH_SHARE * attempt.margin_m + self._hug_m),
+            most_tracks=MOST_TRACKS * widening,
+            around=around,
+            wide=widening > 1,
+            to_go=to_go,
+        ):
+            yield track
+            found += track is not None
+            steps_since += found > 0
+            if found == self._candidates or steps_since > (MOST_TRACKS if to_go is None else FURTHER):
+                return

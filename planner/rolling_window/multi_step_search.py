@@ -1,0 +1,169 @@
+"""The paper's multi-step search: N steps deep, at every step the n best tracks are kept.
+
+A step goes along the guide vector where nothing is in the way. Otherwise it goes along an edge of one of the
+free sectors: by equation (4) the way that is left grows with the angle off the guide vector, so that in the
+continuous plane the best direction in a sector is its edge nearest to the guide vector. The step along an edge
+is as long as it hugs the obstacle; from there the guide vector may turn inwards.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.geometry.curves import Point
+from planner.geometry.step_model import distance_left_m
+from planner.rolling_window.cost_to_go import CostToGo
+from planner.rolling_window.window import SectorEdge, Window, guide_vector
+
+SHORT_OF = 0.005
+"""A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
+
+BACK_RAD, AWAY_RAD = 2.1, 0.8
+"""Largest turn from one step to the next, and largest one away from the obstacle that the last step hugged."""
+
+APART = 0.06
+"""Track points nearer to each other than this share of the distance kept from obstacles are one."""
+
+APART_WIDE = 0.25
+"""In a wide search: than this share of the shortest step about a corner, which is to lead on."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A track of steps: a candidate or the beginning of one.
+
+    Attributes:
+        nodes: track points, from the present one on.
+        flown_m: length of the steps.
+        left_m: distance from the last track point to the goal.
+        last: the edge of the last step, where that ended by hugging it.
+    """
+
+    nodes: tuple[Point, ...]
+    flown_m: float
+    left_m: float
+    last: SectorEdge | None = None
+
+    @property
+    def cost_m(self) -> float:
+        """C: the length of the whole track if nothing more is met."""
+        return self.flown_m + self.left_m
+
+
+def search(
+    window: Window,
+    goal: Point,
+    bounds_m: tuple[float, float, float, float],
+    *,
+    steps: int,
+    keep_best: int,
+    outer_m: float,
+    most_tracks: int,
+    around: Iterable[int] = (),
+    wide: bool = False,
+    to_go: CostToGo | None = None,
+) -> Iterator[Track | None]:
+    """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
+
+    Args:
+        window: the planning window; `window.keep_m` is kept from every point in it.
+        goal: where the guide vector points.
+        bounds_m: area that no track point may leave.
+        steps: N, how many steps are looked ahead.
+        keep_best: n, how many tracks are kept at every step.
+        outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`,
+            so that steps around a round obstacle are long.
+        most_tracks: so many are looked at.
+        around: obstacles that the first step may go past, though they do not lie towards the goal.
+        wide: also take steps that hardly ever belong to a shortest way.
+        to_go: distances to the goal round what is known, by which the cheapest are told instead, within a few per
+            cent; default: straight on, as equation (4) has it.
+
+    Yields:
+        Tracks that see the goal from their last track point but one; none where n tracks at every one
+        of N steps were not enough. None after each step looked at.
+    """
+    start = window.center_m
+    _, _, straight = guide_vector(start, goal)
+    queue = [(straight if to_go is None else to_go(start), 0, 0, Track((start,), 0.0, straight))]
+    apart_m = APART * outer_m
+    if wide:
+        kept_m = float(window.keep_m.max(initial=0.0))
+        apart_m = max(apart_m, APART_WIDE * 2.0 * math.sqrt(outer_m * outer_m - kept_m * kept_m))
+    kept_at = [0] * (steps + 1)
+    visited: set[tuple[int, int]] = set()
+    count = 0
+    while queue:
+        cost, _, depth, track = heapq.heappop(queue)
+        if not track.left_m:
+            yield track
+            continue
+        if cost == math.inf:
+            return
+        here = track.nodes[-1]
+        place = (round(here[0] / apart_m), round(here[1] / apart_m))
+        if place in visited or kept_at[depth] == keep_best:
+            continue
+        visited.add(place)
+        kept_at[depth] += 1
+        if len(visited) > most_tracks:
+            return
+        yield None
+        entry_m, labels = window.entered(here, goal)
+        count += 1
+        if not len(labels):
+            heapq.heappush(
+                queue, (track.cost_m, count, depth, Track((*track.nodes, goal), track.cost_m, 0.0))
+            )
+            continue
+        if depth == steps:
+            continue
+        beside = [int(labels[entry_m.argmin()]), *(around if not depth else ())]
+        if wide:
+            # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
+            beside += np.unique(labels).tolist()
+            beside += [] if track.last is None else [track.last.obstacle]
+        for edge in window.sector_edges(here, beside, outer_m):
+            if not wide and _leads_away(track, edge):
+                continue
+            child = _step(track, edge, goal, outer_m)
+            if child is not None and _inside(child.nodes[-1], bounds_m):
+                count += 1
+                cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
+                heapq.heappush(queue, (cost, count, depth + 1, child))
+
+
+def _leads_away(track: Track, edge: SectorEdge) -> bool:
+    """Whether a step leads away from what the last one hugged, or back: a shortest way bends round it."""
+    if track.last is None:
+        return False
+    turn = math.atan2(
+        track.last.ux * edge.uy - track.last.uy * edge.ux,
+        track.last.ux * edge.ux + track.last.uy * edge.uy,
+    )
+    return abs(turn) > BACK_RAD or turn * track.last.side > AWAY_RAD
+
+
+def _step(track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
+    """One step along the edge of a free sector; None where it leads nowhere."""
+    here = track.nodes[-1]
+    length = min(edge.hugged_m, edge.clear_m - SHORT_OF * outer_m)
+    if length < 1e-2 * outer_m:
+        return None
+    x, y = here[0] + edge.ux * length, here[1] + edge.uy * length
+    gx, gy, left = guide_vector(here, goal)
+    off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
+    left = distance_left_m(left, length, off_guide)
+    return Track(
+        (*track.nodes, (x, y)), track.flown_m + length, left, edge if length == edge.hugged_m else None
+    )
+
+
+def _inside(point: Point, bounds_m: tuple[float, float, float, float]) -> bool:
+    xmin, ymin, xmax, ymax = bounds_m
+    return xmin <= point[0] <= xmax and ymin <= point[1] <= ymax

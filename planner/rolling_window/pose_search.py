@@ -1,0 +1,93 @@
+"""Search over poses where turning is tight: the step model (1)-(3) under the minimum turn radius.
+
+Every step is an arc of one of a few curvatures within the turn radius, so that whatever is found can be flown
+as it is. It is used where no track through the free sectors leaves room for the turns that it needs, and led by the
+distances to go round all that is known (hybrid A*: Dolgov, Thrun, Montemerlo and Diebel, 2008).
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Generator
+
+import numpy as np
+
+from planner.geometry.curves import Limits, Point, Pose, Segment, turns_onto
+from planner.geometry.step_model import largest_course_change_rad, step
+from planner.interface import Path
+from planner.rolling_window.route_optimisation import Route, Terrain
+
+EXPANSIONS = 1000
+"""Poses looked at before the search gives up."""
+
+AWAY = 12.0
+"""So many turn radii nearer to the goal is far enough: from there on ways are looked for in the free sectors again."""
+
+
+def search_poses(
+    start: Pose,
+    start_curvature: float,
+    goal: Point,
+    limits: Limits,
+    terrain: Terrain,
+    to_go: Callable[[Point], float],
+) -> Generator[None, None, Route | None]:
+    """The cheapest flyable route by best-first search over (x, y, course), in steps S_0 of one turn radius.
+
+    A left turn never follows a right one without a straight step between.
+
+    Args:
+        start: first pose.
+        start_curvature: curvature (1/m) flown on arrival there.
+        goal: the end.
+        limits: smallest radius.
+        terrain: where the route may lie.
+        to_go: distance from a place to the goal, m; infinite where there is no way.
+
+    Yields:
+        None after each pose.
+
+    Returns:
+        The route, to the goal or as far towards it as is asked for; None where the search ran out of poses or of
+        its count.
+    """
+    step_m = limits.radius_m
+    largest = largest_course_change_rad(step_m, limits.radius_m)
+    course = math.atan2(start.tangent_north, start.tangent_east)
+    enough_m = to_go(start[:2]) - AWAY * limits.radius_m
+    queue: list[tuple[float, int, float, float, float, float, tuple[Segment, ...]]]
+    queue = [(to_go(start[:2]), 0, 0.0, start.east_m, start.north_m, course, ())]
+    seen: set[tuple[int, int, int]] = set()
+    count = 0
+    while queue and len(seen) < EXPANSIONS:
+        cost, _, flown, x, y, course, done = heapq.heappop(queue)
+        key = (round(2 * x / step_m), round(2 * y / step_m), round(course % math.tau / (0.5 * largest)))
+        if key in seen:
+            continue
+        seen.add(key)
+        yield
+        if done and cost - flown < enough_m:
+            return _route(done, (x, y))
+        pose = Pose(x, y, math.cos(course), math.sin(course))
+        turning = done[-1][4] if done else start_curvature
+        for final in turns_onto(pose, goal, limits.radius_m):
+            if final[0][4] * turning >= 0.0 and terrain.admits(Path(np.array(final))):
+                return _route((*done, *final), goal)
+        for change in (0.0, 0.5 * largest, -0.5 * largest, largest, -largest):
+            if change * turning < 0.0:
+                continue
+            # theta_k is the course of chords: half-way between the tangents at the ends of an arc.
+            nx, ny, _ = step(x, y, course, 0.5 * change, step_m)
+            curvature = 2.0 * math.sin(0.5 * change) / step_m
+            arc: Segment = (*pose, curvature, change / curvature if change else step_m)
+            left = to_go((nx, ny))
+            if left < math.inf and terrain.admits(Path(np.array([arc]))):
+                count += 1
+                so_far = flown + arc[5]
+                heapq.heappush(queue, (so_far + left, count, so_far, nx, ny, course + change, (*done, arc)))
+    return None
+
+
+def _route(segments: tuple[Segment, ...], end: Point) -> Route:
+    return Route((*(segment[:2] for segment in segments[1:]), end), Path(np.array(segments)))

@@ -1,0 +1,118 @@
+"""The paper's route optimisation: shortcuts between track points, under the minimum turn radius."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from planner.geometry.blocks import Blocks, blocks
+from planner.geometry.clearance import first_breach, inside_bounds
+from planner.geometry.curves import Limits, Point, Pose, fillet
+from planner.geometry.fans import shortcuts
+from planner.interface import FloatArray, Path
+from planner.rolling_window.window import PLACE, Tally
+
+SQUARE = 3.0
+"""Side of the squares in which points near a line are looked for, in distances kept."""
+
+MOST_LEFT_OUT = 6
+"""So many corners at most, from the first on, are tried to be left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Terrain:
+    """Where a curve may lie.
+
+    Attributes:
+        points_m: (m, 2) edge points.
+        keep_m: (m,) distance to be kept from each.
+        bounds_m: xmin, ymin, xmax, ymax: area that must not be left.
+        tally: work is counted here.
+    """
+
+    points_m: FloatArray
+    keep_m: FloatArray
+    bounds_m: tuple[float, float, float, float]
+    tally: Tally = field(default_factory=Tally)
+
+    def admits(self, path: Path) -> bool:
+        """Whether a path keeps its distance and stays inside."""
+        if not inside_bounds(path, self.bounds_m):
+            return False
+        self.tally.add(1, PLACE, len(self.points_m) * len(path.segments))
+        return math.isinf(first_breach(path, self.points_m, self.keep_m))
+
+    @cached_property
+    def squares(self) -> Blocks:
+        """The edge points by squares."""
+        side_m = SQUARE * max(float(self.keep_m.max(initial=0.0)), 1.0)
+        return blocks(self.points_m, self.keep_m, side_m)[1]
+
+
+@dataclass(frozen=True)
+class Route:
+    """Track points after the start, and the curve through them."""
+
+    nodes: tuple[Point, ...]
+    path: Path
+
+
+def shortcut(nodes: Sequence[Point], terrain: Terrain) -> list[Point]:
+    """Drops the track points between each one and the furthest that it sees; the first and the last stay."""
+    kept, lines = shortcuts(*terrain.squares, np.array(nodes))
+    terrain.tally.add(lines, PLACE, lines * len(terrain.points_m))
+    return [nodes[i] for i in kept.tolist()]
+
+
+def optimise(
+    start: Pose,
+    start_curvature: float,
+    nodes: Sequence[Point],
+    limits: Limits,
+    cut_m: float,
+    terrain: Terrain,
+) -> Route | None:
+    """The curve through the shortcuts of a track, at the minimum turn radius.
+
+    All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near
+    to something, the turn that is being flown at the start is flown on, past the first corners; then the first turn
+    is flown the other way round, then one corner after the other is left out, then corners are rounded as tightly
+    as may be, and then the track is tried as it came.
+
+    Args:
+        start: pose at which the curve begins.
+        start_curvature: curvature (1/m) flown on arrival there.
+        nodes: track points, that of `start` first.
+        limits: smallest radius and room to roll.
+        cut_m: how far from a track point a wider turn may pass it.
+        terrain: where the curve may lie.
+
+    Returns:
+        The route; None where no choice can be flown.
+    """
+    if len(nodes) < 2:
+        return None
+    short = shortcut(nodes, terrain)[1:]
+    tightest = limits.radius_m
+    choices = [(short, cut_m, False, tightest)]
+    if start_curvature:
+        flown = max(1.0 / abs(start_curvature), tightest)
+        choices += [(short[i:], cut_m, False, flown) for i in range(min(len(short), MOST_LEFT_OUT))]
+    choices += [(short, cut_m, True, tightest)]
+    choices += [
+        ([*short[:i], *short[i + 1 :]], cut_m, False, tightest)
+        for i in range(min(len(short) - 1, MOST_LEFT_OUT))
+    ]
+    choices += [
+        (way, 0.0, longer, tightest)
+        for way, longer in ((short, False), (short, True), (list(nodes[1:]), False))
+    ]
+    for choice, cut, longer_turn, first_radius in choices:
+        path = fillet(start, choice, limits, cut, start_curvature, longer_turn, first_radius)
+        if path is not None and terrain.admits(path):
+            return Route(tuple(choice), path)
+    return None

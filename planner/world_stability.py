@@ -1,0 +1,34 @@
+"""Whether the world has stood still long enough for a verdict on it."""
+
+from __future__ import annotations
+
+import math
+
+from planner.interface import MapView
+
+SETTLED_S = 600.0
+"""So long after something last moved or appeared no goal is called unreachable: what closes the way may go again."""
+
+
+class WorldStability:
+    """Remembers when something last moved or appeared."""
+
+    def __init__(self) -> None:
+        self.changed_s = -math.inf
+        """When that was; -inf for never."""
+
+    @property
+    def ever(self) -> bool:
+        """Whether anything has moved or appeared so far."""
+        return math.isfinite(self.changed_s)
+
+    def note(self, time_s: float, seen: MapView) -> bool:
+        """Takes in what is seen; returns whether something has moved or appeared since the last call."""
+        changed_s = time_s if seen.moving else seen.last_contradiction_s
+        newer = changed_s > self.changed_s
+        self.changed_s = max(self.changed_s, changed_s)
+        return newer
+
+    def settled(self, time_s: float) -> bool:
+        """Whether nothing has moved or appeared for so long that what closes the way is taken to stay."""
+        return time_s - self.changed_s > SETTLED_S

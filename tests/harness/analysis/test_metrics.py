@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.analysis.metrics import (
+    clearance_violation_s,
+    compute_figures,
+    error_figures,
+    metrics,
+    planned_length_m,
+)
+from harness.analysis.trackability import FlightLimits
+from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
+from planner.interface import Path
+
+LIMITS = FlightLimits(
+    altitude_m=300.0,
+    clearance_m=200.0,
+    bank_limit_rad=math.radians(45),
+    turn_radius_m=110.0,
+    tracking_error_m=0.5,
+)
+KEYS = {
+    "outcome",
+    "reason",
+    "flown_length_m",
+    "planned_length_m",
+    "flight_time_s",
+    "min_clearance_m",
+    "clearance_violation_s",
+    "cross_track_m",
+    "altitude_error_m",
+    "smoothness",
+    "bank_saturation_fraction",
+    "max_load_factor",
+    "trackable",
+    "trackability",
+    "replans",
+    "compute_ms",
+    "timing",
+    "digest",
+    "error",
+}
+
+
+def flight(track: Track, *plans: AcceptedPlan, outcome: Outcome = Outcome.REACHED) -> Flight:
+    return Flight(track, plans, outcome, "because", (1.0, 2.0, 3.0), 10.0, 0.5)
+
+
+def test_figures_of_a_straight_flight(make_track: Callable[..., Track], straight_plan: AcceptedPlan) -> None:
+    track = make_track(
+        101,
+        up_m=np.repeat([299.0, 301.0], [1, 100]),
+        cross_track_m=np.repeat([0.0, -2.0], [91, 10]),
+        clearance_m=np.repeat([500.0, 150.0], [71, 30]),
+        load_factor=np.repeat([1.0, 1.4], [100, 1]),
+        roll_command_deg=np.repeat([0.0, -45.0], [100, 1]),
+    )
+    figures = metrics(flight(track, straight_plan), LIMITS)
+    assert set(figures) == KEYS
+    assert (figures["outcome"], figures["reason"]) == ("reached", "because")
+    assert figures["flown_length_m"] == pytest.approx(250.0)
+    assert figures["planned_length_m"] == pytest.approx(250.0)
+    assert figures["flight_time_s"] == 10.0
+    assert figures["min_clearance_m"] == 150.0
+    assert figures["clearance_violation_s"] == pytest.approx(3.0)
+    assert figures["cross_track_m"] == {"rms": pytest.approx(math.sqrt(40 / 101)), "p95": 2.0, "max": 2.0}
+    assert figures["altitude_error_m"] == {"rms": 1.0, "p95": 1.0, "max": 1.0}
+    assert figures["bank_saturation_fraction"] == pytest.approx(1 / 101)
+    assert figures["max_load_factor"] == 1.4
+    assert figures["trackable"] is True
+    assert figures["replans"] == 0
+    assert figures["compute_ms"] == {"p50": 2.0, "p99": pytest.approx(2.98), "max": 3.0}
+    assert figures["timing"] == {"sim_s": 10.0, "wall_s": 0.5, "realtime_factor": 20.0}
+    assert figures["digest"] == digest(track)
+
+
+def test_smoothness_of_planned_and_flown_agree_on_a_circle(
+    make_circle: Callable[..., Track], circle_plan: AcceptedPlan
+) -> None:
+    figures = metrics(flight(make_circle(500.0, 60.0), circle_plan), LIMITS)["smoothness"]
+    assert set(figures) == {"planned", "flown"}
+    for name in ("heading_change_deg", "bending_energy_1pm", "max_curvature_1pm"):
+        assert figures["flown"][name] == pytest.approx(figures["planned"][name], rel=1e-3)
+    assert figures["planned"]["bending_energy_1pm"] == pytest.approx(1500.0 / 500.0**2, rel=1e-3)
+
+
+def test_what_does_not_exist_is_null(make_track: Callable[..., Track]) -> None:
+    track = make_track(30, plan_index=-1, cross_track_m=np.nan, arc_length_m=np.nan, clearance_m=np.inf)
+    empty = replace(flight(track, outcome=Outcome.PLANNER_FAILED), compute_ms=(), wall_s=0.0)
+    figures = metrics(empty, LIMITS)
+    assert figures["min_clearance_m"] is None
+    assert figures["cross_track_m"] == {"rms": None, "p95": None, "max": None}
+    assert figures["compute_ms"] == {"p50": None, "p99": None, "max": None}
+    assert figures["timing"]["realtime_factor"] is None
+    assert figures["planned_length_m"] == 0.0
+    assert figures["trackable"] is False
+    assert figures["trackability"] == []
+    assert json.loads(json.dumps(figures, allow_nan=False)) == figures
+
+
+def test_flight_without_a_track_has_no_metrics(make_track: Callable[..., Track]) -> None:
+    with pytest.raises(ValueError, match="without a track"):
+        metrics(flight(make_track(0)), LIMITS)
+
+
+def test_planned_length_survives_frequent_replanning(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    """A new plan every second, each from where the aircraft is: nothing is lost between them."""
+    rows = np.arange(1001)
+    track = make_track(1001, plan_index=rows // 10, arc_length_m=2.5 * (rows % 10))
+    plans = [make_plan([(0, 25.0 * i, 0, 1, 0.0, 5000.0)], index=i) for i in range(101)]
+    assert planned_length_m(flight(track, *plans)) == pytest.approx(2500.0)
+    assert metrics(flight(track, *plans), LIMITS)["replans"] == 100
+
+
+def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end(
+    make_track: Callable[..., Track], circle_plan: AcceptedPlan
+) -> None:
+    once = circle_plan.plan.path
+    assert once is not None
+    for_ever = replace(circle_plan, plan=replace(circle_plan.plan, path=Path(once.segments, loiter=True)))
+    track = make_track(2001)
+    assert planned_length_m(flight(track, for_ever)) == pytest.approx(5000.0)
+    assert planned_length_m(flight(track, circle_plan)) == pytest.approx(once.length_m)
+    beyond = make_track(101, arc_length_m=once.length_m + 10.0 + 2.5 * np.arange(101))
+    assert planned_length_m(flight(beyond, circle_plan)) == 0.0
+
+
+def test_error_figures_leave_out_nan() -> None:
+    assert error_figures(np.array([np.nan, -3.0, 3.0])) == {"rms": 3.0, "p95": 3.0, "max": 3.0}
+    assert compute_figures((5.0,)) == {"p50": 5.0, "p99": 5.0, "max": 5.0}
+
+
+def test_exactly_the_wanted_clearance_is_no_violation() -> None:
+    times_s = np.arange(50) / 10.0
+    assert clearance_violation_s(times_s, np.full(50, 200.0), 200.0) == 0.0
+    assert clearance_violation_s(times_s, np.full(50, 199.9), 200.0) == pytest.approx(4.9)
+
+
+def test_a_contact_between_two_rows_is_below_the_wanted_clearance(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    """What is thinner than the way from row to row: both rows may be clear of it."""
+    hit = replace(flight(make_track(50, clearance_m=250.0), straight_plan), contact_m=-0.5)
+    figures = metrics(hit, LIMITS)
+    assert figures["min_clearance_m"] == -0.5
+    assert figures["clearance_violation_s"] == pytest.approx(0.1)

@@ -1,0 +1,193 @@
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.analysis.trackability import FlightLimits, legs
+from harness.flight.record import AcceptedPlan, Track
+
+LIMITS = FlightLimits(
+    altitude_m=300.0,
+    clearance_m=50.0,
+    bank_limit_rad=math.radians(45),
+    turn_radius_m=110.0,
+    tracking_error_m=1.0,
+)
+OFF = np.where(np.abs(np.arange(201) - 100) < 20, 6.0, 0.0)
+
+
+def test_threshold_is_the_margin_planners_keep() -> None:
+    assert LIMITS.cross_track_threshold_m == 5.0
+    assert FlightLimits(300.0, 10.0, 0.8, 110.0, 1.0).cross_track_threshold_m == 2.0
+
+
+@pytest.mark.parametrize(("error_m", "trackable"), [(5.0, True), (-5.0, True), (5.1, False), (-5.1, False)])
+def test_leg_is_trackable_up_to_the_threshold(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan, error_m: float, trackable: bool
+) -> None:
+    error = np.minimum(np.arange(201) / 100.0, 1.0) * error_m
+    (leg,) = legs(make_track(201, cross_track_m=error), [straight_plan], LIMITS)
+    assert (leg.start_s, leg.end_s, leg.max_cross_track_m) == (0.0, 20.0, abs(error_m))
+    assert leg.trackable is trackable
+    assert leg.cause == (None if trackable else "tracking error")
+
+
+def test_each_plan_is_a_leg_and_short_ones_join_a_neighbour(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    """Plans flown for 10 s, 2 s, 3 s, 10 s and 1 s, after 1 s without any."""
+    index = np.repeat([-1, 0, 1, 2, 3, 4], [10, 100, 20, 30, 100, 10])
+    plans = [make_plan([(0, 0, 0, 1, 0.0, 5000.0)], index=i) for i in range(5)]
+    judged = legs(make_track(len(index), plan_index=index), plans, LIMITS)
+    assert [(leg.start_s, leg.end_s) for leg in judged] == [(1.0, 10.9), (11.0, 26.9)]
+
+
+def test_one_short_plan_is_still_judged(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    (leg,) = legs(make_track(10, cross_track_m=9.0), [straight_plan], LIMITS)
+    assert leg.trackable is False
+
+
+def test_without_a_plan_there_is_no_leg(make_track: Callable[..., Track]) -> None:
+    assert legs(make_track(100, plan_index=-1), [], LIMITS) == ()
+
+
+def test_cause_is_the_bank_limit(make_track: Callable[..., Track], straight_plan: AcceptedPlan) -> None:
+    track = make_track(201, cross_track_m=OFF, roll_command_deg=-45.0)
+    assert legs(track, [straight_plan], LIMITS)[0].cause == "bank limit"
+
+
+def test_cause_is_a_turn_tighter_than_can_be_flown(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    """The guidance is at its limit too, but because the plan asked for it."""
+    tight = make_plan([(0, 0, 0, 1, 0.0, 180.0), (0, 180, 0, 1, 1 / 80.0, 300.0)])
+    wide = make_plan([(0, 0, 0, 1, 0.0, 180.0), (0, 180, 0, 1, 1 / 120.0, 300.0)])
+    track = make_track(201, cross_track_m=OFF, roll_command_deg=45.0)
+    assert legs(track, [tight], LIMITS)[0].cause == "turn radius too tight"
+    assert legs(track, [wide], LIMITS)[0].cause == "bank limit"
+
+
+def test_cause_is_a_corner_that_is_overshot(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    """The aircraft flies on past a right angle at 250 m; the nearest point of the plan stays there."""
+    corner = make_plan([(0, 0, 0, 1, 0.0, 250.0), (0, 250, 1, 0, 0.0, 900.0)])
+    along = np.minimum(25.0 * np.arange(151) / 10.0, 250.0)
+    off = np.maximum(np.arange(151) - 100.0, 0.0)
+    track = make_track(
+        151, arc_length_m=along, cross_track_m=off, roll_command_deg=np.where(off > 0, 45.0, 0.0)
+    )
+    assert legs(track, [corner], LIMITS)[0].cause == "turn radius too tight"
+    long = make_plan([(0, 0, 0, 1, 0.0, 9000.0)])
+    assert legs(track, [long], LIMITS)[0].cause == "bank limit"
+
+
+WIDE = replace(
+    LIMITS, airspeed_mps=25.0, max_altitude_error_m=10.0, max_airspeed_error_mps=2.5, max_load_factor=2.0
+)
+
+
+@pytest.mark.parametrize(
+    ("columns", "cause"),
+    [
+        ({"up_m": 311.0, "throttle": 1.0}, "speed or throttle saturation"),
+        ({"up_m": 311.0, "throttle": 0.5}, "tracking error"),
+        ({"up_m": 309.0, "throttle": 1.0}, None),
+        ({"airspeed_mps": 22.0}, "speed or throttle saturation"),
+        ({"airspeed_mps": 23.0}, None),
+        ({"airspeed_mps": np.where(np.arange(601) % 100 < 50, 21.0, 28.0)}, None),
+        ({"load_factor": 2.1}, "load factor"),
+        ({"load_factor": np.where(np.arange(601) % 20 == 0, 5.0, 1.0)}, None),
+    ],
+)
+def test_altitude_airspeed_and_load_factor_have_limits_too(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan, columns: dict[str, Any], cause: str | None
+) -> None:
+    """Speed is judged over 20 s and load factor over 1 s: not gust by gust."""
+    (leg,) = legs(make_track(601, **columns), [straight_plan], WIDE)
+    assert leg.cause == cause
+    assert leg.trackable is (cause is None)
+
+
+def test_cause_is_what_was_at_its_limit_for_longer(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    """Rolling at 50 of 60 deg/s all the time, the command at its limit for a part of it."""
+    limits = replace(LIMITS, roll_rate_radps=math.radians(60.0))
+    back_and_forth = 5.0 * np.abs(np.arange(201) % 16 - 8)
+    track = make_track(
+        201,
+        cross_track_m=OFF,
+        roll_deg=back_and_forth,
+        roll_command_deg=np.where(np.arange(201) % 3, 0.0, 45.0),
+    )
+    assert legs(track, [straight_plan], limits)[0].cause == "roll rate"
+    still = replace(track, roll_deg=np.zeros(201))
+    assert legs(still, [straight_plan], limits)[0].cause == "bank limit"
+
+
+def test_thresholds_can_be_given() -> None:
+    assert replace(LIMITS, max_cross_track_m=1.5).cross_track_threshold_m == 1.5
+
+
+@dataclass(frozen=True)
+class Passed:
+    arc_length_m: float
+    cut_m: float
+
+
+def test_corners_end_legs_and_may_be_cut_by_the_clearance(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    corners = [Passed(500.0, 49.0), Passed(1000.0, 51.0)]
+    judged = legs(make_track(601), [straight_plan], LIMITS, corners=corners)
+    assert [(leg.end_s, leg.corner_cut_m, leg.cause) for leg in judged] == [
+        (20.0, 49.0, None),
+        (40.0, 51.0, "turn radius too tight"),
+        (60.0, 0.0, None),
+    ]
+
+
+@pytest.mark.parametrize(("calm_m", "cause"), [(100.0, "wind drift"), (140.0, "bank limit")])
+def test_bank_is_used_up_by_the_wind_where_calm_air_would_do(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan], calm_m: float, cause: str
+) -> None:
+    """A turn of 120 m, where the wind asks for 150 m and the bank limit in calm air gives 60 m."""
+    turning = make_plan([(0, 0, 0, 1, 1 / 120.0, 5000.0)])
+    limits = replace(LIMITS, turn_radius_m=150.0, calm_radius_m=calm_m, tightest_radius_m=60.0)
+    track = make_track(201, cross_track_m=OFF, roll_command_deg=-45.0)
+    assert legs(track, [turning], limits)[0].cause == cause
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "side", "cause"),
+    [
+        (-15.0, 1.0, "wind drift"),
+        (15.0, -1.0, "wind drift"),
+        (-15.0, -1.0, "tracking error"),
+        (-3.0, 1.0, "tracking error"),
+    ],
+)
+def test_cause_is_the_wind_where_the_drift_is_downwind(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan, heading_deg: float, side: float, cause: str
+) -> None:
+    """Course north with the nose to the left: the wind blows from the left and drifts to the right."""
+    track = make_track(201, cross_track_m=side * OFF, heading_deg=heading_deg % 360.0)
+    assert legs(track, [straight_plan], LIMITS)[0].cause == cause
+
+
+def test_lost_control_is_on_the_last_leg(
+    make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    plans = [make_plan([(0, 0, 0, 1, 0.0, 5000.0)], index=i) for i in range(2)]
+    track = make_track(200, plan_index=np.repeat([0, 1], 100))
+    judged = legs(track, plans, LIMITS, lost_control=True)
+    assert [leg.cause for leg in judged] == [None, "lost control"]
+    assert [leg.trackable for leg in judged] == [True, False]

@@ -1,0 +1,138 @@
+"""Guidance, autopilot and JSBSim together: how close an aircraft stays to planned routes, in all kinds of air.
+
+The limits are those that a user is promised; what is flown is about half of each.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.airframes import aircraft_names, airframe
+from aircraft.envelope import performance
+from aircraft.route import route_point
+from aircraft.start import Atmosphere
+from harness.bench.tracking import (
+    CASES,
+    LIMIT_FACTORS,
+    TURNS,
+    Case,
+    Tracking,
+    bench_tracking,
+    course,
+    fly_course,
+    tracked,
+)
+from harness.cli.terminal import print_grid, tracking_rows
+
+CALM = CASES[0]
+BY_NAME = pytest.mark.parametrize("case", CASES, ids=[case.name for case in CASES])
+
+
+@BY_NAME
+def test_the_aerosonde_keeps_what_is_promised(case: Case) -> None:
+    flown = tracked("aerosonde", case, [1])
+    assert flown.within(case.limits), flown
+
+
+def test_two_courses_are_flown_no_better_than_the_worse_one() -> None:
+    one, two = (tracked("aerosonde", CALM, [seed]) for seed in (4, 5))
+    both = tracked("aerosonde", CALM, [4, 5])
+    assert both == one.worse(two)
+    assert both.within(CALM.limits)
+
+
+@pytest.mark.parametrize("name", ["c172p", "T38"])
+def test_others_keep_their_multiple_of_it(name: str) -> None:
+    limits = CASES[1].limits.times(LIMIT_FACTORS[name])
+    flown = tracked(name, CASES[1], [1])
+    assert flown.within(limits), flown
+
+
+@pytest.mark.slow
+@BY_NAME
+@pytest.mark.parametrize("name", LIMIT_FACTORS)
+def test_twenty_courses_of_every_verified_aircraft(name: str, case: Case) -> None:
+    flown = tracked(name, case, range(1, 21))
+    assert flown.within(case.limits.times(LIMIT_FACTORS[name])), flown
+
+
+def test_verified_are_those_that_have_limits() -> None:
+    assert {name for name in aircraft_names() if airframe(name).verified} == set(LIMIT_FACTORS)
+
+
+@pytest.mark.parametrize("airspeed", [20.0, 30.0])
+def test_away_from_cruise(airspeed: float) -> None:
+    flown = tracked("aerosonde", CALM, [4], airspeed)
+    assert flown.within(Tracking(0.2, 0.5, 0.3, 0.0)), flown
+
+
+def test_stays_within_the_error_that_planning_allows_for() -> None:
+    frame = airframe("aerosonde")
+    for case in (CALM, CASES[3]):
+        allowed = performance(frame, 25.0, 0.0, case.intensity).tracking_error_m
+        assert tracked("aerosonde", case, [2]).cross_track_max_m <= allowed
+
+
+def test_a_turn_that_is_too_tight_is_not_tracked() -> None:
+    frame = airframe("aerosonde")
+    tight = fly_course(frame, 25.0, Atmosphere(), course(1, 0.5 * performance(frame, 25.0).turn_radius_m))
+    assert tight.bank_saturation > 0.1
+    assert not tight.within(CALM.limits)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_courses_are_joined_and_turn_as_they_should(seed: int) -> None:
+    route = course(seed, 100.0)
+    turns = route.segments[route.segments[:, 4] != 0.0]
+    degrees = np.degrees(np.abs(turns[:, 4]) * turns[:, 5])
+    assert len(turns) == TURNS
+    assert np.all((degrees >= 20.0) & (degrees <= 120.0))
+    assert np.allclose(np.abs(turns[:, 4]), 0.01)
+    stations = np.concatenate(([0.0], np.cumsum(route.segments[:-1, 5])))
+    for row, station in zip(route.segments[1:], stations[1:], strict=True):
+        assert row[:4] == pytest.approx(route_point(route, station - 1e-9), abs=1e-6)
+    assert not np.array_equal(course(seed + 1, 100.0).segments, route.segments)
+
+
+def test_wind_has_its_share_of_the_airspeed_and_a_direction_of_its_own() -> None:
+    air = [CASES[2].atmosphere(25.0, seed) for seed in (1, 2)]
+    assert [each.wind_mps for each in air] == pytest.approx([12.5, 12.5])
+    assert air[0].wind_east_mps != air[1].wind_east_mps
+    assert CASES[3].atmosphere(25.0, 1).turbulence == "tustin"
+
+
+def test_limits_are_for_every_figure() -> None:
+    limits = Tracking(1.0, 2.0, 3.0, 0.0)
+    assert limits.within(limits)
+    for name in vars(limits):
+        assert not replace(limits, **{name: 10.0}).within(limits)
+    assert limits.times(2.0) == Tracking(2.0, 4.0, 6.0, 0.0)
+
+
+def test_the_table_names_what_is_not_kept(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from harness.bench import tracking
+
+    strict = replace(CALM, limits=CALM.limits.times(0.01))
+    monkeypatch.setattr(tracking, "CASES", (CALM, strict))
+    result = bench_tracking("aerosonde", 1)
+    assert [case["kept"] for case in result["cases"]] == [True, False]
+    print_grid("title", *tracking_rows(result))
+    shown = capsys.readouterr().out.splitlines()
+    assert max(map(len, shown)) <= 80
+    assert sum("not kept" in line for line in shown) == 1
+    assert math.isfinite(result["cases"][0]["altitude_p95_m"])
+
+
+def test_an_aircraft_of_which_nothing_is_promised_has_no_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    from harness.bench import tracking
+
+    monkeypatch.setattr(tracking, "CASES", (CALM,))
+    (case,) = bench_tracking("J3Cub", 1)["cases"]
+    assert (case["limits"], case["kept"]) == (None, None)
+    assert case["cross_track_max_m"] < 2.0

@@ -1,0 +1,532 @@
+"""Campaign files: what their runs fly, what two runs share, and every mistake refused before a flight."""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.campaign import runs as campaign_runs
+from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_campaign, load_campaign
+from harness.campaign.cells import Run
+from harness.campaign.runs import CampaignRuns
+from harness.cli.app import main
+from harness.files.strict_yaml import InputError, dump
+from harness.scenario.scenario import load_scenario
+from harness.scenario.shipped import shipped_campaigns, shipped_scenarios
+
+ROOT = Path(__file__).parents[3]
+SCENARIO = """\
+schema: wayproof/scenario/1
+name: {name}
+area: {{bounds_m: [0, 0, 3000, 3000]}}
+obstacles:
+  - circle: {{center_m: [1500, 1500], radius_m: 300}}
+mission: {{start_m: [300, 300], goal_m: [2700, 2700], goal_radius_m: 60, course_deg: 10}}
+aircraft: {{model: aerosonde, airspeed_mps: 25}}
+sensor: {{range_m: 2500}}
+planner: {{kind: rolling_window, clearance_m: 40}}
+"""
+CAMPAIGN = """\
+schema: wayproof/campaign/1
+name: small
+seed: 5
+scenarios: [ring.yaml]
+planners: [rolling_window, {kind: bug2, clearance_m: 50}]
+aircraft:
+  - aerosonde
+  - {model: c172p, airspeed_mps: 50}
+set:
+  mission.time_limit_s: 900
+grid:
+  environment.wind.speed_mps: [0, 4.5]
+  environment.turbulence: [null, {model: tustin, intensity: light}]
+random:
+  environment.wind.from_deg: {uniform: [0, 360]}
+  sensor.rays: {choice: [360, 720]}
+  sensor.dropout: {normal: {mean: 0, sigma: 0.05, least: 0, most: 0.1}}
+draws: 3
+"""
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    (tmp_path / "ring.yaml").write_text(SCENARIO.format(name="ring"))
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "b.yaml").write_text(SCENARIO.format(name="b"))
+    (tmp_path / "more" / "a.yaml").write_text(SCENARIO.format(name="a"))
+    return tmp_path
+
+
+def runs_of(place: Path, text: str = CAMPAIGN) -> CampaignRuns:
+    file = place / "campaign.yaml"
+    file.write_text(text)
+    return CampaignRuns(load_campaign(file))
+
+
+def all_of(runs: CampaignRuns) -> list[Run]:
+    return [runs.run(number) for number in range(len(runs))]
+
+
+def test_every_combination_is_drawn_and_flown_by_every_pair(place: Path) -> None:
+    runs = runs_of(place)
+    every = all_of(runs)
+    assert (len(runs), runs.cases) == (3 * 4 * 4, 3 * 4)
+    assert [run.run for run in every] == list(range(48))
+    cells = {
+        (
+            run.varied["environment.wind.speed_mps"],
+            run.varied["environment.turbulence"],
+            run.planner,
+            run.aircraft,
+        )
+        for run in every
+    }
+    assert len(cells) == 16
+    assert {run.varied["environment.turbulence"] for run in every} == {
+        "null",
+        '{"model": "tustin", "intensity": "light"}',
+    }
+    assert {run.world for run in every} == {"ring.yaml"}
+    assert {run.scenario for run in every} == {"ring"}
+    assert runs.varied == {
+        "environment.wind.speed_mps": "number",
+        "environment.turbulence": "json",
+        "environment.wind.from_deg": "number",
+        "sensor.rays": "int",
+        "sensor.dropout": "number",
+        "planner.clearance_m": "int",
+        "aircraft.airspeed_mps": "int",
+    }
+
+
+def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> None:
+    planners = "planners: [rolling_window, {kind: bug2, weights: [1, 2]}]"
+    runs = runs_of(
+        place, CAMPAIGN.replace("planners: [rolling_window, {kind: bug2, clearance_m: 50}]", planners)
+    )
+    assert {(run.planner, run.varied["planner.weights"]) for run in all_of(runs)} == {
+        ("rolling_window", None),
+        ("bug2", "[1, 2]"),
+    }
+
+
+def test_runs_of_a_case_fly_the_same_and_cases_do_not(place: Path) -> None:
+    by_case: dict[int, list[Run]] = {}
+    for run in all_of(runs_of(place)):
+        by_case.setdefault(run.case, []).append(run)
+    for own in by_case.values():
+        assert len(own) == 4
+        shared = {
+            json.dumps({k: v for k, v in run.varied.items() if k.startswith(("environment", "sensor"))})
+            for run in own
+        }
+        assert (len({run.seed for run in own}), len(shared)) == (1, 1)
+        assert {(run.planner, run.varied["planner.clearance_m"]) for run in own} >= {("bug2", 50)}
+    assert len({own[0].seed for own in by_case.values()}) == len(by_case)
+    drawn = [own[0].varied["environment.wind.from_deg"] for own in by_case.values()]
+    assert len(set(drawn)) == len(by_case)
+    assert all(isinstance(angle, float) and 0 <= angle <= 360 for angle in drawn)
+
+
+def test_whole_numbers_are_drawn_where_a_key_takes_no_others(place: Path) -> None:
+    text = CAMPAIGN.replace("sensor.rays: {choice", "trackability.altitude_m: {choice").replace(
+        "random:\n",
+        "random:\n  sensor.rays: {uniform: [100, 700]}\n  planner.steps: {normal: {mean: 9, sigma: 3, least: 1}}\n",
+    )
+    runs = runs_of(
+        place, text.replace("{kind: bug2, clearance_m: 50}", "{kind: rolling_window, clearance_m: 50}")
+    )
+    assert (runs.varied["sensor.rays"], runs.varied["planner.steps"]) == ("int", "int")
+    run, scenario = runs.run(5), runs.scenario(5)
+    assert scenario.sensor.rays == run.varied["sensor.rays"]
+    assert scenario.planner.own["steps"] == run.varied["planner.steps"]
+    drawn = {run.varied["sensor.rays"] for run in all_of(runs)}
+    assert all(isinstance(each, int) and 100 <= each <= 700 for each in drawn)
+    assert len(drawn) > 6
+
+
+@pytest.mark.parametrize(
+    ("drawn", "where"),
+    [
+        ("{uniform: [3.5, 9]}", "uniform[0]: is 3.5"),
+        ("{normal: {mean: 9, sigma: 3, most: 9.2}}", "normal.most: is 9.2"),
+    ],
+)
+def test_ranges_of_whole_numbers_end_at_whole_numbers(place: Path, drawn: str, where: str) -> None:
+    text = CAMPAIGN.replace("random:\n", f"random:\n  sensor.rays: {drawn}\n").replace(
+        "sensor.rays: {choice", "trackability.altitude_m: {choice"
+    )
+    with pytest.raises(InputError, match=re.escape(f"random.sensor.rays.{where}; must be a whole number")):
+        runs_of(place, text).check()
+
+
+def test_hidden_files_of_a_folder_are_no_scenarios(place: Path) -> None:
+    (place / "more" / "._a.yaml").write_bytes(b"\x00\x05\x16\x07")
+    (place / "more" / ".#b.yaml").symlink_to("somebody@somewhere.1234")
+    runs = runs_of(place, CAMPAIGN.replace("ring.yaml", "more"))
+    assert {run.scenario for run in all_of(runs)} == {"a", "b"}
+
+
+def test_scenarios_of_a_folder_may_end_in_yml(place: Path) -> None:
+    (place / "more" / "c.yml").write_text(SCENARIO.format(name="c"))
+    runs = runs_of(place, CAMPAIGN.replace("ring.yaml", "more"))
+    assert {run.scenario for run in all_of(runs)} == {"a", "b", "c"}
+
+
+def test_a_scenario_has_what_its_run_says(place: Path) -> None:
+    runs = runs_of(place)
+    for number in (0, 7, 30, 47):
+        run, scenario = runs.run(number), runs.scenario(number)
+        assert scenario.seed == run.seed
+        assert (scenario.planner.kind, scenario.aircraft.model) == (run.planner, run.aircraft)
+        assert scenario.planner.clearance_m == (50 if run.planner == "bug2" else 40)
+        assert scenario.aircraft.airspeed_mps == (50 if run.aircraft == "c172p" else 25)
+        assert scenario.mission.time_limit_s == 900
+        assert scenario.sensor.rays == run.varied["sensor.rays"]
+        assert scenario.environment.wind
+        assert scenario.environment.wind.speed_mps == run.varied["environment.wind.speed_mps"]
+        assert (scenario.environment.turbulence is None) == (run.varied["environment.turbulence"] == "null")
+
+
+@pytest.mark.parametrize("room", [0, 1500, 10**8])
+def test_what_a_check_keeps_is_what_is_flown(place: Path, room: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign_runs, "MOST_KEPT", room)
+    checked, fresh = runs_of(place), runs_of(place)
+    checked.check()
+    assert (len(checked._made) == 0, len(checked._made) == len(checked)) == (room == 0, room == 10**8)
+    for number in range(len(checked)):
+        assert checked.scenario(number) == fresh.scenario(number)
+    other = checked.scenario(0, [("mission.time_limit_s", "77")])
+    assert other.mission.time_limit_s == 77.0
+
+
+def test_the_scenario_of_a_run_without_changes_is_the_file_but_for_its_seed(place: Path) -> None:
+    runs = runs_of(
+        place, "schema: wayproof/campaign/1\nname: small\nseed: 5\nscenarios: [ring.yaml]\ndraws: 2\n"
+    )
+    loaded = load_scenario(place / "ring.yaml", [("seed", str(runs.run(1).seed))])
+    assert runs.scenario(1) == loaded
+    assert runs.run(0).seed != runs.run(1).seed
+
+
+@settings(derandomize=True, max_examples=15)
+@given(draws=st.integers(1, 6), more=st.integers(1, 6), seed=st.integers(0, 2**53))
+def test_more_draws_leave_the_runs_there_were_as_they_are(
+    tmp_path_factory: pytest.TempPathFactory, draws: int, more: int, seed: int
+) -> None:
+    place = tmp_path_factory.mktemp("draws")
+    (place / "ring.yaml").write_text(SCENARIO.format(name="ring"))
+    text = CAMPAIGN.replace("seed: 5", f"seed: {seed}")
+    few = runs_of(place, text.replace("draws: 3", f"draws: {draws}"))
+    many = runs_of(place, text.replace("draws: 3", f"draws: {draws + more}"))
+    assert all_of(few) == all_of(many)[: len(few)]
+    backwards = [few.run(number) for number in reversed(range(len(few)))]
+    assert backwards[::-1] == all_of(few), "in any order"
+
+
+@pytest.mark.parametrize("sampler", ["latin_hypercube", "sobol"])
+def test_a_sampler_spreads_the_draws_of_each_combination(place: Path, sampler: str) -> None:
+    runs = runs_of(place, CAMPAIGN.replace("draws: 3", f"draws: 8\nsampler: {sampler}"))
+    first = [run for run in all_of(runs) if run.case % 4 == 2]
+    angles = {float(str(run.varied["environment.wind.from_deg"])) for run in first}
+    assert sorted(int(angle / 45) for angle in angles) == list(range(8))
+
+
+def test_worlds_take_the_place_of_the_scenarios_own(place: Path) -> None:
+    text = """\
+schema: wayproof/campaign/1
+name: small
+seed: 5
+scenarios: [ring.yaml]
+worlds:
+  - forest: {size_m: [3000, 3000]}
+  - label: few
+    seed: 1
+    circles: {density_1pkm2: 0.5}
+draws: 2
+"""
+    runs = runs_of(place, text)
+    assert [run.world for run in all_of(runs)] == ["forest", "few", "forest", "few"]
+    scenarios = [runs.scenario(number) for number in range(4)]
+    assert [each.name for each in scenarios] == ["ring"] * 4
+    assert scenarios[0].area.bounds_m == (0.0, 0.0, 3000.0, 3000.0)
+    assert scenarios[0].obstacles != scenarios[2].obstacles, "another world in every case"
+    assert scenarios[1].obstacles == scenarios[3].obstacles, "a held one"
+    assert scenarios[0].mission.course_deg == pytest.approx(45.0), "towards the goal of this world"
+    assert scenarios[0].sensor.range_m == 2500
+
+
+def test_worlds_need_no_scenario(place: Path) -> None:
+    runs = runs_of(
+        place, "schema: wayproof/campaign/1\nname: small\nseed: 5\nworlds: [{maze: {cells: [2, 2]}}]\n"
+    )
+    assert runs.run(0).scenario == runs.scenario(0).name == "small"
+    assert (runs.run(0).planner, runs.run(0).aircraft) == ("rolling_window", "aerosonde")
+    assert (runs.scenario(0).planner.kind, runs.scenario(0).aircraft.model) == ("rolling_window", "aerosonde")
+
+
+def test_results_of_a_campaign_of_worlds_do_not_depend_on_its_files_name(place: Path) -> None:
+    text = "schema: wayproof/campaign/1\nname: c\nseed: 1\nworlds: [{forest: {}}]\n"
+    for name in ("one.yaml", "other.yaml"):
+        (place / name).write_text(text)
+    assert load_campaign(place / "one.yaml").plain() == load_campaign(place / "other.yaml").plain()
+
+
+def test_scenarios_are_files_folders_and_shipped_names(place: Path) -> None:
+    text = "schema: wayproof/campaign/1\nname: small\nseed: 5\nscenarios: [ring.yaml, more, paper_circles]\n"
+    runs = runs_of(place, text)
+    assert [run.scenario for run in all_of(runs)] == ["ring", "a", "b", "paper_circles"]
+    assert [run.world for run in all_of(runs)] == ["ring.yaml", "a.yaml", "b.yaml", "paper_circles.yaml"]
+
+
+def test_the_plain_form_flies_the_same_without_a_file(place: Path) -> None:
+    runs = runs_of(place)
+    plain: dict[str, Any] = json.loads(json.dumps(runs.file.plain()))
+    (place / "ring.yaml").unlink()
+    again = CampaignRuns(CampaignFile.from_plain(plain, "results"))
+    assert all_of(again) == all_of(runs)
+    assert [again.scenario(number) for number in (0, 47)] == [runs.scenario(number) for number in (0, 47)]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"campaign": None},
+        {"scenarios": 3},
+        {"scenarios": []},
+        {"scenarios": [3]},
+        {"scenarios": [{"file": "a.yaml"}]},
+        {"scenarios": [{"file": "a.yaml", "keys": 3}]},
+        {"scenarios": [{"file": 3, "keys": {}}]},
+    ],
+)
+def test_a_plain_form_that_is_none_is_bad_input(place: Path, changed: dict[str, Any]) -> None:
+    plain = runs_of(place).file.plain() | changed
+    for each in (plain, {name: plain[name] for name in plain if name not in changed}):
+        with pytest.raises(InputError, match=r"^results\S* "):
+            CampaignRuns(CampaignFile.from_plain(each, "results")).check()
+
+
+def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import shutil
+
+    import aircraft
+
+    shutil.copytree(Path(aircraft.__path__[0], "aerosonde"), place / "mine")
+    monkeypatch.chdir(place.parent)
+    text = CAMPAIGN.replace("  - aerosonde\n", "  - mine\n")
+    runs = runs_of(place, text)
+    assert runs.scenario(0).aircraft.model == str(place / "mine")
+    again = CampaignRuns(CampaignFile.from_plain(runs.file.plain(), "results"))
+    assert again.scenario(0) == runs.scenario(0)
+
+
+LINES = {line: number for number, line in enumerate(CAMPAIGN.splitlines(), start=1)}
+
+
+def line_of(begin: str) -> int:
+    return next(number for line, number in LINES.items() if line.strip().startswith(begin))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("seed: 5\n", "", "campaign.yaml:1: seed: is missing"),
+        ("draws: 3", "draws: 0", "campaign.yaml:18: draws: is 0; must be at least 1"),
+        ("draws: 3", "drawss: 3", "campaign.yaml:18: drawss: unknown key; did you mean draws?"),
+        ("[ring.yaml]", "[rong.yaml]", "campaign.yaml:4: scenarios[0]: is 'rong.yaml'; must be a scenario"),
+        ("[ring.yaml]", "[ring.yaml, ring.yaml]", "scenarios[1]: is a second scenario called ring"),
+        ("scenarios: [ring.yaml]", "draws: 1", "given twice"),
+        ("[ring.yaml]", "[list.yaml]", "list.yaml:1: must be a mapping"),
+        ("  environment.wind.speed_mps", "  environment.wnd.speed_mps", "unknown key; did you mean wind"),
+        ("[0, 4.5]", "[0, 45]", "campaign.yaml:12: grid.environment.wind.speed_mps[1]: is 45; must be below"),
+        ("[0, 4.5]", "[]", "campaign.yaml:12: grid.environment.wind.speed_mps: has 0 items"),
+        ("[0, 4.5]", '[0, "x"]', "grid.environment.wind.speed_mps[1]: is the text 'x'; must be a number"),
+        ("{uniform: [0, 360]}", "{uniform: [361, 400]}", "random.environment.wind.from_deg: is 3"),
+        ("{uniform: [0, 360]}", "{unifrm: [0, 360]}", "from_deg.unifrm: unknown key; did you mean uniform"),
+        ("{uniform: [0, 360]}", "{uniform: [0]}", "from_deg.uniform"),
+        ("sensor.rays: {choice", "seed: {choice", "random.seed: cannot be given here; every case gets"),
+        ("sensor.rays: {choice", "planner: {choice", "random.planner: cannot be given here"),
+        ("sensor.rays: {choice", "planner.kind: {choice", "name planners under `planners`"),
+        ("sensor.rays: {choice", "a..b: {choice", "'a..b' is not a key path"),
+        (
+            "sensor.rays: {choice",
+            "environment.wind: {choice",
+            "is given under grid.environment.wind.speed_mps",
+        ),
+        ("sensor.rays: {choice", "obstacles[7].circle: {choice", "obstacles[7]: does not exist; there are 1"),
+        ("mission.time_limit_s: 900", "mission.start_m: [1500, 1500]", "set.mission.start_m: lies inside"),
+        ("{kind: bug2,", "{kind: bug3,", "planners[1].kind: is 'bug3'; must be one of"),
+        ("{kind: bug2,", "{kind: bug2, stepps: 3,", "planners[1].stepps: unknown key"),
+        ("model: c172p,", "model: nosuch,", "aircraft[1].model: unknown aircraft 'nosuch'"),
+        ("airspeed_mps: 50}", "airspeed_mps: 500}", "aircraft[1].airspeed_mps: "),
+        ("draws: 3", "worlds: [{maze: {cells: [2, 2]}, town: {}}]", "worlds[0]: has town and maze of"),
+        ("draws: 3", "worlds: [{}]", "worlds[0]: has none of circles"),
+        ("draws: 3", "worlds: [{maze: {}}, {maze: {}}]", "worlds[1]: is called maze as another"),
+        (
+            "draws: 3",
+            "worlds: [{forest: {room_m: 20, gap_m: 0, density_1pkm2: 90}}]",
+            "worlds[0].forest: mission.start_m: lies",
+        ),
+        (
+            "draws: 3",
+            "draws: 1000000",
+            "18: draws: makes 16000000 runs with what is combined; must be at most",
+        ),
+        ("{kind: bug2, clearance_m: 50}", "rolling_window", "planners[1]: is there already"),
+        (
+            "  sensor.rays: {choice",
+            "  planner.clearance_m: {choice",
+            "planners[1].clearance_m: is given under random.planner.clearance_m too",
+        ),
+        ("schema: wayproof/campaign/1", "schema: wayproof/campaign/2", "schema: is the text"),
+    ],
+)
+def test_a_mistake_is_told_with_file_line_and_key(
+    place: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
+    assert old in CAMPAIGN
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))
+    (place / "list.yaml").write_text("- schema: wayproof/scenario/1\n")
+    out = place / "out"
+    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out)]) == 2
+    told = capsys.readouterr()
+    assert said in told.err
+    assert told.out == ""
+    assert str(place) in told.err
+    assert len(told.err.splitlines()) <= 5
+    assert not out.exists(), "nothing is written"
+
+
+def test_a_fault_of_the_scenario_itself_names_its_own_line_and_the_run(place: Path) -> None:
+    (place / "ring.yaml").write_text(SCENARIO.format(name="ring").replace("range_m: 2500", "range_m: 0"))
+    with pytest.raises(InputError, match=r"ring.yaml:8: sensor.range_m: is 0; .* \(run 0 of .*campaign.yaml"):
+        runs_of(place).check()
+
+
+def test_a_design_of_too_many_values_is_refused_before_it_is_made(place: Path) -> None:
+    names = "".join(f"  random_{number}: {{uniform: [0, 1]}}\n" for number in range(11))
+    text = "worlds: [{circles: {}}]\nsampler: sobol\ndraws: 1000000\nrandom:\n" + names
+    with pytest.raises(
+        InputError, match=r"campaign.yaml:6: draws: .* 11000000 values at once; must be at most"
+    ):
+        runs_of(place, f"schema: wayproof/campaign/1\nname: small\nseed: 5\n{text}")
+
+
+def test_a_campaign_with_neither_scenarios_nor_worlds_is_refused(place: Path) -> None:
+    with pytest.raises(InputError, match="has neither scenarios nor worlds"):
+        runs_of(place, "schema: wayproof/campaign/1\nname: small\nseed: 5\n")
+
+
+def test_validate_and_schema_know_campaigns(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN)
+    assert main(["validate", str(place / "campaign.yaml"), str(place / "ring.yaml")]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first.endswith("campaign.yaml: small, 48 runs of 12 cases: valid")
+    assert second.endswith("ring.yaml: ring, 1 obstacle: valid")
+    assert main(["schema", "campaign"]) == 0
+    assert json.loads(capsys.readouterr().out) == campaign_schema()
+
+
+def test_a_dry_run_shows_the_runs_and_writes_nothing(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(place)
+    (place / "campaign.yaml").write_text(CAMPAIGN)
+    before = sorted(place.rglob("*"))
+    assert main(["sweep", "campaign.yaml", "--dry-run"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "small: 48 runs of 12 cases, root seed 5, recordings: none"
+    assert "speed_mps" in "".join(lines)
+    numbers = [int(line.split()[0]) for line in lines if line.split() and line.split()[0].isdigit()]
+    assert numbers == [*range(15), *range(43, 48)]
+    assert main(["sweep", "campaign.yaml", "--dry-run", "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert [each["run"] for each in plain] == list(range(48))
+    assert sorted(place.rglob("*")) == before
+
+
+def test_a_dry_run_fits_a_narrow_terminal(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN)
+    runs = runs_of(place, CAMPAIGN)
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["sweep", str(place / "campaign.yaml"), "--dry-run"]) == 0
+    lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
+    assert max(map(len, lines)) <= 80
+    words = " ".join(lines).split()
+    for name in runs.varied:
+        assert words.count(name.rpartition(".")[2]) == 1
+    pieces = [line for line in lines if line.split()[:1] == ["47"]]
+    assert len(pieces) > 1, "it did not fit"
+    last = runs.run(47)
+    assert " ".join(pieces).split()[:5] == ["47", "11", last.scenario, last.world, last.planner]
+    assert pieces[-1].split()[-1] == str(last.seed)
+
+
+@pytest.mark.parametrize("name", shipped_campaigns())
+def test_shipped_campaigns_are_valid_and_named_after_their_files(name: str) -> None:
+    path = shipped_campaigns()[name]
+    first, second = path.read_text().splitlines()[:2]
+    assert first == "# yaml-language-server: $schema=../campaign.schema.json"
+    assert second.startswith("# ")
+    assert is_campaign(path)
+    runs = CampaignRuns(load_campaign(path))
+    assert runs.campaign.name == name
+    assert f"{len(runs)} flights" in second
+    for number in {*range(0, len(runs), 37), len(runs) - 1}:
+        runs.scenario(number)
+
+
+def test_editors_find_the_campaign_schema_and_one_shipped_campaign_has_every_key() -> None:
+    assert len(shipped_campaigns()) >= 2
+    shipped = json.loads((ROOT / "scenarios" / "campaign.schema.json").read_text())
+    assert shipped == campaign_schema()
+    whole = load_campaign(shipped_campaigns()["everything"]).campaign
+    assert whole.model_fields_set == set(type(whole).model_fields)
+    generators = {world.generator for world in whole.worlds}
+    assert len(generators) == 7
+    assert {name for each in whole.random.values() for name in each.model_fields_set} == {
+        "uniform",
+        "normal",
+        "choice",
+    }
+
+
+def test_campaigns_are_no_scenarios_to_list() -> None:
+    assert shipped_campaigns().keys().isdisjoint(shipped_scenarios())
+
+
+@settings(derandomize=True, max_examples=60)
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.integers(-3, 1000) | st.floats(allow_nan=False) | st.text(max_size=5),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
+        max_leaves=6,
+    ),
+    st.sampled_from(
+        ("scenarios", "worlds", "planners", "aircraft", "set", "grid", "random", "draws", "name")
+    ),
+)
+def test_whatever_a_key_holds_it_is_taken_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, value: Any, key: str
+) -> None:
+    place = tmp_path_factory.mktemp("fuzz")
+    (place / "ring.yaml").write_text(SCENARIO.format(name="ring"))
+    keys = {"schema": "wayproof/campaign/1", "name": "x", "seed": 1, "scenarios": ["ring.yaml"], key: value}
+    (place / "campaign.yaml").write_text(dump(keys))
+    with suppress(InputError):
+        runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+        if len(runs) < 20:
+            runs.check()

@@ -1,0 +1,183 @@
+"""A campaign's journal with a line that is not as it was written: told by file and line, and nothing touched."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from harness.campaign.campaign_file import load_campaign
+from harness.campaign.folder import CampaignFolder
+from harness.campaign.journal import JOURNAL
+from harness.campaign.results import RESULTS
+from harness.campaign.runs import CampaignRuns
+from harness.cli.app import main
+from tests.faults.command import CAMPAIGN_FILES
+
+Lines = list[bytes]
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A campaign of three runs, and its folder as if it had been flown."""
+    for name, text in CAMPAIGN_FILES.items():
+        (tmp_path / name).write_text(text)
+    runs = CampaignRuns(load_campaign(tmp_path / "campaign.yaml"))
+    with CampaignFolder(tmp_path / "out", runs, resume=False) as folder:
+        for number in range(len(runs)):
+            flown = {"outcome": "reached", "flown_length_m": 1000.0 + number, "digest": "0"}
+            folder.append(number, {**runs.run(number).cells(), **flown}, {"wall_s": 1.0})
+        folder.write_tables()
+    return tmp_path
+
+
+def sweep(place: Path, *options: str) -> int:
+    return main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), "--quiet", *options])
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in folder.iterdir()}
+
+
+def lines_of(place: Path) -> Lines:
+    return (place / "out" / JOURNAL).read_bytes().splitlines(keepends=True)
+
+
+def edited(index: int, cells: dict[str, Any] | None = None, **changes: Any) -> Callable[[Lines], Lines]:
+    """A line with other content, and other cells in its row."""
+
+    def edit(lines: Lines) -> Lines:
+        line = json.loads(lines[index])
+        line["row"] |= cells or {}
+        lines[index] = json.dumps(line | changes).encode() + b"\n"
+        return lines
+
+    return edit
+
+
+LAST = 2
+DAMAGE: dict[str, tuple[Callable[[Lines], Lines], str]] = {
+    "no JSON": (
+        lambda lines: [lines[0], b"x" + lines[1][1:], *lines[2:]],
+        ":2: is damaged: it tells of no run",
+    ),
+    "first": (lambda lines: [b"x" + lines[0][1:], *lines[1:]], ":1: is damaged: it tells of no run"),
+    "not UTF-8": (lambda lines: [b"\xff" + lines[0], *lines[1:]], ":1: is damaged: it tells of no run"),
+    "empty": (lambda lines: [b"\n", *lines], ":1: is damaged: it tells of no run"),
+    "two in one": (
+        lambda lines: [lines[0][:-1] + lines[1], *lines[2:]],
+        ":1: is damaged: it tells of no run",
+    ),
+    "no mapping": (lambda lines: [b"[1]\n", *lines], ":1: is damaged: it tells of no run"),
+    "deep": (lambda lines: [b"[" * 100_000 + b"\n", *lines], ":1: is damaged: it tells of no run"),
+    "beyond": (
+        edited(LAST, run=300, cells={"run": 300}),
+        ":3: is damaged: it tells of run 300 where the last is 2",
+    ),
+    "below": (edited(LAST, run=-1, cells={"run": -1}), ":3: is damaged: it tells of no run"),
+    "text": (edited(LAST, run="2"), ":3: is damaged: it tells of no run"),
+    "share": (edited(LAST, run=2.0), ":3: is damaged: it tells of no run"),
+    "yes": (edited(1, run=True), ":2: is damaged: it tells of no run"),
+    "another row": (edited(LAST, cells={"run": 1}), ":3: is damaged: it tells of no run"),
+    "no row": (edited(LAST, row={}), ":3: is damaged: it tells of no run"),
+    "another seed": (
+        edited(1, cells={"seed": 5}),
+        ":2: is damaged: it tells of run 1 with another seed than the campaign has",
+    ),
+    "another wind": (
+        edited(1, cells={"environment.wind.speed_mps": 4}),
+        ":2: is damaged: it tells of run 1 with another environment.wind.speed_mps than the campaign has",
+    ),
+    "null": (edited(0, row=None), ":1: is damaged: it tells of no run"),
+    "no times": (edited(0, times=None), ":1: is damaged: it tells of no run"),
+    "twice": (
+        lambda lines: [*lines, edited(0, cells={"digest": "1"})(lines[:1])[0]],
+        ":4: is damaged: it tells of run 0 otherwise than line 1",
+    ),
+    "a type": (
+        edited(1, cells={"flown_length_m": "far"}),
+        ":2: is damaged: it tells of a value of another type",
+    ),
+    "a time": (edited(1, times={"wall_s": "long"}), ":2: is damaged: it tells of a value of another type"),
+}
+
+
+@pytest.mark.parametrize("options", [(), ("--resume",)], ids=["", "resume"])
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_line_is_named_and_nothing_touched(
+    damage: str, options: tuple[str, ...], place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edit, said = DAMAGE[damage]
+    (place / "out" / JOURNAL).write_bytes(b"".join(edit(lines_of(place))))
+    before = content(place / "out")
+    assert sweep(place, *options) == 2
+    told = capsys.readouterr().err
+    assert len(told.splitlines()) == 1
+    if options:
+        assert told.startswith(f"wayproof: {place / 'out' / JOURNAL}{said}; delete that line")
+    else:
+        assert JOURNAL in told or "holds 3 runs" in told or "holds 4 runs" in told
+    assert content(place / "out") == before
+
+
+def test_a_run_told_twice_alike_is_one(place: Path) -> None:
+    lines = lines_of(place)
+    (place / "out" / JOURNAL).write_bytes(b"".join([*lines, lines[0]]))
+    results = (place / "out" / RESULTS).read_bytes()
+    assert sweep(place, "--resume") == 0
+    assert (place / "out" / RESULTS).read_bytes() == results
+
+
+def other_campaign(place: Path) -> None:
+    """The campaign file with another seed."""
+    text = (place / "campaign.yaml").read_text()
+    (place / "campaign.yaml").write_text(text.replace("seed: ", "seed: 1"))
+    assert (place / "campaign.yaml").read_text() != text
+
+
+@pytest.mark.parametrize("left", [None, b"", b'{"run": 0, "ro'], ids=["deleted", "emptied", "torn"])
+def test_results_without_a_journal_are_results(
+    left: bytes | None, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (place / "out" / JOURNAL).unlink()
+    if left is not None:
+        (place / "out" / JOURNAL).write_bytes(left)
+    before = content(place / "out")
+    assert sweep(place) == 2
+    assert f"{place / 'out'} holds {RESULTS}: go on with --resume" in capsys.readouterr().err
+    other_campaign(place)
+    assert sweep(place) == 2
+    assert sweep(place, "--resume") == 2
+    assert "is of another campaign: campaign.seed was" in capsys.readouterr().err
+    assert content(place / "out") == before
+
+
+def test_results_that_cannot_be_read_count_and_are_made_anew_from_the_journal(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = (place / "out" / RESULTS).read_bytes()
+    shutil.copytree(place / "out", place / "lost")
+    for folder in ("out", "lost"):
+        (place / folder / RESULTS).write_bytes(b"spoilt")
+    (place / "lost" / JOURNAL).unlink()
+    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "lost")]) == 2
+    assert f"holds {RESULTS}: go on with --resume" in capsys.readouterr().err
+    assert sweep(place, "--resume") == 0
+    assert (place / "out" / RESULTS).read_bytes() == whole
+
+
+def test_a_campaign_made_shorter_is_another_campaign(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = (place / "campaign.yaml").read_text()
+    (place / "campaign.yaml").write_text(text.replace("[0, 3, 6]", "[0, 3]"))
+    assert text != (place / "campaign.yaml").read_text()
+    assert sweep(place, "--resume") == 2
+    assert (
+        "is of another campaign: campaign.grid.environment.wind.speed_mps was [0, 3, 6], is [0, 3]"
+        in capsys.readouterr().err
+    )
+    assert pq.read_table(place / "out" / RESULTS).num_rows == 3

@@ -1,0 +1,505 @@
+"""The answers of a campaign, on tables whose answers are known."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from harness.campaign.figures import lengths
+from harness.campaign.groups import BINS, MOST_NAMES, NONE, grouped
+from harness.campaign.paired import mean_estimate
+from harness.campaign.questions import QUESTIONS, percent
+from harness.campaign.report import PAGE, PLAIN, write_summary
+from harness.campaign.summary import CURVE_POINTS, Cell, Summary, summarise, wilson
+from harness.cli.app import main
+from harness.cli.campaign_terminal import print_summary
+from harness.files.strict_yaml import InputError
+from tests.page import shown
+
+SCHEMA = pa.schema(
+    [(name, pa.int64()) for name in ("run", "case", "seed")]
+    + [(name, pa.string()) for name in ("scenario", "world", "planner", "aircraft")]
+    + [("environment.wind.speed_mps", pa.float64()), ("sensor.rays", pa.int64())]
+    + [(name, pa.string()) for name in ("outcome", "reason", "error")]
+    + [(name, pa.float64()) for name in ("flown_length_m", "min_clearance_m", "clearance_violation_s")]
+    + [("cross_track_m.p95", pa.float64()), ("trackability.legs", pa.int64()), ("trackable", pa.bool_())]
+    + [("optimum_m", pa.float64()), ("length_ratio", pa.float64()), ("wanted_clearance_m", pa.float64())]
+)
+WIND = "environment.wind.speed_mps"
+
+
+def row(run: int, outcome: str = "reached", /, **other: Any) -> dict[str, Any]:
+    """A run of 1.1 times an optimum of 1 km, 100 m from the nearest obstacle where 50 m were wanted."""
+    flown = outcome != "error"
+    return {
+        "run": run,
+        "case": run,
+        "seed": 1000 + run,
+        "scenario": "base",
+        "world": "forest",
+        "planner": "rolling_window",
+        "aircraft": "aerosonde",
+        "outcome": outcome,
+        "reason": f"reason of run {run}",
+        WIND: 5.0,
+        "sensor.rays": 720,
+        "error": None if flown else "Traceback: <b>boom</b>",
+        "flown_length_m": 1100.0 if flown else None,
+        "min_clearance_m": 100.0 if flown else None,
+        "clearance_violation_s": 0.0 if flown else None,
+        "cross_track_m.p95": 0.1 if flown else None,
+        "trackability.legs": 3 if flown else None,
+        "trackable": True if flown else None,
+        "optimum_m": 1000.0,
+        "length_ratio": 1.1 if outcome == "reached" else None,
+        "wanted_clearance_m": 50.0,
+    } | other
+
+
+def campaign(
+    folder: Path, rows: Sequence[Mapping[str, Any]], times: Sequence[tuple[float, float, float]] = ()
+) -> Path:
+    """The folder of a campaign with these rows."""
+    folder.mkdir(exist_ok=True)
+    names = [name for name in SCHEMA.names if not rows or name in rows[0]]
+    schema = pa.schema([SCHEMA.field(name) for name in names])
+    pq.write_table(pa.Table.from_pylist(list(rows), schema), folder / "results.parquet")
+    if times:
+        columns = {
+            f"compute_ms.{name}": values
+            for name, values in zip(("p50", "p99", "max"), zip(*times, strict=True), strict=True)
+        }
+        table = pa.table({"run": [each["run"] for each in rows], **columns})
+        pq.write_table(table, folder / "timings.parquet")
+    return folder
+
+
+def by_two(folder: Path) -> Path:
+    """Two planners on 12 cases; one flies 10 % further and fails in two cases in strong wind."""
+    rows = []
+    for case in range(12):
+        wind = float(case)
+        rows.append(row(2 * case, case=case, **{WIND: wind}))
+        lost = "collision" if case in (10, 11) else "reached"
+        other = row(2 * case + 1, lost, case=case, planner="bug2", **{WIND: wind})
+        other |= {"flown_length_m": 1210.0, "length_ratio": 1.21 if lost == "reached" else None}
+        rows.append(other | ({"min_clearance_m": -2.5} if lost == "collision" else {}))
+    return campaign(folder, rows, [(1.0, 4.0, 9.0)] * 23 + [(2.0, 8.0, 30.0)])
+
+
+@pytest.mark.parametrize("digits", [(0, 1), (1, 1), (19, 20), (532, 600)])
+def test_a_share_has_wilsons_interval(digits: tuple[int, int]) -> None:
+    successes, trials = digits
+    z, share = 1.959963984540054, successes / trials
+    middle = (share + z * z / (2 * trials)) / (1 + z * z / trials)
+    half = z / (1 + z * z / trials) * math.sqrt(share * (1 - share) / trials + z * z / (4 * trials**2))
+    assert wilson(successes, trials) == pytest.approx((middle - half, middle + half), abs=1e-12)
+
+
+def test_a_cell_holds_the_figures_of_its_runs(tmp_path: Path) -> None:
+    ratios = (1.0, 1.1, 1.3)
+    rows = [row(run, length_ratio=ratio) for run, ratio in enumerate(ratios)]
+    rows.append(row(3, "collision", min_clearance_m=-1.0, clearance_violation_s=4.0, trackable=False))
+    rows.append(row(4, "error"))
+    total = summarise(campaign(tmp_path, rows, [(1, 5, 9), (2, 6, 8), (3, 4, 7), (4, 4, 4), (9, 9, 9)])).total
+    assert total == Cell(
+        runs=5,
+        reached=3,
+        success=0.6,
+        success_low=wilson(3, 5)[0],
+        success_high=wilson(3, 5)[1],
+        length_median=1.1,
+        length_p95=float(np.percentile(ratios, 95)),
+        least_clearance_m=-1.0,
+        below_wanted=0.25,
+        trackable=0.75,
+        planner_p50_ms=3.0,
+        planner_p99_ms=9.0,
+        planner_max_ms=9.0,
+    )
+
+
+def test_nearly_all_is_not_all_and_a_few_are_not_none(tmp_path: Path) -> None:
+    """One failure in thousands of runs is what a campaign is flown for."""
+    shares = (1.0, 4999 / 5000, 0.5, 1 / 5000, 0.0)
+    assert [percent(share) for share in shares] == ["100 %", "99.9 %", "50.0 %", "0.1 %", "0 %"]
+    cell = summarise(campaign(tmp_path, [row(0)])).total
+    brief = [QUESTIONS[0].brief(replace(cell, success=share)).split()[0] for share in shares]
+    assert brief == ["100", "99.9", "50", "0.1", "0"]
+
+
+def test_a_ratio_of_a_run_that_did_not_arrive_does_not_count(tmp_path: Path) -> None:
+    rows = [row(0), row(1, "timeout", length_ratio=7.0)]
+    assert summarise(campaign(tmp_path, rows)).total.length_p95 == 1.1
+
+
+def test_tables_by_two_keys_split_the_runs(tmp_path: Path) -> None:
+    summary = summarise(by_two(tmp_path / "c"), by=[("planner", WIND), ("sensor.rays",)])
+    two, one = summary.tables
+    assert (two.rows.labels, one.rows.labels, one.columns) == (("rolling_window", "bug2"), ("720",), None)
+    assert two.columns is not None
+    assert two.columns.edges == tuple(np.quantile(np.arange(12.0), np.linspace(0, 1, BINS + 1)).tolist())
+    assert [[cell.reached for cell in cells] for cells in two.cells] == [[3, 3, 3, 3], [3, 3, 3, 1]]
+    assert two.cells[1][3].least_clearance_m == -2.5
+    assert (one.cells[0][0].runs, one.cells[0][0].reached) == (24, 22)
+    assert two.cells[1][3].planner_max_ms == 30.0
+    assert [curve.rows.key for curve in summary.curves] == [WIND, "sensor.rays"]
+    assert summary.lengths["bug2"] == pytest.approx([1.21] * 201)
+
+
+def test_without_a_choice_tables_are_of_the_first_varied_keys(tmp_path: Path) -> None:
+    summary = summarise(by_two(tmp_path / "c"))
+    assert summary.varied == ("planner", WIND, "sensor.rays")
+    keys = [(table.rows.key, table.columns.key if table.columns else None) for table in summary.tables]
+    assert keys == [("planner", WIND), ("planner", "sensor.rays"), (WIND, "sensor.rays")]
+
+
+def test_planners_are_compared_in_pairs(tmp_path: Path) -> None:
+    (duel,) = summarise(by_two(tmp_path / "c")).duels
+    assert (duel.first, duel.second, duel.pairs) == ("rolling_window", "bug2", 12)
+    assert (duel.only_first, duel.only_second, duel.both_reached) == (2, 0, 10)
+    assert duel.success.value == pytest.approx(2 / 12)
+    assert duel.success.low is not None
+    assert duel.success.high is not None
+    assert 0.0 <= duel.success.low < 2 / 12 < duel.success.high <= 0.5
+    assert duel.length.value == pytest.approx(1 / 1.1)
+    assert duel.length.low is None, "every pair has the same ratio: there is nothing to resample"
+
+
+def test_rows_that_share_no_case_make_no_pair(tmp_path: Path) -> None:
+    rows = [row(0), row(1, planner="bug2"), row(2, case=0, planner="bug2", aircraft="c172p")]
+    (duel,) = summarise(campaign(tmp_path, rows)).duels
+    assert (duel.pairs, duel.success.value, duel.length.value) == (0, None, None)
+
+
+def test_scenarios_are_told_apart_where_each_is_flown_in_every_world(tmp_path: Path) -> None:
+    places = [(scenario, world) for scenario in ("calm", "storm") for world in ("forest", "maze")]
+    rows = [
+        row(run, "reached" if scenario == "storm" else "collision", scenario=scenario, world=world)
+        for run, (scenario, world) in enumerate(places)
+    ]
+    summary = summarise(campaign(tmp_path, rows))
+    (first, *_) = summary.tables
+    assert first.columns is not None
+    assert (first.rows.key, first.columns.key) == ("world", "scenario")
+    assert summary.worst[0].name == "calm, forest, rolling_window, aerosonde"
+
+
+def test_the_bootstrap_interval_is_that_of_the_binomial_where_it_is_known() -> None:
+    differences = np.array([1.0] * 300 + [0.0] * 700)
+    estimate = mean_estimate(differences, np.arange(1000))
+    low, high = (float(stats.binom.ppf(end, 1000, 0.3)) / 1000 for end in (0.025, 0.975))
+    assert estimate.low is not None
+    assert estimate.high is not None
+    assert estimate.value == pytest.approx(0.3)
+    assert estimate.low == pytest.approx(low, abs=0.003)
+    assert estimate.high == pytest.approx(high, abs=0.003)
+    assert mean_estimate(differences, np.arange(1000)) == estimate, "the same every time"
+
+
+def test_pairs_of_one_case_are_drawn_together() -> None:
+    of_case = np.array([1.0] * 6 + [0.0] * 14)
+    one = mean_estimate(of_case, np.arange(20))
+    assert mean_estimate(np.repeat(of_case, 5), np.repeat(np.arange(20), 5)) == one
+    assert mean_estimate(np.array([1.0, 0.0]), np.array([3, 3])).low is None, "a single case"
+    few, enough = np.array([1.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.5, 0.0])
+    assert mean_estimate(few, np.arange(3)).low is None, "one in 27 resamples is the least of them alone"
+    assert mean_estimate(enough, np.arange(4)).low is not None
+
+
+def test_numbers_that_differ_late_are_groups_of_their_own() -> None:
+    axis, index = grouped("w", [1000000.1, 1000000.4, 1000000.1])
+    assert axis.labels == ("1000000.1", "1000000.4")
+    assert index.tolist() == [0, 1, 0]
+    many, _ = grouped("w", [1000 + step / 1000 for step in range(20)])
+    assert len(set(many.labels)) == BINS
+
+
+def entries_campaign(folder: Path) -> Path:
+    """Two planners of one kind on two aircraft of one model, told apart by the keys that they are given."""
+    planners = [{"kind": "rolling_window", "clearance_m": 40}, {"kind": "rolling_window", "steps": 8}, "bug2"]
+    about = {
+        "schema": "wayproof/results/1",
+        "runs": 8,
+        "campaign": {
+            "planners": planners,
+            "aircraft": ["aerosonde", {"model": "aerosonde", "airspeed_mps": 30}],
+        },
+    }
+    rows: list[dict[str, Any]] = [
+        {"planner": "rolling_window", "planner.clearance_m": 40, "planner.steps": None},
+        {"planner": "rolling_window", "planner.clearance_m": None, "planner.steps": 8},
+        {"planner": "bug2", "planner.clearance_m": None, "planner.steps": None},
+    ]
+    every = [
+        row(3 * a + p, case=0) | each | {"aircraft.airspeed_mps": airspeed}
+        for a, airspeed in enumerate((None, 30))
+        for p, each in enumerate(rows)
+    ]
+    given = ("planner.clearance_m", "planner.steps", "aircraft.airspeed_mps")
+    fields = [*SCHEMA, *(pa.field(name, pa.int64()) for name in given)]
+    order = [f for f in fields if f.name in every[0]]
+    first = [f for f in order if f.name != "outcome" and fields.index(f) < SCHEMA.names.index("outcome")]
+    rest = [f for f in order if f not in first and f.name not in given]
+    added = [f for f in order if f.name in given]
+    schema = pa.schema([*first, *added, *rest], metadata={"wayproof": json.dumps(about)})
+    folder.mkdir()
+    pq.write_table(pa.Table.from_pylist(every, schema), folder / "results.parquet")
+    return folder
+
+
+def test_entries_of_one_kind_are_told_apart_and_paired(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = entries_campaign(tmp_path / "c")
+    summary = summarise(folder)
+    names = ["rolling_window, clearance_m 40", "rolling_window, steps 8", "bug2"]
+    assert list(summary.lengths) == names
+    assert {(duel.first, duel.second, duel.pairs) for duel in summary.duels} == {
+        (names[0], names[1], 2),
+        (names[0], names[2], 2),
+        (names[1], names[2], 2),
+    }
+    assert "planner.clearance_m" in summary.varied
+    assert summary.worst[0].name == "forest, rolling_window, clearance_m 40, aerosonde"
+
+
+@pytest.mark.parametrize("about", ["{torn", "[1]", '{"campaign": {"planners": 3}}', "[" * 100_000])
+def test_a_table_that_says_nonsense_of_its_campaign_is_damaged(tmp_path: Path, about: str) -> None:
+    folder = campaign(tmp_path / "c", [row(0)])
+    rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": about})
+    pq.write_table(rows, folder / "results.parquet")
+    with pytest.raises(InputError, match="is damaged"):
+        summarise(folder)
+
+
+def test_a_number_of_runs_that_is_none_is_not_known(tmp_path: Path) -> None:
+    folder = campaign(tmp_path / "c", [row(0)])
+    rows = pq.read_table(folder / "results.parquet").replace_schema_metadata({"wayproof": '{"runs": "x"}'})
+    pq.write_table(rows, folder / "results.parquet")
+    assert summarise(folder).missing == 0
+
+
+def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = entries_campaign(tmp_path / "c")
+    summary = summarise(folder)
+    assert (summary.planned, summary.missing) == (8, 2)
+    print_summary(summary)
+    out = capsys.readouterr().out
+    assert "c: 6 of 8 runs" in out
+    assert "not complete: 2 are missing, --resume flies them" in out
+    page = write_summary(summary, folder).read_text()
+    assert "6 of 8 runs" in page
+    assert "2 runs are missing" in page
+    assert json.loads((folder / PLAIN).read_text())["planned"] == 8
+
+
+def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
+    rows = [
+        row(0, "unreachable"),
+        row(1, min_clearance_m=60.0, wanted_clearance_m=30.0),
+        row(2, min_clearance_m=80.0, wanted_clearance_m=200.0),
+        row(3, "timeout"),
+        row(4, "error"),
+        row(5, "collision", min_clearance_m=-1.0),
+        row(6, "collision", min_clearance_m=-9.0),
+        row(7, "something new"),
+        row(8, min_clearance_m=None),
+        *(row(run) for run in range(9, 14)),
+    ]
+    folder = campaign(tmp_path / "my campaign", rows)
+    (folder / "runs" / "6").mkdir(parents=True)
+    (folder / "runs" / "6" / "flight.rrd").touch()
+    (folder / "runs" / "5").mkdir()
+    worst = summarise(folder).worst
+    assert [run.run for run in worst] == [6, 5, 4, 3, 0, 7, 2, 1, 9, 10]
+    assert [(run.folder, run.recording, run.view) for run in worst[:3]] == [
+        ("runs/6", True, f"wayproof view '{folder}/runs/6'"),
+        ("runs/5", False, ""),
+        ("", False, ""),
+    ]
+    assert worst[0].clearance_ratio == pytest.approx(-0.18)
+    assert worst[0].command == f"wayproof fly --from '{folder}/results.parquet' --run 6"
+    page = write_summary(summarise(folder), folder).read_text()
+    assert 'href="runs/6/flight.rrd"' in page
+    assert 'href="runs/5/flight.rrd"' not in page
+    assert ', -0.18 of the wanted. <a href="runs/6">Run folder</a>' in page
+    assert worst[-1].clearance_ratio is not None
+    assert worst[-1].clearance_ratio > 1.0
+    assert f", {worst[-1].clearance_ratio:.2f} of the wanted." in page
+
+
+def test_without_the_wanted_clearance_the_nearest_run_is_the_worst(tmp_path: Path) -> None:
+    rows = [row(run, min_clearance_m=metres) for run, metres in enumerate((70.0, 20.0, 40.0))]
+    for each in rows:
+        del each["wanted_clearance_m"]
+    worst = summarise(campaign(tmp_path, rows)).worst
+    assert [(run.run, run.clearance_ratio) for run in worst] == [(1, None), (2, None), (0, None)]
+
+
+@pytest.mark.parametrize(
+    ("rows", "timed"),
+    [
+        ([], False),
+        ([row(0)], False),
+        ([row(0)], True),
+        ([row(run, "error", planner=("a", "b")[run % 2]) for run in range(4)], True),
+        ([row(0, **{WIND: math.nan}), row(1, **{WIND: None}), row(2, min_clearance_m=math.nan)], True),
+    ],
+    ids=["empty", "one", "one-timed", "all-errors", "holes"],
+)
+def test_thin_campaigns_have_answers_too(
+    rows: list[dict[str, Any]], timed: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = campaign(tmp_path, rows, [(1.0, math.nan, 3.0)] * len(rows) if timed else ())
+    summary = summarise(folder, by=[(WIND, "planner")])
+    print_summary(summary)
+    word = "run" if len(rows) == 1 else "runs"
+    assert f": {len(rows)} {word}" in capsys.readouterr().out
+    page = write_summary(summary, folder).read_text()
+    assert ("Nothing has been flown" in page) == (not rows)
+    assert "nan" not in page.lower().replace("nanosecond", "")
+    assert json.loads((folder / PLAIN).read_text())["total"]["runs"] == len(rows)
+
+
+def test_results_without_a_metric_are_read(tmp_path: Path) -> None:
+    kept = {"run", "case", "seed", "scenario", "world", "planner", "aircraft", "outcome", "error"}
+    rows = [{name: value for name, value in row(run, "error").items() if name in kept} for run in range(3)]
+    total = summarise(campaign(tmp_path, rows)).total
+    assert (total.runs, total.success, total.least_clearance_m, total.trackable) == (3, 0.0, None, None)
+
+
+@given(st.lists(st.none() | st.floats(-1e6, 1e6, allow_nan=False), max_size=60))
+@settings(max_examples=60)
+def test_every_number_has_one_group_between_its_edges(values: list[float | None]) -> None:
+    axis, index = grouped("key", values)
+    assert len(index) == len(values)
+    for value, group in zip(values, index, strict=True):
+        label = axis.labels[group]
+        assert (label == NONE) == (value is None)
+        if value is not None and axis.edges:
+            low, high = axis.edges[group : group + 2]
+            assert low <= value <= high
+    if axis.edges:
+        assert axis.edges == tuple(sorted(set(axis.edges)))
+
+
+def test_the_rarest_of_many_names_share_a_group() -> None:
+    values = [f"world {number}" for number in range(30) for _ in range(30 - number)]
+    axis, index = grouped("world", values)
+    assert axis.labels == (*(f"world {number}" for number in range(MOST_NAMES - 1)), "19 others")
+    assert (index == MOST_NAMES - 1).sum() == sum(30 - number for number in range(11, 30))
+    assert grouped("sensor", [[1, 2], [1, 2], [3]])[0].labels == ("[1, 2]", "[3]")
+    assert grouped("flag", [True, False])[0].labels == ("true", "false")
+
+
+def test_a_terminal_shows_how_to_look_at_the_worst_run_that_was_recorded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = by_two(tmp_path / "c")
+    (folder / "runs" / "21").mkdir(parents=True)
+    (folder / "runs" / "21" / "flight.rrd").touch()
+    print_summary(summarise(folder))
+    assert capsys.readouterr().out.splitlines()[-1] == f"view: wayproof view {folder}/runs/21"
+
+
+def test_a_terminal_of_80_columns_shows_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    print_summary(summarise(by_two(tmp_path / "c")), all_tables=True)
+    printed = capsys.readouterr().out
+    lines = printed.splitlines()
+    assert max(map(len, lines[:-1])) <= 80
+    assert "reached 22, collision 2" in printed
+    assert any(line.split()[:4] == ["all", "runs", "24", "91.7"] for line in lines)
+    assert "collision run 21 (forest, bug2, aerosonde), least clearance -2.5 m" in printed
+    assert lines[-1] == f"again: wayproof fly --from {tmp_path}/c/results.parquet --run 21"
+
+
+def test_the_command_makes_the_summary_again_by_other_keys(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = by_two(tmp_path / "c")
+    assert main(["report", str(folder), "--by", f"planner, {WIND}", "--by", "sensor.rays"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert said.out.splitlines()[-1] == f"summary: {folder / PAGE}"
+    page = (folder / PAGE).read_text()
+    assert f"<h2>By planner and {WIND}</h2>" in page
+    assert "<h2>By sensor.rays</h2>" in page
+    assert "with the edges 0, 2.75, 5.5, 8.25, 11;" in page
+
+
+@pytest.mark.parametrize(
+    ("by", "sentence"),
+    [
+        ("planner,wind", f"no column 'wind'; varied there: planner, {WIND}, sensor.rays"),
+        ("obstacles.0.velocity_mps.1", "no column 'obstacles[0].velocity_mps[1]'"),
+        ("planner,planner", "must be one key, or two different ones"),
+        ("planner,world,aircraft", "must be one key, or two different ones"),
+    ],
+)
+def test_a_wrong_key_is_bad_input(
+    by: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = by_two(tmp_path / "c")
+    assert main(["report", str(folder), "--by", by]) == 2
+    assert sentence in capsys.readouterr().err
+    assert not (folder / PAGE).exists()
+
+
+def test_a_run_folder_has_no_keys_and_damage_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["report", str(tmp_path), "--by", "planner"]) == 2
+    assert "only a campaign has tables by keys" in capsys.readouterr().err
+    (tmp_path / "campaign.json").write_text("{}")
+    assert main(["report", str(tmp_path)]) == 2
+    assert "stopped before the tables were written; `wayproof sweep` with --resume" in capsys.readouterr().err
+    (tmp_path / "results.parquet").write_bytes(b"PAR1 torn")
+    assert main(["report", str(tmp_path)]) == 2
+    assert f"the campaign in {tmp_path} is damaged" in capsys.readouterr().err
+    with pytest.raises(InputError, match="not the folder of a campaign"):
+        summarise(tmp_path / "none")
+
+
+def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: Any) -> None:
+    folder = by_two(tmp_path / "c")
+    summary: Summary = summarise(folder)
+    page = write_summary(summary, folder)
+    assert "<b>boom" not in page.read_text()
+    for width_px in (400, 1280):
+        seen = shown(chromium, page, width_px)
+        assert (seen.said, seen.asked_for, seen.overflow_px) == ((), (), 0)
+        assert (seen.figures, seen.missing) == (len(summary.curves) + 1, 0)
+
+
+def test_an_inner_edge_belongs_to_the_group_above() -> None:
+    axis, index = grouped("key", [float(value) for value in range(9)])
+    assert axis.edges == (0.0, 2.0, 4.0, 6.0, 8.0)
+    assert index.tolist() == [0, 0, 1, 1, 2, 2, 3, 3, 3]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("rolling_window", "tangent_bug", "bug2"),
+        ("rolling_window, clearance_m 120", "rolling_window, clearance_m 200", "vfh_plus"),
+    ],
+)
+def test_the_legend_lies_within_the_figure(names: tuple[str, ...]) -> None:
+    figure = lengths({name: [1.0 + 0.001 * step for step in range(CURVE_POINTS)] for name in names})
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    box, whole = legend.get_window_extent(), figure.bbox
+    assert whole.x0 <= box.x0 < box.x1 <= whole.x1

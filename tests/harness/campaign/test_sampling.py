@@ -1,0 +1,86 @@
+"""Distributions and designs: limits kept, shares right, every slice of a Latin hypercube taken once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from scipy import stats
+
+from harness.campaign.sampling import Distribution, Sampler, design
+
+shares = st.floats(0.0, 1.0, exclude_max=True)
+SEED = 3
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6), shares)
+def test_uniform_stays_inside_and_is_even(low: float, width: float, share: float) -> None:
+    drawn = Distribution(uniform=(low, low + width)).number(share)
+    assert low <= drawn <= low + width
+    assert drawn == pytest.approx(low + share * width)
+
+
+@given(shares)
+def test_normal_is_the_bell_and_a_cut_one_the_truncated_bell(share: float) -> None:
+    whole = Distribution.model_validate({"normal": {"mean": 3.0, "sigma": 2.0}})
+    assert whole.number(share) == pytest.approx(
+        stats.norm(3.0, 2.0).ppf(np.clip(share, 1e-12, 1 - 1e-12)), abs=1e-6
+    )
+    cut = Distribution.model_validate({"normal": {"mean": 3.0, "sigma": 2.0, "least": 0.0, "most": 4.0}})
+    assert 0.0 <= cut.number(share) <= 4.0
+    assert cut.number(share) == pytest.approx(stats.truncnorm(-1.5, 0.5, 3.0, 2.0).ppf(share), abs=1e-6)
+
+
+def test_whole_numbers_are_drawn_alike_the_ends_too() -> None:
+    each = Distribution(uniform=(3.0, 5.0))
+    shares_of = [each.whole_number((k + 0.5) / 300) for k in range(300)]
+    assert [shares_of.count(number) for number in (3, 4, 5)] == [100, 100, 100]
+    assert each.whole_number(1.0 - 1e-16) == 5
+    bell = Distribution.model_validate({"normal": {"mean": 3.0, "sigma": 2.0, "least": 1, "most": 4}})
+    assert {bell.whole_number(share) for share in np.linspace(0.0, 0.999, 100)} == {1, 2, 3, 4}
+
+
+def test_choices_are_equally_likely() -> None:
+    each = Distribution.model_validate({"choice": ["a", "b", "c"]})
+    assert [each.chosen(share) for share in (0.0, 0.33, 0.34, 0.66, 0.67, 0.999)] == [0, 0, 1, 1, 2, 2]
+
+
+@pytest.mark.parametrize("draws", [1, 5, 16])
+def test_a_latin_hypercube_takes_every_slice_of_every_key_once(draws: int) -> None:
+    points = design("latin_hypercube", draws, 3, SEED)
+    assert points.shape == (draws, 3)
+    for column in (points * draws).astype(int).T:
+        assert sorted(column) == list(range(draws))
+
+
+def test_a_sobol_design_is_more_even_than_independent_draws() -> None:
+    points = design("sobol", 64, 2, SEED)
+    cells = {(int(8 * x), int(8 * y)) for x, y in points}
+    assert len(cells) == 64, "a (0, 6, 2) net has one point in each of 64 squares"
+    assert (design("sobol", 50, 2, SEED) == points[:50]).all(), "cut from the same sequence"
+
+
+@pytest.mark.parametrize("sampler", ["latin_hypercube", "sobol"])
+def test_a_design_is_a_function_of_its_seed(sampler: Sampler) -> None:
+    assert (design(sampler, 8, 2, 3) == design(sampler, 8, 2, 3)).all()
+    assert (design(sampler, 8, 2, 3) != design(sampler, 8, 2, 4)).any()
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({}, "has none of uniform, normal, choice"),
+        ({"uniform": [0, 1], "choice": [1]}, "has uniform and choice"),
+        ({"uniform": [1, 1]}, "least < most"),
+        ({"normal": {"mean": 0, "sigma": 0}}, "greater than 0"),
+        ({"normal": {"mean": 0, "sigma": 1, "least": 2, "most": 1}}, "leaves nothing"),
+        ({"normal": {"mean": 0, "sigma": 1, "least": 50}}, "leaves nothing"),
+        ({"choice": []}, "at least 1 item"),
+        ({"uniform": ["a", 1]}, "valid number"),
+    ],
+)
+def test_a_distribution_that_is_none_is_refused(keys: dict[str, object], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        Distribution.model_validate(keys)

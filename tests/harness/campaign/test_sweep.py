@@ -1,0 +1,664 @@
+"""Campaigns flown: the same bytes whoever flies, crashes as rows, what is done kept, and one at a time."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from harness.campaign.campaign_file import load_campaign
+from harness.campaign.flight import Job
+from harness.campaign.folder import CampaignFolder
+from harness.campaign.results import METRICS, RUN, TIMES, metric_cells
+from harness.campaign.runs import CampaignRuns
+from harness.campaign.workers import ONE_THREAD, local_workers
+from harness.cli.app import main
+from harness.files.errors import RunFolderError
+from harness.run_files.run_folder import load_run
+from harness.scenario.scenario import load_scenario
+
+ROOT = Path(__file__).parents[3]
+SCENARIO = """\
+schema: wayproof/scenario/1
+name: short
+area: {bounds_m: [0, 0, 2000, 2000]}
+obstacles:
+  - circle: {center_m: [1000, 1000], radius_m: 100}
+mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 60}
+sensor: {range_m: 900, rays: 360}
+planner: {clearance_m: 40}
+"""
+CAMPAIGN = """\
+schema: wayproof/campaign/1
+name: short
+seed: 5
+scenarios: [short.yaml]
+planners: [rolling_window, vfh_plus]
+grid:
+  environment.wind.speed_mps: [0, 5]
+random:
+  environment.wind.from_deg: {uniform: [0, 360]}
+draws: 2
+"""
+PLUGIN = """
+import os
+import signal
+
+from planner.registry import PlannerKind
+from planner.rolling_window.planner import RollingWindow, RollingWindowConfig
+
+
+class Dies(RollingWindow):
+    def plan(self, request):
+        print("a planner that talks")
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Raises(RollingWindow):
+    def __init__(self, config, mission):
+        raise ValueError(f"not *to* be made: {object()}")
+
+
+class Leaves(RollingWindow):
+    error = SystemExit(0)
+
+    def __init__(self, config, mission):
+        raise self.error
+
+
+class Lacks(Leaves):
+    error = FileNotFoundError(2, "no such file", "model.bin")
+
+
+class Full(Leaves):
+    error = OSError(28, "no space left on device")
+
+
+class Panics(Leaves):
+    error = GeneratorExit("a panic")
+
+
+DIES, RAISES, LEAVES, LACKS, FULL, PANICS = (
+    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind)
+    for kind in (Dies, Raises, Leaves, Lacks, Full, Panics)
+)
+"""
+ENTRY_POINTS = "".join(
+    [
+        "[wayproof.planners]\n",
+        *(
+            f"{name.lower()} = campaign_plugin:{name}\n"
+            for name in ("DIES", "RAISES", "LEAVES", "LACKS", "FULL", "PANICS")
+        ),
+    ]
+)
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    (tmp_path / "campaign.yaml").write_text(CAMPAIGN)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The campaign's folder, flown by one process without a break."""
+    place = tmp_path_factory.mktemp("unbroken")
+    (place / "short.yaml").write_text(SCENARIO)
+    (place / "campaign.yaml").write_text(CAMPAIGN)
+    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), "--workers", "1"]) == 0
+    return place / "out"
+
+
+def sweep(place: Path, *options: str) -> int:
+    return main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "out"), *options])
+
+
+def rows_of(folder: Path, name: str = "results") -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = pq.read_table(folder / f"{name}.parquet").to_pylist()
+    return rows
+
+
+def results(folder: Path) -> bytes:
+    return (folder / "results.parquet").read_bytes()
+
+
+def start(place: Path, *options: str) -> subprocess.Popen[str]:
+    """The command in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "harness", "sweep", "campaign.yaml", "--out", "out", *options],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for(what: Callable[[], bool], seconds: float = 90.0) -> None:
+    until = time.monotonic() + seconds
+    while not what():
+        assert time.monotonic() < until, "too long"
+        time.sleep(0.02)
+
+
+def journal_lines(folder: Path) -> int:
+    journal = folder / "journal.jsonl"
+    return journal.read_bytes().count(b"\n") if journal.exists() else 0
+
+
+def test_results_have_a_row_a_run_and_every_metric(unbroken: Path) -> None:
+    table = pq.read_table(unbroken / "results.parquet")
+    varied = ["environment.wind.speed_mps", "environment.wind.from_deg"]
+    assert table.column_names == [*RUN, *varied, *METRICS]
+    assert [str(table.schema.field(name).type) for name in ("run", "case", "seed", *varied)] == [
+        *["int64"] * 4,
+        "double",
+    ]
+    rows = rows_of(unbroken)
+    assert [row["run"] for row in rows] == list(range(8))
+    assert [row["case"] for row in rows] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert {row["outcome"] for row in rows} == {"reached"}
+    assert {row["error"] for row in rows} == {None}
+    for first, second in zip(rows[::2], rows[1::2], strict=True):
+        assert first["seed"] == second["seed"]
+        assert [first[name] for name in varied] == [second[name] for name in varied]
+    assert all(row["optimum_m"] > 1414 and 0.9 < row["length_ratio"] < 2 for row in rows)
+    times = rows_of(unbroken, "timings")
+    assert [list(row) for row in times] == [list(TIMES)] * 8
+    assert all(row["wall_s"] > 0 and row["compute_ms.max"] > 0 for row in times)
+
+
+def test_columns_are_what_metrics_json_has(place: Path) -> None:
+    assert main(["fly", str(place / "short.yaml"), "--out", str(place / "run"), "--no-recording"]) == 0
+    metrics = load_run(place / "run").metrics
+    cells = metric_cells(metrics, 60.0, 1500.0)
+    assert cells.keys() | {"error"} == METRICS.keys()
+    assert cells["cross_track_m.p95"] == metrics["cross_track_m"]["p95"]
+    assert cells["trackability.legs"] == len(metrics["trackability"])
+    assert cells["length_ratio"] == metrics["flown_length_m"] / 1500.0
+    for name, value in cells.items():
+        kind = {"number": float, "int": int, "bool": bool, "text": str}[METRICS[name]]
+        assert value is None or type(value) is kind, name
+    legs = [{"trackable": not why, "cause": why} for why in (None, "wind drift", "bank limit", "wind drift")]
+    hit = metric_cells({**metrics, "outcome": "collision", "trackability": legs}, 60.0, 1500.0)
+    assert (hit["trackability.legs"], hit["trackability.not_trackable"]) == (4, 3)
+    assert hit["trackability.causes"] == "bank limit; wind drift"
+    assert hit["length_ratio"] is None
+
+
+@pytest.mark.parametrize("workers", ["2", "4"])
+def test_the_bytes_are_the_same_at_any_number_of_workers(place: Path, unbroken: Path, workers: str) -> None:
+    assert sweep(place, "--workers", workers) == 0
+    assert results(place / "out") == results(unbroken)
+
+
+def test_a_row_is_flown_again_alone_from_the_results_alone(
+    place: Path, unbroken: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    elsewhere = place / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "r.parquet").write_bytes(results(unbroken))
+    (elsewhere / "times").write_bytes((unbroken / "timings.parquet").read_bytes())
+    monkeypatch.chdir(elsewhere)
+    assert (
+        main(["fly", "--from", "r.parquet", "--run", "6", "--out", "run", "--no-recording", "--quiet"]) == 0
+    )
+    row = rows_of(unbroken)[6]
+    again = load_run(elsewhere / "run")
+    assert again.metrics["digest"] == row["digest"]
+    assert load_scenario(elsewhere / "run" / "scenario.yaml").seed == row["seed"]
+    assert capsys.readouterr().err == ""
+    for arguments, said in (
+        (["--from", "r.parquet", "--run", "8"], "has no run 8; must be 0 to 7"),
+        (["--from", "r.parquet"], "--from and --run go together"),
+        (["paper_circles", "--from", "r.parquet", "--run", "1"], "either a SCENARIO or --from"),
+        (["--from", "run/track.parquet", "--run", "1"], "is not the results.parquet of a campaign"),
+        (["--from", "nowhere", "--run", "1"], "nowhere: there is no such file"),
+        (["--from", "times", "--run", "1"], "is not the results.parquet of a campaign"),
+    ):
+        assert main(["fly", *arguments]) == 2
+        assert said in capsys.readouterr().err
+    rows = pq.read_table(unbroken / "results.parquet")
+    deep = rows.replace_schema_metadata({"wayproof": "[" * 100_000})
+    pq.write_table(deep, elsewhere / "deep.parquet")
+    assert main(["fly", "--from", "deep.parquet", "--run", "1"]) == 2
+    assert "is not the results.parquet of a campaign" in capsys.readouterr().err
+    damaged = bytearray(results(unbroken))
+    damaged[300:308] = b"XXXXXXXX"
+    (elsewhere / "r.parquet").write_bytes(damaged)
+    assert main(["fly", "--from", "r.parquet", "--run", "1"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("r.parquet: is damaged: ")
+    assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize("of", ["[]", "{}", '{"schema": "wayproof/results/0"}', "no JSON"])
+def test_a_table_of_something_else_is_no_campaigns(
+    of: str, place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = pq.read_table(unbroken / "results.parquet")
+    pq.write_table(rows.replace_schema_metadata({"wayproof": of}), place / "r.parquet")
+    assert main(["fly", "--from", str(place / "r.parquet"), "--run", "1"]) == 2
+    assert "is not the results.parquet of a campaign" in capsys.readouterr().err
+
+
+def test_a_row_that_was_flown_otherwise_is_told(
+    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = pq.read_table(unbroken / "results.parquet")
+    column = rows.column_names.index("digest")
+    changed = rows.set_column(column, "digest", pa.array(["0" * 64] * len(rows)))
+    pq.write_table(changed.replace_schema_metadata(rows.schema.metadata), place / "r.parquet")
+    again = ["fly", "--from", str(place / "r.parquet"), "--run", "1", "--out", str(place / "run"), "--quiet"]
+    assert main(again) == 1
+    assert f"run 1 was flown otherwise (digest {'0' * 64})" in capsys.readouterr().err
+    again[2] = str(unbroken / "results.parquet")
+    assert main(again[:-1]) == 0
+    assert "digest: as the campaign flew it" in capsys.readouterr().out
+    assert main([*again[:-1], "--seed", "5"]) == 0
+    assert "as the campaign flew it" not in capsys.readouterr().out
+
+
+def with_plugin(place: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.0") -> None:
+    """Installs a distribution with planners."""
+    site = place / f"site-{version}"
+    info = site / f"campaign_plugin-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: campaign_plugin\nVersion: {version}\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    (site / "campaign_plugin.py").write_text(PLUGIN)
+    monkeypatch.syspath_prepend(site)
+
+
+def test_crashes_are_rows_with_their_tracebacks_and_end_nothing(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with_plugin(place, monkeypatch)
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[dies, rolling_window, raises]").replace(
+        "draws: 2", "draws: 1\nrecordings: all"
+    )
+    (place / "campaign.yaml").write_text(text)
+    told = []
+    for workers in ("1", "2"):
+        assert sweep(place, "--workers", workers, "--json") == 1
+        told.append(results(place / "out"))
+        assert {each.name for each in (place / "out" / "runs").iterdir()} == {"1", "4"}, "whole ones only"
+        shutil.rmtree(place / "out")
+    assert told[0] == told[1]
+    (place / "r.parquet").write_bytes(told[0])
+    rows = pq.read_table(place / "r.parquet").to_pylist()
+    assert [row["outcome"] for row in rows] == ["error", "reached", "error"] * 2
+    died, _, raised = rows[:3]
+    assert "died" in died["error"]
+    assert died["reason"] == "the process that flew it died, each time that it was tried"
+    assert raised["error"].startswith("Traceback")
+    assert "campaign_plugin.py" in raised["error"]
+    assert raised["reason"] == (
+        "the planner raises cannot be made: ValueError: not *to* be made: <object object at 0x...>"
+    )
+    assert raised["digest"] is None
+    out = capfd.readouterr().out
+    assert json.loads(out[: len(out) // 2])["outcomes"] == {"error": 4, "reached": 2}, (
+        "standard output is ours"
+    )
+
+
+@pytest.mark.parametrize("torn", [b'{"run": 99, "row": {"outc', b"\n", b"\x00\xff"])
+def test_resume_flies_only_what_is_missing_and_drops_a_torn_line(
+    place: Path, unbroken: Path, torn: bytes, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = place / "out"
+    out.mkdir()
+    (out / "campaign.json").write_bytes((unbroken / "campaign.json").read_bytes())
+    whole = (unbroken / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (out / "journal.jsonl").write_bytes(b"".join(whole[:6]) + torn)
+    assert sweep(place) == 2
+    assert "holds 6 runs: go on with --resume, or choose another folder" in capsys.readouterr().err
+    assert sweep(place, "--resume", "--workers", "1") == 0
+    assert results(out) == results(unbroken)
+    lines = (out / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    assert lines[:6] == whole[:6]
+    assert [json.loads(line)["run"] for line in lines[6:]] == [6, 7]
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        ("campaign.yaml", "seed: 5", "seed: 6", "campaign.seed was 5, is 6"),
+        ("campaign.yaml", "draws: 2", "draws: 3", "campaign.draws was 2, is 3"),
+        ("campaign.yaml", "[0, 5]", "[0, 6]", "campaign.grid.environment.wind.speed_mps[1] was 5, is 6"),
+        ("short.yaml", "rays: 360", "rays: 720", "scenarios[0].keys.sensor.rays was 360, is 720"),
+        ("short.yaml", ", rays: 360", "", "scenarios[0].keys.sensor.rays was 360, is not there"),
+    ],
+)
+def test_resume_refuses_a_changed_campaign_and_says_what_changed(
+    place: Path,
+    unbroken: Path,
+    capsys: pytest.CaptureFixture[str],
+    file: str,
+    old: str,
+    new: str,
+    said: str,
+) -> None:
+    out = place / "out"
+    out.mkdir()
+    for name in ("campaign.json", "journal.jsonl", "results.parquet"):
+        (out / name).write_bytes((unbroken / name).read_bytes())
+    changed = (place / file).read_text().replace(old, new)
+    assert changed != (place / file).read_text()
+    (place / file).write_text(changed)
+    assert sweep(place, "--resume") == 2
+    assert said in capsys.readouterr().err
+    assert results(out) == results(unbroken), "nothing lost"
+    (place / file).write_text(changed.replace(new, old) if new else SCENARIO)
+    (place / file).write_text(f"# a comment is no change\n{(place / file).read_text()}")
+    assert sweep(place, "--resume") == 0
+
+
+def cut_short(place: Path, unbroken: Path) -> None:
+    """The campaign's folder after two of its runs."""
+    (place / "out").mkdir()
+    (place / "out" / "campaign.json").write_bytes((unbroken / "campaign.json").read_bytes())
+    lines = (unbroken / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (place / "out" / "journal.jsonl").write_bytes(b"".join(lines[:2]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "  environment.wind.speed_mps: [0, 5]\n",
+            "  environment.wind.speed_mps: [0, 5]\n  sensor.rays: [360, 720]\n",
+            "campaign.grid.sensor.rays was not there, is [360, 720]",
+        ),
+        ("seed: 5\n", "seed: 5\nset: {environment.gust: null}\n", "campaign.set was not there"),
+    ],
+)
+def test_resume_refuses_what_was_added(
+    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, said: str
+) -> None:
+    cut_short(place, unbroken)
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace(old, new))
+    assert sweep(place, "--resume") == 2
+    assert said in capsys.readouterr().err
+
+
+def test_resume_refuses_an_added_null_and_another_order_of_keys(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What a run flies follows from the order of grid and random keys; a null replaces what the scenario has."""
+    grid = "  environment.wind.speed_mps: [0, 5]\n"
+    two = CAMPAIGN.replace(grid, f"{grid}  sensor.rays: [360, 720]\n").replace(
+        "seed: 5\n", "seed: 5\nset: {sensor.dropout: 0}\n"
+    )
+    (place / "campaign.yaml").write_text(two)
+    with CampaignFolder(
+        place / "out", CampaignRuns(load_campaign(place / "campaign.yaml")), resume=False
+    ) as folder:
+        folder.append(0, {"outcome": "reached"}, {})
+    other = two.replace(grid, "").replace("  sensor.rays: [360, 720]\n", f"  sensor.rays: [360, 720]\n{grid}")
+    (place / "campaign.yaml").write_text(other)
+    assert sweep(place, "--resume") == 2
+    assert "campaign.grid had its keys in the order environment.wind.speed_mps, sensor.rays, has" in (
+        capsys.readouterr().err
+    )
+    (place / "campaign.yaml").write_text(
+        two.replace("{sensor.dropout: 0}", "{sensor.dropout: 0, environment.gust: null}")
+    )
+    assert sweep(place, "--resume") == 2
+    assert "campaign.set.environment.gust was not there, is null" in capsys.readouterr().err
+
+
+def test_resume_refuses_another_aircraft_or_planner_of_the_same_name(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(ROOT / "aircraft" / "aerosonde", place / "mine")
+    with_plugin(place, monkeypatch)
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[rolling_window, leaves]\naircraft: [./mine]")
+    (place / "campaign.yaml").write_text(text)
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    with CampaignFolder(place / "out", runs, resume=False) as folder:
+        folder.append(0, {"outcome": "reached"}, {})
+    model = place / "mine" / "aerosonde.xml"
+    model.write_text(model.read_text() + "<!-- other -->\n")
+    assert sweep(place, "--resume") == 2
+    assert "aircraft." in capsys.readouterr().err
+    model.write_text(model.read_text().removesuffix("<!-- other -->\n"))
+    with_plugin(place, monkeypatch, "2.0")
+    assert sweep(place, "--resume") == 2
+    assert 'planners.leaves was "campaign_plugin 1.0", is "campaign_plugin 2.0"' in capsys.readouterr().err
+
+
+def test_a_planner_that_cannot_be_made_is_a_row_whatever_it_raises(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with_plugin(place, monkeypatch)
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[leaves, lacks, full, panics, rolling_window]")
+    (place / "campaign.yaml").write_text(text.replace("draws: 2", "draws: 1"))
+    assert sweep(place, "--workers", "1", "--quiet") == 1
+    rows = rows_of(place / "out")
+    assert [row["outcome"] for row in rows] == [*["error"] * 4, "reached"] * 2
+    why = ("SystemExit: 0", "FileNotFoundError: [Errno 2]", "OSError: [Errno 28]", "GeneratorExit: a panic")
+    for row, told in zip(rows[:4], why, strict=True):
+        assert f"cannot be made: {told}" in row["reason"]
+        assert told.split(":")[0] in row["error"]
+    assert main(["fly", str(place / "short.yaml"), "--planner", "lacks", "--out", str(place / "run")]) == 2
+    assert "wayproof: the planner lacks cannot be made: FileNotFoundError" in capfd.readouterr().err
+    assert not (place / "run").exists()
+
+
+def test_resume_refuses_other_versions(
+    place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = place / "out"
+    out.mkdir()
+    index = json.loads((unbroken / "campaign.json").read_text())
+    index["versions"]["jsbsim"] = "1.0.0"
+    (out / "campaign.json").write_text(json.dumps(index))
+    (out / "journal.jsonl").write_bytes((unbroken / "journal.jsonl").read_bytes())
+    assert sweep(place, "--resume") == 2
+    assert 'versions.jsbsim was "1.0.0", is' in capsys.readouterr().err
+
+
+def test_a_folder_that_holds_other_things_is_refused(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (place / "out").mkdir()
+    (place / "out" / "thesis.tex").write_text("years of work")
+    assert sweep(place) == 2
+    assert "is not empty and not a campaign's folder" in capsys.readouterr().err
+    assert [each.name for each in (place / "out").iterdir()] == ["thesis.tex"]
+    (place / "out" / "thesis.tex").unlink()
+    (place / "out").rmdir()
+    (place / "out").write_text("a file")
+    assert sweep(place) == 2
+    assert "is a file" in capsys.readouterr().err
+
+
+def test_two_sweeps_into_one_folder_are_one_too_many(place: Path) -> None:
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    with (
+        CampaignFolder(place / "out", runs, resume=False),
+        pytest.raises(RunFolderError, match="another wayproof is writing to"),
+    ):
+        CampaignFolder(place / "out", runs, resume=True)
+    with CampaignFolder(place / "out", runs, resume=True) as folder:
+        assert folder.done == set(), "the lock ends with its holder"
+
+
+@pytest.fixture
+def long_campaign(place: Path) -> Path:
+    """Some more runs, so that there is something to break off."""
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 6"))
+    return place
+
+
+def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(long_campaign: Path) -> None:
+    out = long_campaign / "out"
+    flying = start(long_campaign, "--workers", "2")
+    wait_for(lambda: journal_lines(out) >= 3)
+    flying.send_signal(signal.SIGINT)
+    told, said = flying.communicate(timeout=30)
+    assert flying.returncode == 130
+    assert said == "wayproof: interrupted; what is done is in out, --resume goes on\n"
+    assert told == ""
+    done = len(rows_of(out))
+    assert 3 <= done == journal_lines(out) < 24
+    assert sweep(long_campaign, "--resume", "--workers", "2") == 0
+    assert [row["run"] for row in rows_of(out)] == list(range(24))
+
+
+def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(long_campaign: Path) -> None:
+    import psutil
+
+    out = long_campaign / "out"
+    flying = start(long_campaign, "--workers", "2")
+    wait_for(lambda: journal_lines(out) >= 2)
+    children = psutil.Process(flying.pid).children(recursive=True)
+    flying.kill()
+    flying.communicate(timeout=30)
+    _, alive = psutil.wait_procs(children, timeout=10)
+    assert alive == []
+    kept = journal_lines(out)
+    assert sweep(long_campaign, "--resume", "--workers", "2", "--json") == 0
+    assert kept >= 2
+    broken = results(out)
+    assert main(["sweep", str(long_campaign / "campaign.yaml"), "--out", str(out / ".." / "whole")]) == 0
+    assert broken == results(long_campaign / "whole")
+
+
+def test_a_worker_killed_in_mid_run_costs_nothing(long_campaign: Path) -> None:
+    import psutil
+
+    out = long_campaign / "out"
+    flying = start(long_campaign, "--workers", "2")
+    wait_for(lambda: journal_lines(out) >= 2)
+    workers = [
+        child for child in psutil.Process(flying.pid).children() if "spawn_main" in " ".join(child.cmdline())
+    ]
+    assert len(workers) == 2
+    workers[0].kill()
+    assert flying.wait(timeout=120) == 0
+    flying.communicate()
+    assert {row["outcome"] for row in rows_of(out)} == {"reached"}
+    assert len(rows_of(out)) == 24
+
+
+def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
+    runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
+    job = Job(0, runs.packed(0), place / "run", "none", optimum=False)
+    with local_workers(1) as workers:
+        first = workers.start(job).result(timeout=60)
+        for child in multiprocessing.active_children():
+            child.kill()
+            child.join()
+        time.sleep(0.5)
+        # One flies and one waits.
+        assert workers.free() == 2
+        second, third = workers.start(job), workers.start(job)
+        assert workers.free() == 0
+        assert second.result(timeout=60).row == third.result(timeout=60).row == first.row
+        assert workers.free() == 2
+    wait_for(lambda: multiprocessing.active_children() == [])
+
+
+@pytest.mark.parametrize(("which", "kept"), [("all", {0, 1}), ("failures", {1}), ("none", set())])
+def test_recordings_are_kept_of_all_of_failures_or_of_none(place: Path, which: str, kept: set[int]) -> None:
+    text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[{kind: rolling_window}]").replace(
+        "draws: 2", "draws: 1"
+    )
+    # In the second case there is no time to get there.
+    text = text.replace("  environment.wind.speed_mps: [0, 5]", "  mission.time_limit_s: [900, 5]")
+    (place / "campaign.yaml").write_text(f"{text}recordings: {which}\n")
+    assert sweep(place, "--workers", "1") == 0
+    rows = rows_of(place / "out")
+    assert [row["outcome"] for row in rows] == ["reached", "timeout"], "no failure of the sweep"
+    folders = {int(path.name): path for path in (place / "out").glob("runs/*")}
+    assert set(folders) == kept
+    for number, folder in folders.items():
+        assert load_run(folder).metrics["digest"] == rows[number]["digest"]
+        assert (folder / "flight.rrd").stat().st_size > 10_000
+
+
+def test_the_optimum_can_be_left_out(place: Path) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 1\noptimum: false"))
+    assert sweep(place) == 0
+    assert {(row["optimum_m"], row["length_ratio"]) for row in rows_of(place / "out")} == {(None, None)}
+
+
+def test_a_full_disk_is_told_and_what_is_done_stays(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    append, left = CampaignFolder.append, [3]
+
+    def full(self: CampaignFolder, *given: Any) -> None:
+        left[0] -= 1
+        if left[0] < 0:
+            raise OSError(28, "No space left on device")
+        append(self, *given)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CampaignFolder, "append", full)
+        assert sweep(place, "--workers", "1") == 1
+    assert "No space left on device; what is done is in" in capsys.readouterr().err
+    assert [row["run"] for row in rows_of(place / "out")] == [0, 1, 2]
+    assert sweep(place, "--resume", "--workers", "1") == 0
+    assert len(rows_of(place / "out")) == 8
+
+
+FLIGHTS_IN_ONE_PROCESS = """
+import json, sys
+from pathlib import Path
+
+import psutil
+
+from harness.campaign.campaign_file import load_campaign
+from harness.campaign.runs import CampaignRuns
+from harness.campaign.flight import Job, fly_job
+
+runs = CampaignRuns(load_campaign(Path("campaign.yaml")))
+grown = []
+for number in range(len(runs)):
+    answer = fly_job(Job(number, runs.packed(number), Path("run"), sys.argv[1], True))
+    assert answer.row["outcome"] == "reached", answer.row
+    process = psutil.Process()
+    grown.append((process.memory_info().rss / 2**20, process.num_threads()))
+sys.stdout.write(json.dumps(grown))
+"""
+
+
+@pytest.mark.parametrize(
+    ("recordings", "draws", "flights"),
+    [pytest.param("none", 128, 512, marks=pytest.mark.slow), ("all", 16, 64)],
+)
+def test_a_worker_does_not_grow(place: Path, recordings: str, draws: int, flights: int) -> None:
+    (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", f"draws: {draws}"))
+    flown = subprocess.run(
+        [sys.executable, "-c", FLIGHTS_IN_ONE_PROCESS, recordings],
+        cwd=place,
+        env={**os.environ, **ONE_THREAD, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert flown.returncode == 0, flown.stderr
+    used_mib, threads = zip(*json.loads(flown.stdout), strict=True)
+    assert len(used_mib) == flights
+    # The first flights fill caches and the heap, and with recordings it swings by 10 MiB from flight to flight: so
+    # means of twenty are compared. A leak of half a track a flight would show.
+    assert fmean(used_mib[-20:]) - fmean(used_mib[24:44]) < 10.0
+    assert threads[-1] <= threads[24]

@@ -1,0 +1,169 @@
+"""Campaigns on a real Dask cluster on this machine: the same bytes, a worker killed in mid-run included."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from harness.cli.app import main
+from tests.harness.campaign.test_sweep import (
+    CAMPAIGN,
+    ROOT,
+    SCENARIO,
+    journal_lines,
+    results,
+    start,
+    wait_for,
+)
+
+LOCAL = "127.0.0.1"
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind((LOCAL, 0))
+        return int(found.getsockname()[1])
+
+
+class Cluster:
+    """A scheduler with two workers, each a process of its own."""
+
+    def __init__(self, folder: Path, stack: ExitStack) -> None:
+        self._folder, self._stack = folder, stack
+        port = free_port()
+        self.address = f"tcp://{LOCAL}:{port}"
+        self.scheduler = self._run("scheduler", "--host", LOCAL, "--port", str(port), "--no-dashboard")
+        self.workers = [self.add_worker() for _ in range(2)]
+
+    def add_worker(self) -> subprocess.Popen[bytes]:
+        """One flight at a time; it ends with its first death, as a machine does."""
+        return self._run(
+            "worker", self.address, "--host", LOCAL, "--nthreads", "1", "--no-nanny", "--no-dashboard"
+        )
+
+    def _run(self, *arguments: str) -> subprocess.Popen[bytes]:
+        log = self._stack.enter_context((self._folder / f"{arguments[0]}.log").open("ab"))
+        process = subprocess.Popen(
+            [sys.executable, "-m", "dask", *arguments],
+            cwd=self._folder,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stdout=log,
+            stderr=log,
+        )
+        self._stack.callback(process.wait, timeout=30)
+        self._stack.callback(process.kill)
+        return process
+
+    def log(self, of: str) -> str:
+        return (self._folder / f"{of}.log").read_text()
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("cluster")
+    (folder / "short.yaml").write_text(SCENARIO)
+    (folder / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 6"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def whole(place: Path) -> bytes:
+    """The results of this machine alone."""
+    assert main(["sweep", str(place / "campaign.yaml"), "--out", str(place / "whole")]) == 0
+    return results(place / "whole")
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    with ExitStack() as stack:
+        made = Cluster(tmp_path, stack)
+        wait_for(lambda: made.log("worker").count("Registered to") == 2)
+        yield made
+
+
+def test_a_cluster_gives_the_same_bytes_with_a_worker_killed_in_mid_run(
+    place: Path, whole: bytes, cluster: Cluster
+) -> None:
+    flying = start(place, "--scheduler", cluster.address)
+    wait_for(lambda: journal_lines(place / "out") >= 4)
+    cluster.workers[0].kill()
+    flying.wait(timeout=120)
+    told, said = flying.communicate()
+    assert (flying.returncode, said) == (0, "")
+    assert "reached" in told
+    assert cluster.workers[1].poll() is None
+    assert results(place / "out") == whole
+
+
+def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
+    whole: bytes, cluster: Cluster, tmp_path: Path, place: Path
+) -> None:
+    for name in ("short.yaml", "campaign.yaml"):
+        (tmp_path / name).write_text((place / name).read_text())
+    out = tmp_path / "out"
+    flying = start(tmp_path, "--scheduler", cluster.address)
+    wait_for(lambda: journal_lines(out) >= 2)
+    for worker in cluster.workers:
+        worker.send_signal(signal.SIGSTOP)  # else all may be flown before it is interrupted
+    flying.send_signal(signal.SIGINT)
+    told, said = flying.communicate(timeout=60)
+    for worker in cluster.workers:
+        worker.send_signal(signal.SIGCONT)
+    assert (flying.returncode, told) == (130, "")
+    assert said == "wayproof: interrupted; what is done is in out, --resume goes on\n"
+
+    kept = journal_lines(out)
+    flying = start(tmp_path, "--scheduler", cluster.address, "--resume", "--quiet")
+    wait_for(lambda: journal_lines(out) > kept)
+    cluster.scheduler.kill()
+    told, said = flying.communicate(timeout=60)
+    assert (flying.returncode, told) == (1, "")
+    assert said == "wayproof: the Dask scheduler has gone; what is done is in out, --resume goes on\n"
+
+    assert kept < journal_lines(out) < 24
+    assert main(["sweep", str(tmp_path / "campaign.yaml"), "--out", str(out), "--resume"]) == 0
+    assert results(out) == whole
+
+
+def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    begun = time.monotonic()
+    address = f"tcp://{LOCAL}:{free_port()}"
+    out = place / "nowhere"
+    assert main(["sweep", str(place / "campaign.yaml"), "--scheduler", address, "--out", str(out)]) == 2
+    assert f"no Dask scheduler answers at {address}" in capsys.readouterr().err
+    assert time.monotonic() - begun < 60
+    assert not out.exists()
+    nobody = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "harness",
+            "sweep",
+            "campaign.yaml",
+            "--scheduler",
+            "no-such-host",
+            "--out",
+            "nowhere",
+        ],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    line = "wayproof: no Dask scheduler answers at no-such-host; start one there\n"
+    assert (nobody.returncode, nobody.stderr) == (2, line), "no traceback at its end"
+    for options, said in (
+        (["--scheduler", address, "--workers", "2"], "--workers goes with this machine"),
+        (["--scheduler", "nonsense://x"], "no Dask scheduler answers at nonsense://x"),
+    ):
+        assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out), *options]) == 2
+        assert said in capsys.readouterr().err

@@ -1,0 +1,463 @@
+"""The command line: what it prints where, and its exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from aircraft import airframes
+from harness.cli import app as cli
+from harness.cli import flights
+from harness.cli.app import main
+from harness.files.errors import RunFolderError
+from harness.scenario import scenario, shipped
+from planner.registry import planner_kinds
+
+ROOT = Path(__file__).parents[3]
+SLOW = {"jsbsim", "numba", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "scipy", "yaml"}
+COMMANDS = (
+    "fly",
+    "check",
+    "compare",
+    "falsify",
+    "validate",
+    "schema",
+    "list",
+    "view",
+    "report",
+    "export",
+    "bench",
+    "envelope",
+)
+FLY_OPTIONS = (
+    *("--planner", "--aircraft", "--seed", "--set", "--out"),
+    *("--no-recording", "--view", "--quiet", "--json"),
+)
+METRICS: dict[str, Any] = {
+    "outcome": "collision",
+    "reason": "hit obstacle [3] at 812.3 s, "
+    + "and a reason that goes on for longer than a line of 80 columns",
+    "flown_length_m": 94321.5,
+    "planned_length_m": None,
+    "flight_time_s": 3772.9,
+    "min_clearance_m": -0.52,
+    "clearance_violation_s": 0.0,
+    "cross_track_m": {"rms": 0.04, "p95": 0.09, "max": 0.18},
+    "altitude_error_m": {"rms": None, "p95": None, "max": None},
+    "trackable": False,
+    "trackability": [
+        {"trackable": True, "cause": None},
+        {"trackable": False, "cause": "wind drift"},
+        {"trackable": False, "cause": "bank limit"},
+        {"trackable": False, "cause": "wind drift"},
+    ],
+    "replans": 41,
+    "compute_ms": {"p50": 0.2, "p99": 3.25, "max": 7.75},
+    "timing": {"sim_s": 3772.9, "wall_s": 6.12, "realtime_factor": 616.5},
+}
+
+
+def wayproof(*arguments: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs the command in a process of its own, in a folder."""
+    return subprocess.run(
+        [sys.executable, "-m", "harness", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)} | environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_help_lists_the_commands_and_fits_80_columns(tmp_path: Path) -> None:
+    shown = wayproof("--help", folder=tmp_path, COLUMNS="80", NO_COLOR="1")
+    assert shown.returncode == 0
+    assert all(f"│ {command} " in shown.stdout for command in COMMANDS)
+    assert max(map(len, shown.stdout.splitlines())) <= 80
+    assert "\x1b" not in shown.stdout
+
+
+def test_help_of_fly_has_every_option_of_the_contract(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fly", "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert [option for option in FLY_OPTIONS if f" {option} " not in shown] == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_a_command_has_an_example_that_is_one(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    (example,) = re.findall(r"For example: wayproof (.*)", shown)
+    assert example.split()[0] == command
+    assert "<bool>" not in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("wayproof be", {"bench"}),
+        ("wayproof fly paper_b", {"paper_bug_trap"}),
+        ("wayproof fly x --planner tangent", {"tangent_bug"}),
+        ("wayproof fly x --aircraft aero", {"aerosonde"}),
+    ],
+)
+def test_the_shell_completes_commands_and_names(words: str, offered: set[str], tmp_path: Path) -> None:
+    completing = {
+        "_WAYPROOF_COMPLETE": "complete_bash",
+        "COMP_WORDS": words,
+        "COMP_CWORD": str(len(words.split()) - 1),
+    }
+    assert set(wayproof(folder=tmp_path, **completing).stdout.split()) == offered
+
+
+def test_the_script_for_the_shell_is_printed(tmp_path: Path) -> None:
+    by_name = {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    shown = wayproof("--show-completion", "bash", folder=tmp_path, **by_name)
+    assert "_WAYPROOF_COMPLETE=complete_bash" in shown.stdout
+
+
+def test_help_imports_nothing_slow(tmp_path: Path) -> None:
+    code = f"""
+import sys
+from harness.cli.app import main
+assert main(["--help"]) == 0
+print(sorted({SLOW!r} & set(sys.modules)), file=sys.stderr)
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stderr == "[]\n"
+
+
+def test_validating_imports_nothing_of_the_flight(tmp_path: Path) -> None:
+    code = """
+import sys
+from harness.cli.app import main
+assert main(["validate", "paper_circles"]) == 0
+print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=sys.stderr)
+"""
+    environment = {"PYTHONPATH": str(ROOT), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    wayproof("validate", "paper_circles", folder=tmp_path, **environment)  # flies the aircraft, once
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stderr == "[]\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([], "Missing command"),
+        (["flight"], "No such command 'flight'"),
+        (["fly"], "SCENARIO"),
+        (["fly", "paper_circles", "--sed", "3"], "No such option: --sed"),
+        (["fly", "paper_circles", "--seed", "three"], "--seed"),
+        (["fly", "paper_circles", "--seed", "-3"], "command line: seed: is -3; must be at least 0"),
+        (["fly", "paper_circles", "--planner", "astar"], "command line: planner.kind: is 'astar'"),
+        (["fly", "paper_circles", "--aircraft", "kite"], "command line: aircraft.model: "),
+        (["fly", "paper_circles", "--aircraft", "T38"], "T38 cannot hold 25 m/s"),
+        (["fly", "paper_circles", "--set", "seed"], "'seed' is not KEY.PATH=VALUE"),
+        (["fly", "paper_circles", "--set", "sensor.rnge_m=3"], "did you mean range_m?"),
+        (["fly", "paper_circles", "--view", "--no-recording"], "nothing to view with --no-recording"),
+        (["fly", "paper_circle"], "no such file; give a scenario file or one of aerosonde_forest"),
+        (["fly", "one", "two"], "two"),
+        (["schema", "campaigns"], "campaigns"),
+        (["list", "birds"], "birds"),
+        (["validate"], "FILE"),
+        (["view"], "RUN_DIR"),
+        (["view", "no-such-run"], "no-such-run"),
+        (["report", "no-such-run"], "no-such-run is not a run folder"),
+        (["bench", "nowhere.yaml"], "nowhere.yaml: no such file"),
+    ],
+)
+def test_bad_usage_is_one_line_and_writes_nothing(
+    arguments: list[str],
+    sentence: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert sentence in said.err
+    assert len(said.err.splitlines()) <= 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_usage_in_a_process_of_its_own(tmp_path: Path) -> None:
+    run = wayproof("fly", "paper_circles", "--set", "sensor.rays=2", folder=tmp_path)
+    assert run.returncode == 2
+    assert run.stdout == ""
+    assert run.stderr == "command line: sensor.rays: is 2; must be at least 3\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("arguments", [["--debug", "fly", "nope"], ["fly", "nope", "--debug"]])
+def test_debug_shows_where_and_ends_as_without(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("Traceback (most recent call last):")
+    assert said.splitlines()[-1].startswith("nope: ")
+
+
+def test_the_name_of_an_aircraft_may_look_like_a_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["fly", "paper_circles", "--aircraft", "737"]) == 2
+    assert "aircraft.airspeed_mps: 737 cannot hold 25 m/s" in capsys.readouterr().err
+
+
+def test_an_error_of_our_own_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken() -> dict[str, Any]:
+        raise ZeroDivisionError("first line\nsecond line")
+
+    monkeypatch.setattr(scenario, "scenario_schema", broken)
+    assert main(["schema"]) == 1
+    said = capsys.readouterr().err
+    assert (
+        said == "wayproof: internal error, ZeroDivisionError: first line second line; --debug shows where\n"
+    )
+    assert main(["schema", "--debug"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_interrupting_exits_130(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted() -> dict[str, Any]:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scenario, "scenario_schema", interrupted)
+    assert main(["schema"]) == 130
+    monkeypatch.setattr(cli, "app", lambda *_, **__: interrupted())
+    assert main(["schema"]) == 130
+
+
+def test_a_reader_that_goes_away_is_no_error(tmp_path: Path) -> None:
+    run = subprocess.run(
+        ["bash", "-c", f"'{sys.executable}' -m harness schema | head -c 10"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout == '{\n  "$schem'[:10]
+    assert run.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"), [(["list", "planners"], 0), (["validate", "paper_circles", "{bad}"], 2)]
+)
+def test_a_reader_that_has_gone_changes_no_status(
+    arguments: list[str], status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("name: bad\n")
+    reader, writer = os.pipe()
+    os.close(reader)
+    with os.fdopen(writer, "w", buffering=1) as nobody_reads:
+        monkeypatch.setattr("sys.stdout", nobody_reads)
+        assert main([each.format(bad=bad) for each in arguments]) == status
+        assert sys.stdout is nobody_reads
+
+
+def test_validate_goes_on_after_a_bad_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("name: bad\n")
+    assert main(["validate", str(bad), "paper_circles"]) == 2
+    said = capsys.readouterr()
+    assert said.out == "paper_circles: paper_circles, 10 obstacles: valid\n"
+    assert said.err.startswith(f"{bad}:1: schema: is missing")
+
+
+def test_schema_prints_the_json_schema(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", "scenario"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == scenario.scenario_schema()
+    assert printed["$defs"]["Sensor"]["properties"]["range_m"]["exclusiveMinimum"] == 0
+
+
+def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    wanted = {
+        "planners": tuple(planner_kinds()),
+        "scenarios": tuple(shipped.shipped_scenarios()),
+    }
+    for what, names in wanted.items():
+        assert main(["list", what]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert tuple(line.split()[0] for line in lines) == names
+        assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_list_of_aircraft_has_their_figures(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "c172p", "SGS"))
+    assert main(["list", "aircraft"]) == 0
+    heading, aerosonde, cessna, glider = capsys.readouterr().out.splitlines()
+    assert heading.split()[0] == "name"
+    assert aerosonde.split()[:6] == ["aerosonde", "11", "17.6-32.3", "25", "110", "yes"]
+    assert cessna.split()[:2] == ["c172p", "853"]
+    assert glider.startswith("SGS        cannot be flown: SGS cannot be trimmed for level flight")
+
+
+def test_a_flight_of_a_model_that_cannot_be_flown_ends_before_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["fly", "paper_circles", "--aircraft", "SGS", "--out", str(out)]) == 2
+    assert "aircraft.model: SGS cannot be trimmed for level flight at any speed" in capsys.readouterr().err
+    too_high = ["--set", "mission.altitude_m=9000"]
+    assert main(["fly", "paper_circles", *too_high, "--out", str(out)]) == 2
+    assert (
+        "wayproof: aerosonde cannot be trimmed for level flight at 25 m/s, 9000 m" in capsys.readouterr().err
+    )
+    assert not out.exists()
+
+
+def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "tracking", "--seeds", "1", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["aircraft"], result["seeds"], len(result["cases"])) == ("aerosonde", 1, 6)
+    calm = result["cases"][0]
+    assert 0.0 < calm["cross_track_p95_m"] < calm["cross_track_max_m"] <= calm["limits"]["cross_track_max_m"]
+    assert all(case["kept"] for case in result["cases"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["bench", "paper_circles", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
+        (["bench", "tracking", "--aircraft", "kite"], "unknown aircraft 'kite'"),
+        (["bench", "worlds", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
+        (["bench", "paper_circles", "--most", "100"], "--most goes with `bench worlds`"),
+    ],
+)
+def test_bench_refuses_what_makes_no_sense(
+    arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_bench_worlds_prints_a_row_a_world(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "worlds", "--most", "10"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2].startswith(" obstacles   load s")
+    assert lines[4].split()[0] == "10"
+    assert len(lines[4].split()) == 7
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("wayproof")
+
+
+def test_the_default_run_folder_is_that_of_the_contract(tmp_path: Path) -> None:
+    text = shipped.shipped_scenarios()["paper_circles"].read_text()
+    (tmp_path / "s.yaml").write_text(text.replace("name: paper_circles", "name: other"))
+    loaded = scenario.load_scenario(tmp_path / "s.yaml", [("seed", "7")])
+    assert flights._default_folder(loaded) == Path("runs/other/rolling_window-aerosonde-7")
+
+
+@dataclass
+class Pilot:
+    """Stands in for the flying itself: takes note of what `fly` asks for and ends as told."""
+
+    outcome: str | BaseException = "reached"
+    asked: list[tuple[scenario.Scenario, Path, bool]] = field(default_factory=list)
+
+    def fly_to_folder(
+        self, flown: scenario.Scenario, out: Path, recording: bool, progress: object
+    ) -> dict[str, Any]:
+        self.asked.append((flown, out, recording))
+        if isinstance(self.outcome, BaseException):
+            raise self.outcome
+        return {**METRICS, "outcome": self.outcome}
+
+
+@pytest.fixture
+def pilot(monkeypatch: pytest.MonkeyPatch) -> Pilot:
+    stand_in = Pilot()
+    module = ModuleType("harness.run.scenario_flight")
+    module.__dict__["fly_to_folder"] = stand_in.fly_to_folder
+    monkeypatch.setitem(sys.modules, "harness.run.scenario_flight", module)
+    return stand_in
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status"),
+    [("reached", 0), ("unreachable", 3)]
+    + [(name, 1) for name in ("collision", "out_of_bounds", "timeout", "lost_control", "planner_failed")],
+)
+def test_exit_status_of_fly_follows_the_outcome(
+    outcome: str, status: int, pilot: Pilot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pilot.outcome = outcome
+    assert main(["fly", "paper_circles"]) == status
+    said = capsys.readouterr()
+    assert outcome in said.out
+    assert said.out.splitlines()[-1] == "run folder: runs/paper_circles/rolling_window-aerosonde-1"
+    assert said.err == ""
+
+
+def test_fly_passes_its_options_on(pilot: Pilot) -> None:
+    options = ["--seed", "9", "--set", "sensor.rays=90", "--set", "mission.goal_m=[81e3, 7e4]"]
+    assert main(["fly", "paper_circles", *options, "--out", "here", "--no-recording", "--quiet"]) == 0
+    ((flown, out, recording),) = pilot.asked
+    assert (flown.seed, flown.sensor.rays, flown.mission.goal_m) == (9, 90, (81e3, 70e3))
+    assert (out, recording) == (Path("here"), False)
+
+
+def test_fly_prints_the_metrics_alone_with_json(pilot: Pilot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fly", "paper_circles", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {**METRICS, "outcome": "reached"}
+
+
+def test_fly_is_quiet_when_told_so(pilot: Pilot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fly", "paper_circles", "--quiet"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_an_interrupted_flight_exits_130_and_says_so(
+    pilot: Pilot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pilot.outcome = KeyboardInterrupt()
+    assert main(["fly", "paper_circles", "--out", "here"]) == 130
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err == "wayproof: interrupted; the run in here is marked incomplete\n"
+
+
+def test_a_refused_run_folder_is_bad_input(pilot: Pilot, capsys: pytest.CaptureFixture[str]) -> None:
+    pilot.outcome = RunFolderError("here is not empty and not a run folder")
+    assert main(["fly", "paper_circles", "--out", "here"]) == 2
+    assert capsys.readouterr().err == "wayproof: here is not empty and not a run folder\n"

@@ -1,0 +1,146 @@
+"""Real flights through the command: what they leave behind, also when they are stopped half-way."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import rerun as rr
+
+from harness.cli.app import main
+from harness.files.errors import RunFolderError
+from harness.recording.file import end_of_whole
+from harness.run_files.run_folder import load_run
+
+ROOT = Path(__file__).parents[3]
+RRD_HEADER_BYTES = 12
+RECORDED_BYTES = 600_000
+"""A good deal less than a whole recording of paper_circles, and more than its first block."""
+SHORT = ("--set", "mission.time_limit_s=15")
+
+
+def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    """Starts the command in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "harness", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for(path: Path, process: subprocess.Popen[str], size: int = 0) -> None:
+    """Waits until a file is there and has a size, bytes."""
+    until = time.monotonic() + 60.0
+    while not path.exists() or path.stat().st_size < size:
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < until, f"{path} did not come"
+        time.sleep(0.005)
+
+
+def entities(recording: Path) -> set[str]:
+    """Names of what a recording without an end holds, up to its last whole message."""
+    data = bytearray(recording.read_bytes())
+    recording = recording.with_suffix(".whole.rrd")
+    recording.write_bytes(data[: end_of_whole(data, RRD_HEADER_BYTES)])
+    with pytest.warns(rr.error_utils.RerunWarning, match="no footer"):
+        reader = rr.chunk.RrdReader(recording)
+    found = {str(chunk.entity_path) for chunk in reader.stream()}
+    recording.unlink()
+    return found
+
+
+def test_flies_into_the_default_folder_and_prints_a_summary(tmp_path: Path) -> None:
+    process = start(tmp_path, "fly", "aerosonde_forest", "--no-recording")
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, err) == (0, "")
+    assert "reached: inside the goal circle after" in out
+    assert out.splitlines()[-1] == "run folder: runs/aerosonde_forest/rolling_window-aerosonde-1"
+    run = load_run(tmp_path / "runs" / "aerosonde_forest" / "rolling_window-aerosonde-1")
+    assert run.manifest["complete"] is True
+    assert "fly aerosonde_forest --no-recording" in run.manifest["command"][0]
+
+
+def test_json_is_the_metrics_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run"
+    assert main(["fly", "aerosonde_forest", *SHORT, "--out", str(out), "--no-recording", "--json"]) == 1
+    said = capsys.readouterr()
+    assert json.loads(said.out) == json.loads((out / "metrics.json").read_text())
+    assert said.err == ""
+
+
+def test_killed_while_flying_leaves_an_incomplete_run_and_a_readable_recording(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = start(tmp_path, "fly", "paper_circles", "--out", str(out))
+    wait_for(out / "flight.rrd", process, size=RECORDED_BYTES)
+    process.send_signal(signal.SIGKILL)
+    process.communicate(timeout=30)
+    assert process.returncode == -signal.SIGKILL
+    assert json.loads((out / "manifest.json").read_text())["complete"] is False
+    assert not (out / "metrics.json").exists()
+    assert not (out / "track.parquet").exists()
+    with pytest.raises(RunFolderError, match="incomplete"):
+        load_run(out)
+    assert {"/plan/flown", "/plan/aircraft", "/plan/goal"} <= entities(out / "flight.rrd")
+
+    # The same folder takes another run, and nothing of the killed one is left.
+    assert main(["fly", "aerosonde_forest", *SHORT, "--out", str(out), "--no-recording", "--quiet"]) == 1
+    assert load_run(out).metrics["outcome"] == "timeout"
+    assert not list(out.glob("*.partial"))
+    assert not (out / "flight.rrd").exists()
+
+
+def test_interrupted_says_so_and_leaves_an_incomplete_run(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = start(tmp_path, "fly", "paper_circles", "--out", str(out), "--no-recording")
+    wait_for(out / "scenario.yaml", process)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert err.splitlines() == [f"wayproof: interrupted; the run in {out} is marked incomplete"]
+    with pytest.raises(RunFolderError, match="incomplete"):
+        load_run(out)
+
+
+def test_a_folder_with_other_things_is_refused_and_left_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    assert main(["fly", "aerosonde_forest", *SHORT, "--out", str(tmp_path), "--quiet"]) == 2
+    assert "not empty and not a run folder" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+def test_an_aircraft_that_cannot_be_trimmed_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keys = ("--aircraft", "c172p", "--set", "aircraft.airspeed_mps=60", "--set", "mission.altitude_m=9000")
+    assert main(["fly", "paper_circles", *keys, "--out", str(tmp_path / "run")]) == 2
+    assert "c172p cannot be trimmed for level flight at 60 m/s, 9000 m" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_run_replaces_the_first(tmp_path: Path) -> None:
+    options = ["--out", str(tmp_path / "run"), "--no-recording", "--quiet"]
+    assert main(["fly", "aerosonde_forest", "--set", "mission.time_limit_s=9", *options]) == 1
+    assert main(["fly", "aerosonde_forest", *SHORT, *options]) == 1
+    assert load_run(tmp_path / "run").metrics["flight_time_s"] == 15.0
+
+
+def test_viewing_a_run_without_a_recording_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    main(["fly", "aerosonde_forest", *SHORT, "--out", str(out), "--no-recording", "--quiet"])
+    assert main(["view", str(out)]) == 2
+    assert f"{out} has no flight.rrd" in capsys.readouterr().err

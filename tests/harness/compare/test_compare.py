@@ -1,0 +1,549 @@
+"""Planners side by side: real flights in processes of their own, and what is written of them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from harness.analysis.planned import PlannedRows, planned_rows
+from harness.analysis.rows import Row, number, row_of, to_csv, to_markdown
+from harness.cli.app import main
+from harness.cli.compare_terminal import print_comparison
+from harness.flight.record import AcceptedPlan, Track
+from harness.report import figure_style, figures
+from harness.run_files.run_folder import load_run
+from harness.world.obstacle import Circle, Obstacle
+from planner.interface import Path as PlanPath
+from planner.interface import Plan, PlanStatus
+from tests.page import shown
+
+ROOT = Path(__file__).parents[3]
+PLUGIN = '''
+import os
+
+import numpy as np
+
+from planner.interface import Path, Plan, PlanStatus
+from planner.registry import PlannerKind
+from planner.rolling_window.config import RollingWindowConfig
+
+
+class Corner:
+    """East, then straight to the goal."""
+
+    def __init__(self, config, mission):
+        self.mission = mission
+
+    def plan(self, request):
+        print("a planner that talks")
+        if request.flown is not None:
+            return Plan(PlanStatus.KEPT, "goes on")
+        corners = np.array([request.position_m, (2700.0, 300.0), self.mission.goal_m])
+        leg = np.diff(corners, axis=0)
+        length = np.hypot(*leg.T)
+        rows = np.column_stack((corners[:-1], leg / length[:, None], 0 * length, length))
+        return Plan(PlanStatus.FOUND, "a corner", corners, Path(rows))
+
+
+class Dies(Corner):
+    def plan(self, request):
+        os._exit(7)
+
+
+class Raises(Corner):
+    def __init__(self, config, mission):
+        raise ValueError("<script>alert(1)</script> | *not* to be run")
+
+
+CORNER, DIES, RAISES = (
+    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Corner, Dies, Raises)
+)
+'''
+ENTRY_POINTS = "[wayproof.planners]\n" + "\n".join(
+    f"{kind} = side_by_side_plugin:{kind.upper()}" for kind in ("corner", "dies", "raises")
+)
+SCENARIO = """
+schema: wayproof/scenario/1
+name: {name}
+area: {{bounds_m: [0, 0, 3000, 3000]}}
+obstacles:
+  - circle: {{center_m: [1500, 1500], radius_m: 300}}{motion}
+mission: {{start_m: [300, 300], goal_m: [2700, 2700], goal_radius_m: 60}}
+aircraft: {{model: aerosonde, airspeed_mps: 25}}
+sensor: {{range_m: 1500}}
+planner: {{kind: rolling_window, clearance_m: 40}}
+"""
+TIMES = ("planner_p50_ms", "planner_p99_ms", "planner_max_ms")
+SIDE_M = 1200.0 * math.sqrt(2)
+GROWN_M = 340.0
+OPTIMUM_M = 2 * math.sqrt(SIDE_M**2 - GROWN_M**2) + 2 * GROWN_M * math.asin(GROWN_M / SIDE_M)
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with two scenarios, and with another distribution's planners that children find as well."""
+    folder = tmp_path_factory.mktemp("compare")
+    (folder / "ring.yaml").write_text(SCENARIO.format(name="ring", motion=""))
+    (folder / "drift.yaml").write_text(
+        SCENARIO.format(name="drift", motion="\n    velocity_mps: [-1.0, 0.5]")
+    )
+    site = folder / "site"
+    info = site / "side_by_side_plugin-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: side_by_side_plugin\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    (site / "side_by_side_plugin.py").write_text(PLUGIN)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(site)
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def flown(place: Path) -> Path:
+    """The aircraft on one scenario, with four planners of which two crash."""
+    out = place / "flown"
+    kinds = "rolling_window,corner,dies,raises"
+    arguments = [
+        "compare",
+        str(place / "ring.yaml"),
+        "--planners",
+        kinds,
+        "--out",
+        str(out),
+        "--workers",
+        "2",
+    ]
+    assert main(arguments) == 1
+    return out
+
+
+def rows_of(out: Path) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = json.loads((out / "comparison.json").read_text())["rows"]
+    return rows
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path) -> None:
+    assert files(flown) == {"comparison.csv", "comparison.json", "comparison.md", "report.html", "ring"}
+    drawn = {
+        f"{name}.{kind}"
+        for name in ("map", "profiles", "path-rolling_window", "path-corner")
+        for kind in ("svg", "png")
+    }
+    assert files(flown / "ring") == drawn | {"overlay.rrd", "rolling_window", "corner", "dies"}
+    assert load_run(flown / "ring" / "corner").metrics["outcome"] == "reached"
+    assert json.loads((flown / "comparison.json").read_text())["complete"] is True
+
+
+def test_a_crash_is_a_row_and_the_others_fly_on(flown: Path) -> None:
+    rows = rows_of(flown)
+    assert [row["planner"] for row in rows] == ["rolling_window", "corner", "dies", "raises"]
+    assert [row["outcome"] for row in rows] == ["reached", "reached", "crashed", "crashed"]
+    assert rows[2]["reason"] == "its process ended with exit status 7 before the flight did"
+    told = "ValueError: <script>alert(1)</script> | *not* to be run"
+    assert rows[3]["reason"] == f"the planner raises cannot be made: {told}"
+    assert rows[3]["flown_length_m"] is None
+
+
+def test_figures_are_those_of_the_runs(flown: Path) -> None:
+    for row in rows_of(flown)[:2]:
+        said = load_run(flown / "ring" / row["planner"]).metrics
+        assert row["digest"] == said["digest"]
+        assert row["cross_track_max_m"] == said["cross_track_m"]["max"]
+        assert row["planned_heading_change_deg"] == said["smoothness"]["planned"]["heading_change_deg"]
+        assert row["planner_max_ms"] == said["compute_ms"]["max"]
+        assert row["optimum_m"] == pytest.approx(OPTIMUM_M, rel=1e-9)
+        assert row["ratio"] == pytest.approx(said["flown_length_m"] / OPTIMUM_M, rel=1e-9)
+
+
+def test_there_is_no_ratio_of_a_flight_that_did_not_arrive(flown: Path) -> None:
+    said = load_run(flown / "ring" / "corner").metrics
+    row = row_of(
+        "ring",
+        "corner",
+        {**said, "outcome": "timeout"},
+        optimum_m=OPTIMUM_M,
+        turn_radius_m=100.0,
+        tightest_1pm=0.02,
+        kinematic=False,
+    )
+    assert row.ratio is None
+    assert row.flown_length_m == said["flown_length_m"]
+    assert row.tightest_turn == pytest.approx(2.0)
+
+
+def test_a_corner_is_tighter_than_the_aircraft_and_is_not_tracked(flown: Path) -> None:
+    smooth, corner = rows_of(flown)[:2]
+    assert smooth["tightest_turn"] == pytest.approx(1.0, abs=1e-6)
+    assert smooth["trackable"] is True
+    # 90 degrees in one second of flight.
+    assert corner["tightest_turn"] == pytest.approx(math.pi / 2 / 25.0 * corner["turn_radius_m"], rel=1e-2)
+    assert corner["trackable"] is False
+    assert corner["cross_track_max_m"] > 10.0
+
+
+def test_csv_holds_the_same_rows(flown: Path) -> None:
+    with (flown / "comparison.csv").open(newline="") as file:
+        table = list(csv.DictReader(file))
+    for cells, row in zip(table, rows_of(flown), strict=True):
+        assert cells == {name: "" if value is None else str(value) for name, value in row.items()}
+
+
+class Page(HTMLParser):
+    """What a report refers to, and its text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.references: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.references += [
+            value or "" for name, value in attrs if name in ("src", "href", "srcset", "action")
+        ]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_the_report_needs_nothing_but_itself_and_escapes_what_it_is_told(flown: Path) -> None:
+    page = Page((flown / "report.html").read_text())
+    assert page.references
+    assert all(reference.startswith("data:") for reference in page.references)
+    assert page.tags.count("img") == 4
+    assert "script" not in page.tags
+    assert "@import" not in page.text
+    assert "url(" not in page.text
+    assert "ValueError: <script>alert(1)</script> | *not* to be run" in page.text
+    for row in rows_of(flown)[:2]:
+        assert row["digest"] in page.text
+
+
+def test_a_browser_shows_the_report_on_phone_and_screen(flown: Path, chromium: Any) -> None:
+    for width_px in (390, 1280):
+        page = shown(chromium, flown / "report.html", width_px)
+        assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
+        assert (page.figures, page.missing) == (4, 0)
+
+
+def test_the_report_says_how_to_repeat_it(
+    place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = place / "repeat"
+    arguments = ["compare", str(place / "ring.yaml"), "--planners", "raises", "--out", str(out)]
+    monkeypatch.setattr("sys.argv", ["/somewhere/bin/wayproof", *arguments])
+    assert main(arguments) == 1
+    assert f"wayproof compare {place / 'ring.yaml'} --planners raises" in (out / "report.html").read_text()
+    assert (
+        "raises crashed: the planner raises cannot be made: ValueError: <script>" in capsys.readouterr().out
+    )
+    assert files(out / "ring") == set()
+
+
+def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
+    place: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scenarios = [str(place / "ring.yaml"), str(place / "drift.yaml")]
+    answers = []
+    for workers in ("1", "2"):
+        out = place / f"workers-{workers}"
+        options = ["--planners", "corner", "--kinematic", "--no-recording", "--json", "--workers", workers]
+        assert main(["compare", *scenarios, *options, "--out", str(out)]) == 0
+        answer = json.loads(capfd.readouterr().out)
+        assert answer == json.loads((out / "comparison.json").read_text())
+        assert not (out / "ring" / "overlay.rrd").exists()
+        answers.append([{name: row[name] for name in row if name not in TIMES} for row in answer["rows"]])
+    assert answers[0] == answers[1]
+    ring, drift = answers[0]
+    assert (ring["scenario"], drift["scenario"]) == ("ring", "drift")
+    assert ring["cross_track_max_m"] == 0.0
+    assert ring["trackable"] is None
+    # The flight ends at the edge of the goal circle, at the first look inside it.
+    assert ring["flown_length_m"] == pytest.approx(2400.0 + 2400.0 - 60.0, abs=3.0)
+    assert drift["ratio"] is None
+    assert "an obstacle moves" in (place / "workers-1" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["{place}/ring.yaml"], "--planners"),
+        (["--planners", "corner"], "SCENARIO"),
+        (["{place}/ring.yaml", "--planners", "corner,astar"], "planner.kind: is 'astar'"),
+        (["{place}/ring.yaml", "--planners", ""], "planner.kind"),
+        (["{place}/ring.yaml", "--planners", "corner,corner"], "corner is to fly ring twice"),
+        (["{place}/ring.yaml", "{place}/ring.yaml", "--planners", "corner"], "corner is to fly ring twice"),
+        (["{place}/nowhere.yaml", "--planners", "corner"], "nowhere.yaml: no such file"),
+        (["{place}/ring.yaml", "--planners", "corner", "--workers", "0"], "--workers"),
+    ],
+)
+def test_bad_input_ends_with_2_before_anything_is_flown(
+    place: Path, tmp_path: Path, arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [argument.format(place=place) for argument in arguments]
+    assert main(["compare", *given, "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr()
+    assert sentence in said.err
+    assert said.err.count("\n") <= 2
+    assert said.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["comparison.json", "comparison.csv", "comparison.md", "report.html"])
+def test_a_scenario_with_the_name_of_a_file_of_ours_is_refused(
+    place: Path, tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "other.yaml"
+    file.write_text((place / "ring.yaml").read_text().replace("name: ring", f"name: {name}"))
+    assert main(["compare", str(file), "--planners", "corner", "--out", str(tmp_path / "out")]) == 2
+    assert f"a scenario is called {name}, as a file of the comparison" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_with_other_things_is_refused_and_left_alone(
+    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    (tmp_path / "comparison.json").write_text("[]")
+    arguments = ["compare", str(place / "ring.yaml"), "--planners", "corner", "--out"]
+    assert main([*arguments, str(tmp_path)]) == 2
+    assert "is not empty and not a comparison" in capsys.readouterr().err
+    assert files(tmp_path) == {"thesis.tex", "comparison.json"}
+    assert main([*arguments, str(tmp_path / "thesis.tex")]) == 2
+    assert "is a file" in capsys.readouterr().err
+
+
+def alive(group: int) -> bool:
+    """Whether any process of a group is there."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place: Path) -> None:
+    out = place / "interrupted"
+    arguments = [
+        "compare",
+        "paper_circles",
+        "--planners",
+        "rolling_window",
+        "--no-recording",
+        "--out",
+        str(out),
+    ]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "harness", *arguments],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    until = time.monotonic() + 60.0
+    while not (out / "paper_circles" / "rolling_window" / "scenario.yaml").exists():
+        assert process.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert said.splitlines() == [f"wayproof: interrupted; the comparison in {out} is marked incomplete"]
+    assert json.loads((out / "comparison.json").read_text())["complete"] is False
+    assert (
+        json.loads((out / "paper_circles" / "rolling_window" / "manifest.json").read_text())["complete"]
+        is False
+    )
+    until = time.monotonic() + 10.0
+    while alive(process.pid):
+        assert time.monotonic() < until, "a flight goes on"
+        time.sleep(0.05)
+
+
+def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    worst = Row(
+        "a-scenario", "a_planner_with_a_long_name", "planner_failed", "[bold] it raised", 123456.7,
+        optimum_m=1e5, ratio=12.3456, min_clearance_m=-1234.5, tightest_turn=123.456, trackable=False,
+        cross_track_max_m=1234.5, planner_p99_ms=123.4,
+    )  # fmt: skip
+    print_comparison([worst, Row("a-scenario", "b", "crashed", "[bold] it died")])
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    for text in ("planner_failed", "123.5", "12.3456", "-1234", "123.46", "no", "crashed"):
+        assert any(text in line for line in lines), text
+    assert lines[-1] == "b crashed: [bold] it died"
+
+
+def test_markdown_is_a_table_whatever_the_names_are() -> None:
+    text = to_markdown([Row("s", "a", "reached", "a | b <i>", ratio=1.5), Row("s", "b", "crashed", "c")])
+    table = [line for line in text.splitlines() if line.startswith("| ")]
+    assert {line.count("|") for line in table} == {4}
+    assert "| ratio to the clairvoyant optimum | 1.5000 | \N{EN DASH} |" in table
+    assert "- a: a \\| b \\<i\\>" in text
+
+
+def test_csv_of_a_crash_has_empty_cells() -> None:
+    head, line = to_csv([Row("s", "p", "crashed", "a, b")]).splitlines()
+    assert head.startswith("scenario,planner,outcome,reason,flown_length_m,")
+    assert line == 's,p,crashed,"a, b"' + "," * (head.count(",") - 3)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(None, ""), (0.0, "0"), (1.0, "1"), (0.12345, "0.123"), (0.00004, "4.0e-05"), (-0.5, "-0.5"),
+     (94321.5, "94322"), (306.04, "306.0"), (99.96, "100")],
+)  # fmt: skip
+def test_numbers_read_well(value: float | None, text: str) -> None:
+    assert number(value) == text
+
+
+MakeTrack = Callable[..., Track]
+MakePlan = Callable[..., AcceptedPlan]
+
+
+def test_planned_rows_follow_line_corner_arc_and_end(make_track: MakeTrack, make_plan: MakePlan) -> None:
+    east_then_left = [(0.0, 0.0, 0.0, 1.0, 0.0, 100.0), (0.0, 100.0, 1.0, 0.0, 0.01, 50.0 * math.pi)]
+    track = make_track(160)
+    planned = planned_rows(track, [make_plan(east_then_left)])
+    before, after = track.arc_length_m < 100.0, track.arc_length_m > 100.0 + 50.0 * math.pi
+    corner = (track.arc_length_m >= 100.0) & (track.arc_length_m < 125.0)
+    assert planned.curvature_1pm[before] == pytest.approx(0.0)
+    # A right turn of 90 degrees within one second of flight, on top of the arc that begins there.
+    assert planned.curvature_1pm[corner] == pytest.approx(-math.pi / 2 / 25.0 + 0.01)
+    assert planned.curvature_1pm[~before & ~corner & ~after] == pytest.approx(0.01)
+    assert planned.curvature_1pm[after] == pytest.approx(0.0)
+    # The quarter of a circle ends northward at (100, 200); beyond it goes straight on.
+    beyond = track.arc_length_m[after] - 100.0 - 50.0 * math.pi
+    assert planned.east_m[after] == pytest.approx(100.0)
+    assert planned.north_m[after] == pytest.approx(200.0 + beyond)
+    assert planned.tightest is not None
+    assert corner[planned.tightest]
+    assert planned.tightest_1pm == pytest.approx(math.pi / 2 / 25.0 - 0.01)
+
+
+def test_planned_rows_go_round_a_loiter(make_track: MakeTrack) -> None:
+    circle = np.array([[100.0, 0.0, 0.0, 1.0, 0.01, math.tau * 100.0]])
+    plan = Plan(PlanStatus.FOUND, "holds", circle[:, :2], PlanPath(circle, loiter=True))
+    planned = planned_rows(make_track(600), [AcceptedPlan(0, 0.0, 1.0, plan)])
+    assert np.hypot(planned.east_m, planned.north_m) == pytest.approx(100.0)
+    assert planned.curvature_1pm == pytest.approx(0.01)
+
+
+def test_the_turn_onto_a_plan_that_takes_effect_counts(make_track: MakeTrack, make_plan: MakePlan) -> None:
+    north, east = [(0.0, 0.0, 0.0, 1.0, 0.0, 900.0)], [(0.0, 100.0, 1.0, 0.0, 0.0, 900.0)]
+    index = np.repeat((0, 1), 40)
+    station = np.concatenate((2.5 * np.arange(40), 2.5 * np.arange(40)))
+    planned = planned_rows(
+        make_track(80, plan_index=index, arc_length_m=station), [make_plan(north), make_plan(east, index=1)]
+    )
+    assert planned.curvature_1pm[:40] == pytest.approx(0.0)
+    assert planned.curvature_1pm[40:50] == pytest.approx(-math.pi / 2 / 25.0)
+    assert planned.curvature_1pm[50:] == pytest.approx(0.0)
+
+
+def test_before_the_first_plan_nothing_is_planned(make_track: MakeTrack) -> None:
+    planned = planned_rows(make_track(5, plan_index=-1, arc_length_m=math.nan), [])
+    assert np.isnan(planned.curvature_1pm).all()
+    assert (planned.tightest, planned.tightest_1pm) == (None, 0.0)
+
+
+def test_of_equal_turns_the_longest_is_the_tightest() -> None:
+    bend = np.array([0.1, 0.0, -0.1, -0.1, -0.1, 0.0, 0.1, 0.1])
+    assert PlannedRows(0 * bend, 0 * bend, bend).tightest == 3
+
+
+@pytest.fixture
+def drawn(
+    make_circle: Callable[..., Track], circle_plan: AcceptedPlan
+) -> tuple[figures.Scene, figures.DrawnRun]:
+    track = make_circle(500.0, 60.0)
+    obstacle = Obstacle(Circle((3000.0, 3000.0), 400.0))
+    scene = figures.Scene(
+        name="a_world", bounds_m=(-1000.0, -1000.0, 5000.0, 5000.0), obstacles=(obstacle,), start_m=(500.0, 0.0),
+        goal_m=(4000.0, 4500.0), goal_radius_m=60.0, clearance_m=50.0, turn_radius_m=100.0, optimum_m=np.zeros((0, 2)),
+    )  # fmt: skip
+    return scene, figures.DrawnRun("round", "timeout", track, planned_rows(track, [circle_plan]))
+
+
+def test_the_map_shows_the_track_and_the_tightest_turn(drawn: tuple[figures.Scene, figures.DrawnRun]) -> None:
+    scene, run = drawn
+    (axes,) = figures.overview(scene, [(2, run)]).axes
+    lines = {str(line.get_label()): line for line in axes.get_lines()}
+    flown = np.asarray(lines["round"].get_xydata())
+    assert flown[0] == pytest.approx((0.5, 0.0))
+    assert flown[-1] == pytest.approx((run.track.east_m[-1] / 1e3, run.track.north_m[-1] / 1e3))
+    assert np.hypot(*flown.T) == pytest.approx(0.5, abs=2e-3)
+    assert lines["round"].get_color() == figure_style.COLOURS[2]
+    assert "clairvoyant optimum" not in lines
+    row = run.planned.tightest
+    assert row is not None
+    tightest = (run.planned.east_m[row] / 1e3, run.planned.north_m[row] / 1e3)
+    places = [np.asarray(line.get_xydata()) for line in axes.get_lines()]
+    assert any(np.allclose(place, tightest) for place in places if place.shape == (1, 2))
+
+
+@pytest.mark.parametrize("changes", [False, True])
+@pytest.mark.parametrize("outcome", ["reached", "timeout"])
+def test_the_legend_explains_every_mark_that_is_there_and_no_other(
+    drawn: tuple[figures.Scene, figures.DrawnRun], changes: bool, outcome: str
+) -> None:
+    scene, run = drawn[0], replace(drawn[1], outcome=outcome)
+    if changes:
+        scene = replace(scene, obstacles=(*scene.obstacles, Obstacle(Circle((0.0, 2000.0), 9.0), (1.0, 0.0))))
+    for figure in (figures.overview(scene, [(0, run)]), figures.planner_figure(scene, run, 0)):
+        (legend,) = figure.legends
+        told = {text.get_text() for text in legend.get_texts()}
+        assert ("moves, or stands for a time" in told) is changes
+        assert ("ended, not at G" in told) is (outcome == "timeout")
+        assert "tightest planned turn" in told
+
+
+@pytest.mark.parametrize("kind", ["overview", "planner_figure", "profiles"])
+def test_figures_are_the_same_bytes_every_time(
+    drawn: tuple[figures.Scene, figures.DrawnRun], kind: str
+) -> None:
+    scene, run = drawn
+    draw: dict[str, Callable[[], Any]] = {
+        "overview": lambda: figures.overview(scene, [(0, run)]),
+        "planner_figure": lambda: figures.planner_figure(scene, run, 0),
+        "profiles": lambda: figures.profiles(scene, [(0, run)]),
+    }
+    content = figure_style.svg(draw[kind]())
+    assert content == figure_style.svg(draw[kind]())
+    assert ElementTree.fromstring(content).tag == "{http://www.w3.org/2000/svg}svg"
+    assert figure_style.png(draw[kind]()).startswith(b"\x89PNG")
+
+
+def test_a_curve_of_many_rows_keeps_its_peaks(
+    make_track: MakeTrack, straight_plan: AcceptedPlan, drawn: tuple[figures.Scene, figures.DrawnRun]
+) -> None:
+    error = np.zeros(50_000)
+    error[31_234], error[44_321] = 7.0, -3.0
+    track = make_track(50_000, cross_track_m=error)
+    run = figures.DrawnRun("straight", "reached", track, planned_rows(track, [straight_plan]))
+    cross = figures.profiles(drawn[0], [(0, run)]).axes[1]
+    curve = max((np.asarray(line.get_xydata()) for line in cross.get_lines()), key=len)
+    assert len(curve) < 2000
+    assert (curve[:, 1].max(), curve[:, 1].min()) == (7.0, -3.0)

@@ -1,0 +1,244 @@
+"""The breaking point of flights whose end is known, and what the command leaves behind."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aircraft.airframes import AircraftError
+from harness.cli.app import main
+from harness.cli.falsify_terminal import breaking_rows, last_line
+from harness.falsify.folder import FALSIFIED, INDEX, PICTURES, TRIALS
+from harness.falsify.keys import scenario_at, vary_of
+from harness.files.strict_yaml import InputError
+from harness.scenario.scenario import Scenario, load_scenario
+from tests.harness.breaking import WAY_M, broken, flown, stand_in
+
+
+def test_the_time_that_is_too_short_is_found(to_break: Path) -> None:
+    result = broken(to_break, ("mission.time_limit_s", 300.0, 20.0), tolerance=0.005)
+    assert (result.verdict, result.settled, result.not_monotone) == ("found", True, 0)
+    assert result.found is not None
+    assert result.passes is not None
+    needed_s = WAY_M / 25.0
+    assert needed_s - 280 * 0.005 - 0.5 <= result.found.values[0] <= needed_s <= result.passes[0] + 0.5
+    assert result.found.outcome == "timeout"
+    assert last_line(result) == f"falsified: mission.time_limit_s={result.found.values[0]:.6g}"
+
+    rows = list(csv.DictReader((to_break.parent / "out" / TRIALS).read_text().splitlines()))
+    assert len(rows) == result.conditions == len(result.trials)
+    assert [float(row["mission.time_limit_s"]) for row in rows[:2]] == [300.0, 20.0]
+    assert {row["failed"] for row in rows} == {"True", "False"}
+    index = json.loads((to_break.parent / "out" / INDEX).read_text())
+    assert (index["complete"], index["found"]["digest"]) == (True, result.found.digest)
+
+    again = load_scenario(to_break.parent / "out" / FALSIFIED)
+    assert again.mission.time_limit_s == result.found.values[0]
+    assert flown(again)["digest"] == result.found.digest
+
+
+def test_two_keys_are_brought_to_the_edge_between_passing_and_failing(to_break: Path) -> None:
+    keys = ("mission.time_limit_s", 100.0, 40.0), ("aircraft.airspeed_mps", 28.0, 18.0)
+    result = broken(to_break, *keys, tolerance=0.02, conditions=80)
+    assert result.found is not None
+    assert result.settled
+    limit_s, speed_mps = result.found.values
+    assert WAY_M / speed_mps > limit_s - 0.5, "it fails there"
+    for limit, speed in ((limit_s + 0.02 * 60, speed_mps), (limit_s, speed_mps + 0.02 * 10)):
+        assert WAY_M / speed < limit + 0.5, "and a little milder in either key it does not"
+    # On the diagonal the two meet where 1400 / (28 - 10 u) = 100 - 60 u.
+    shares = [share / 1e4 for share in range(10001)]
+    mildest = next(share for share in shares if WAY_M / (28 - 10 * share) >= 100 - 60 * share)
+    assert max(result.found.displacement) == pytest.approx(mildest, abs=0.03)
+    for name in PICTURES:
+        assert (to_break.parent / "out" / name).stat().st_size > 5000
+
+
+def test_nothing_fails_and_it_is_said(to_break: Path) -> None:
+    result = broken(to_break, ("mission.time_limit_s", 300.0, 200.0), conditions=3)
+    assert (result.verdict, result.found, result.conditions) == ("not_found", None, 3)
+    assert last_line(result) == "not falsified: nothing failed in 3 flights"
+    assert breaking_rows(result)["mildest failure"] == "none: every condition tried was reached"
+    assert sorted(path.name for path in (to_break.parent / "out").iterdir()) == [TRIALS, INDEX]
+
+
+def test_it_fails_already_at_the_mild_end(to_break: Path) -> None:
+    result = broken(to_break, ("mission.time_limit_s", 30.0, 20.0))
+    assert (result.verdict, result.conditions) == ("fails_at_the_mild_end", 1)
+    assert load_scenario(to_break.parent / "out" / FALSIFIED).mission.time_limit_s == 30.0
+    assert "already at the mild end" in last_line(result)
+    assert breaking_rows(result)["tried"] == "1 condition"
+
+
+def test_a_condition_fails_when_one_of_its_seeds_does(to_break: Path) -> None:
+    def unlucky(scenario: Scenario) -> dict[str, Any]:
+        lost = scenario.seed == 6 and scenario.sensor.range_noise_m >= 4.0
+        return stand_in("collision" if lost else "reached", digest=f"{scenario.seed}")
+
+    result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=unlucky, seeds=4, tolerance=0.1)
+    assert result.found is not None
+    assert (result.found.values, result.found.seed) == ((4.0,), 6)
+    assert [trial.seed for trial in result.trials if trial.condition == 0] == [4, 5, 6, 7]
+    assert breaking_rows(result)["tried"] == f"{result.conditions} conditions, {len(result.trials)} flights"
+    assert [trial.seed for trial in result.trials if trial.condition == 1] == [4, 5, 6]
+    assert load_scenario(to_break.parent / "out" / FALSIFIED).seed == 6
+
+
+def test_untrackable_counts_where_it_is_asked_for(to_break: Path) -> None:
+    def shaky(scenario: Scenario) -> dict[str, Any]:
+        noise = scenario.sensor.range_noise_m
+        near: dict[str, Any] = {
+            "min_clearance_m": 9900.0,
+            "flight_time_s": 3.0,
+            "cross_track_m": {"max": noise},
+        }
+        return stand_in(trackable=noise < 3.0, **near)
+
+    noise = ("sensor.range_noise_m", 0.0, 8.0)
+    assert broken(to_break, noise, flown=shaky).verdict == "not_found"
+    result = broken(to_break, noise, flown=shaky, until="untrackable")
+    assert result.found is not None
+    assert 3.0 <= result.found.values[0] <= 3.08
+    margins = {trial.values[0]: trial.margin for trial in result.trials if not trial.failed}
+    assert margins[2.0] < margins[1.0] < margins[0.0]
+
+
+def test_a_crash_is_a_failure_and_a_model_that_cannot_begin_is_not(to_break: Path) -> None:
+    def crashes(scenario: Scenario) -> dict[str, Any]:
+        if scenario.sensor.range_noise_m > 0.0:
+            raise ZeroDivisionError("in the\nplanner")
+        return stand_in()
+
+    def refuses(scenario: Scenario) -> dict[str, Any]:
+        raise AircraftError("cannot be trimmed")
+
+    noise = ("sensor.range_noise_m", 0.0, 8.0)
+    result = broken(to_break, noise, flown=crashes)
+    assert result.found is not None
+    assert (result.found.outcome, result.found.reason) == ("error", "ZeroDivisionError: in the planner")
+    with pytest.raises(InputError, match="cannot fly this condition: cannot be trimmed"):
+        broken(to_break, noise, flown=refuses)
+    assert json.loads((to_break.parent / "out" / INDEX).read_text())["complete"] is True, "the earlier search"
+
+
+def test_what_is_not_monotone_is_reported(to_break: Path) -> None:
+    def island(scenario: Scenario) -> dict[str, Any]:
+        return stand_in("collision" if 2.0 <= scenario.sensor.range_noise_m <= 3.0 else "reached")
+
+    result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=island)
+    assert result.found is not None
+    assert result.found.values == (2.0,)
+    assert result.example is not None
+    assert result.example[0][0] < result.example[1][0]
+    assert "but passes at" in breaking_rows(result)["not monotone"]
+
+
+def test_whole_numbers_stay_whole(to_break: Path) -> None:
+    def coarse(scenario: Scenario) -> dict[str, Any]:
+        return stand_in("collision" if scenario.sensor.rays < 47 else "reached")
+
+    result = broken(to_break, ("sensor.rays", 90.0, 10.0), flown=coarse, tolerance=0.001)
+    assert result.found is not None
+    assert (result.found.values, result.passes) == ((46,), (47,))
+    assert load_scenario(to_break.parent / "out" / FALSIFIED).sensor.rays == 46
+
+
+def test_a_key_inside_a_list_can_be_varied(to_break: Path) -> None:
+    def load(replaced: Sequence[tuple[str, str]]) -> Scenario:
+        return load_scenario(to_break, replaced)
+
+    vary = vary_of(load, [("obstacles.0.circle.radius_m", 100.0, 500.0)])
+    assert vary[0].key == "obstacles[0].circle.radius_m"
+    assert not vary[0].whole
+    circle = scenario_at(load, vary, (0.5,)).obstacles[0].circle
+    assert circle is not None
+    assert circle.radius_m == 300.0
+
+
+def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
+    to_break: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(to_break.parent)
+    given = ["straight.yaml", "--vary", "mission.time_limit_s=90:30", "--planner", "rolling_window"]
+    assert main(["falsify", *given, "--seed", "9", "--tolerance", "0.1", "--runs", "9"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert "again: wayproof fly runs/straight/falsify-mission.time_limit_s/falsified.yaml" in said.out
+    assert max(map(len, said.out.splitlines())) <= 80
+    found = json.loads(Path("runs/straight/falsify-mission.time_limit_s/falsify.json").read_text())
+    (value,) = found["found"]["values"]
+    assert said.out.splitlines()[-1] == f"falsified: mission.time_limit_s={value:.6g}"
+    assert WAY_M / 25.0 - 10.0 < value < WAY_M / 25.0 + 3.0
+    again = [
+        "fly",
+        "runs/straight/falsify-mission.time_limit_s/falsified.yaml",
+        "--no-recording",
+        "--json",
+        "--out",
+        "again",
+    ]
+    assert main(again) == 1
+    metrics_again = json.loads(capsys.readouterr().out)
+    assert metrics_again["outcome"] == found["found"]["outcome"] == "timeout"
+    assert metrics_again["digest"] == found["found"]["digest"]
+
+    assert main(["falsify", *given, "--runs", "2", "--json", "--set", "mission.goal_radius_m=60"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert (printed["verdict"], printed["flights"], printed["settled"]) == ("found", 2, False)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ([], "--vary"),
+        (["--vary", "mission.time_limit_s"], "'mission.time_limit_s' is not KEY.PATH=LO:HI with two numbers"),
+        (["--vary", "mission.time_limit_s=1:x"], "is not KEY.PATH=LO:HI with two numbers"),
+        (["--vary", "mission.time_limit_s=1:inf"], "is not KEY.PATH=LO:HI with two numbers"),
+        (
+            ["--vary", "sensor.dropout=0:1", "--set", "sensor.dropout=0.5"],
+            "sensor.dropout is given a value, and a range with --vary; give one of them",
+        ),
+        (
+            ["--vary", "mission[goal_m].0=0:1", "--set", "mission.goal_m[0]=5"],
+            "mission.goal_m[0] is given a value, and a range with --vary; give one of them",
+        ),
+        (
+            ["--vary", "mission.goal_m[0]=0:1", "--vary", "mission.goal_m.0=0:1"],
+            "--vary mission.goal_m[0]: is given twice",
+        ),
+        (["--vary", "sensor..rays=0:1"], "--vary: 'sensor..rays' is not a key path"),
+        (["--vary", "seed=1:5"], "a seed is no condition; --seeds flies several"),
+        (["--vary", "sensor.dropout=0:0"], "both ends are 0; give two, as sensor.dropout=0:1"),
+        (["--vary", "sensor.dropout=0:1", "--vary", "sensor.dropout=0:1"], "is given twice"),
+        (["--vary", "sensor.dropout=0:2"], "command line: sensor.dropout: is 2; must be at most 1"),
+        (
+            ["--vary", "sensor.dropuot=0:1"],
+            "command line: sensor.dropuot: unknown key; did you mean dropout?",
+        ),
+        (["--vary", "sensor.rate_hz=4:1"], "which does not divide 120 Hz"),
+        (["--vary", "planner.kind=0:1"], "planner.kind: is 0; must be text"),
+        (["--vary", "sensor.dropout=0:1", "--tolerance", "0"], "is 0; must be between 0 and 1"),
+        (["--vary", "sensor.dropout=0:1", "--runs", "1"], "--runs"),
+        (["--vary", "sensor.dropout=0:1", "--until", "later"], "--until"),
+        ([item for key in "abcdefg" for item in ("--vary", f"sensor.{key}=0:1")], "at most 6 keys"),
+    ],
+)
+def test_bad_usage_is_one_line_and_writes_nothing(
+    arguments: list[str],
+    sentence: str,
+    to_break: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(to_break.parent)
+    assert main(["falsify", "straight.yaml", *arguments]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert sentence in said.err
+    assert len(said.err.splitlines()) <= 2
+    assert [path.name for path in to_break.parent.iterdir()] == ["straight.yaml"]

@@ -1,0 +1,179 @@
+"""The search for the mildest failing condition, against failures that are known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.falsify.search import POPULATION, STEPS, Point, Searched, Verdict, search
+from harness.files.strict_yaml import InputError
+
+Fails = Callable[[Point], bool]
+
+
+def found(
+    fails: Fails, keys: int = 1, conditions: int = 40, tolerance: float = 0.01, seed: int = 1
+) -> tuple[Searched, list[Point]]:
+    """A search, and the conditions that it asked for."""
+    asked: list[Point] = []
+
+    def judge(point: Point) -> Verdict:
+        asked.append(point)
+        return Verdict(True) if fails(point) else Verdict(False, 1.0 - max(point) / 2)
+
+    return search(keys, judge, conditions, tolerance, seed), asked
+
+
+@given(st.floats(0.001, 1.0), st.sampled_from([0.1, 0.03, 0.004]))
+@settings(max_examples=60)
+def test_one_key_is_narrowed_down_to_the_tolerance(edge: float, tolerance: float) -> None:
+    result, asked = found(lambda point: point[0] >= edge, tolerance=tolerance)
+    assert result.mildest is not None
+    assert result.passed_below is not None
+    assert result.passed_below[0] < edge <= result.mildest[0]
+    assert result.mildest[0] - result.passed_below[0] <= tolerance
+    assert result.settled
+    assert len(asked) == len(set(asked)) <= STEPS + 1 + math.ceil(math.log2(1 / STEPS / tolerance) + 1)
+    assert result.not_monotone == ()
+
+
+def test_the_ends_come_first_and_may_be_all_there_is() -> None:
+    at_once, asked = found(lambda point: True)
+    assert (at_once.mildest, at_once.passed_below, asked) == ((0.0,), None, [(0.0,)])
+    never, asked = found(lambda point: False)
+    assert never.mildest is None
+    assert never.settled
+    assert asked[:2] == [(0.0,), (1.0,)]
+    assert sorted(asked) == [(step / STEPS,) for step in range(STEPS + 1)]
+
+
+def test_a_failure_between_ends_that_pass_is_found_and_said_to_be_odd() -> None:
+    result, _ = found(lambda point: 0.3 <= point[0] <= 0.4)
+    assert result.mildest is not None
+    assert 0.3 <= result.mildest[0] <= 0.31
+    assert all(failed[0] <= passed[0] for failed, passed in result.not_monotone)
+    assert ((0.375,), (1.0,)) in result.not_monotone
+
+
+def test_the_conditions_are_counted() -> None:
+    for conditions in range(2, 14):
+        result, asked = found(lambda point: point[0] > 0.77, conditions=conditions, tolerance=0.001)
+        assert len(asked) == conditions
+        assert not result.settled
+        assert result.mildest is not None
+        assert result.mildest[0] > 0.77
+    with pytest.raises(ValueError, match="2 conditions or more"):
+        found(lambda point: True, conditions=1)
+    with pytest.raises(ValueError, match="tolerance between 0 and 1"):
+        found(lambda point: True, tolerance=1.0)
+
+
+@pytest.mark.parametrize("conditions", range(2, 14))
+def test_settled_is_a_scan_in_eighths_and_nothing_less(conditions: int) -> None:
+    result, asked = found(lambda point: False, conditions=conditions)
+    assert len(asked) == min(conditions, STEPS + 1), "none is left over"
+    assert result.settled == (conditions >= STEPS + 1)
+
+
+def test_a_coarse_scan_leaves_conditions_to_bisect_with() -> None:
+    _, asked = found(lambda point: point[0] >= 0.47, conditions=8)
+    assert [point[0] for point in asked] == [0, 1, 0.25, 0.5, 0.75, 0.375, 0.4375, 0.46875]
+    result, _ = found(lambda point: point[0] >= 0.47, conditions=9, tolerance=0.2)
+    assert result.settled, "what bisection left over made the scan whole"
+    assert result.mildest == (0.5,)
+    result, _ = found(lambda point: point[0] == 0.125 or point[0] >= 0.97, conditions=8, tolerance=0.2)
+    assert (result.settled, result.mildest) == (False, (0.125,)), "what was left over found it"
+
+
+@pytest.mark.parametrize("whole", [1, 4])
+def test_whole_numbers_need_no_more_conditions_than_there_are_of_them(whole: int) -> None:
+    def judge(point: Point) -> Verdict:
+        return Verdict(point[0] >= 0.8)
+
+    result = search(1, judge, whole + 1, 0.01, 1, snap=lambda point: (round(point[0] * whole) / whole,))
+    assert (result.settled, len(result.verdicts), result.mildest) == (True, whole + 1, (1.0,))
+
+
+def test_without_conditions_for_the_evolution_it_is_not_settled() -> None:
+    result, _ = found(lambda point: False, keys=2, conditions=STEPS + 1 + POPULATION)
+    assert (result.evolved, result.settled) == (0, False)
+    result, _ = found(lambda point: False, keys=2, conditions=80)
+    assert (result.evolved >= POPULATION, result.settled) == (True, True)
+
+
+@given(st.lists(st.floats(0.05, 0.95), min_size=2, max_size=3), st.integers(0, 3))
+@settings(max_examples=25)
+def test_where_every_key_makes_it_harder_the_mildest_is_found(edges: list[float], seed: int) -> None:
+    keys, tolerance = len(edges), 0.02
+    result, asked = found(
+        lambda point: all(place >= edge for place, edge in zip(point, edges, strict=True)),
+        keys,
+        conditions=120,
+        tolerance=tolerance,
+        seed=seed,
+    )
+    assert result.mildest is not None
+    assert max(edges) <= max(result.mildest) <= max(edges) + tolerance
+    assert result.settled
+    assert len(asked) <= 120
+    for place, edge in zip(result.mildest, edges, strict=True):
+        assert edge <= place <= edge + tolerance, "every key was taken back as far as it goes"
+    assert result.not_monotone == ()
+
+
+def test_a_key_that_does_nothing_goes_back_to_its_mild_end() -> None:
+    result, _ = found(lambda point: point[1] >= 0.6, keys=3, conditions=120)
+    assert result.mildest is not None
+    assert (result.mildest[0], result.mildest[2]) == (0.0, 0.0)
+    assert 0.6 <= result.mildest[1] <= 0.61
+
+
+def test_a_milder_failure_off_the_diagonal_is_found_by_evolution() -> None:
+    def fails(point: Point) -> bool:
+        return min(point) >= 0.9 or (point[0] > 0.25 and point[1] < 0.2)
+
+    result, asked = found(fails, keys=2, conditions=100)
+    assert result.mildest is not None
+    assert 0.25 < result.mildest[0] <= 0.26
+    assert result.mildest[1] == 0.0
+    assert result.evolved >= POPULATION
+    assert result.not_monotone, "harder in the second key passes"
+    again, asked_again = found(fails, keys=2, conditions=100)
+    assert (again.verdicts, asked_again) == (result.verdicts, asked)
+    assert found(fails, keys=2, conditions=100, seed=2)[1] != asked
+
+
+def test_places_without_a_scenario_are_passed_over_away_from_the_diagonal() -> None:
+    def judge(point: Point) -> Verdict:
+        if point[0] > point[1] + 0.3:
+            raise InputError("the goal lies inside an obstacle")
+        return Verdict(True) if point[1] >= 0.7 else Verdict(False, 1.0 - max(point) / 2)
+
+    result = search(2, judge, 60, 0.01, 1)
+    assert result.mildest == pytest.approx((0.0, 0.7), abs=0.02)
+    assert result.evolved > 0
+    assert all(point[0] <= point[1] + 0.3 for point in result.verdicts)
+    with pytest.raises(InputError, match="inside an obstacle"):
+        search(2, lambda point: judge((point[1], 0.1)), 60, 0.01, 1)
+
+
+def test_few_conditions_leave_out_the_evolution_and_say_so() -> None:
+    result, asked = found(lambda point: min(point) >= 0.5, keys=2, conditions=14)
+    assert (result.evolved, len(asked)) == (0, 14)
+    assert not result.settled
+
+
+def test_points_that_stand_for_the_same_value_are_tried_once() -> None:
+    asked: list[Point] = []
+
+    def judge(point: Point) -> Verdict:
+        asked.append(point)
+        return Verdict(point[0] >= 0.5)
+
+    result = search(1, judge, 40, 0.001, 1, snap=lambda point: (round(point[0] * 4) / 4,))
+    assert sorted(asked) == [(0.0,), (0.25,), (0.5,), (0.75,), (1.0,)]
+    assert (result.mildest, result.passed_below, result.settled) == ((0.5,), (0.25,), True)

@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from aircraft.interface import AircraftState
+from harness.flight.record import COLUMNS, TRACK_FIELDS, AcceptedPlan, FloatArray, Track, TrackLog, digest
+from planner.interface import Plan, PlanStatus
+
+CONTRACT = (
+    "time_s east_m north_m up_m course_deg heading_deg roll_deg pitch_deg airspeed_mps groundspeed_mps "
+    "load_factor roll_command_deg cross_track_m clearance_m plan_index"
+)
+
+
+def state(time_s: float) -> AircraftState:
+    return AircraftState(time_s, 3.0, 4.0, 300.0, -15.0, 20.0, 0.5, -0.1, 0.2, 0.03, 24.0, 1.1)
+
+
+def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
+    assert points_m.shape == (len(times_s), 2)
+    return np.full(len(times_s), np.inf)
+
+
+def test_columns_are_those_of_the_contract() -> None:
+    assert " ".join(COLUMNS) == CONTRACT
+    assert (*COLUMNS, "arc_length_m", "throttle") == TRACK_FIELDS
+
+
+def test_row_holds_the_state_in_the_units_of_the_file() -> None:
+    log = TrackLog(lambda points, times: points.sum(axis=1) + times)
+    log.add(state(0.5), 0.25, -1.5, 77.0, 3)
+    track = log.close()
+    row = {name: getattr(track, name)[0] for name in TRACK_FIELDS}
+    assert row["course_deg"] == pytest.approx(360.0 - math.degrees(math.atan(0.75)))
+    assert row["heading_deg"] == pytest.approx(360.0 - math.degrees(0.1))
+    assert row["groundspeed_mps"] == 25.0
+    assert row["roll_deg"] == pytest.approx(math.degrees(0.2))
+    assert row["pitch_deg"] == pytest.approx(math.degrees(0.03))
+    assert row["roll_command_deg"] == pytest.approx(math.degrees(0.25))
+    assert row["clearance_m"] == 7.5
+    assert (row["time_s"], row["east_m"], row["north_m"], row["up_m"]) == (0.5, 3.0, 4.0, 300.0)
+    assert (row["airspeed_mps"], row["load_factor"]) == (24.0, 1.1)
+    assert (row["cross_track_m"], row["arc_length_m"], row["plan_index"]) == (-1.5, 77.0, 3)
+
+
+def test_blocks_come_while_flying_and_add_up() -> None:
+    blocks: list[Track] = []
+    log = TrackLog(none_near, [blocks.append], block_rows=4)
+    for tick in range(10):
+        log.add(state(tick / 10), 0.0, math.nan, math.nan, -1)
+        assert len(blocks) == (tick + 1) // 4
+    track = log.close()
+    assert [len(block) for block in blocks] == [4, 4, 2]
+    assert digest(Track.joined(blocks)) == digest(track)
+    assert track.plan_index.dtype == np.int64
+    np.testing.assert_array_equal(track.time_s, np.arange(10) / 10)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_a_state_that_is_not_finite_is_no_row_nor_a_block(rows: int) -> None:
+    blocks: list[Track] = []
+    log = TrackLog(none_near, [blocks.append], block_rows=rows)
+    for tick in range(4):
+        log.add(state(tick / 10), 0.0, math.nan, math.nan, -1)
+    log.add(state(0.4)._replace(velocity_up_mps=math.inf), 0.0, math.nan, math.nan, -1)
+    np.testing.assert_array_equal(log.close().time_s, np.arange(4) / 10)
+    assert all(len(block) for block in blocks)
+
+
+def test_digest_does_not_depend_on_the_blocks() -> None:
+    digests = set()
+    for rows in (1, 3, 100):
+        log = TrackLog(none_near, block_rows=rows)
+        for tick in range(7):
+            log.add(state(tick / 10), 0.01 * tick, math.nan, 0.0, tick)
+        digests.add(digest(log.close()))
+    assert len(digests) == 1
+
+
+def test_digest_is_the_hash_of_the_columns_in_order(make_track: Callable[..., Track]) -> None:
+    track = make_track(5, cross_track_m=np.array([np.nan, 1, 2, 3, 4]))
+    joined = b"".join(
+        np.asarray(getattr(track, name), "<i8" if name == "plan_index" else "<f8").tobytes()
+        for name in CONTRACT.split()
+    )
+    assert digest(track) == hashlib.sha256(joined).hexdigest()
+    assert digest(make_track(5, arc_length_m=9.0)) == digest(make_track(5))
+    for name in CONTRACT.split():
+        assert digest(make_track(5, **{name: 17})) != digest(make_track(5)), name
+
+
+def test_track_is_read_only_and_copies(make_track: Callable[..., Track]) -> None:
+    east = np.zeros(5)
+    track = make_track(5, east_m=east)
+    east[0] = 9.0
+    assert track.east_m[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        track.east_m[0] = 1.0
+
+
+def test_a_part_of_a_track_is_some_of_its_rows(make_track: Callable[..., Track]) -> None:
+    track = make_track(7, east_m=np.arange(7.0), plan_index=np.arange(7))
+    part = track.part(2, 5)
+    assert len(part) == 3
+    assert digest(part) == digest(Track(**{name: column[2:5] for name, column in vars(track).items()}))
+    with pytest.raises(ValueError, match="read-only"):
+        part.east_m[0] = 1.0
+
+
+def test_columns_of_different_length_are_refused(make_track: Callable[..., Track]) -> None:
+    columns = dict(vars(make_track(5)))
+    with pytest.raises(ValueError, match="track column up_m has shape"):
+        Track(**{**columns, "up_m": np.zeros(4)})
+
+
+def test_accepted_plan_needs_a_path() -> None:
+    with pytest.raises(ValueError, match="accepted plan 3 has no path"):
+        AcceptedPlan(3, 0.0, 1.0, Plan(PlanStatus.NO_PATH, "none"))

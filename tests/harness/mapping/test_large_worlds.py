@@ -1,0 +1,131 @@
+"""What is written of very many obstacles is made with little memory, and is the same as of few."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.files.strict_yaml import dump
+from harness.files.yaml_pieces import PIECE, dump_in_pieces
+from harness.mapping.scan import RangeScan
+from harness.recording.scene import circle, lines_2d
+from harness.recording.sensed import NEAR_CELLS, Sensed, returns_m
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from planner.interface import FloatArray
+
+NUMBER = 2 * PIECE + 3
+
+
+def one_by_one(number: int) -> dict[str, object]:
+    """With obstacles of both kinds, so many."""
+    shapes = (
+        {"circle": {"center_m": [0.1 * i, -2.5], "radius_m": 1e-7 * i}}
+        if i % 3
+        else {
+            "polygon": {"vertices_m": [[float(i), 0.0], [1.0, 2.0], [3.5, i / 7.0]]},
+            "velocity_mps": [1.0, 0.5],
+        }
+        for i in range(number)
+    )
+    return {
+        "schema": "wayproof/scenario/1",
+        "area": {"bounds_m": [0.0, 0.0, 1e5, 1e5]},
+        "obstacles": list(shapes),
+        "mission": {"start_m": (1.0, 2.0), "nothing": {}, "none": []},
+        "note": "yes",
+    }
+
+
+@pytest.mark.parametrize("left_out", [(), ("mission", "note"), ("mission",), ("schema", "area"), ("area",)])
+def test_a_long_list_in_pieces_is_the_same_text(left_out: tuple[str, ...]) -> None:
+    value = {key: inner for key, inner in one_by_one(NUMBER).items() if key not in left_out}
+    whole = dump(value)
+    assert dump_in_pieces(value) == whole
+    few = {**value, "obstacles": value["obstacles"][:5]}  # type: ignore[index]
+    assert dump_in_pieces(few) == dump(few)
+
+
+@pytest.mark.parametrize("inner", [1.5, "yes", [1.0, 2.0], {"a": 1}, {"a": {}}])
+def test_so_is_a_long_list_of_anything(inner: object) -> None:
+    for value in (
+        {"a": {"b": 1}, "long": [inner] * NUMBER},
+        {"long": [inner] * NUMBER},
+        {"long": [inner] * NUMBER, "b": 2},
+    ):
+        text = dump_in_pieces(value)
+        assert text == dump(value)
+        assert yaml.safe_load(text) == value
+
+
+CELL_M = 20.0
+
+
+def crowd(number: int, side_m: float, seed: int) -> list[Obstacle]:
+    """Small circles and triangles in a square, one in fifty of them moving or timed."""
+    rng = np.random.default_rng(seed)
+    rows = zip(rng.uniform(0.0, side_m, (number, 2)).tolist(), rng.uniform(2.0, 30.0, number), strict=True)
+    shapes = [
+        Circle((x, y), size) if i % 3 else Polygon(((x, y), (x + size, y), (x, y + 2.0 * size)))
+        for i, ((x, y), size) in enumerate(rows)
+    ]
+    return [
+        Obstacle(shape, *(() if i % 50 else ((4.0, -3.0), (10.0, 60.0) if i % 100 else None)))
+        for i, shape in enumerate(shapes)
+    ]
+
+
+def looks(rng: np.random.Generator, low_m: float, high_m: float) -> list[RangeScan]:
+    """Three scans that returned places in a square."""
+    away = rng.uniform(low_m, high_m, (3, 300)) + 1j * rng.uniform(low_m, high_m, (3, 300))
+    return [
+        RangeScan(t, t, 0.0, 0.0, 0.0, 0.0, 0.01, row / np.abs(row), np.abs(row), 1e6)
+        for t, row in zip((0.0, 20.0, 80.0), away, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_a_scan_shows_of_a_crowd_is_told_by_the_nearest_edge(seed: int) -> None:
+    obstacles, scans = crowd(300, 2000.0, seed), looks(np.random.default_rng(seed), 500.0, 1500.0)
+    points = [returns_m(scan) for scan in scans]
+    news = Sensed(obstacles, CELL_M).take(scans, points)
+    where, times = np.concatenate(points), np.repeat([0.0, 20.0, 80.0], 300)
+    away = np.abs([each.distance(where, times) for each in obstacles])
+    near = away.min(axis=0) <= NEAR_CELLS * CELL_M
+    nearest = away.argmin(axis=0)
+    assert set(news.first) <= set(nearest[near].tolist())
+    shown = {
+        tuple(point): index for point, index, so in zip(where.tolist(), nearest, near, strict=True) if so
+    }
+    assert len(news.points_m) > 100
+    for point in news.points_m.tolist():
+        assert obstacles[shown[tuple(point)]].stands_for_ever
+        assert shown[tuple(point)] in news.first
+
+
+def test_what_a_scan_shows_of_a_large_crowd_takes_little_memory() -> None:
+    obstacles, scans = crowd(20_000, 20_000.0, 1), looks(np.random.default_rng(1), 5000.0, 15_000.0)
+    sensed = Sensed(obstacles, CELL_M)
+    tracemalloc.start()
+    news = sensed.take(scans, [returns_m(scan) for scan in scans])
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(news.first) > 100
+    assert peak < 20e6
+
+
+@given(st.lists(st.integers(3, 6), min_size=1, max_size=6))
+@settings(max_examples=30)
+def test_outlines_are_recorded_as_they_are(lengths: list[int]) -> None:
+    def recorded(rings: list[FloatArray]) -> list[list[list[float]]]:
+        batch = lines_2d(rings, (1, 2, 3), 1.0, 1).strips
+        assert batch is not None
+        found: list[list[list[float]]] = batch.as_arrow_array().to_pylist()
+        return found
+
+    rings = [circle((10.0 * i, 1 / 3), 2.0 + i, points) for i, points in enumerate(lengths)]
+    assert recorded(rings) == [ring.astype(np.float32).tolist() for ring in rings]

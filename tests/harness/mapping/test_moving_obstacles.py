@@ -1,0 +1,399 @@
+"""What moves is found, and nothing else is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from harness.mapping import moving_obstacles
+from harness.mapping.followed_outline import bow
+from harness.mapping.moving_obstacles import COASTS_S, MovingObstacles
+from harness.mapping.scan import RangeScan
+from harness.world import ray_casting
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.world import World
+from planner.interface import BoolArray, ComplexArray, FloatArray, MovingEdges
+from tests.harness.sensing import CLEARANCE, SCAN_S, SPEED, block, flight, off, regular, sensor, world_of
+
+SEEDS = st.integers(0, 2**32 - 1)
+START = (3000.0, 1500.0)
+Found = list[tuple[float, tuple[MovingEdges, ...]]]
+
+
+def watched(scans: Iterable[RangeScan], noise_m: float = 0.0) -> Found:
+    """What is known to move after each scan, and the time of that."""
+    seen = MovingObstacles(CLEARANCE, noise_m)
+    found: Found = []
+    for scan in scans:
+        seen.update(scan)
+        found.append((scan.time_s, seen.found))
+    return found
+
+
+def errors(found: Found, velocity: complex) -> list[float]:
+    """How far off each velocity is, m/s."""
+    return [abs(complex(*each.velocity_mps) - velocity) for _, all_found in found for each in all_found]
+
+
+def known_error(each: MovingEdges, velocity: complex) -> float:
+    """How far off a velocity is, m/s; across its face where nothing else of it shows: along it it is not known."""
+    points = each.points_m[:, 0] + 1j * each.points_m[:, 1]
+    off, along = complex(*each.velocity_mps) - velocity, points[-1] - points[0]
+    along /= max(abs(along), 1e-9)
+    is_straight = np.abs(((points - points[0]) * along.conjugate()).imag).max() < 0.1
+    return abs((off * along.conjugate()).imag) if is_straight else abs(off)
+
+
+def passing(
+    speed_mps: float, turned_rad: float, away_m: float, bearing_rad: float, size: float, corners: int
+) -> tuple[World, complex]:
+    """An obstacle that comes nearer or crosses, and its velocity (east + i north).
+
+    It is `away_m` from the aircraft after 20 s, in a direction; there it moves towards the aircraft, but for an angle.
+    """
+    direction = complex(math.sin(bearing_rad), math.cos(bearing_rad))
+    velocity = -speed_mps * direction * complex(math.cos(turned_rad), math.sin(turned_rad))
+    place = complex(*START) + 1j * SPEED * 20.0 + away_m * direction - velocity * 20.0
+    shape: Circle | Polygon = Circle((place.real, place.imag), size)
+    if corners > 2:
+        shape = regular(place.real, place.imag, size, corners, bearing_rad + turned_rad)
+    return world_of(Obstacle(shape, velocity_mps=(velocity.real, velocity.imag))), velocity
+
+
+@settings(max_examples=40, derandomize=True)  # of a thousand passes three are told worse
+@given(
+    speed=st.floats(1.0, 10.0),
+    turned=st.floats(-1.4, 1.4),
+    away=st.floats(400.0, 800.0),
+    bearing=st.floats(-1.1, 1.1),
+    size=st.floats(50.0, 150.0),
+    corners=st.sampled_from([0, 0, 3, 4, 5]),
+)
+@example(speed=3.0, turned=0.25, away=400.0, bearing=-0.75, size=81.0, corners=5)
+@example(
+    speed=2.0, turned=-1.25, away=672.0, bearing=0.75, size=50.0, corners=3
+)  # a lone face, another in the end
+@example(
+    speed=4.0, turned=1.4, away=509.0, bearing=1.05, size=137.0, corners=3
+)  # a face that slides along itself
+def test_velocity_is_told(
+    speed: float, turned: float, away: float, bearing: float, size: float, corners: int
+) -> None:
+    world, velocity = passing(speed, turned, away, bearing, size, corners)
+    found = watched(flight(sensor(world), 40.0, START))
+    # Slower ones take longer to leave what was looked through.
+    assert speed < 2.0 or any(all_found for time_s, all_found in found if time_s <= 30.0)
+    assert max(len(all_found) for _, all_found in found) <= 2
+    off_mps = errors([each for each in found if each[0] <= 28.0], velocity)
+    told = [each for time_s, all_found in found if time_s <= 28.0 for each in all_found]
+    assert np.median([known_error(each, velocity) for each in told] or [0.0]) < 1.5
+    # Near by, an obstacle shows other faces than before: for a moment that looks like motion.
+    assert max(off_mps, default=0.0) < 5.0
+
+
+@pytest.mark.parametrize("speed", [2.0, 3.0])
+def test_what_shows_only_a_face_that_comes_nearer_is_told_as_soon(speed: float) -> None:
+    """No end of it is seen: where it goes along its face is not known, that it moves is."""
+    world, velocity = passing(speed, 0.21875, 400.0, 0.0625, 76.0, 5)
+    found = watched(flight(sensor(world), 20.0, START))
+    assert any(all_found for _, all_found in found)
+    assert max(errors(found, velocity)) < 1.5
+
+
+def test_velocity_is_told_anew_when_another_face_comes_into_view() -> None:
+    """Of a lone face only motion across it is known; with the next one all is, and what was believed is dropped."""
+    world, velocity = passing(5.0, 0.0, 400.0, 1.0, 105.0, 5)
+    found = watched(flight(sensor(world), 28.0, START))
+    off_mps = {time_s: errors([(time_s, each)], velocity) for time_s, each in found}
+    assert off_mps[15.0][0] > 1.5
+    assert all(max(off_mps[time_s]) < 0.1 for time_s in np.arange(19.0, 28.0, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("corners_m", "velocity", "discs"),
+    [
+        (
+            [(3038.0, 2431.0), (2912.0, 2271.0), (3113.0, 2242.0)],
+            (-0.7, -4.0),
+            [(2923.0, 2234.0, 47.0), (3077.0, 2234.0, 73.0)],
+        ),
+        (
+            [(2940.0, 2200.0), (2982.0, 2031.0), (3151.0, 2073.0), (3109.0, 2242.0)],
+            (0.0, -5.6),
+            [(2837.0, 2026.0, 73.0), (3000.0, 2026.0, 55.0), (3163.0, 2026.0, 54.0)],
+        ),
+    ],
+)
+def test_what_comes_out_between_still_things_that_it_overlaps_is_followed_without_them(
+    corners_m: list[tuple[float, float]],
+    velocity: tuple[float, float],
+    discs: list[tuple[float, float, float]],
+) -> None:
+    body = Obstacle(Polygon(tuple(corners_m)), velocity_mps=velocity)
+    world = world_of(body, *(Circle((east, north), radius) for east, north, radius in discs))
+    mover = World(world.obstacles[:1], world.bounds_m)
+    found = watched(flight(sensor(world), 45.0, START, speed=12.0))
+    told = [(time_s, each) for time_s, all_found in found for each in all_found]
+    assert len(told) > 40
+    assert max(abs(complex(*each.velocity_mps) - complex(*velocity)) for _, each in told) < 2.0
+    assert (
+        max(np.median(np.abs(off(mover, each.points_m, time_s))) for time_s, each in told) < 0.1 * CLEARANCE
+    )
+
+
+def test_what_appears_in_sight_and_moves_loses_no_returns() -> None:
+    """All scans before looked through where it would have been."""
+    body = Obstacle(Circle((2800.0, 2500.0), 80.0), velocity_mps=(6.0, -3.0), active_s=(20.0, 500.0))
+    seen, taken, met = MovingObstacles(CLEARANCE, 0.0), 0, 0
+    for scan in flight(sensor(world_of(body)), 45.0, START, speed=5.0):
+        moving = seen.update(scan)
+        if scan.time_s >= 27.0:
+            met += int((scan.ranges_m < math.inf).sum())
+            taken += 0 if moving is None else int(moving.sum())
+    assert taken > 0.9 * met > 500
+
+
+@pytest.mark.parametrize("speed", [20.0, 25.0, 30.0])
+@pytest.mark.parametrize("period_s", [0.5, 1.0])
+def test_what_is_fast_is_found(speed: float, period_s: float) -> None:
+    """Until its velocity is known it may be anywhere that it can have come to since it was seen first."""
+    body = Obstacle(Circle((2550.0, 2300.0), 80.0), velocity_mps=(speed, 0.0))
+    eye = sensor(world_of(body))
+    scans = [eye.scan(3000.0, 1500.0, 0.0, time_s) for time_s in np.arange(0.0, 30.0, period_s)]
+    found = [each for _, all_found in watched(iter(scans)) for each in all_found]
+    assert found
+    assert abs(complex(*found[-1].velocity_mps) - speed) < 0.5
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_long_walls_that_appear_are_not_told_to_move_where_ranges_err_a_little(seed: int) -> None:
+    """Neighbouring returns bend about: that is no outline that tells of motion along it."""
+    rng = np.random.default_rng(seed)
+    turn, north = rng.uniform(-0.6, 0.6), rng.uniform(1900.0, 2300.0)
+    along, across = (np.array([math.cos(a), math.sin(a)]) for a in (turn, turn + math.pi / 2))
+    ends = [
+        (3000.0, north) + along * i + across * j for i, j in ((-1500, 0), (1500, 0), (1500, 40), (-1500, 40))
+    ]
+    wall = Obstacle(Polygon(tuple((float(x), float(y)) for x, y in ends)), active_s=(15.0, 500.0))
+    found = watched(flight(sensor(world_of(wall), seed, range_noise_m=3.0), 60.0, START), noise_m=3.0)
+    assert not any(any(each.velocity_mps) for _, all_found in found for each in all_found)
+
+
+def test_what_moves_has_an_outline_though_no_two_returns_of_it_are_near_each_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def apart(places: ComplexArray, _: FloatArray) -> BoolArray:
+        return np.zeros(len(places), dtype=np.bool_)
+
+    monkeypatch.setattr(moving_obstacles, "joined", apart)
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    found = [each for _, all_found in watched(flight(sensor(world), 35.0, START)) for each in all_found]
+    assert len(found) > 20
+    assert min(len(each.points_m) for each in found) >= 3
+    assert abs(complex(*found[-1].velocity_mps) - velocity) < 0.2
+
+
+@pytest.mark.parametrize("corners", [0, 4])
+@pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}, {"field_of_view_deg": 180.0}])
+def test_it_is_where_it_is_told_to_be(corners: int, flaws: dict[str, Any]) -> None:
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, corners)
+    found = watched(flight(sensor(world, **flaws), 35.0, START))
+    first_s = next(time_s for time_s, all_found in found if all_found)
+    assert first_s <= 20.0
+    assert max(errors(found, velocity)) < 2.0
+    assert max(errors(found[-10:], velocity)) < 0.2
+    for time_s, all_found in found:
+        for each in all_found:
+            assert each.time_s == time_s
+            assert np.abs(off(world, each.points_m, time_s)).max() < 0.3 * CLEARANCE
+
+
+@pytest.mark.parametrize("noise_m", [1.0, 4.0])
+def test_with_noise_it_takes_longer_but_is_found(noise_m: float) -> None:
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    found = watched(flight(sensor(world, range_noise_m=noise_m), 40.0, START), noise_m)
+    assert next(time_s for time_s, all_found in found if all_found) <= 25.0
+    assert max(errors(found, velocity)) < 2.0
+
+
+def random_still_world(seed: int) -> World:
+    rng = np.random.default_rng(seed)
+    shapes: list[Circle | Polygon] = []
+    for _ in range(int(rng.integers(3, 14))):
+        east, north, size = rng.uniform(1500.0, 4500.0), rng.uniform(1500.0, 5500.0), rng.uniform(20.0, 300.0)
+        corners, turn = int(rng.integers(3, 7)), rng.uniform(0.0, math.tau)
+        long, high = rng.uniform(50.0, 1500.0), rng.uniform(20.0, 200.0)
+        kinds: tuple[Circle | Polygon, ...] = (
+            Circle((east, north), size),
+            regular(east, north, size, corners, turn),
+            block(east, north, east + long, north + high),
+        )
+        shapes.append(kinds[int(rng.integers(3))])
+    return world_of(*shapes)
+
+
+STILL: list[dict[str, Any]] = [
+    {},
+    {"dropout": 0.1, "false_return": 0.01},
+    {"range_noise_m": 2.0, "field_of_view_deg": 180.0},
+    {"range_noise_m": 4.0, "dropout": 0.1, "false_return": 0.01},
+    {"rays": 180},
+]
+
+
+@settings(max_examples=60)
+@given(
+    seed=SEEDS,
+    flaws=st.sampled_from(STILL),
+    turn=st.sampled_from([0.0, 0.0, 0.05, -0.16]),
+    course=st.floats(-0.6, 0.6),
+)
+@example(seed=623, flaws=STILL[0], turn=0.0, course=0.0)
+@example(seed=1215, flaws=STILL[4], turn=0.0, course=-0.24699075901474227)
+@example(seed=11734, flaws=STILL[1], turn=0.05, course=0.0707772080525213)
+@example(seed=68076, flaws=STILL[1], turn=-0.16, course=0.006071549687820643)
+def test_nothing_moves_in_a_still_world(seed: int, flaws: dict[str, Any], turn: float, course: float) -> None:
+    world, outside = random_still_world(seed), []
+    for scan in flight(sensor(world, seed, **flaws), 90.0, (3000.0, 1000.0), course, turn):
+        if world.clearance_at(scan.east_m, scan.north_m, 0.0) < 20.0:
+            break
+        outside.append(scan)
+    noise_m = flaws.get("range_noise_m", 0.0)
+    assert not any(all_found for _, all_found in watched(outside, noise_m))
+
+
+@pytest.mark.parametrize("flaws", STILL)
+@pytest.mark.parametrize("corners", [0, 4])
+def test_what_appears_does_not_move(corners: int, flaws: dict[str, Any]) -> None:
+    shape = Circle((2830.0, 2400.0), 80.0) if corners == 0 else regular(2830.0, 2400.0, 80.0, corners, 0.3)
+    world = world_of(Obstacle(shape, active_s=(15.0, 500.0)))
+    found = watched(flight(sensor(world, **flaws), 60.0, START), flaws.get("range_noise_m", 0.0))
+    assert not any(all_found for _, all_found in found)
+
+
+def told_s(found: Found, velocity: complex) -> float:
+    """When something is first told to move, and moves as told."""
+    time_s, told = next((time_s, all_found) for time_s, all_found in found if all_found)
+    assert min(abs(complex(*each.velocity_mps) - velocity) for each in told) < 0.5
+    return time_s
+
+
+def test_what_draws_back_is_found() -> None:
+    """It comes to no place that was looked through, but leaves those where it was met."""
+    world = world_of(Obstacle(Circle((3000.0, 2200.0), 100.0), velocity_mps=(0.0, 8.0)))
+    assert told_s(watched(flight(sensor(world), 40.0, START)), 8.0j) < 15.0
+
+
+@pytest.mark.parametrize(
+    ("place", "velocity", "from_east", "within_s"),
+    [
+        ((2800.0, 2380.0), 8.0 + 0.0j, 3100.0, 25.0),
+        ((2900.0, 2380.0), 8.0 + 0.0j, 3100.0, 15.0),
+        ((2900.0, 2380.0), 6.0 - 5.0j, 3000.0, 15.0),
+        ((2900.0, 2380.0), 4.0 + 0.0j, 3100.0, 15.0),
+    ],
+)
+def test_what_comes_out_between_still_ones_is_found_soon(
+    place: tuple[float, float], velocity: complex, from_east: float, within_s: float
+) -> None:
+    """Nearer to them than the clearance: they belong to no outline that is followed."""
+    moves = Obstacle(Circle(place, 80.0), velocity_mps=(velocity.real, velocity.imag))
+    world = world_of(moves, Circle((2880.0, 2280.0), 100.0), Circle((3150.0, 2420.0), 50.0))
+    found = watched(flight(sensor(world), 50.0, (from_east, 1800.0), speed=5.0))
+    assert told_s(found, velocity) < within_s
+
+
+def test_what_leaves_sight_moves_on_for_a_while() -> None:
+    """It goes behind a wall."""
+    velocity = 8.0 + 0.0j
+    moves = Obstacle(Circle((2700.0, 2600.0), 40.0), velocity_mps=(8.0, 0.0))
+    world = world_of(moves, block(3000.0, 2300.0, 3600.0, 2350.0))
+    found = watched(flight(sensor(world), 80.0, (3000.0, 1900.0), speed=2.0))
+    times = [time_s for time_s, all_found in found if all_found]
+    hidden_s = 43.0  # wholly behind the wall from then on
+    assert times[0] < 25.0
+    assert hidden_s < times[-1] < hidden_s + COASTS_S
+    assert np.diff(times).max() == SCAN_S
+    last = next(all_found for time_s, all_found in reversed(found) if all_found)
+    assert abs(complex(*last[0].velocity_mps) - velocity) < 1.0
+    away = off(World([moves], world.bounds_m), last[0].points_m, times[-1])
+    assert np.abs(away).max() < 40.0
+
+
+def test_latency_changes_nothing_but_when_it_is_known() -> None:
+    world, _ = passing(8.0, 0.7, 500.0, 0.3, 100.0, 4)
+    prompt = watched(flight(sensor(world), 30.0, START))
+    late = watched(flight(sensor(world, latency_s=2.0), 30.0, START))
+    for (time_s, one), (other_s, other) in zip(prompt, late, strict=True):
+        assert time_s == other_s
+        assert [each.velocity_mps for each in one] == [each.velocity_mps for each in other]
+
+
+def test_rays_that_met_it_are_told() -> None:
+    world, _ = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    still = block(2000.0, 2900.0, 4000.0, 2950.0)
+    both = World([*world.obstacles, Obstacle(still)], world.bounds_m)
+    seen = MovingObstacles(CLEARANCE, 0.0)
+    told = 0
+    for scan in flight(sensor(both), 30.0, START):
+        moving = seen.update(scan)
+        assert (moving is None) or moving.any()
+        if moving is not None:
+            told += 1
+            rays = np.flatnonzero(moving)
+            where = scan.from_sensor_m(rays) + complex(scan.east_m, scan.north_m)
+            points = np.column_stack((where.real, where.imag))
+            assert np.abs(off(world, points, scan.time_s)).max() < 1.0
+            of_it = np.abs(world.clearance(*_all_hits(scan))) < 1.0
+            assert len(rays) >= 0.7 * of_it.sum()
+    assert told > 20
+
+
+def _all_hits(scan: RangeScan) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    rays = np.flatnonzero(scan.ranges_m < math.inf)
+    where = scan.from_sensor_m(rays) + complex(scan.east_m, scan.north_m)
+    return np.column_stack((where.real, where.imag)), np.full(len(rays), scan.time_s)
+
+
+def test_where_it_was_is_told_when_it_is_found() -> None:
+    world, velocity = passing(8.0, 0.7, 500.0, 0.3, 100.0, 0)
+    seen, told = MovingObstacles(CLEARANCE, 0.0), []
+    for scan in flight(sensor(world), 30.0, START):
+        seen.update(scan)
+        if len(seen.trail_m):
+            told.append((scan.time_s, seen.trail_m))
+    ((time_s, trail),) = told
+    assert np.unique(np.floor(trail / (0.5 * CLEARANCE)), axis=0).shape == trail.shape
+    # All along, for as long as it took to be found.
+    for ago_s in np.arange(0.0, 12.0, 1.0):
+        (points,) = (each.points_m for each in seen.found)
+        back = points - np.array((velocity.real, velocity.imag)) * (30.0 - SCAN_S - time_s + ago_s)
+        away = np.hypot(*(back[:, None] - trail).transpose(2, 0, 1)).min(axis=1)
+        assert away.max() < CLEARANCE
+
+
+def test_in_a_still_world_few_scans_are_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    read = []
+    follow = ray_casting.Fan.ranges_m
+
+    def counted(self: ray_casting.Fan, *arguments: Any) -> Any:
+        read.append(arguments)
+        return follow(self, *arguments)
+
+    monkeypatch.setattr(ray_casting.Fan, "ranges_m", counted)
+    watched(flight(sensor(world_of(Circle((3300.0, 2500.0), 150.0))), 60.0, START))
+    assert 10 <= len(read) <= 60.0 / 3.0
+
+
+@pytest.mark.parametrize("chord", [0j, 40.0 + 30.0j])
+def test_returns_from_one_place_are_laid_on_no_curve(chord: complex) -> None:
+    places = np.array([100.0 + 50.0j] * 4)
+    np.testing.assert_array_equal(bow(places, 10.0), places)
+    curve = bow(places + chord * np.linspace(0.0, 1.0, 4), 10.0)
+    np.testing.assert_allclose(curve[[0, -1]], [100.0 + 50.0j, 100.0 + 50.0j + chord])

@@ -1,0 +1,417 @@
+"""The obstacle map against the true world, fed by the range sensor and by scans made by hand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from numpy.typing import NDArray
+
+from harness.mapping.free_space import FreeSpace
+from harness.mapping.obstacle_map import ObstacleMap
+from harness.mapping.scan import RangeScan
+from harness.world.world import Circle, Obstacle, Polygon, World
+from tests.harness.looking import (
+    BOUNDS,
+    CLEARANCE,
+    MIDDLE,
+    RANGE,
+    SEEDS,
+    WALL,
+    FloatArray,
+    distance_to,
+    on_circle,
+    random_world,
+    scans,
+    sensor,
+    world_of,
+)
+
+IntArray = NDArray[np.intp]
+
+SPACING = CLEARANCE / 4.0
+Edit = Callable[[int, FloatArray], None]
+
+
+def empty_map(doubtful: bool = True) -> ObstacleMap:
+    return ObstacleMap(BOUNDS, CLEARANCE, RANGE, doubtful=doubtful)
+
+
+def fed(*sequences: list[RangeScan], doubtful: bool = True) -> ObstacleMap:
+    seen = empty_map(doubtful)
+    for scan in (scan for sequence in sequences for scan in sequence):
+        seen.update(scan)
+    return seen
+
+
+def edited(scan: RangeScan, ray: int, range_m: float) -> RangeScan:
+    """A scan with one other return."""
+    ranges = scan.ranges_m.copy()
+    ranges[ray] = range_m
+    return replace(scan, ranges_m=ranges)
+
+
+def edges(seen: ObstacleMap) -> FloatArray:
+    return seen.edges_since(-1)
+
+
+def cells(points: FloatArray) -> set[tuple[int, int]]:
+    """Cells of the grid on which points are kept, at most one a cell."""
+    origin = BOUNDS[0] - 2.0 * CLEARANCE - SPACING
+    return {(int(x), int(y)) for x, y in np.floor((points - origin) / SPACING).tolist()}
+
+
+MOST_IN_A_CELL = 1 + 4 * 4
+"""Points in a cell: one, and of a near outline one in every sixteenth of it."""
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS)
+def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
+    world = random_world(seed)
+    taken = scans(sensor(world, rays=1440), on_circle(4))
+    points = edges(fed(taken, taken))
+    if not len(points):
+        assert all(np.isinf(scan.ranges_m).all() for scan in taken)
+        return
+    # Rays lie 13 m apart or less: what is put between two hits of one wall is near it. What is put between
+    # two obstacles too near to each other to pass between lies within the clearance of one of them.
+    of_each = np.array([np.abs(o.distance(points, np.zeros(len(points)))) for o in world.obstacles])
+    off = np.sort(of_each, axis=0)
+    between = np.zeros(len(points), dtype=np.bool_) if len(off) < 2 else off[1] < 2.0 * CLEARANCE
+    assert off[0].max() <= CLEARANCE
+    assert off[0, ~between].max(initial=0.0) < SPACING
+    assert len(points) <= MOST_IN_A_CELL * len(cells(points))
+    tree = shapely.STRtree(shapely.points(points))
+    for scan in taken:
+        # What a single ray met is not believed: it might be a false return.
+        rays = np.flatnonzero(np.isfinite(scan.ranges_m))
+        hits = (scan.east_m, scan.north_m) + scan.directions[rays] * scan.ranges_m[rays, None]
+        ranges = scan.ranges_m[rays]
+        near = np.abs(ranges[:, None] - ranges) < 0.5 * CLEARANCE
+        apart = np.abs(rays[:, None] - rays)
+        beside = np.minimum(apart, len(scan.ranges_m) - apart) <= 2
+        hits = hits[(near & beside).sum(axis=0) > 1]
+        if len(hits):
+            _, gap = tree.query_nearest(shapely.points(hits), return_distance=True, all_matches=False)
+            assert gap.max() <= SPACING * math.sqrt(2.0) + 1e-6
+
+
+def test_edges_of_lone_obstacles_lie_on_them() -> None:
+    world = world_of(WALL, Circle((5000.0, 3000.0), 500.0))
+    points = edges(fed(scans(sensor(world), on_circle(40))))
+    assert len(points) > 30
+    assert np.abs(distance_to(world, points)).max() < 0.5 * SPACING
+
+
+def test_a_sensor_that_returns_nothing_false_is_believed_at_once() -> None:
+    eye = sensor(world_of(WALL))
+    first, second = scans(eye, [MIDDLE, MIDDLE])
+    at_once, later = fed([first], doubtful=False), fed([first, second])
+    assert len(edges(at_once)) > 0
+    assert cells(edges(at_once)) == cells(edges(later))
+    assert at_once.revision == 1
+
+
+def test_a_wall_is_known_at_the_second_look() -> None:
+    eye, seen = sensor(world_of(WALL)), empty_map()
+    first, second = scans(eye, [MIDDLE, MIDDLE])
+    seen.update(first)
+    assert len(edges(seen)) == 0
+    seen.update(second)
+    known = edges(seen)
+    assert known[:, 0].min() < 4000.0 + SPACING
+    assert known[:, 0].max() > 6000.0 - SPACING
+    assert np.diff(np.sort(known[:, 0])).max() < 2.0 * SPACING
+
+
+@pytest.mark.parametrize(("way_m", "gap_m"), [(0.0, 2.0 * SPACING), (600.0, 600.0 + 2.0 * 110.0)])
+def test_neighbouring_hits_too_near_to_each_other_to_pass_between_are_joined(
+    way_m: float, gap_m: float
+) -> None:
+    # Rays 105 m apart on a wall, in whose middle there may be a way.
+    halves = [
+        Polygon(((a, 6000.0), (b, 6000.0), (b, 6400.0), (a, 6400.0)))
+        for a, b in ((3500.0, 5000.0 - way_m / 2), (5000.0 + way_m / 2, 6500.0))
+    ]
+    points = edges(fed(scans(sensor(world_of(*halves), rays=60), [MIDDLE] * 8)))
+    front = points[np.abs(points - (5000.0, 6000.0)).max(axis=1) < 900.0]
+    gap = np.diff(np.sort(front[np.abs(front[:, 1] - 6000.0) < 1.0, 0])).max()
+    assert way_m <= gap < gap_m
+
+
+@pytest.mark.parametrize("at_m", [100.0, 900.0, 2500.0])
+def test_one_false_return_makes_no_wall_in_any_later_scan(at_m: float) -> None:
+    world = world_of(WALL)
+    taken = scans(sensor(world), on_circle(60))
+    truth, seen = fed(taken), empty_map()
+    for i, scan in enumerate(taken):
+        seen.update(edited(scan, 500, at_m) if i == 7 else scan)
+        assert np.abs(distance_to(world, edges(seen))).max(initial=0.0) < SPACING
+    np.testing.assert_array_equal(edges(seen), edges(truth))
+
+
+def test_false_returns_of_one_in_a_thousand_are_mostly_taken_back() -> None:
+    world = world_of(WALL)
+    seen = fed(scans(sensor(world, false_return=0.001), on_circle(400, 1500.0)))
+    off = np.abs(distance_to(world, edges(seen)))
+    assert (off > 2.0 * SPACING).mean() < 0.03
+
+
+def ray_at(scan: RangeScan, east_m: float, north_m: float) -> int:
+    """The ray that passes nearest to a place."""
+    to = np.array([east_m - scan.east_m, north_m - scan.north_m])
+    return int((scan.directions @ to).argmax())
+
+
+@pytest.mark.parametrize("scan_number", [0, 1, 3, 7, 11])
+def test_one_lost_return_opens_no_wall(scan_number: int) -> None:
+    taken = scans(sensor(world_of(WALL)), on_circle(40, 100.0))
+    lost = [
+        edited(scan, ray_at(scan, 5000.0, 6000.0), math.inf) if i == scan_number else scan
+        for i, scan in enumerate(taken)
+    ]
+    seen = empty_map()
+    for scan in lost[: scan_number + 1]:
+        seen.update(scan)
+    before = cells(edges(seen))
+    assert seen.last_removal_revision == 0
+    for scan in lost[scan_number + 1 :]:
+        seen.update(scan)
+        assert before <= cells(edges(seen))
+    assert cells(edges(seen)) == cells(edges(fed(taken)))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_with_a_fifth_of_the_returns_lost_walls_stay_closed(seed: int) -> None:
+    world, seen = world_of(WALL), empty_map()
+    for i, scan in enumerate(scans(sensor(world, seed, dropout=0.2), on_circle(120))):
+        seen.update(scan)
+        if i >= 10:
+            along = np.sort(np.concatenate((edges(seen)[:, 0], [4000.0, 6000.0])))
+            assert np.diff(along).max() < 2.0 * CLEARANCE
+    assert np.diff(np.sort(edges(seen)[:, 0])).max() < 2.0 * SPACING + 1.0
+
+
+def test_range_noise_leaves_walls_where_they_are() -> None:
+    world = world_of(WALL)
+    seen = fed(scans(sensor(world, range_noise_m=10.0), on_circle(80)))
+    assert np.abs(distance_to(world, edges(seen))).max() < 50.0 + SPACING
+    assert np.diff(np.sort(edges(seen)[:, 0])).max() < 2.0 * SPACING
+
+
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_an_obstacle_that_has_gone_is_forgotten(doubtful: bool) -> None:
+    gone = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 30.0))
+    stays = Obstacle(Circle((5000.0, 3500.0), 400.0))
+    eye = sensor(World([gone, stays], BOUNDS))
+    there = scans(eye, on_circle(60))
+    seen = fed(there, doubtful=doubtful)
+    assert (edges(seen)[:, 1] > 5500.0).sum() > 10
+    kept = edges(seen)[edges(seen)[:, 1] < 4500.0]
+    for scan in scans(eye, on_circle(60) * 4, start_s=31.0):
+        seen.update(scan)
+    left = edges(seen)
+    assert (left[:, 1] > 5500.0).sum() == 0
+    assert cells(kept) <= cells(left)
+    assert seen.last_removal_revision > 0
+
+
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_an_obstacle_that_moves_leaves_no_trail(doubtful: bool) -> None:
+    world = World([Obstacle(Circle((3500.0, 6500.0), 400.0), velocity_mps=(10.0, 0.0))], BOUNDS)
+    taken = scans(sensor(world), on_circle(80) * 8)
+    seen = fed(taken, doubtful=doubtful)
+    time = taken[-1].time_s
+    points = edges(seen)
+    off = np.abs(world.clearance(points, np.full(len(points), time)))
+    assert len(points) > 5
+    # Evidence against an edge that was certain takes six scans a point, six points: 18 s and 180 m.
+    assert off.max() < 3.0 * 180.0
+
+
+@pytest.mark.parametrize("doubtful", [True, False])
+def test_what_comes_back_is_an_edge_again_and_only_once(doubtful: bool) -> None:
+    comes_and_goes = [
+        Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(200.0 * i, 200.0 * i + 60.0)) for i in range(4)
+    ]
+    eye, seen = sensor(World(comes_and_goes, BOUNDS)), empty_map(doubtful)
+    for i in range(4):
+        for scan in scans(eye, on_circle(60), 200.0 * i):
+            seen.update(scan)
+        points = edges(seen)
+        assert len(points) > 10
+        assert len(cells(points)) == len(points)
+        for scan in scans(eye, on_circle(60) * 3, 200.0 * i + 61.0):
+            seen.update(scan)
+        assert len(edges(seen)) == 0
+
+
+def test_the_same_loop_again_and_again_adds_nothing() -> None:
+    world = world_of(WALL, Circle((5000.0, 3000.0), 500.0), Circle((3000.0, 5000.0), 300.0))
+    taken = scans(sensor(world), on_circle(50, 800.0))
+    seen = fed(taken, taken, taken)
+    points, revision = edges(seen), seen.revision
+    for _ in range(10):
+        for scan in taken:
+            seen.update(scan)
+    assert seen.revision == revision
+    np.testing.assert_array_equal(edges(seen), points)
+
+
+def test_what_lies_beyond_the_border_leaves_nothing() -> None:
+    """Near enough to be kept in detail, further out than the grid, and the only thing in sight."""
+    world = world_of(Circle((BOUNDS[0] - 700.0, 5000.0), 50.0))
+    taken = scans(sensor(world), [(5.0, 5000.0 + 20.0 * i) for i in range(5)])
+    assert all(600.0 < scan.ranges_m.min() < 5.0 * CLEARANCE for scan in taken)
+    assert fed(taken).revision == 0
+
+
+def test_points_never_outnumber_the_cells() -> None:
+    tiny = ObstacleMap((0.0, 0.0, 1000.0, 1000.0), CLEARANCE, RANGE)
+    rng = np.random.default_rng(1)
+    base = sensor(world_of()).scan(500.0, 500.0, 0.0, 0.0)
+    for _ in range(300):
+        tiny.update(replace(base, ranges_m=rng.uniform(0.0, RANGE, 720)))
+    # The area and a border of twice the clearance and a cell, in cells of 50 m.
+    assert 0 < len(edges(tiny)) <= MOST_IN_A_CELL * (1000 + 2 * 450) ** 2 / 50**2
+    low, high = edges(tiny).min(), edges(tiny).max()
+    assert low >= -500.0
+    assert high <= 1500.0
+
+
+def test_far_out_hits_do_not_matter() -> None:
+    corner = ObstacleMap((0.0, 0.0, 1000.0, 1000.0), CLEARANCE, RANGE)
+    world = World([Obstacle(Circle((2500.0, 500.0), 300.0))], BOUNDS)
+    for scan in scans(sensor(world), [(500.0, 500.0)] * 4):
+        corner.update(scan)
+    assert len(edges(corner)) == 0
+    assert corner.revision == 0
+
+
+def test_edges_since_tells_each_edge_once_in_order() -> None:
+    world = world_of(WALL, Circle((7000.0, 5000.0), 500.0))
+    seen, known, revisions = empty_map(), np.zeros((0, 2)), [seen_revision := 0]
+    line = [(3000.0 + 40.0 * i, 5000.0) for i in range(60)]
+    for scan in scans(sensor(world), line):
+        seen.update(scan)
+        fresh = seen.edges_since(seen_revision)
+        assert (len(fresh) > 0) == (seen.revision > seen_revision)
+        known = np.concatenate((known, fresh))
+        assert seen.revision in (seen_revision, seen_revision + 1)
+        seen_revision = seen.revision
+        revisions.append(seen_revision)
+        np.testing.assert_array_equal(edges(seen), known)
+    assert seen.last_removal_revision == 0
+    assert len(cells(known)) == len(known) > 40
+    assert len(seen.edges_since(seen.revision)) == 0
+    half = revisions[30]
+    later = seen.edges_since(half)
+    np.testing.assert_array_equal(later, known[len(known) - len(later) :])
+
+
+def test_what_is_taken_back_is_told_by_the_revision() -> None:
+    gone = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 10.0))
+    eye, seen = sensor(World([gone], BOUNDS)), empty_map()
+    for scan in scans(eye, [MIDDLE] * 20):
+        seen.update(scan)
+    assert seen.last_removal_revision == 0
+    size = len(edges(seen))
+    for scan in scans(eye, on_circle(100), 11.0):
+        before = seen.revision
+        seen.update(scan)
+        if len(edges(seen)) < size:
+            assert seen.last_removal_revision == seen.revision == before + 1
+        elif len(edges(seen)) == size:
+            assert seen.revision == before
+        size = len(edges(seen))
+    assert size == 0
+
+
+def test_edges_cannot_be_changed_from_outside() -> None:
+    seen = fed(scans(sensor(world_of(WALL)), [MIDDLE] * 4))
+    before = edges(seen).copy()
+    taken = seen.edges_since(-1)
+    taken[:] = 0.0
+    np.testing.assert_array_equal(edges(seen), before)
+
+
+def test_when_a_scan_becomes_available_does_not_matter() -> None:
+    world = world_of(WALL)
+    prompt = fed(scans(sensor(world), on_circle(30)))
+    late = fed(scans(sensor(world, latency_s=3.0), on_circle(30)))
+    np.testing.assert_array_equal(edges(prompt), edges(late))
+
+
+def test_a_wall_right_behind_is_joined_like_any_other() -> None:
+    # Rays 105 m apart on the wall; with the nose north, the first and the last of them look south.
+    south = Polygon(((3000.0, 2800.0), (7000.0, 2800.0), (7000.0, 2900.0), (3000.0, 2900.0)))
+    seen = fed(scans(sensor(world_of(south), rays=120), [MIDDLE] * 8))
+    along = np.sort(edges(seen)[np.abs(edges(seen)[:, 0] - 5000.0) < 800.0, 0])
+    assert np.diff(along).max() < 2.0 * SPACING
+
+
+@pytest.mark.parametrize("bounds", [(-7000.0, -333.3, 4000.0, 9000.0), (1e6, -1e6, 1.01e6, -0.99e6)])
+def test_areas_may_lie_anywhere(bounds: tuple[float, float, float, float]) -> None:
+    place = ((bounds[0] + bounds[2]) / 2, (bounds[1] + bounds[3]) / 2)
+    world = World([Obstacle(Circle((place[0] + 1500.0, place[1]), 500.0))], bounds)
+    seen, free = ObstacleMap(bounds, CLEARANCE, RANGE), FreeSpace(bounds, CLEARANCE, RANGE)
+    for scan in scans(sensor(world), [place] * 4):
+        seen.update(scan)
+        free.update(scan)
+    points = edges(seen)
+    assert len(points) > 10
+    assert np.abs(world.clearance(points, np.zeros(len(points)))).max() < SPACING
+    assert free.contains(np.array([place])).all()
+    assert not free.contains(np.array([(place[0] + 2500.0, place[1])])).any()
+
+
+def test_what_is_certain_is_forgotten_within_twenty_seconds_of_clear_sight() -> None:
+    there = Obstacle(Circle((5000.0, 6500.0), 400.0), active_s=(0.0, 30.0))
+    taken = scans(sensor(World([there], BOUNDS)), [(5000.0 + 15.0 * (i % 20), 5000.0) for i in range(61)])
+    seen = fed(taken)
+    assert len(edges(seen)) > 10
+    nothing = replace(taken[0], ranges_m=np.full(len(taken[0].ranges_m), math.inf))
+    scans_to_go = 0
+    while len(edges(seen)) and scans_to_go < 100:
+        seen.update(nothing)
+        scans_to_go += 1
+    # Two scans a second.
+    assert len(edges(seen)) == 0
+    assert 8 < scans_to_go <= 2 * 20
+
+
+def test_an_outline_is_kept_in_detail_where_the_wall_is_certain_already() -> None:
+    def outline(places: list[tuple[float, float]]) -> int:
+        seen = fed(scans(sensor(world_of(Circle((5000.0, 6500.0), 200.0))), [(5000.0, 4000.0)] * 20 + places))
+        return len(edges(seen)) - len(cells(edges(seen)))
+
+    assert outline([]) == 0
+    assert outline([(5000.0 + 20.0 * i, 6000.0) for i in range(10)]) > 2
+
+
+@pytest.mark.parametrize("off_m", [0.0, 13.0, 29.0, 41.0])
+def test_a_corner_is_kept_in_detail_though_both_of_its_sides_are_in_sight(off_m: float) -> None:
+    corner = (5000.0 + off_m, 5300.0 + off_m)
+    block = Polygon((corner, (corner[0] + 600.0, corner[1] + 600.0), (corner[0] - 600.0, corner[1] + 600.0)))
+    eye = sensor(world_of(block))
+    seen = fed(scans(eye, [(4990.0, 2800.0), (5000.0, 2850.0)]), scans(eye, [MIDDLE, (5010.0, 5000.0)]))
+    away = np.hypot(*(edges(seen) - corner).T)
+    # Near by rays are 3 m apart, and the points that were kept from afar up to 50.
+    assert away.min() < 5.0
+
+
+def test_the_flank_of_a_pillar_is_known_in_detail_though_the_gap_behind_it_is_closed() -> None:
+    pillars = [Circle((5000.0 + 90.0 * i, 5000.0 + 90.0 * j), 45.0) for i, j in ((0, 0), (0, 1), (1, 0))]
+    seen = ObstacleMap(BOUNDS, 50.0, RANGE, doubtful=False)
+    past = [(4903.7 - 1.62 * i, 5000.0 + 12.4 * i) for i in range(-90, 4)]
+    for scan in scans(sensor(world_of(*pillars)), past):
+        seen.update(scan)
+    track = np.array(past)
+    known = min(np.hypot(*(track - edge).T).min() for edge in edges(seen))
+    assert known == pytest.approx(distance_to(world_of(*pillars), track).min(), abs=0.5)

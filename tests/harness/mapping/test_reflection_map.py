@@ -1,0 +1,202 @@
+"""The map of a noisy sensor against the true world."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from harness.mapping.reflection_map import ReflectionMap
+from harness.world.obstacle import Circle, Obstacle
+from harness.world.world import World
+from tests.harness.sensing import (
+    BOUNDS,
+    CLEARANCE,
+    RANGE,
+    SCAN_S,
+    FloatArray,
+    block,
+    flight,
+    off,
+    regular,
+    sensor,
+    world_of,
+)
+
+NOISE = 0.01 * RANGE
+CELL = CLEARANCE / 4.0
+WALL = block(2400.0, 2500.0, 3600.0, 2600.0)
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def empty_map() -> ReflectionMap:
+    return ReflectionMap(BOUNDS, CLEARANCE, RANGE, NOISE)
+
+
+def seen_by_flight(world: World, seconds: float, seed: int = 1, **keys: float) -> ReflectionMap:
+    seen = empty_map()
+    for scan in flight(sensor(world, seed, **{"range_noise_m": NOISE} | keys), seconds, (2600.0, 1500.0)):
+        seen.update(scan)
+    return seen
+
+
+def edges(seen: ReflectionMap) -> FloatArray:
+    return seen.edges_since(-1)
+
+
+def random_world(seed: int) -> World:
+    """Some obstacles ahead, none in the way of the flight."""
+    rng = np.random.default_rng(seed)
+    shapes = []
+    for _ in range(5):
+        east, north, radius = (
+            rng.uniform(2000.0, 4000.0),
+            rng.uniform(1900.0, 3000.0),
+            rng.uniform(60.0, 250.0),
+        )
+        if abs(east - 2600.0) < radius + 80.0:
+            continue
+        turned = regular(east, north, radius, int(rng.integers(3, 6)), rng.uniform(0.0, 6.0))
+        shapes.append(Circle((east, north), radius) if rng.random() < 0.5 else turned)
+    return world_of(*(shapes or [Circle((3200.0, 2500.0), 100.0)]))
+
+
+@settings(max_examples=15)
+@given(
+    seed=SEEDS,
+    flaws=st.sampled_from([{}, {"dropout": 0.1, "false_return": 0.01}, {"field_of_view_deg": 180.0}]),
+)
+def test_edges_lie_at_true_walls_and_cover_what_is_in_view(seed: int, flaws: dict[str, float]) -> None:
+    world = random_world(seed)
+    points = edges(seen_by_flight(world, 30.0, seed, **flaws))
+    before = off(world, points) / NOISE
+    # What lies behind a wall does no harm.
+    assert np.quantile(before, 0.95) < 1.2
+    assert before.max() < 2.5
+    assert before.min() > -4.5
+    exact = next(flight(sensor(world), 1.0, (2600.0, 1900.0)))
+    near = np.flatnonzero(exact.ranges_m < 0.5 * RANGE)
+    assume(len(near) > 10)
+    where = exact.from_sensor_m(near) + complex(exact.east_m, exact.north_m)
+    away = np.abs(where[:, None] - (points[:, 0] + 1j * points[:, 1])).min(axis=1)
+    assert np.median(away) < 1.2 * NOISE + CELL
+    assert away.max() < 2.0 * CLEARANCE, "no gap to fly through"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lost_and_false_returns_together_change_nothing_of_note(seed: int) -> None:
+    world = world_of(WALL, Circle((3300.0, 1900.0), 120.0))
+    clean = seen_by_flight(world, 30.0, seed)
+    flawed = seen_by_flight(world, 30.0, seed, dropout=0.1, false_return=0.01)
+    for one, other in ((clean, flawed), (flawed, clean)):
+        here, there = edges(one), edges(other)
+        away = np.hypot(*(here[:, None] - there).transpose(2, 0, 1)).min(axis=1)
+        assert len(here) > 100
+        assert away.max() <= 2.0 * NOISE
+        assert np.mean(away <= 1.5 * CELL) > 0.98
+
+
+@pytest.mark.parametrize("false_return", [0.0, 0.01])
+def test_there_are_no_edges_in_empty_space(false_return: float) -> None:
+    seen = seen_by_flight(world_of(), 60.0, dropout=0.1, false_return=false_return)
+    assert len(edges(seen)) == 0
+    assert seen.revision == 0
+
+
+@pytest.mark.parametrize("active_s", [20.0, 60.0])
+def test_what_has_gone_fades_within_thirty_seconds_in_view(active_s: float) -> None:
+    stays = Circle((3400.0, 2200.0), 100.0)
+    goes = Obstacle(Circle((2900.0, 2200.0), 100.0), active_s=(0.0, active_s))
+    world, seen = world_of(goes, stays), empty_map()
+    left: dict[float, int] = {}
+    for scan in flight(sensor(world, range_noise_m=NOISE), active_s + 31.0, (2600.0, 1900.0), speed=3.0):
+        seen.update(scan)
+        left[scan.time_s] = int((edges(seen)[:, 0] < 3150.0).sum())
+    assert left[active_s - SCAN_S] > 15
+    assert left[active_s + 30.0] == 0
+    assert seen.last_removal_revision > 0
+    assert len(edges(seen)) > 15
+
+
+def test_what_appears_is_an_edge_within_ten_seconds_though_looked_through_for_long() -> None:
+    comes = Obstacle(Circle((2900.0, 2200.0), 100.0), active_s=(60.0, 500.0))
+    seen, known_s = empty_map(), []
+    for scan in flight(sensor(world_of(comes), range_noise_m=NOISE), 80.0, (2600.0, 1900.0), speed=3.0):
+        seen.update(scan)
+        if len(edges(seen)) > 10:
+            known_s.append(scan.time_s)
+    assert 60.0 < known_s[0] <= 70.0
+
+
+def test_edges_are_told_once_in_order_and_memory_is_bounded_by_the_area() -> None:
+    small = (2000.0, 2000.0, 2600.0, 2600.0)
+    seen, known, revision = ReflectionMap(small, CLEARANCE, RANGE, NOISE), np.zeros((0, 2)), 0
+    world = world_of(block(2500.0, 1900.0, 2550.0, 2700.0))
+    eye = sensor(world, range_noise_m=NOISE, false_return=0.5)
+    for _ in range(8):
+        for scan in flight(eye, 20.0, (2100.0, 2050.0)):
+            seen.update(scan)
+            if seen.last_removal_revision > revision:
+                known = edges(seen)
+            else:
+                known = np.concatenate((known, seen.edges_since(revision)))
+            revision = seen.revision
+            np.testing.assert_array_equal(known, edges(seen))
+    assert len(known) > 50
+    # Area and a border of twice the clearance and a cell.
+    assert len(known) <= ((600.0 + 2.0 * (2.0 * CLEARANCE + CELL)) / CELL + 1) ** 2
+    assert known.min() > 2000.0 - 2.0 * CLEARANCE - CELL
+    assert known.max() < 2600.0 + 2.0 * CLEARANCE + 2.0 * CELL
+
+
+def test_ignored_rays_and_forgotten_places_leave_nothing() -> None:
+    world, seen = world_of(WALL), empty_map()
+    for scan in flight(sensor(world, range_noise_m=NOISE), 20.0, (2600.0, 1900.0)):
+        seen.update(scan, ignored=scan.directions[:, 0] > 0.0)
+    points = edges(seen)
+    assert points[:, 0].max() < 2600.0 + 2.0 * CELL
+    assert points[:, 0].min() < 2420.0
+    revision = seen.revision
+    seen.forget(np.array([(9000.0, 9000.0)]), 100.0)
+    assert seen.revision == revision
+    seen.forget(np.array([(2400.0, 2500.0), (2400.0, 2550.0)]), 50.0)
+    assert seen.revision == seen.last_removal_revision == revision + 1
+    left = edges(seen)
+    assert 0 < len(left) < len(points)
+    assert np.hypot(*(left - (2400.0, 2500.0)).T).min() > 50.0
+
+
+def test_rays_that_met_what_moves_say_nothing_of_what_stands() -> None:
+    """Something passes before the wall for a minute."""
+    world, seen = world_of(WALL), empty_map()
+    scans = [*flight(sensor(world, range_noise_m=NOISE), 20.0, (2600.0, 1900.0), speed=2.0)]
+    for scan in scans:
+        seen.update(scan)
+    before = edges(seen)
+    blank = replace(scans[-1].kept(), ranges_m=np.full(len(scans[-1].ranges_m), np.inf))
+    for _ in range(120):
+        seen.update(blank, ignored=np.ones(len(blank.ranges_m), dtype=np.bool_))
+    assert len(before) > 50
+    np.testing.assert_array_equal(edges(seen), before)
+
+
+def test_what_has_long_stood_is_told_from_what_has_just_come() -> None:
+    pops = Obstacle(Circle((3000.0, 2200.0), 60.0), active_s=(28.0, 500.0))
+    on_wall, on_circle = np.array([(2700.0, 2500.0), (3200.0, 2500.0)]), np.array([(2960.0, 2155.0)])
+    elsewhere = np.array([(2700.0, 2500.0 - 4.0 * NOISE), (100.0, 5900.0), (-50.0, 7000.0)])
+    seen, told_s = empty_map(), 0.0
+    assert not seen.stands(on_wall).any()
+    eye = sensor(World([Obstacle(WALL), pops], BOUNDS), range_noise_m=NOISE)
+    for scan in flight(eye, 60.0, (2600.0, 1500.0), speed=5.0):
+        seen.update(scan)
+        if not told_s and np.hypot(*(edges(seen) - on_circle).T).min(initial=np.inf) < NOISE:
+            told_s = scan.time_s
+            assert seen.stands(on_wall).all()
+            assert not seen.stands(np.concatenate((on_circle, elsewhere))).any()
+    assert told_s >= 28.0
+    assert seen.stands(np.concatenate((on_wall, on_circle))).all()
+    assert not seen.stands(elsewhere).any()
+    assert seen.stands(np.zeros((0, 2))).shape == (0,)

@@ -1,0 +1,346 @@
+"""Edges, what moves and free space, put together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.mapping.free_space import FreeSpace
+from harness.mapping.scan import RangeScan
+from harness.mapping.sensed_map import SensedMap
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.world import World
+from planner.interface import MapView
+from tests.harness.sensing import (
+    BOUNDS,
+    CLEARANCE,
+    RANGE,
+    FloatArray,
+    block,
+    flight,
+    off,
+    regular,
+    sensor,
+    world_of,
+)
+
+FREE_CELL = CLEARANCE / 2.0
+START = (3000.0, 1500.0)
+
+
+def empty_world(noise_m: float = 0.0, false_returns: bool = False) -> SensedMap:
+    return SensedMap(BOUNDS, CLEARANCE, RANGE, noise_m=noise_m, false_returns=false_returns)
+
+
+def fed(scans: Iterable[RangeScan]) -> SensedMap:
+    seen = empty_world()
+    for scan in scans:
+        seen.update(scan)
+    return seen
+
+
+def lattice() -> FloatArray:
+    """Places all about, a quarter of a cell of free space apart at least."""
+    return np.random.default_rng(1).uniform(1500.0, 4500.0, (20_000, 2))
+
+
+def test_it_is_all_that_a_planner_may_know() -> None:
+    seen: MapView = empty_world()
+    assert (seen.revision, seen.last_removal_revision, seen.moving, seen.last_contradiction_s) == (
+        0,
+        0,
+        (),
+        -math.inf,
+    )
+    assert seen.spacing_m == CLEARANCE / 4.0
+    assert seen.edges_since(-1).shape == (0, 2)
+    assert not seen.seen_free(np.array([START])).any()
+
+
+@pytest.mark.parametrize("corners", [0, 4])
+def test_edges_of_what_moves_are_not_among_the_still_ones_and_leave_no_trail(corners: int) -> None:
+    shape = Circle((2700.0, 2400.0), 60.0) if corners == 0 else regular(2700.0, 2400.0, 60.0, corners, 0.2)
+    world = world_of(Obstacle(shape, velocity_mps=(8.0, -2.0)), block(2000.0, 2600.0, 4000.0, 2700.0))
+    mover, still = (World(world.obstacles[part], BOUNDS) for part in (slice(1), slice(1, None)))
+    seen, found_s = empty_world(), []
+    for scan in flight(sensor(world), 45.0, (3000.0, 1500.0), speed=5.0):
+        seen.update(scan)
+        found_s += [scan.time_s] if seen.moving else []
+        if seen.moving:
+            edges = seen.edges_since(-1)
+            strays = edges[np.abs(off(still, edges)) > CLEARANCE]
+            # At once: it is not waited for looks through its trail. Single rays may meet its ends at a glance.
+            assert len(strays) <= 6
+            assert np.abs(off(mover, strays, scan.time_s)).max(initial=0.0) < 1.5 * CLEARANCE
+            assert np.abs(off(world, seen.moving[0].points_m, scan.time_s)).max() < 0.3 * CLEARANCE
+    assert found_s[0] < 20.0
+    assert found_s[-1] == 44.5
+    assert (np.abs(off(still, seen.edges_since(-1))) < 1.0).sum() > 50
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_of_what_moves_also_that_is_known_to_which_comes_into_view_as_one_passes_by(side: float) -> None:
+    """It is met head on, and passed with its other flank in view in the end; beside it stands something."""
+    velocity = (-7.0 * side, 4.0)
+    body = Obstacle(Circle((3000.0 + side * 450.0, 2000.0), 140.0), velocity_mps=velocity)
+    world = world_of(body, Circle((3000.0 - side * 260.0, 2300.0), 60.0))
+    mover, still = (World(world.obstacles[part], BOUNDS) for part in (slice(1), slice(1, None)))
+    seen, looks = empty_world(), 0
+    for scan in flight(sensor(world), 55.0, (3000.0, 1300.0), speed=22.0):
+        seen.update(scan)
+        if seen.moving:
+            edges, ends = seen.edges_since(-1), scan.ends_m((scan.ranges_m < math.inf).nonzero()[0])
+            assert (np.abs(off(still, edges)) > CLEARANCE).sum() <= 6
+            met = np.column_stack((ends.real, ends.imag))
+            met = met[np.abs(off(mover, met, scan.time_s)) < 1.0]
+            away = np.hypot(*(met[:, None] - seen.moving[0].points_m).transpose(2, 0, 1)).min(axis=1)
+            assert np.quantile(away, 0.9) < 0.2 * CLEARANCE
+            looks += 1
+    assert looks > 80
+
+
+def test_free_space_is_taken_back_where_something_appears_and_in_its_shadow_only() -> None:
+    pops = Obstacle(Circle((3100.0, 2200.0), 60.0), active_s=(20.0, 500.0))
+    eye = sensor(world_of(pops))
+    before = fed(flight(eye, 20.0, START))
+    last = [*flight(eye, 20.0, START)][-1]
+    place = complex(last.east_m, last.north_m)
+    points = lattice()
+    points = points[before.seen_free(points)]
+    assert before.last_contradiction_s == -math.inf
+    # A scan from there at the time.
+    after = fed(
+        [*flight(eye, 20.0, START), *flight(eye, 1.0, (place.real, place.imag), start_s=20.0, speed=0.0)]
+    )
+    gone = points[~after.seen_free(points)]
+    away = gone[:, 0] - 3100.0 + 1j * (gone[:, 1] - 2200.0)
+    towards = complex(3100.0, 2200.0) - place
+    along, across = (
+        (away * towards.conjugate() / abs(towards)).real,
+        (away * towards.conjugate() / abs(towards)).imag,
+    )
+    widening = 60.0 * (1.0 + np.maximum(along, 0.0) / abs(towards))
+    assert after.last_contradiction_s == 20.0
+    assert along.min() > -60.0 - 3.0 * FREE_CELL
+    assert (np.abs(across) < widening + 3.0 * FREE_CELL * (1.0 + np.maximum(along, 0.0) / abs(towards))).all()
+    # Within and right behind it all of it.
+    inside = np.hypot(points[:, 0] - 3100.0, points[:, 1] - 2200.0) < 60.0
+    offset = points[:, 0] - place.real + 1j * (points[:, 1] - place.imag)
+    turned = offset * towards.conjugate() / abs(towards)
+    shadow = (turned.real > abs(towards)) & (np.abs(turned.imag) < 50.0) & (np.abs(turned) < RANGE)
+    assert inside.any()
+    assert shadow.any()
+    assert not after.seen_free(points[inside | shadow]).any()
+
+
+@settings(max_examples=15)
+@given(seed=st.integers(0, 2**32 - 1), appears_s=st.sampled_from([5.0, 10.0, 15.0]))
+def test_what_is_seen_free_is_free_of_what_has_appeared_in_view(seed: int, appears_s: float) -> None:
+    rng = np.random.default_rng(seed)
+    place, size = (rng.uniform(2300.0, 3700.0), rng.uniform(2200.0, 3200.0)), rng.uniform(30.0, 150.0)
+    shape = Circle(place, size) if rng.random() < 0.5 else regular(*place, size, int(rng.integers(3, 7)))
+    world = world_of(Obstacle(shape, active_s=(appears_s, 500.0)))
+    taken = [*flight(sensor(world), 20.0, START)]
+    seen = fed(taken)
+    points = lattice()
+    free = points[seen.seen_free(points)]
+    last = taken[-1]
+    offset = free[:, 0] - last.east_m + 1j * (free[:, 1] - last.north_m)
+    assert len(free) > 1000
+    # Beyond the range nobody can know; further than the rays are dense nothing was marked.
+    in_view = np.abs(offset) < 0.9 * RANGE
+    assert off(world, free[in_view], last.time_s).min() > -FREE_CELL
+
+
+def test_nothing_surprises_in_a_still_world() -> None:
+    world = world_of(
+        block(2400.0, 2500.0, 3600.0, 2600.0), Circle((3200.0, 2000.0), 90.0), Circle((2500.0, 1900.0), 40.0)
+    )
+    for turn in (0.0, 0.1, -0.1):
+        assert fed(flight(sensor(world), 30.0, START, turn_rad_s=turn)).last_contradiction_s == -math.inf
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 2.0])
+def test_it_is_surprised_when_the_scan_is_there(latency_s: float) -> None:
+    pops = Obstacle(regular(3000.0, 2300.0, 60.0, 4), active_s=(12.0, 500.0))
+    seen = fed(flight(sensor(world_of(pops), latency_s=latency_s), 13.0, START))
+    assert seen.last_contradiction_s == 12.0 + latency_s
+
+
+def test_what_moves_takes_free_space_back_and_gives_it_again() -> None:
+    moves = Obstacle(Circle((2700.0, 2200.0), 60.0), velocity_mps=(8.0, 0.0))
+    world, seen = world_of(moves), empty_world()
+    for scan in flight(sensor(world), 60.0, START, speed=3.0):
+        seen.update(scan)
+        place = moves.shape.center_m[0] + 8.0 * scan.time_s if isinstance(moves.shape, Circle) else 0.0
+        if scan.time_s > 20.0:
+            face = np.array([(place, 2200.0 - 50.0), (place, 2200.0)])
+            assert not seen.seen_free(face).any()
+    assert seen.seen_free(np.array([(2800.0, 2200.0), (2900.0, 2200.0)])).all()
+    assert seen.last_contradiction_s > 40.0
+
+
+NOISE = 0.01 * RANGE
+FLAWS: dict[str, Any] = {"range_noise_m": NOISE, "dropout": 0.1, "false_return": 0.01}
+
+
+@pytest.mark.parametrize("fov_deg", [360.0, 180.0])
+@pytest.mark.parametrize(
+    ("start", "velocity"), [((2600.0, 2300.0), (8.0, -2.0)), ((3000.0, 2900.0), (0.0, -9.0))]
+)
+def test_with_much_noise_what_moves_is_followed(
+    start: tuple[float, float], velocity: tuple[float, float], fov_deg: float
+) -> None:
+    moves = Obstacle(Circle(start, 60.0), velocity_mps=velocity)
+    still = block(2000.0, 2800.0, 2600.0, 2900.0)
+    # Far from others before the flight begins.
+    world, seen = world_of(moves, still), empty_world(noise_m=NOISE, false_returns=True)
+    mover = World(world.obstacles[:1], BOUNDS)
+    known_s: list[float] = []
+    for scan in flight(sensor(world, field_of_view_deg=fov_deg, **FLAWS), 45.0, START, speed=5.0):
+        seen.update(scan)
+        for each in seen.moving:
+            assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 1.5 * NOISE
+            if each.velocity_mps != (0.0, 0.0):
+                known_s.append(scan.time_s)
+                assert math.dist(each.velocity_mps, velocity) < (4.0 if scan.time_s < 30.0 else 2.0)
+    assert known_s[0] < 25.0
+    assert known_s[-1] > 40.0
+
+
+@pytest.mark.parametrize("seed", [3, 5, 6])
+def test_with_much_noise_what_comes_out_of_something_is_followed_though_little_of_it_is_new(
+    seed: int,
+) -> None:
+    corners = ((2811.0, 2300.0), (2677.0, 2169.0), (2857.0, 2118.0))
+    body = Obstacle(Polygon(corners), velocity_mps=(3.4, -3.2))
+    world = world_of(body, Circle((2809.0, 2170.0), 90.0), Circle((3117.0, 2049.0), 42.0))
+    mover, seen, told = World(world.obstacles[:1], BOUNDS), empty_world(noise_m=12.0), 0
+    for scan in flight(sensor(world, seed, range_noise_m=12.0), 45.0, (3000.0, 1500.0), speed=12.0):
+        seen.update(scan)
+        if scan.time_s > 25.0:
+            told += any(
+                np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 24.0 for each in seen.moving
+            )
+    assert told > 25  # of 39 scans
+
+
+@pytest.mark.parametrize("east", [2785.0, 2790.0, 2795.0])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_with_much_noise_what_stands_is_not_taken_for_a_part_of_what_passes_by(
+    east: float, seed: int
+) -> None:
+    """It all but touches three that stand in a row."""
+    moves = Obstacle(Circle((east, 2750.0), 60.0), velocity_mps=(0.0, -8.0))
+    row = [Circle(place, 40.0) for place in ((2890.0, 2350.0), (2940.0, 2430.0), (2990.0, 2490.0))]
+    world, seen = world_of(moves, *row), empty_world(noise_m=NOISE, false_returns=True)
+    mover, told = World(world.obstacles[:1], BOUNDS), 0
+    for scan in flight(sensor(world, seed, **FLAWS), 75.0, (3250.0, 1900.0), speed=5.0):
+        seen.update(scan)
+        for each in seen.moving:
+            told += 1
+            if each.velocity_mps == (0.0, 0.0):  # what has just come into view
+                assert np.median(np.abs(off(world, each.points_m, scan.time_s))) < 2.0 * NOISE
+            else:
+                assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 2.0 * NOISE
+    assert told > 10
+
+
+@pytest.mark.parametrize(
+    ("seed", "east", "north", "radius", "velocity", "behind_s"),
+    [
+        (19, 2733.0, 2296.0, 145.0, (8.9, -0.6), 20.0),
+        (25, 2610.0, 2341.0, 131.0, (6.9, -1.8), 21.0),
+        (38, 2655.0, 2446.0, 109.0, (6.1, -1.5), 13.0),
+        (39, 2631.0, 2264.0, 84.0, (7.0, -0.9), 12.0),
+    ],
+)
+def test_with_much_noise_what_appeared_is_not_taken_for_a_part_of_what_comes_out_of_it(
+    seed: int, east: float, north: float, radius: float, velocity: tuple[float, float], behind_s: float
+) -> None:
+    """Their faces go on from one to the other without a step: only when each was seen first tells them apart."""
+    begin = (east - velocity[0] * behind_s, north - velocity[1] * behind_s)
+    moves = Obstacle(Circle(begin, radius), velocity_mps=velocity)
+    pops = Obstacle(Circle((east, 2250.0), 180.0), active_s=(12.0, 500.0))
+    seen, wrong = empty_world(noise_m=NOISE, false_returns=True), 0
+    mover = World([moves], BOUNDS)
+    for scan in flight(sensor(world_of(moves, pops), seed, **FLAWS), 50.0, (3000.0, 1500.0), speed=12.0):
+        seen.update(scan)
+        for each in seen.moving:
+            if each.velocity_mps != (0.0, 0.0):
+                wrong += math.dist(each.velocity_mps, velocity) > 4.0
+                assert np.median(np.abs(off(mover, each.points_m, scan.time_s))) < 2.0 * NOISE
+    assert wrong <= 2
+
+
+def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_free() -> None:
+    pops = Obstacle(Circle((3050.0, 2200.0), 60.0), active_s=(20.0, 500.0))
+    seen, told_s = empty_world(noise_m=NOISE, false_returns=True), []
+    for scan in flight(sensor(world_of(pops), **FLAWS), 40.0, START, speed=10.0):
+        seen.update(scan)
+        told_s += [scan.time_s] if seen.moving else []
+        assert all(each.velocity_mps == (0.0, 0.0) for each in seen.moving)
+    assert 20.0 <= told_s[0] <= 21.0
+    assert seen.last_contradiction_s >= 20.0
+    assert not seen.seen_free(np.array([(3050.0, 2150.0), (3055.0, 2200.0)])).any()
+    # By then the map has it.
+    assert np.abs(off(world_of(pops.shape), seen.edges_since(-1))).min() < 0.5 * NOISE
+
+
+@settings(max_examples=12)
+@given(seed=st.integers(0, 2**32 - 1), fov_deg=st.sampled_from([360.0, 180.0]))
+def test_with_much_noise_nothing_is_taken_to_move_that_stands(seed: int, fov_deg: float) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = [
+        Circle((east, rng.uniform(1700.0, 3500.0)), rng.uniform(20.0, 120.0))
+        for east in (2400.0, 2700.0, 3300.0, 3500.0, 3700.0)
+    ]
+    eye = sensor(world_of(*shapes), seed % 1000, field_of_view_deg=fov_deg, **FLAWS)
+    seen, told = empty_world(noise_m=NOISE, false_returns=True), 0
+    for scan in flight(eye, 60.0, START, turn_rad_s=rng.uniform(-0.05, 0.05)):
+        seen.update(scan)
+        told += len(seen.moving) > 0
+        assert all(each.velocity_mps == (0.0, 0.0) for each in seen.moving)
+    assert told <= 12, "for a moment at most"
+
+
+def test_free_space_beyond_the_range_of_the_scan_stays() -> None:
+    free = FreeSpace(BOUNDS, CLEARANCE, RANGE)
+    eye = sensor(world_of())
+    for scan in flight(eye, 80.0, (3000.0, 500.0)):
+        free.update(scan)
+    here = eye.scan(3000.0, 1000.0, 0.0, 90.0)
+    behind = np.array([(3000.0, 1000.0 + away) for away in (300.0, 800.0, 1400.0, 1700.0, 2500.0)])
+    assert free.contains(behind).all()
+    assert not free.take_back(here, np.array([(5900.0, 5900.0)]))
+    assert free.contains(behind).all()
+    assert free.take_back(here, np.array([(3000.0, 1200.0)]))
+    assert free.contains(behind).tolist() == [False, False, False, True, True]
+    assert free.contains(np.array([(3000.0, 1100.0), (3300.0, 1300.0), (3000.0, 700.0)])).all()
+
+
+@pytest.mark.parametrize("noise_m", [15.0, 30.0, 60.0])
+@pytest.mark.parametrize("false_return", [0.1, 0.4])
+@pytest.mark.parametrize("clearance_m", [10.0, CLEARANCE])
+def test_whatever_a_bad_sensor_returns_is_taken_in(
+    noise_m: float, false_return: float, clearance_m: float
+) -> None:
+    world = world_of(
+        Obstacle(Circle((2700.0, 2400.0), 60.0), velocity_mps=(8.0, -2.0)),
+        block(2000.0, 2600.0, 4000.0, 2700.0),
+        *(Circle((300.0 + 700.0 * i, 1700.0 + 170.0 * (i % 3)), 50.0) for i in range(8)),
+    )
+    eye = sensor(world, range_noise_m=noise_m, false_return=false_return, dropout=0.1, rays=360)
+    seen = SensedMap(BOUNDS, clearance_m, RANGE, noise_m=noise_m, false_returns=True)
+    for scan in flight(eye, 60.0, START, turn_rad_s=0.02):
+        seen.update(scan)
+        for each in seen.moving:
+            assert np.isfinite(each.points_m).all()
+            assert math.hypot(*each.velocity_mps) <= 30.0 + 1e-9
+    assert np.isfinite(seen.edges_since(-1)).all()

@@ -1,0 +1,80 @@
+"""Quieter scans against those of a sensor without errors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from harness.mapping.scan import RangeScan
+from harness.mapping.smoothed_scan import ERR, smoothed
+from harness.world.obstacle import Circle
+from tests.harness.sensing import CLEARANCE, RANGE, block, flight, sensor, world_of
+
+NOISE = 0.01 * RANGE
+PLACE = (3000.0, 2000.0)
+
+
+def scans(*shapes: object, count: int = 40, **keys: float) -> list[RangeScan]:
+    """Scans from one place."""
+    eye = sensor(world_of(*shapes), **keys)  # type: ignore[arg-type]
+    return [*flight(eye, 0.5 * count, PLACE, speed=0.0)]
+
+
+@pytest.mark.parametrize(("away_m", "share"), [(1200.0, ERR), (400.0, 0.4), (150.0, 0.25)])
+def test_errors_shrink_the_more_the_nearer(away_m: float, share: float) -> None:
+    ring = Circle(PLACE, away_m)
+    errors = (
+        np.array([smoothed(scan, CLEARANCE).ranges_m for scan in scans(ring, range_noise_m=NOISE)]) - away_m
+    )
+    assert errors.std() < 1.1 * share * NOISE
+    assert abs(errors.mean()) < 0.05 * NOISE
+
+
+def test_lost_and_false_returns_hardly_count() -> None:
+    wall = block(2000.0, 2400.0, 4000.0, 2500.0)
+    (exact,) = scans(wall, count=1)
+    there = np.isfinite(exact.ranges_m)
+    wall_ends = np.convolve(np.diff(there, append=there[0]), np.ones(11), "same") > 0.0
+    inside, outside = there & ~wall_ends, ~there & ~wall_ends
+    assert min(inside.sum(), outside.sum()) > 100
+    quiet = np.array(
+        [smoothed(scan, CLEARANCE).ranges_m for scan in scans(wall, dropout=0.1, false_return=0.01)]
+    )
+    assert np.isinf(quiet[:, outside]).all()
+    assert np.isinf(quiet[:, inside]).mean() < 0.02
+    off = quiet[:, inside] / exact.ranges_m[inside] - 1.0
+    assert np.abs(off[np.isfinite(off)]).max() < 0.06
+
+
+def test_steps_stay_where_they_are() -> None:
+    (exact,) = scans(Circle((3000.0, 2250.0), 60.0), block(2000.0, 2600.0, 4000.0, 2700.0), count=1)
+    quiet = smoothed(exact, CLEARANCE).ranges_m
+    steps, kept = (
+        np.flatnonzero(np.abs(np.diff(np.minimum(ranges, RANGE))) > 100.0)
+        for ranges in (exact.ranges_m, quiet)
+    )
+    assert len(steps) == 4
+    np.testing.assert_array_equal(kept, steps)
+
+
+def test_what_is_narrower_than_half_the_width_and_stands_alone_is_lost() -> None:
+    (exact,) = scans(Circle((3000.0, 2250.0), 3.0), count=1)
+    assert np.isfinite(exact.ranges_m).sum() > 1
+    assert np.isinf(smoothed(exact, CLEARANCE).ranges_m).all()
+
+
+def test_the_ends_of_a_narrow_view_are_no_holes() -> None:
+    around = Circle(PLACE, 500.0)
+    for scan in scans(around, range_noise_m=NOISE, field_of_view_deg=180.0):
+        quiet = smoothed(scan, CLEARANCE)
+        assert np.abs(quiet.ranges_m - 500.0).max() < 3.0 * NOISE
+        assert (quiet.time_s, quiet.east_m, quiet.spacing_rad) == (scan.time_s, scan.east_m, scan.spacing_rad)
+
+
+def test_a_few_rays_are_enough() -> None:
+    for scan in scans(Circle(PLACE, 500.0), rays=5, count=3):
+        np.testing.assert_allclose(smoothed(scan, CLEARANCE).ranges_m, 500.0)
+    for scan in scans(rays=3, count=3):
+        assert (smoothed(scan, CLEARANCE).ranges_m == math.inf).all()

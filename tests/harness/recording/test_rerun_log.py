@@ -1,0 +1,568 @@
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+import urllib.request
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+import rerun as rr
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aircraft.interface import AircraftState
+from harness.analysis.metrics import metrics
+from harness.analysis.trackability import FlightLimits
+from harness.files.errors import RunFolderError
+from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.mapping.scan import RangeScan
+from harness.recording.blueprint import ERROR_COLOURS, Scene
+from harness.recording.log import RerunLog
+from harness.recording.overlay import write_overlay
+from harness.recording.scene import quaternions
+from harness.recording.states import mode_of
+from harness.recording.viewer import (
+    NO_DRIVER,
+    ViewerError,
+    _executable,
+    open_viewer,
+    run_names,
+    screenshot,
+    served,
+)
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from planner.interface import Mission, MovingEdges, Plan, PlanPicture, PlanStatus
+from planner.interface import Path as PlannedPath
+
+MISSION = Mission(
+    goal_m=(0.0, 2500.0),
+    goal_radius_m=50.0,
+    bounds_m=(-2000.0, -1000.0, 2000.0, 3000.0),
+    clearance_m=100.0,
+    turn_radius_m=110.0,
+    speed_mps=25.0,
+    roll_in_s=0.6,
+    tracking_error_m=0.5,
+    sensor_range_m=800.0,
+)
+OBSTACLES = (
+    Obstacle(Circle((600.0, 1250.0), 300.0)),
+    Obstacle(Polygon(((-1500.0, 500.0), (-500.0, 500.0), (-500.0, 1500.0), (-1000.0, 800.0)))),
+    Obstacle(Circle((1000.0, 2500.0), 100.0), velocity_mps=(-2.0, 0.0)),
+    Obstacle(Circle((-1000.0, 2500.0), 100.0), active_s=(20.0, 60.0)),
+)
+LIMITS = FlightLimits(300.0, 100.0, 0.78, 110.0, 0.5)
+SCENE = Scene("straight, none, aerosonde, seed 1", MISSION, (0.0, 0.0), LIMITS, OBSTACLES, "name: straight\n")
+PICTURE = PlanPicture(
+    guide_m=np.array([[0.0, 0.0], [0.0, 800.0]]),
+    window_m=700.0,
+    sectors=np.array([[1.0, 0.0, 0.0, 1.0]]),
+    candidates=(np.array([[0.0, 0.0], [0.0, 700.0]]), np.array([[0.0, 0.0], [200.0, 600.0]])),
+    met_m=np.array([[100.0, 300.0], [110.0, 300.0]]),
+)
+STATE = AircraftState(0.0, 0.0, 0.0, 300.0, 0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 25.0, 1.0)
+
+Columns = dict[str, list[Any]]
+
+
+@pytest.fixture(autouse=True)
+def strict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bad data is an error, not a warning."""
+    monkeypatch.setattr(rr.error_utils, "_strict_mode", True)
+
+
+def scan(time_s: float) -> RangeScan:
+    ranges = np.array([100.0, np.inf, 200.0, np.inf])
+    fan = np.array([1.0, -1.0j, -1.0, 1.0j])
+    return RangeScan(time_s, time_s, 5.0, 7.0, 0.0, math.pi / 2, math.pi / 2, fan, ranges, 800.0)
+
+
+def record(
+    path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan], east_m: float = 0.0
+) -> Flight:
+    """100 s north, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
+    track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
+    first = make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE)
+    second = make_plan([(0, 1250, 0, 1, 0.0, 1250.0)], index=1, time_s=50.0)
+    log = RerunLog(path, SCENE, recording_id="a")
+    for tick in range(200):
+        log.on_scan(scan(0.5 * tick), STATE)
+        for plan in (first, second):
+            if plan.time_s == 0.5 * tick:
+                log.on_plan(plan, STATE)
+    log.on_event(99.9, "goal reached")
+    for start in range(0, 1001, 300):
+        log.on_block(Track(**{name: column[start : start + 300] for name, column in vars(track).items()}))
+    flight = Flight(track, (first, second), Outcome.REACHED, "in the goal's circle", (2.5, 2.5), 100.0, 0.1)
+    log.close(metrics(flight, LIMITS))
+    return flight
+
+
+@pytest.fixture
+def recording(
+    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> tuple[Path, Flight]:
+    (tmp_path / "run").mkdir()
+    path = tmp_path / "run" / "flight.rrd"
+    return path, record(path, make_track, make_plan)
+
+
+def read(path: Path) -> dict[str, Columns]:
+    """All rows of a recording, by entity and column, in the order of logging."""
+    entities: dict[str, Columns] = {}
+    chunks = [
+        (chunk.entity_path, chunk.to_record_batch().to_pydict())
+        for chunk in rr.chunk.RrdReader(str(path)).stream().to_chunks()
+    ]
+    for entity, rows in sorted(chunks, key=lambda chunk: chunk[1]["rerun.controls.RowId"][0]):
+        columns = entities.setdefault(entity, {})
+        for name, values in rows.items():
+            columns.setdefault(name, []).extend(values)
+    return entities
+
+
+def column(entities: dict[str, Columns], entity: str, ending: str) -> list[Any]:
+    (values,) = (values for name, values in entities[entity].items() if name.endswith(ending))
+    return values
+
+
+def seconds(entities: dict[str, Columns], entity: str) -> list[float]:
+    times = entities[entity]["sim_time"]
+    return [time.total_seconds() for time in times]
+
+
+def rerun(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([_executable(), *arguments], capture_output=True, text=True, check=False)
+
+
+def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
+    path, flight = recording
+    entities = read(path)
+    for entity, values in {
+        "cross_track/flown": flight.track.cross_track_m,
+        "bank/pitch": flight.track.pitch_deg,
+        "bank/commanded": flight.track.roll_command_deg,
+        "bank/flown": flight.track.roll_deg,
+        "speed/ground": flight.track.groundspeed_mps,
+        "speed/flown": flight.track.airspeed_mps,
+        "altitude_error/flown": flight.track.up_m - 300.0,
+    }.items():
+        logged = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
+        np.testing.assert_array_equal(logged[-1001:], values)
+    for entity, value in {"clearance/wanted": 100.0, "bank/limit_left": -math.degrees(0.78)}.items():
+        level = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
+        np.testing.assert_allclose(level, value)
+        assert (seconds(entities, f"/series/{entity}")[0], seconds(entities, f"/series/{entity}")[-1]) == (
+            0,
+            100,
+        )
+    np.testing.assert_array_equal(np.ravel(column(entities, "/series/search/flown", "scalars")), [2.5, 2.5])
+    clearance = np.array(column(entities, "/series/clearance/flown", "scalars"), dtype=np.float64).ravel()
+    assert np.isnan(clearance[:200]).all()
+    assert (clearance[200:] == 150.0).all()
+    assert seconds(entities, "/series/bank/flown")[:2] == [0.0, 0.1]
+    assert seconds(entities, "/series/bank/flown")[-1] == 100.0
+
+
+def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    position = np.array(column(entities, "/world/aircraft", "translation"), dtype=np.float64).reshape(-1, 3)
+    np.testing.assert_allclose(
+        position, np.column_stack((np.zeros(1001), np.arange(1001) * 2.5, np.full(1001, 300.0)))
+    )
+    times = seconds(entities, "/plan/flown")
+    pieces = column(entities, "/plan/flown", "strips")
+    assert times[-1] == 100.0
+    assert max(np.diff([0.0, *times])) <= 1.0 + 1e-9
+    ends = [strip[-1] for (strip,) in pieces]
+    starts = [strip[0] for (strip,) in pieces]
+    np.testing.assert_allclose(ends, [(0.0, 25.0 * time) for time in times], atol=1e-3)
+    np.testing.assert_array_equal(starts[1:], ends[:-1])
+
+
+def test_scans_are_drawn_as_the_aircraft_goes_on(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    times = seconds(entities, "/plan/scan")
+    assert times[:3] == [0.0, 2.0, 4.0]
+    assert 50.0 in times
+    np.testing.assert_array_equal(
+        column(entities, "/plan/scan", "positions")[0], [[105.0, 7.0], [-195.0, 7.0]]
+    )
+
+
+def test_obstacles_appear_as_they_are_sensed(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    """Sees the near edge of the circle from 5 s on, and something that is not there."""
+    near, false = (300.0, 1250.0), (-300.0, 0.0)
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    for time_s, points in ((0.0, [false]), (5.0, [near, false]), (10.0, [near])):
+        away = np.array([complex(*point) for point in points])
+        ranges = np.abs(away)
+        log.on_scan(RangeScan(time_s, time_s, 0.0, 0.0, 0.0, 0.0, 0.1, away / ranges, ranges, 2000.0), STATE)
+    log.on_block(make_track(201, plan_index=-1))
+    log.close()
+    entities = read(tmp_path / "a.rrd")
+    assert seconds(entities, "/world/obstacles/0/circles") == [5.0]
+    assert "/world/obstacles/1/polygons" not in entities
+    assert seconds(entities, "/plan/sensed") == seconds(entities, "/world/sensed") == [5.0]
+    np.testing.assert_array_equal(column(entities, "/plan/sensed", "positions"), [[near]])
+    ((post,),) = column(entities, "/world/sensed", "strips")
+    np.testing.assert_allclose(post, [(*near, 0.0), (*near, SCENE.obstacle_top_m)], rtol=1e-6)
+    assert [str(text) for (text,) in column(entities, "/events", "text")] == [
+        "t = 5 s: obstacle 0 comes into view, 1.3 km away"
+    ]
+
+
+def test_the_trail_shows_the_error_by_its_colour(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    row = np.arange(101)
+    error = np.where((row < 50) & (row != 20), 0.0, -2.0 * LIMITS.cross_track_threshold_m)
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    log.on_block(make_track(101, cross_track_m=error, plan_index=-1))
+    log.close()
+    colours = [rgba >> 8 for (rgba,) in column(read(tmp_path / "a.rrd"), "/plan/flown", "colors")]
+    on, _, off = ((red << 16) + (green << 8) + blue for red, green, blue in ERROR_COLOURS)
+    assert [colour == off for colour in colours[:5]] == [False, False, True, False, False], "the worst counts"
+    assert {colours[0], colours[4]} == {on}
+    assert set(colours[5:]) == {off}
+
+
+def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    """A plan to 5 s of flight, then its closing circle; at the bank limit from 8 s on."""
+    circle = (0, 125.0, 0, 1, 0.01, 200 * math.pi)
+    straight = (0, 0, 0, 1, 0.0, 125.0)
+    path = PlannedPath(np.array([straight, circle]), loiter=True)
+    plan = Plan(PlanStatus.FOUND, "obstacle ahead at 9.8 km, passing left", path=path)
+    rows = np.arange(101)
+    track = make_track(
+        101,
+        plan_index=np.where(rows < 10, -1, 0),
+        arc_length_m=np.where(rows < 10, np.nan, 2.5 * rows),
+        roll_command_deg=np.where(rows < 80, 0.0, math.degrees(LIMITS.bank_limit_rad)),
+        cross_track_m=np.where(rows < 90, 0.0, 25.0),
+    )
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    accepted = AcceptedPlan(0, 1.0, 2.5, plan)
+    log.on_plan(accepted, STATE)
+    log.on_block(track)
+    flight = Flight(track, (accepted,), Outcome.TIMEOUT, "late", (2.5,), 10.0, 0.1)
+    log.close(metrics(flight, LIMITS))
+    entities = read(tmp_path / "a.rrd")
+    lanes = {
+        lane: list(zip(seconds(entities, f"/states/{lane}")[-len(states) :], states, strict=True))
+        for lane in ("planner", "saturation", "tracking")
+        for states in [[str(cell[0]) for cell in column(entities, f"/states/{lane}", "state") if cell]]
+    }
+    assert lanes["planner"] == [
+        (0.0, "waiting for a plan"),
+        (1.0, "obstacle ahead, passing left"),
+        (5.1, "holding"),
+    ]
+    assert lanes["saturation"] == [(0.0, "bank command below its limit"), (8.0, "bank command at its limit")]
+    ((start, cause),) = lanes["tracking"]
+    assert (start, cause == "trackable") == (1.0, False)
+
+
+@pytest.mark.parametrize(
+    ("reason", "mode"),
+    [
+        ("obstacle ahead at 9.8 km, passing left", "obstacle ahead, passing left"),
+        ("way to the goal in view, 56.2 km to go", "way to the goal in view"),
+        ("following a boundary, 1.3 km from the hit point", "following a boundary"),
+        ("turning away", "turning away"),
+        ("3 ways", "3 ways"),
+    ],
+)
+def test_a_mode_is_a_reason_without_its_numbers(reason: str, mode: str) -> None:
+    assert mode_of(reason) == mode
+
+
+def test_scan_before_a_plan_is_drawn(tmp_path: Path, make_plan: Callable[..., AcceptedPlan]) -> None:
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    for time_s in (0.0, 3.0, 3.5):
+        log.on_scan(scan(time_s), STATE)
+    log.on_plan(make_plan([(0, 0, 0, 1, 0.0, 100.0)], time_s=3.7), STATE)
+    log.close()
+    assert seconds(read(tmp_path / "a.rrd"), "/plan/scan") == [0.0, 3.0, 3.5]
+
+
+def test_plan_is_drawn_with_how_it_came_about(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    assert seconds(entities, "/plan/chosen") == [0.0, 50.0]
+    np.testing.assert_array_equal(
+        column(entities, "/plan/chosen", "strips")[1], [[[0.0, 1250.0], [0.0, 2500.0]]]
+    )
+    np.testing.assert_array_equal(column(entities, "/plan/waypoints", "positions")[0], [[0.0, 0.0]])
+    np.testing.assert_array_equal(column(entities, "/plan/guide", "vectors")[0], [[0.0, 800.0]])
+    np.testing.assert_array_equal(
+        column(entities, "/plan/candidates", "strips")[0], [[[0.0, 0.0], [200.0, 600.0]]]
+    )
+    (window,), (sector,) = (column(entities, f"/plan/{name}", "strips")[0] for name in ("window", "sectors"))
+    np.testing.assert_allclose(np.hypot(*np.array(window).T), 700.0, rtol=1e-6)
+    np.testing.assert_allclose([sector[0], sector[1], sector[-2]], [[0, 0], [700, 0], [0, 700]], atol=1e-3)
+    for entity, part in (
+        ("guide", "vectors"),
+        *((each, "strips") for each in ("window", "candidates", "sectors")),
+    ):
+        assert seconds(entities, f"/plan/{entity}") == [0.0, 50.0]
+        assert column(entities, f"/plan/{entity}", part)[1] == [], "cleared where the planner shows nothing"
+
+
+def test_where_moving_obstacles_are_expected_to_be_met_is_shown(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    assert seconds(entities, "/plan/met") == [0.0, 50.0]
+    assert column(entities, "/plan/met", "positions") == [[[100.0, 300.0], [110.0, 300.0]], []]
+
+
+def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(
+    tmp_path: Path, make_track: Callable[..., Track]
+) -> None:
+    """Known from 5 to 20 s, at 2 Hz."""
+    known: list[MovingEdges] = []
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a", moving=lambda: known)
+    for tick in range(60):
+        time_s = 0.5 * tick
+        outline = np.array([(10.0 * time_s, 0.0), (10.0 * time_s + 20.0, 0.0), (10.0 * time_s + 40.0, 30.0)])
+        known[:] = [MovingEdges(time_s, outline, (10.0, -1.0))] if 5.0 <= time_s <= 20.0 else []
+        log.on_scan(scan(time_s), STATE)
+    log.on_block(make_track(301, plan_index=-1))
+    log.close()
+    entities = read(tmp_path / "a.rrd")
+    times = seconds(entities, "/plan/tracked")
+    np.testing.assert_array_equal(times, [*np.arange(5.0, 20.5), 20.5])
+    np.testing.assert_array_equal(
+        column(entities, "/plan/tracked", "strips")[3], [[(80.0, 0.0), (100.0, 0.0), (120.0, 30.0)]]
+    )
+    np.testing.assert_array_equal(column(entities, "/plan/tracked/velocity", "origins")[3], [(100.0, 10.0)])
+    np.testing.assert_array_equal(column(entities, "/plan/tracked/velocity", "vectors")[3], [(300.0, -30.0)])
+    for entity, part in (("tracked", "strips"), ("tracked/velocity", "vectors")):
+        assert column(entities, f"/plan/{entity}", part)[-1] == [], "cleared when it is lost"
+
+
+def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    texts = [str(text) for (text,) in column(entities, "/events", "text")]
+    assert texts == [
+        "t = 0 s: a way was found (plan 0, 2.5 ms)",
+        "t = 50 s: a way was found (plan 1, 2.5 ms)",
+        "t = 100 s: goal reached",
+    ]
+    documents = [str(text) for (text,) in column(entities, "/summary", "text")]
+    assert "stopped before the end" in documents[0]
+    assert "reached: in the goal's circle" in documents[-1]
+    assert "2500 m in 100 s" in documents[-1]
+    assert "name: straight" in documents[-1]
+    figures = json.loads(column(entities, "/__properties/metrics", "json")[0][0])
+    assert figures["outcome"] == "reached"
+
+
+def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    (centre,) = column(entities, "/world/true_obstacles/circles", "centers")[0]
+    assert tuple(centre[:2]) == (600.0, 1250.0)
+    faces = np.array(column(entities, "/world/true_obstacles/polygons", "triangle_indices")[0])
+    corners = np.array(column(entities, "/world/true_obstacles/polygons", "vertex_positions")[0])
+    edge = corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]]
+    cross = 0.5 * np.cross(*edge)
+    assert cross[:, 2].sum() == pytest.approx(400000.0, rel=1e-5), "roof: the polygon's area, seen from above"
+    assert corners[:, 2].min() == 0.0
+    assert corners[:, 2].max() > 300.0
+    moved = np.array(column(entities, "/world/moving/2", "translation"), dtype=np.float64).reshape(-1, 3)
+    assert seconds(entities, "/world/moving/2")[-1] == 100.0
+    np.testing.assert_allclose(moved[-1], [-200.0, 0.0, 0.0])
+    assert seconds(entities, "/plan/moving/3") == [20.0, 60.0]
+    assert column(entities, "/plan/moving/3", "is_recursive")[-1] == [True]
+
+
+def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -> None:
+    path, _ = recording
+    done = rerun("rrd", "verify", str(path))
+    assert done.returncode == 0, done.stderr
+    reader = rr.chunk.RrdReader(str(path))
+    assert len(reader.blueprints()) == 1
+    assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
+    layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
+    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 12
+
+
+def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    times = [
+        time for entity in entities if "sim_time" in entities[entity] for time in seconds(entities, entity)
+    ]
+    assert (min(times), max(times)) == (0.0, 100.0)
+
+
+def test_killed_process_leaves_a_readable_recording(tmp_path: Path) -> None:
+    script = f"""
+import os, sys
+sys.path[:0] = {[str(Path(__file__).parents[1]), str(Path(__file__).parents[3])]!r}
+from pathlib import Path
+from conftest import track
+from test_rerun_log import SCENE
+from harness.recording.log import RerunLog
+log = RerunLog(Path({str(tmp_path / "a.rrd")!r}), SCENE, "a")
+log.on_block(track(600, plan_index=-1))
+log.flush()
+os._exit(9)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (9, "", "")
+    with pytest.warns(rr.error_utils.RerunWarning, match="no footer"):
+        entities = read(tmp_path / "a.rrd")
+    assert len(column(entities, "/series/bank/flown", "scalars")) == 600
+    shown = tmp_path / "overlay.rrd"
+    write_overlay([tmp_path / "a.rrd", tmp_path / "a.rrd"], ["one", "two"], shown)
+    assert rerun("rrd", "verify", str(shown)).returncode == 0
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+@pytest.mark.parametrize("ended", [True, False])
+def test_the_fork_of_a_process_that_records_can_record(tmp_path: Path, ended: bool) -> None:
+    script = f"""
+import os, signal, sys
+sys.path[:0] = {[str(Path(__file__).parents[1]), str(Path(__file__).parents[3])]!r}
+from pathlib import Path
+from conftest import track
+from test_rerun_log import SCENE
+from harness.recording.log import RerunLog
+def log(name):
+    log = RerunLog(Path({str(tmp_path)!r}, name), SCENE, "a")
+    log.on_block(track(600, plan_index=-1))
+    return log
+first = log("parent.rrd")
+if {ended}:
+    first.end()
+child = os.fork()
+if not child:
+    signal.alarm(60)
+    log("one.rrd").end()
+    log("two.rrd").end()
+    os._exit(0)
+assert os.waitpid(child, 0)[1] == 0
+first.end()
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    for name in ("parent.rrd", "one.rrd", "two.rrd"):
+        assert len(column(read(tmp_path / name), "/series/bank/flown", "scalars")) == 600
+
+
+def test_recording_is_silent(
+    tmp_path: Path,
+    make_track: Callable[..., Track],
+    make_plan: Callable[..., AcceptedPlan],
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    record(tmp_path / "a.rrd", make_track, make_plan)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_missing_folder_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no folder"):
+        RerunLog(tmp_path / "none" / "a.rrd", SCENE, "a")
+
+
+def test_overlay_keeps_every_track_and_one_world(
+    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    for name, east_m in (("a", 0.0), ("b", 40.0)):
+        record(tmp_path / f"{name}.rrd", make_track, make_plan, east_m)
+    write_overlay([tmp_path / "a.rrd", tmp_path / "b.rrd"], ["first", "second"], tmp_path / "c.rrd")
+    entities = read(tmp_path / "c.rrd")
+    for number, east_m in enumerate((0.0, 40.0)):
+        position = column(entities, f"/world/runs/{number}/aircraft", "translation")[0]
+        assert position[0][0] == east_m
+        assert len(column(entities, f"/series/bank/flown/{number}", "scalars")) >= 1001
+    assert "/world/true_obstacles/circles" in entities
+    assert "/plan/chosen" not in entities
+    told = [str(text) for (text,) in column(entities, "/events", "text")]
+    assert "first, t = 100 s: goal reached" in told
+    assert "second, t = 100 s: goal reached" in told
+    (((summary,),)) = (column(entities, "/summary", "text")[-1],)
+    assert "| outcome | reached | reached |" in str(summary)
+    assert "/states/1-first/planner" in entities
+    colours = [column(entities, f"/plan/runs/{number}/flown", "colors")[-1] for number in (0, 1)]
+    assert colours[0] != colours[1]
+
+
+@pytest.mark.parametrize(
+    ("folders", "names"),
+    [
+        (["runs/a", "runs/b"], ["a", "b"]),
+        (["one/bug2-1", "two/bug2-1"], ["one/bug2-1", "two/bug2-1"]),
+        (["one/x/run", "two/x/run", "two/y/run"], ["one/x/run", "two/x/run", "two/y/run"]),
+        (["a", "a"], ["a (1)", "a (2)"]),
+    ],
+)
+def test_overlaid_runs_have_names_of_their_own(folders: list[str], names: list[str]) -> None:
+    assert run_names([Path(folder) for folder in folders]) == names
+
+
+def test_view_says_what_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match=r"has no flight\.rrd"):
+        open_viewer([tmp_path])
+    (tmp_path / "flight.rrd").write_bytes(b"not a recording")
+    with pytest.raises(RunFolderError, match="recording"):
+        open_viewer([tmp_path, tmp_path], web=True)
+    with pytest.raises(ViewerError, match="no recording"):
+        screenshot(tmp_path / "none.rrd", tmp_path / "a.png")
+
+
+def test_view_says_that_there_is_no_screen(
+    recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(ViewerError, match="no screen"):
+        open_viewer([recording[0].parent])
+
+
+def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
+    recording: tuple[Path, Flight], tmp_path: Path
+) -> None:
+    with served(recording[0], 1, tmp_path) as (viewer, address):
+        assert address.startswith("http://127.0.0.1:")
+        assert "rerun%2Bhttp%3A%2F%2F127.0.0.1" in address
+        with urllib.request.urlopen(address, timeout=10) as answer:
+            assert b"re_viewer" in answer.read()
+        command = [str(part) for part in cast(list[str], viewer.args)]
+        assert command[command.index("--bind") + 1] == "127.0.0.1"
+        assert viewer.poll() is None
+    assert viewer.poll() is not None
+
+
+def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
+    path, _ = recording
+    png = path.with_suffix(".png")
+    try:
+        complaints = screenshot(path, png, time_s=50.0, size=(1200, 700))
+    except ViewerError as error:
+        assert str(error) == NO_DRIVER  # noqa: PT017
+        return
+    assert complaints == []
+    assert png.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert int.from_bytes(png.read_bytes()[16:20]) == 1200
+
+
+def test_a_missing_driver_is_said(recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("VK_DRIVER_FILES", "VK_ICD_FILENAMES"):
+        monkeypatch.setenv(name, "/nowhere")
+    with pytest.raises(ViewerError, match="mesa-vulkan-drivers"):
+        screenshot(recording[0], recording[0].with_suffix(".png"))
+
+
+@given(heading=st.floats(0.0, 360.0), pitch=st.floats(-80.0, 80.0), roll=st.floats(-180.0, 180.0))
+def test_attitude_points_nose_and_wing_the_right_way(heading: float, pitch: float, roll: float) -> None:
+    """Nose: heading from north and pitch up. Left wing: up by sin(roll) cos(pitch) in a right bank."""
+    ((x, y, z, w),) = quaternions(np.array([heading]), np.array([pitch]), np.array([roll]))
+    nose = np.array([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)])
+    left = np.array([2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)])
+    h, p, r = np.radians((heading, pitch, roll))
+    np.testing.assert_allclose(nose, [np.sin(h) * np.cos(p), np.cos(h) * np.cos(p), np.sin(p)], atol=1e-9)
+    assert left[2] == pytest.approx(np.sin(r) * np.cos(p), abs=1e-9)

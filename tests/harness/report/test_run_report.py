@@ -1,0 +1,108 @@
+"""The report of a single run: written from the run folder alone, and shown by a real browser."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.cli.app import main
+from harness.run_files.run_folder import REPORT_FILES, load_run
+from tests.page import shown
+
+SCENARIO = """
+schema: wayproof/scenario/1
+name: ring
+area: {bounds_m: [0, 0, 3000, 3000]}
+obstacles: [{circle: {center_m: [1500, 1500], radius_m: 300}}]
+mission: {start_m: [300, 300], goal_m: [2700, 2700], goal_radius_m: 60}
+planner: {kind: bug2, clearance_m: 100}
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run whose plans have corners, with its report."""
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "ring.yaml").write_text(SCENARIO)
+    out = folder / "run"
+    assert main(["fly", str(folder / "ring.yaml"), "--out", str(out), "--no-recording", "--quiet"]) == 0
+    assert main(["report", str(out)]) == 0
+    return out
+
+
+def test_report_is_written_into_the_run_folder(run: Path) -> None:
+    assert {path.name for path in run.iterdir()} >= set(REPORT_FILES)
+    page, metrics = (run / "report.html").read_text(), load_run(run).metrics
+    assert metrics["digest"] in page
+    assert "kind: bug2" in page, "the scenario as flown"
+    lost = [leg for leg in metrics["trackability"] if not leg["trackable"]]
+    assert f"{len(lost)} of {len(metrics['trackability'])} legs were not." in page
+    (row,) = csv.DictReader((run / "report.csv").read_text().splitlines())
+    assert (row["outcome"], row["digest"]) == ("reached", metrics["digest"])
+    assert float(row["flown_length_m"]) == metrics["flown_length_m"]
+    assert "| outcome | reached |" in (run / "report.md").read_text()
+
+
+def test_report_escapes_what_it_is_told(run: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    text = (copy / "metrics.json").read_text()
+    reason = load_run(run).metrics["reason"]
+    (copy / "metrics.json").write_text(text.replace(reason, "<script>alert(1)</script>"))
+    assert main(["report", str(copy)]) == 0
+    page = (copy / "report.html").read_text()
+    assert "<script" not in page
+    assert "&lt;script&gt;alert(1)" in page
+
+
+def test_flying_anew_removes_the_report_of_the_run_before(run: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    again = ["fly", str(copy / "scenario.yaml"), "--out", str(copy), "--no-recording", "--quiet"]
+    assert main(again) == 0
+    assert not {path.name for path in copy.iterdir()} & set(REPORT_FILES)
+
+
+def test_a_folder_without_a_complete_run_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["report", str(tmp_path)]) == 2
+    assert "is not a run folder" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", [[None], [7], [], None, "", ["'"]])
+def test_a_manifest_with_another_command_is_damaged(
+    command: Any, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    manifest = json.loads((copy / "manifest.json").read_text())
+    (copy / "manifest.json").write_text(json.dumps(manifest | {"command": command}))
+    assert main(["report", str(copy)]) == 2
+    assert "damaged" in capsys.readouterr().err
+
+
+def test_a_browser_shows_the_report_on_phone_and_screen(run: Path, chromium: Any) -> None:
+    for width_px in (390, 1280):
+        page = shown(chromium, run / "report.html", width_px)
+        assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
+        assert (page.figures, page.missing) == (2, 0)
+
+
+def test_a_browser_would_tell_what_is_wrong(tmp_path: Path, chromium: Any) -> None:
+    page = tmp_path / "bad.html"
+    page.write_text(
+        "<link rel=icon href='data:,'><div style='width:800px'>wide</div><img src='none.png'>"
+        "<script>console.log('hm')</script>"
+    )
+    bad = shown(chromium, page, 390)
+    assert bad.overflow_px > 0
+    assert bad.missing == bad.figures == 1
+    assert bad.asked_for == ((tmp_path / "none.png").as_uri(),)
+    assert "hm" in bad.said

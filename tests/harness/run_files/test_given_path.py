@@ -1,0 +1,151 @@
+"""Corners flown by, curves given back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.flight.polylines import polylines
+from harness.run_files.given_path import FloatArray, fly_by
+from planner.geometry.curves import end_of
+from planner.interface import Path
+
+
+def circle(radius: float, turn: float, chord: float) -> FloatArray:
+    angle = np.linspace(0.0, turn, max(round(turn * radius / chord), 2) + 1)
+    return np.column_stack((radius * np.cos(angle), radius * np.sin(angle)))
+
+
+def joints(segments: FloatArray) -> FloatArray:
+    """(n - 1,) largest of gap (m) and jump of direction (rad) at each joint."""
+    ends = [end_of(Path(row)) for row in segments[:-1]]
+    gap = [math.dist(end[:2], row[:2]) for end, row in zip(ends, segments[1:], strict=True)]
+    jump = [math.dist(end[2:], row[2:4]) for end, row in zip(ends, segments[1:], strict=True)]
+    return np.maximum(gap, jump)
+
+
+@pytest.mark.parametrize("turn_deg", [10.0, 45.0, 90.0, 120.0, -90.0])
+def test_a_corner_is_flown_by_with_the_turn_radius(turn_deg: float) -> None:
+    out = math.radians(turn_deg)
+    points = np.array([(0, 0), (0, 3000), (-3000 * math.sin(out), 3000 + 3000 * math.cos(out))])
+    way = fly_by(points, 150.0, 0.1)
+    (corner,) = way.corners
+    assert (corner.waypoint, corner.east_m, corner.north_m) == (1, 0.0, 3000.0)
+    assert corner.turn_deg == pytest.approx(turn_deg)
+    assert corner.radius_m == pytest.approx(150.0)
+    assert corner.cut_m == pytest.approx(150.0 / math.cos(out / 2) - 150.0)
+    assert way.segments[:, 4] == pytest.approx([0.0, math.copysign(1 / 150.0, turn_deg), 0.0])
+    assert joints(way.segments).max() < 1e-6
+    near = np.hypot(*(polylines([way.segments], 1e-4)[0] - points[1]).T).min()
+    assert near == pytest.approx(corner.cut_m, abs=0.01)
+    trim = 150.0 * math.tan(abs(out) / 2)
+    assert corner.arc_length_m == pytest.approx(3000.0 - trim + 75.0 * abs(out))
+
+
+def test_a_corner_without_room_gets_what_room_there_is() -> None:
+    way = fly_by(np.array([(0.0, 0), (0, 3000), (60, 3000), (60, 0)]), 110.0, 1.0)
+    assert [corner.radius_m for corner in way.corners] == pytest.approx([30.0, 30.0])
+    assert way.segments[:, 5].min() > 1.0
+    assert joints(way.segments).max() < 1e-6
+
+
+def test_neighbours_share_a_leg_by_what_they_need() -> None:
+    """A right angle needs 110 m of a leg of 140 m, the slight turn after it a few."""
+    out = math.radians(5.0)
+    points = np.array(
+        [(0, 0), (0, 3000), (140, 3000), (140 + 3000 * math.cos(out), 3000 + 3000 * math.sin(out))]
+    )
+    way = fly_by(points, 110.0, 1e-3)
+    assert way.corners[0].radius_m == pytest.approx(110.0)
+    assert way.corners[1].radius_m == pytest.approx(110.0)
+
+
+@given(
+    radius=st.floats(100.0, 5000.0), turn=st.floats(0.5, 6.0), share=st.floats(0.02, 0.2), side=st.booleans()
+)
+def test_points_on_a_circle_give_the_circle_back(
+    radius: float, turn: float, share: float, side: bool
+) -> None:
+    points = circle(radius, turn, share * radius)
+    points[:, 1] *= 1.0 if side else -1.0
+    sagitta = 0.5 * (share * radius) ** 2 / radius
+    way = fly_by(points, 100.0, sagitta)
+    bend = np.abs(way.segments[:, 4])
+    # The first and the last arc have a whole leg for themselves.
+    assert (bend[bend > 0] >= 0.45 / radius).all()
+    assert (bend <= 1.02 / radius + 1e-12).all()
+    off = np.abs(np.hypot(*polylines([way.segments], 1e-4)[0].T) - radius)
+    assert off.max() <= sagitta
+    assert way.corners == ()
+
+
+def test_points_on_a_line_are_left_out() -> None:
+    points = np.column_stack((np.zeros(101), np.linspace(0.0, 1000.0, 101)))
+    way = fly_by(points, 100.0, 1.0)
+    assert way.segments.tolist() == [[0.0, 0.0, 0.0, 1.0, 0.0, 1000.0]]
+    assert way.waypoints_m.tolist() == [[0.0, 0.0], [0.0, 1000.0]]
+
+
+def test_a_curve_may_have_a_point_every_few_millimetres() -> None:
+    curve = circle(300.0, 1.5, 0.005)
+    points = np.concatenate(([(300.0, -500.0)], curve, [curve[-1] + (-500.0, 500.0 / math.tan(1.5))]))
+    way = fly_by(points, 110.0, 1.0)
+    assert way.corners == ()
+    assert np.abs(way.segments[:, 4]).max() < 1.0 / 250.0
+    drawn = polylines([way.segments], 0.1)[0]
+    off = np.hypot(*drawn.T)[(drawn[:, 1] > 5.0) & (drawn[:, 0] > 30.0)] - 300.0
+    assert np.abs(off).max() < 1.0
+
+
+def test_corners_have_the_numbers_of_the_points_given() -> None:
+    points = np.repeat(
+        [(0.0, 0.0), (0.0, 1000.0), (0.004, 1000.0), (1000.0, 1000.0), (1000.0, 0.0)], 3, axis=0
+    )
+    way = fly_by(points, 110.0, 1.0)
+    assert [corner.waypoint for corner in way.corners] == [3, 9]
+    assert len(way.waypoints_m) == 4
+
+
+def test_a_zigzag_of_any_length_becomes_a_path() -> None:
+    count = 100_000
+    points = np.column_stack((4.0 * np.arange(count), np.arange(count) % 2))
+    assert len(fly_by(points, 110.0, 1.0).waypoints_m) == count
+
+
+def test_a_corner_between_dense_points_has_the_room_of_its_legs() -> None:
+    up = np.column_stack((np.zeros(101), np.linspace(0.0, 1000.0, 101)))
+    across = np.column_stack((np.linspace(10.0, 1000.0, 100), np.full(100, 1000.0)))
+    (corner,) = fly_by(np.concatenate((up, across)), 110.0, 1.0).corners
+    assert corner.waypoint == 100
+    assert corner.radius_m == pytest.approx(110.0)
+
+
+def test_there_and_back_again_is_a_corner_that_no_arc_rounds() -> None:
+    way = fly_by(np.array([(0.0, 0), (0, 1000), (0, 0)]), 110.0, 1.0)
+    assert np.isfinite(way.segments).all()
+    assert (way.segments[:, 5] > 0).all()
+    assert (way.corners[0].radius_m, way.corners[0].cut_m, way.corners[0].arc_length_m) == (0.0, 0.0, 1000.0)
+
+
+def test_a_path_may_cross_itself_at_one_of_its_points() -> None:
+    points = np.array([(0.0, 0), (0, 2000), (1000, 1000), (0, 1000), (-1000, 1000), (0, 0), (500, -900)])
+    way = fly_by(points, 50.0, 0.1)
+    assert way.waypoints_m.tolist() == np.delete(points, 3, axis=0).tolist()
+
+
+@given(st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=2, max_size=12))
+def test_any_polyline_becomes_a_path_from_its_start_to_its_end(grid: list[tuple[int, int]]) -> None:
+    points = 200.0 * np.array(grid, dtype=np.float64)
+    points = points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 0)]
+    if len(points) < 2:
+        points = np.array([(0.0, 0.0), (200.0, 0.0)])
+    way = fly_by(points, 110.0, 1.0)
+    assert np.isfinite(way.segments).all()
+    assert (way.segments[:, 5] > 0).all()
+    assert np.hypot(way.segments[:, 2], way.segments[:, 3]) == pytest.approx(1.0)
+    assert way.segments[0, :2] == pytest.approx(points[0])
+    assert end_of(Path(way.segments))[:2] == pytest.approx(points[-1], abs=1e-3)

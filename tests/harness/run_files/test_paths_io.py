@@ -1,0 +1,272 @@
+"""Paths read from files, and what is said of files that are none."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pyproj import Geod
+
+from harness.files.strict_yaml import InputError
+from harness.run_files.path_files import read_path
+
+WGS84 = Geod(ellps="WGS84")
+POINTS = [(47.0, 8.0), (47.1, 8.0), (47.1, 8.4)]
+"""Latitude, longitude."""
+
+
+def item(latitude: float, longitude: float, altitude: float = 120.0, **keys: Any) -> dict[str, Any]:
+    plain = {
+        "autoContinue": True,
+        "command": 16,
+        "doJumpId": 1,
+        "frame": 3,
+        "params": [0, 0, 0, None, latitude, longitude, altitude],
+        "type": "SimpleItem",
+    }
+    return {**plain, **keys}
+
+
+def plan(*items: dict[str, Any], home_m: float = 400.0) -> str:
+    mission = {"items": list(items), "plannedHomePosition": [47.0, 8.0, home_m], "version": 2}
+    return json.dumps({"fileType": "Plan", "mission": mission, "version": 1})
+
+
+def line(*cells: object) -> str:
+    return "\t".join(map(str, cells))
+
+
+def wpl(*rows: str) -> str:
+    return "\n".join(("QGC WPL 110", line(0, 1, 0, 16, 0, 0, 0, 0, 47.0, 8.0, 400.0, 1), *rows)) + "\n"
+
+
+def wpl_items(frame: int = 3, command: int = 16, hold: float = 0.0, altitude: float = 120.0) -> list[str]:
+    return [
+        line(number, 0, frame, command, hold, 0, 0, 0, *place, altitude, 1)
+        for number, place in enumerate(POINTS, start=1)
+    ]
+
+
+def geojson(coordinates: Any, kind: str = "LineString") -> str:
+    feature = {"type": "Feature", "properties": {}, "geometry": {"type": kind, "coordinates": coordinates}}
+    return json.dumps({"type": "FeatureCollection", "features": [feature]})
+
+
+LINE = [[longitude, latitude] for latitude, longitude in POINTS]
+GOOD = {
+    "degrees.csv": ("latitude_deg,longitude_deg\n" + "".join(f"{a},{b}\n" for a, b in POINTS), None),
+    "short.csv": ("name, LAT, lon\n" + "".join(f"p,{a},{b}\n" for a, b in POINTS), None),
+    "collection.geojson": (geojson(LINE), None),
+    "unlocated.geojson": (
+        json.dumps(
+            {
+                "type": "FeatureCollection",
+                "features": [
+                    {"type": "Feature", "properties": {"name": "a note"}, "geometry": None},
+                    {
+                        "type": "Feature",
+                        "properties": {},
+                        "geometry": {"type": "LineString", "coordinates": LINE},
+                    },
+                ],
+            }
+        ),
+        None,
+    ),
+    "bare.json": (json.dumps({"type": "LineString", "coordinates": [[*p, 520] for p in LINE]}), 520.0),
+    "mission.plan": (plan(*(item(*place) for place in POINTS)), 520.0),
+    "above_sea.plan": (plan(*(item(*place, 520.0, frame=0) for place in POINTS)), 520.0),
+    "mission.waypoints": (wpl(*wpl_items()), 520.0),
+}
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_every_format_gives_the_same_path(name: str, tmp_path: Path) -> None:
+    text, altitude = GOOD[name]
+    (tmp_path / name).write_text(text)
+    given = read_path(tmp_path / name)
+    assert given.origin_deg == POINTS[0]
+    assert given.altitude_m == altitude
+    for (latitude, longitude), (east, north) in zip(POINTS, given.points_m, strict=True):
+        azimuth, _, distance = WGS84.inv(8.0, 47.0, longitude, latitude)
+        assert east == pytest.approx(distance * math.sin(math.radians(azimuth)), abs=0.1)
+        assert north == pytest.approx(distance * math.cos(math.radians(azimuth)), abs=0.1)
+
+
+@pytest.mark.parametrize("columns", ["x_m,y_m", "east_m, north_m"])
+def test_csv_in_metres(columns: str, tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text(f"\ufeff{columns}\n0,0\n100,5e2\n100,500\n\n-3.5,700\n", encoding="utf-8")
+    given = read_path(path)
+    assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 500.0], [100.0, 500.0], [-3.5, 700.0]]
+    assert given.origin_deg is None
+    assert given.altitude_m is None
+
+
+@pytest.mark.parametrize(("frame", "place"), [(4, (100.0, 200.0, 50.0)), (1, (200.0, 100.0, -50.0))])
+def test_mission_in_local_metres(frame: int, place: tuple[float, float, float], tmp_path: Path) -> None:
+    """ENU has east first and up positive, NED north first and down positive."""
+    path = tmp_path / "local.waypoints"
+    rows = [line(1, 0, frame, 16, 0, 0, 0, 0, 0, 0, place[2], 1)]
+    path.write_text(wpl(*rows, line(2, 0, frame, 16, 0, 0, 0, 0, *place, 1)))
+    given = read_path(path)
+    assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 200.0]]
+    assert (given.origin_deg, given.altitude_m) == (None, 450.0)
+
+
+@pytest.mark.parametrize("column", ["altitude_m", "z_m", "up_m"])
+@pytest.mark.parametrize("names", ["x_m,y_m", "latitude_deg,longitude_deg"])
+def test_csv_with_altitudes(names: str, column: str, tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text(f"{names},{column}\n1,2,300\n2,3,300.5\n")
+    assert read_path(path).altitude_m == 300.0
+    path.write_text(f"{names},{column}\n1,2,300\n2,3,500\n")
+    with pytest.raises(
+        InputError, match="point 1 is at 500 m, point 0 at 300 m; a checked path has one altitude"
+    ):
+        read_path(path)
+
+
+@pytest.mark.parametrize("altitude", [20.0, 30_000.0])
+def test_an_altitude_that_cannot_be_flown_is_told_of_the_file(altitude: float, tmp_path: Path) -> None:
+    path = tmp_path / "path.csv"
+    path.write_text(f"x_m,y_m,z_m\n1,2,{altitude}\n2,3,{altitude}\n")
+    told = (
+        f"path.csv: is at {altitude:g} m above the sea; must be between 50 and 20000 m, or give --altitude-m"
+    )
+    with pytest.raises(InputError, match=told):
+        read_path(path)
+    assert read_path(path, any_altitude=True).altitude_m is None
+
+
+def test_different_altitudes_can_be_overridden(tmp_path: Path) -> None:
+    path = tmp_path / "stairs.plan"
+    path.write_text(plan(item(47.0, 8.0, 100.0), item(47.1, 8.0, 150.0)))
+    with pytest.raises(InputError, match="point 1 is at 550 m, point 0 at 500 m"):
+        read_path(path)
+    given = read_path(path, any_altitude=True)
+    assert (len(given.points_m), given.altitude_m) == (2, None)
+
+
+SURVEY = {"type": "ComplexItem", "complexItemType": "survey"}
+BROKEN = {
+    "ending": ("path.gpx", "<gpx/>", ": is none of .csv, .geojson"),
+    "empty csv": ("a.csv", "", ":1: has the columns none; must have x_m,y_m"),
+    "no header": ("a.csv", "0,0\n1,1\n", ":1: has the columns 0, 0; must have x_m,y_m"),
+    "text in csv": ("a.csv", "x_m,y_m\n0,0\n1,far\n", ":3: y_m: is 'far'; must be a finite number"),
+    "nan in csv": ("a.csv", "x_m,y_m\n0,0\n1,nan\n", ":3: y_m: is 'nan'; must be a finite number"),
+    "short row": ("a.csv", "x_m,y_m\n0,0\n1\n", ":3: has 1 cells, the header 2"),
+    "one point": ("a.csv", "x_m,y_m\n0,0\n", ": has 1 point; a path has at least 2"),
+    "one place": ("a.csv", "x_m,y_m\n5,5\n5,5\n", ": all its points are in one place"),
+    "too far": ("a.csv", "x_m,y_m\n0,0\n9e5,0\n", ": reaches 900 km; must stay within 500 km"),
+    "not degrees": ("a.geojson", geojson([[0, 0], [3000, 2000]]), "latitude 2000, longitude 3000"),
+    "not json": ("a.geojson", '{"type":\n "LineString",,}', ":2: is not JSON"),
+    "json nan": ("a.geojson", '{"type": "LineString", "coordinates": [[NaN, 1], [1, 2]]}', "must be finite"),
+    "polygon": ("a.geojson", geojson([LINE], "Polygon"), ": has 0 LineStrings; must have exactly one"),
+    "no geojson": ("a.geojson", '{"points": []}', ": has no type; must be a GeoJSON LineString"),
+    "a point of one": (
+        "a.geojson",
+        geojson([[8.0, 47.0], [8.0]]),
+        "features[0].geometry.coordinates[1]: must be",
+    ),
+    "some altitudes": (
+        "a.geojson",
+        geojson([[8.0, 47.0, 9], [8.1, 47.0]]),
+        "an altitude at some points only",
+    ),
+    "no plan": ("a.plan", '{"fileType": "Fence"}', ": is not a plan of QGroundControl"),
+    "no items": ("a.plan", '{"fileType": "Plan", "mission": {}}', ": mission.items: is missing"),
+    "takeoff": (
+        "a.plan",
+        plan(item(47.0, 8.0, command=22, doJumpId=1), item(47.1, 8.0)),
+        ": mission.items[0]: item 1 is MAV_CMD_NAV_TAKEOFF (22); a path to be checked may only have",
+    ),
+    "unknown command": (
+        "a.plan",
+        plan(item(47.0, 8.0), item(47.1, 8.0, command=31999, doJumpId=2)),
+        ": mission.items[1]: item 2 is command 31999",
+    ),
+    "survey": (
+        "a.plan",
+        plan(item(47.0, 8.0), SURVEY),
+        ": mission.items[1]: item 2 is a complex item, survey",
+    ),
+    "terrain": ("a.plan", plan(item(47.0, 8.0, frame=10)), "item 1 has the frame 10 GLOBAL_TERRAIN_ALT"),
+    "few params": (
+        "a.plan",
+        plan(item(47.0, 8.0, params=[0])),
+        "mission.items[0].params: must be a list of 7",
+    ),
+    "no place": (
+        "a.plan",
+        plan(item(47.0, 8.0, params=[0, 0, 0, None, 47.0, 8.0, None]), item(47.1, 8.0)),
+        ": mission.items[0].params[6]: is 'None'; must be a finite number",
+    ),
+    "text as command": (
+        "a.plan",
+        plan(item(47.0, 8.0, command="fly")),
+        "items[0].command: is 'fly'; must be",
+    ),
+    "no header line": ("a.waypoints", "0 1 0 16\n", ':1: must begin with "QGC WPL 110"'),
+    "fields": ("a.waypoints", wpl("1\t0\t3"), ":3: has 3 fields; a mission item has 12"),
+    "loiter": (
+        "a.waypoints",
+        wpl(*wpl_items(command=18)),
+        ":3: item 1 is MAV_CMD_NAV_LOITER_TURNS (18); a path to be checked may only have MAV_CMD_NAV_WAYPOINT",
+    ),
+    "hold": ("a.waypoints", wpl(*wpl_items(hold=30.0)), ":3: item 1 holds for 30 s"),
+    "mixed frames": (
+        "a.waypoints",
+        wpl(wpl_items()[0], *wpl_items(frame=4)[1:]),
+        ":3: item 1 has the frame 3, must be one of 4, 1; local and global waypoints cannot be mixed",
+    ),
+    "only home": ("a.waypoints", wpl(), ": has 0 points"),
+}
+
+
+@pytest.mark.parametrize(("name", "text", "sentence"), BROKEN.values(), ids=BROKEN)
+def test_says_where_and_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError) as fault:
+        read_path(path)
+    assert str(fault.value).startswith(f"{path}:")
+    assert sentence in str(fault.value)
+    assert len(str(fault.value).splitlines()) == 1
+
+
+def test_no_point_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "dense.csv"
+    path.write_text("x_m,y_m\n" + "".join(f"{i * 0.005:.3f},0\n" for i in range(1001)))
+    points = read_path(path).points_m
+    assert (len(points), points[-1].tolist()) == (1001, [5.0, 0.0])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_number_near_the_largest_is_too_far(tmp_path: Path) -> None:
+    path = tmp_path / "far.csv"
+    path.write_text("x_m,y_m\n1e308,0\n-1e308,1\n")
+    with pytest.raises(InputError, match="must stay within 500 km of its origin"):
+        read_path(path)
+
+
+@pytest.mark.parametrize("name", ["missing.csv", "folder.csv"])
+def test_says_what_cannot_be_read(name: str, tmp_path: Path) -> None:
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(InputError, match="cannot be read"):
+        read_path(tmp_path / name)
+
+
+def test_points_are_within_a_metre_of_the_geodesic_out_to_100_km(tmp_path: Path) -> None:
+    """Along every direction, against GeographicLib in pyproj."""
+    azimuths = np.arange(0.0, 360.0, 30.0)
+    ends = [WGS84.fwd(8.0, 47.0, azimuth, 1e5)[:2] for azimuth in azimuths]
+    path = tmp_path / "star.geojson"
+    path.write_text(geojson([[8.0, 47.0], *map(list, ends)]))
+    found = read_path(path).points_m[1:]
+    wanted = 1e5 * np.column_stack((np.sin(np.radians(azimuths)), np.cos(np.radians(azimuths))))
+    assert np.hypot(*(found - wanted).T).max() < 1.0

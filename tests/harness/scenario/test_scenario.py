@@ -1,0 +1,366 @@
+"""A scenario read, completed, written and read again."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+import aircraft
+from aircraft.airframes import airframe
+from aircraft.envelope import performance
+from harness.files.strict_yaml import InputError
+from harness.scenario.scenario import (
+    LEAST_CLEARANCE,
+    Scenario,
+    dump_scenario,
+    load_scenario,
+    mission_of,
+    parse_scenario,
+    performance_of,
+    scenario_schema,
+)
+from harness.scenario.shipped import scenario_path
+from planner.registry import planner_kinds
+
+LEAST = """\
+schema: wayproof/scenario/1
+name: least
+area: {bounds_m: [0, 0, 40000, 40000]}
+mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
+"""
+WITH_PLANNER = LEAST + "planner: {kind: rolling_window, clearance_m: 70, candidates: 9}\n"
+
+
+def test_trackability_follows_from_clearance_and_aircraft() -> None:
+    light = parse_scenario(LEAST).trackability
+    assert light.altitude_m == max(10.0, light.cross_track_m)
+    assert (light.airspeed_mps, light.load_factor) == (2.5, 3.8)
+    wide = parse_scenario(LEAST + "planner: {clearance_m: 500}\n").trackability
+    assert (wide.cross_track_m, wide.altitude_m) == (50.0, 50.0)
+    narrow = parse_scenario(LEAST + "planner: {clearance_m: 1}\n")
+    assert narrow.trackability.cross_track_m == 2.0 * performance_of(narrow).tracking_error_m
+    # 853 kg are 1880 lb: 2.1 + 24000 / 11880 is more than the 3.8 that suffice.
+    assert parse_scenario(LEAST + "aircraft: {model: c172p}\n").trackability.load_factor == 3.8
+    own = parse_scenario(LEAST + "trackability: {cross_track_m: 3.0, load_factor: 1.5}\n").trackability
+    assert (own.cross_track_m, own.altitude_m, own.load_factor) == (3.0, 10.0, 1.5)
+
+
+def test_fills_in_every_default() -> None:
+    scenario = parse_scenario(LEAST)
+    radius_m = performance(airframe("aerosonde"), 25.0).turn_radius_m
+    assert scenario.seed == 1
+    assert scenario.obstacles == ()
+    assert scenario.aircraft.airspeed_mps == airframe("aerosonde").cruise_mps == 25.0
+    assert scenario.mission.course_deg == 90.0
+    assert scenario.mission.goal_radius_m == scenario.planner.clearance_m == 10 * math.ceil(radius_m / 10)
+    assert scenario.mission.time_limit_s == 60 * math.ceil((10 * 30000 / 25 + 60) / 60)
+    assert scenario.sensor.range_m == 100 * math.ceil(radius_m / 10)
+    assert scenario.environment.wind is None
+    assert set(scenario.planner.own) == set(planner_kinds()["rolling_window"].config.__dataclass_fields__)
+    assert None not in scenario.planner.own.values()
+
+
+@pytest.mark.parametrize(
+    ("goal", "course_deg"),
+    [((1000, 9000), 0.0), ((9000, 9000), 45.0), ((1000, 500), 180.0), ((500, 1000), 270.0)],
+)
+def test_course_is_towards_the_goal(goal: tuple[float, float], course_deg: float) -> None:
+    scenario = parse_scenario(LEAST.replace("[31000, 1000]", str(list(goal))))
+    assert scenario.mission.course_deg == pytest.approx(course_deg, abs=1e-12)
+
+
+def test_wind_widens_what_follows_from_the_turn_radius() -> None:
+    windy = parse_scenario(LEAST + "environment: {wind: {speed_mps: 10, from_deg: 0}}\n")
+    calm = parse_scenario(LEAST)
+    assert windy.planner.clearance_m > calm.planner.clearance_m
+    assert windy.mission.time_limit_s > calm.mission.time_limit_s
+
+
+def test_mission_of_tells_the_planner_what_the_scenario_says() -> None:
+    scenario = parse_scenario(WITH_PLANNER)
+    mission = mission_of(scenario)
+    assert mission.goal_m == (31000.0, 1000.0)
+    assert mission.clearance_m == 70.0
+    assert mission.bounds_m == (0.0, 0.0, 40000.0, 40000.0)
+    assert mission.turn_radius_m == performance(airframe("aerosonde"), 25.0).turn_radius_m
+    assert mission.sensor_range_m == scenario.sensor.range_m
+
+
+@pytest.mark.parametrize("wanted_m", [0.0, 0.01])
+def test_planners_keep_a_share_of_the_turn_radius_at_the_least(wanted_m: float) -> None:
+    scenario = parse_scenario(WITH_PLANNER.replace("clearance_m: 70", f"clearance_m: {wanted_m}"))
+    mission = mission_of(scenario)
+    assert scenario.planner.clearance_m == wanted_m
+    assert mission.clearance_m == LEAST_CLEARANCE * mission.turn_radius_m
+
+
+def test_the_planners_config_is_complete_and_resolved() -> None:
+    scenario = parse_scenario(WITH_PLANNER)
+    config = planner_kinds()["rolling_window"].config
+    assert config(**scenario.planner.own) == config(candidates=9).resolved(mission_of(scenario))
+
+
+def test_numbers_are_those_of_yaml_1_2() -> None:
+    text = LEAST.replace("[31000, 1000]", "[31e3, +1.0E3]").replace("40000, 40000]", "4.e4, 0x9c40]")
+    assert parse_scenario(text) == parse_scenario(LEAST)
+
+
+def test_a_closing_vertex_is_dropped() -> None:
+    polygon = "obstacles: [{polygon: {vertices_m: [[5000, 5000], [6000, 5000], [6000, 6000]%s]}}]\n"
+    closed = parse_scenario(LEAST + polygon % ", [5000, 5000]")
+    assert closed == parse_scenario(LEAST + polygon % "")
+    assert closed.obstacles[0].polygon
+    assert len(closed.obstacles[0].polygon.vertices_m) == 3
+
+
+@pytest.mark.parametrize("own", ["active_s: [60, 120]", "velocity_mps: [3, 0]"])
+def test_only_what_stays_may_not_lie_on_the_goal(own: str) -> None:
+    there = "obstacles: [{circle: {center_m: [31000, 1000], radius_m: 300}%s}]\n"
+    assert parse_scenario(LEAST + there % f", {own}").obstacles
+    with pytest.raises(InputError, match=r"mission\.goal_m: lies inside obstacles\[0\]"):
+        parse_scenario(LEAST + there % "")
+
+
+@pytest.mark.parametrize("key", ["start_m", "goal_m"])
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "circle: {center_m: [%d, 1000], radius_m: 300}",
+        "polygon: {vertices_m: [[%d, 0], [0, 9000], [40000, 9000]]}",
+    ],
+)
+def test_nobody_starts_or_ends_inside_an_obstacle_however_little_clearance_is_wanted(
+    key: str, shape: str
+) -> None:
+    east = 1000 if key == "start_m" else 31000
+    with pytest.raises(InputError, match=rf"mission\.{key}: lies inside obstacles\[0\]"):
+        parse_scenario(LEAST + f"obstacles: [{{{shape % east}}}]\nplanner: {{clearance_m: 0}}\n")
+
+
+def test_what_pops_up_later_may_lie_on_the_start() -> None:
+    there = "obstacles: [{circle: {center_m: [1000, 1000], radius_m: 300}, active_s: [%d, 120]}]\n"
+    assert parse_scenario(LEAST + there % 1).obstacles
+    with pytest.raises(InputError, match=r"mission\.start_m: lies inside obstacles\[0\]"):
+        parse_scenario(LEAST + there % 0)
+
+
+def test_is_frozen() -> None:
+    scenario = parse_scenario(LEAST)
+    with pytest.raises(ValueError, match="frozen"):
+        scenario.seed = 2
+    with pytest.raises(ValueError, match="frozen"):
+        scenario.mission.altitude_m = 2.0
+
+
+@pytest.mark.parametrize("name", ["on", "1e3", "0.1", "null", "0x1f", "yes", "-", "_", "2001-01-01", "1.-"])
+def test_dumped_text_stays_text(name: str) -> None:
+    data = {**yaml.safe_load(LEAST), "name": name}
+    scenario = Scenario.model_validate(data)
+    text = dump_scenario(scenario)
+    assert parse_scenario(text) == scenario
+    assert yaml.safe_load(text)["name"] == name
+
+
+finite = st.floats(-1e6, 1e6, allow_nan=False).filter(lambda x: x == 0 or abs(x) > 1e-300)
+away = st.tuples(finite, finite).filter(
+    lambda center: min(math.dist(center, (1000, 1000)), math.dist(center, (31000, 1000))) > 2000
+)
+time = st.floats(0, 1e6)
+obstacle = st.fixed_dictionaries(
+    {"circle": st.fixed_dictionaries({"center_m": away, "radius_m": st.floats(1e-9, 1e3)})},
+    optional={
+        "velocity_mps": st.tuples(st.floats(-100, 100), st.floats(-100, 100)),
+        "active_s": st.tuples(time, time).filter(lambda t: t[0] < t[1]),
+    },
+)
+
+
+@given(
+    obstacles=st.lists(obstacle, max_size=4),
+    seed=st.integers(0, 2**53),
+    altitude_m=st.floats(50, 20000),
+    sensor=st.fixed_dictionaries(
+        {},
+        optional={"range_m": st.floats(2e4, 1e5), "rays": st.integers(3, 9999), "dropout": st.floats(0, 1)},
+    ),
+)
+def test_a_dump_loads_back_bit_for_bit(
+    obstacles: list[dict[str, Any]], seed: int, altitude_m: float, sensor: dict[str, Any]
+) -> None:
+    data = yaml.safe_load(LEAST)
+    data["mission"]["altitude_m"] = altitude_m
+    scenario = Scenario.model_validate({**data, "obstacles": obstacles, "seed": seed, "sensor": sensor})
+    text = dump_scenario(scenario)
+    again = parse_scenario(text)
+    assert again == scenario
+    assert again.model_dump_json() == scenario.model_dump_json()
+    assert dump_scenario(again) == text
+    assert yaml.safe_load(text)["mission"]["altitude_m"] == altitude_m
+
+
+def overridden(*settings: tuple[str, str], text: str, folder: Path) -> Scenario:
+    path = folder / "file.yaml"
+    path.write_text(text)
+    return load_scenario(path, settings)
+
+
+def test_overrides_replace_keys_before_defaults_follow(tmp_path: Path) -> None:
+    scenario = overridden(
+        ("mission.goal_m", "[1000, 31000]"),
+        ("sensor.range_m", "5e3"),
+        ("environment.wind.speed_mps", "4"),
+        ("obstacles", "[{circle: {center_m: [9000, 9000], radius_m: 10}}]"),
+        ("obstacles[0].circle.radius_m", "20"),
+        text=LEAST,
+        folder=tmp_path,
+    )
+    assert scenario.mission.course_deg == 0.0
+    assert scenario.sensor.range_m == 5000.0
+    assert scenario.environment.wind
+    assert scenario.environment.wind.speed_mps == 4.0
+    assert scenario.obstacles[0].circle
+    assert scenario.obstacles[0].circle.radius_m == 20.0
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        (("sensor.rnage_m", "1"), "command line: sensor.rnage_m: unknown key; did you mean range_m?"),
+        (("sensor.rays", "many"), "command line: sensor.rays: is the text 'many'"),
+        (("seed", ""), "command line: seed: has no value"),
+        (("seed", "[1"), "command line: seed:1:"),
+        (("mission..start_m", "1"), "command line: 'mission..start_m' is not a key path"),
+        (("name.first", "1"), "command line: name.first: no such key"),
+        (("mission.start_m[7]", "1"), "command line: mission.start_m[7]: does not exist; there are 2"),
+        (("planner.kind", "other"), "command line: planner.kind: is 'other'; must be one of rolling_window"),
+        (("planner.kind", 2000 * "x"), f"command line: planner.kind: is '{40 * 'x'}'; must be one of"),
+    ],
+)
+def test_a_bad_override_is_named(setting: tuple[str, str], message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        overridden(setting, text=LEAST, folder=tmp_path)
+    assert str(caught.value).startswith(message)
+
+
+def test_the_same_planner_keeps_its_keys_and_another_drops_them(tmp_path: Path) -> None:
+    same = overridden(("planner.kind", "rolling_window"), text=WITH_PLANNER, folder=tmp_path)
+    assert same.planner.own["candidates"] == 9
+    elsewhere = WITH_PLANNER.replace("rolling_window", "elsewhere").replace("candidates", "whatever")
+    other = overridden(("planner.kind", "rolling_window"), text=elsewhere, folder=tmp_path)
+    assert other.planner.clearance_m == 70.0
+    assert "whatever" not in other.planner.own
+
+
+def described_keys(schema: dict[str, Any], defs: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Every key below a schema, with its own schema."""
+    found: list[tuple[str, dict[str, Any]]] = []
+    for choice in (schema, *schema.get("anyOf", ())):
+        resolved = defs[choice["$ref"].rpartition("/")[2]] if "$ref" in choice else choice
+        for name, key in resolved.get("properties", {}).items():
+            section = defs[key["$ref"].rpartition("/")[2]] if "$ref" in key else {}
+            found += [(name, {**section, **key}), *described_keys(key, defs)]
+        if "items" in resolved:
+            found += described_keys(resolved["items"], defs)
+    return found
+
+
+def test_the_schema_describes_every_key_with_its_unit() -> None:
+    schema = scenario_schema()
+    keys = described_keys(schema, schema["$defs"])
+    assert len(keys) > 45
+    for name, key in keys:
+        assert key.get("description"), name
+        if name.endswith(("_m", "_mps", "_s", "_deg", "_hz")):
+            assert key["unit"] == {"mps": "m/s", "hz": "Hz"}.get(name.rsplit("_")[-1], name.rsplit("_")[-1])
+    assert schema["required"] == ["schema", "name", "area", "mission"]
+
+
+def bounded(key: dict[str, Any]) -> bool:
+    """Whether a key's schema, or that of each of its items, says what it may be."""
+    limits = {
+        "minimum",
+        "exclusiveMinimum",
+        "maximum",
+        "exclusiveMaximum",
+        "enum",
+        "const",
+        "pattern",
+        "minLength",
+    }
+    choices = [choice for choice in key.get("anyOf", [key]) if choice.get("type") != "null"]
+    inner = [item for choice in choices for item in choice.get("prefixItems", [choice.get("items", choice)])]
+    return all(limits & item.keys() or bounded_items(item) for item in inner)
+
+
+def bounded_items(key: dict[str, Any]) -> bool:
+    return "prefixItems" in key and bounded(key)
+
+
+def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
+    schema = scenario_schema()
+    keys = described_keys(schema, schema["$defs"])
+    holders = {"area", "origin", "obstacles", "circle", "polygon", "mission", "aircraft", "sensor", "planner"}
+    values = [
+        (name, key)
+        for name, key in keys
+        if name not in holders | {"environment", "wind", "turbulence", "gust", "trackability"}
+    ]
+    required = {
+        "schema",
+        "name",
+        "bounds_m",
+        "center_m",
+        "radius_m",
+        "vertices_m",
+        "start_m",
+        "goal_m",
+        "kind",
+        "speed_mps",
+    }
+    words = {"schema", "name", "kind", "model", "turn", "intensity", "shape"}
+    assert len(values) > 40
+    for name, key in values:
+        assert bounded(key), name
+        assert name in words or key.get("unit"), name
+        told = key.get("default") is not None or "default:" in key["description"].lower()
+        assert told or name in required, name
+
+
+def test_editors_find_the_schema_beside_the_scenarios() -> None:
+    folder = Path(__file__).parents[3] / "scenarios"
+    assert json.loads((folder / "scenario.schema.json").read_text()) == scenario_schema()
+    for path in folder.glob("*.yaml"):
+        first, second = path.read_text().splitlines()[:2]
+        assert first == "# yaml-language-server: $schema=scenario.schema.json"
+        assert second.startswith("# ")
+
+
+def test_a_model_folder_is_sought_beside_the_scenario_and_then_from_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beside, here = tmp_path / "beside", tmp_path / "here"
+    for place, name in ((beside, "mine"), (here, "mine"), (here, "other")):
+        shutil.copytree(Path(aircraft.__path__[0], "aerosonde"), place / name)
+    text = scenario_path("paper_circles").read_text()
+    file = beside / "s.yaml"
+    monkeypatch.chdir(here)
+
+    def model(given: str) -> str:
+        file.write_text(text.replace("model: aerosonde", f"model: {given}"))
+        return load_scenario(file).aircraft.model
+
+    assert model("aerosonde") == "aerosonde"
+    assert model("mine") == str(beside / "mine")
+    assert model("../here/mine") == str(here / "mine")
+    assert model("./other") == str(here / "other")
+    assert parse_scenario(dump_scenario(load_scenario(file))) == load_scenario(file)
+    with pytest.raises(InputError, match=r"s.yaml:\d+: aircraft.model: unknown aircraft 'nowhere/mine'"):
+        model("nowhere/mine")

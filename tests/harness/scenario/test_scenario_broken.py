@@ -1,0 +1,331 @@
+"""Every way to spoil a scenario file that its loader must name, with the line and the key at fault."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from harness.cli.app import main
+
+GOOD = """\
+schema: wayproof/scenario/1
+name: good
+seed: 1
+area:
+  bounds_m: [0, 0, 20000, 10000]
+  origin: {latitude_deg: 47.0, longitude_deg: 8.0}
+obstacles:
+  - circle: {center_m: [8000, 5000], radius_m: 900}
+  - polygon: {vertices_m: [[12000, 3000], [14000, 3000], [14000, 5000], [12000, 5000]]}
+    active_s: [60, 600]
+mission:
+  start_m: [1000, 5000]
+  course_deg: 90
+  goal_m: [19000, 5000]
+  goal_radius_m: 200
+  altitude_m: 300
+aircraft: {model: aerosonde, airspeed_mps: 25}
+sensor: {range_m: 3000, rays: 360, rate_hz: 2}
+planner:
+  kind: rolling_window
+  clearance_m: 200
+  steps: 8
+environment:
+  wind: {speed_mps: 5, from_deg: 270}
+  turbulence: {model: tustin, intensity: light}
+  gust: {shape: one_minus_cosine, speed_mps: 4, start_s: 60, duration_s: 5}
+trackability: {cross_track_m: 10, altitude_m: 15, airspeed_mps: 2, load_factor: 2.5}
+"""
+
+SPEED = "airspeed_mps: 25"
+SQUARE = "[[12000, 3000], [14000, 3000], [14000, 5000], [12000, 5000]]"
+
+# what is replaced, by what, then the line and the key that must be named, and a part of the sentence.
+BROKEN = {
+    "wrong schema": ("scenario/1", "scenario/2", "1: schema", "must be 'wayproof/scenario/1'"),
+    "no schema": ("schema: wayproof/scenario/1\n", "", "1: schema", "is missing"),
+    "no name": ("name: good\n", "", "1: name", "is missing"),
+    "no bounds": ("  bounds_m: [0, 0, 20000, 10000]\n", "", "4: area.bounds_m", "is missing"),
+    "no start": ("  start_m: [1000, 5000]\n", "", "11: mission.start_m", "is missing"),
+    "no goal": ("  goal_m: [19000, 5000]\n", "", "11: mission.goal_m", "is missing"),
+    "name in capitals": ("name: good", "name: Good", "2: name", "must match"),
+    "name climbs out": ("name: good", "name: ..", "2: name", "must match"),
+    "name is a number": ("name: good", "name: 7", "2: name", "must be text; put it in quotes"),
+    "name is a path": ("name: good", "name: a/b", "2: name", "must match"),
+    "negative seed": ("seed: 1", "seed: -1", "3: seed", "must be at least 0"),
+    "fractional seed": ("seed: 1", "seed: 1.5", "3: seed", "must be a whole number"),
+    "seed with a point": (
+        "seed: 1",
+        "seed: 7.0",
+        "3: seed",
+        "is 7.0; must be a whole number without a point",
+    ),
+    "seed beyond floats": ("seed: 1", "seed: 1%s" % (20 * "0"), "3: seed", "of at most 9007199254740992"),
+    "seed is true": ("seed: 1", "seed: true", "3: seed", "is true; must be a whole number"),
+    "three bounds": ("[0, 0, 20000, 10000]", "[0, 0, 20000]", "5: area.bounds_m", "must have more numbers"),
+    "five bounds": ("20000, 10000]", "20000, 10000, 1]", "5: area.bounds_m", "has 5 items; must have 4"),
+    "bounds turned round": (
+        "[0, 0, 20000,",
+        "[20000, 0, 0,",
+        "5: area.bounds_m",
+        "with xmin < xmax and ymin < ymax",
+    ),
+    "flat bounds": ("20000, 10000]", "20000, 0]", "5: area.bounds_m", "with xmin < xmax and ymin < ymax"),
+    "bounds beyond the plane": ("20000, 10000]", "2e7, 10000]", "5: area.bounds_m[2]", "at most 1000000"),
+    "latitude": ("latitude_deg: 47.0", "latitude_deg: 91", "6: area.origin.latitude_deg", "at most 85"),
+    "section left empty": (
+        "{model: aerosonde, airspeed_mps: 25}",
+        "",
+        "17: aircraft",
+        "is empty; must be a mapping",
+    ),
+    "no shape": ("- circle: {center_m: [8000, 5000], radius_m: 900}", "- {}", "8: obstacles[0]", "neither"),
+    "two shapes": (
+        "  - polygon: {",
+        "    polygon: {",
+        "8: obstacles[0]",
+        "has both of circle and polygon; must have exactly one",
+    ),
+    "radius zero": ("radius_m: 900", "radius_m: 0", "8: obstacles[0].circle.radius_m", "greater than 0"),
+    "radius is text": ("radius_m: 900", "radius_m: big", "8: obstacles[0].circle.radius_m", "a number"),
+    "radius is nan": ("radius_m: 900", "radius_m: .nan", "8: obstacles[0].circle.radius_m", "finite"),
+    "centre is one number": ("[8000, 5000]", "8000", "8: obstacles[0].circle.center_m", "must be a list"),
+    "centre is infinite": ("[8000, 5000]", "[.inf, 0]", "8: obstacles[0].circle.center_m[0]", "finite"),
+    "overflowing number": ("radius_m: 900", "radius_m: 1e999", "8: obstacles[0].circle.radius_m", "finite"),
+    "polygon crosses itself": (
+        SQUARE,
+        "[[12000, 3000], [14000, 5000], [14000, 3000], [12000, 5000]]",
+        "9: obstacles[1].polygon.vertices_m",
+        "crosses or touches itself at (13000, 4000)",
+    ),
+    "two vertices": (SQUARE, "[[1, 2], [3, 4]]", "9: obstacles[1].polygon.vertices_m", "at least 3"),
+    "closed line": (
+        SQUARE,
+        "[[1, 2], [3, 4], [1, 2]]",
+        "9: obstacles[1].polygon.vertices_m",
+        "has 2 distinct vertices",
+    ),
+    "closed twice": (
+        SQUARE,
+        "[[12000, 3000], [14000, 3000], [14000, 5000], [12000, 3000], [12000, 3000]]",
+        "9: obstacles[1].polygon.vertices_m",
+        "vertex 4 repeats vertex 3",
+    ),
+    "polygon without area": (
+        SQUARE,
+        "[[12000, 3000], [13000, 3000], [14000, 3000]]",
+        "9: obstacles[1].polygon.vertices_m",
+        "encloses no area",
+    ),
+    "repeated vertex": (
+        SQUARE,
+        "[[12000, 3000], [12000, 3000], [14000, 3000], [14000, 5000]]",
+        "9: obstacles[1].polygon.vertices_m",
+        "vertex 1 repeats vertex 0",
+    ),
+    "stops before it starts": ("[60, 600]", "[600, 60]", "10: obstacles[1].active_s", "start < stop"),
+    "starts before time": ("[60, 600]", "[-1, 60]", "10: obstacles[1].active_s[0]", "at least 0"),
+    "start outside": ("[1000, 5000]", "[-1, 5000]", "12: mission.start_m", "must lie inside area.bounds_m"),
+    "goal outside": ("[19000, 5000]", "[19000, 5e5]", "14: mission.goal_m", "must lie inside area.bounds_m"),
+    "start in a circle": ("[1000, 5000]", "[8000, 5100]", "12: mission.start_m", "lies inside obstacles[0]"),
+    "start near a circle": ("[1000, 5000]", "[7000, 5000]", "12: mission.start_m", "100 m from obstacles[0]"),
+    "goal near a circle": ("[19000, 5000]", "[9000, 5000]", "14: mission.goal_m", "100 m from obstacles[0]"),
+    "goal at the start": ("[19000, 5000]", "[1100, 5000]", "14: mission.goal_m", "inside goal_radius_m"),
+    "course": ("course_deg: 90", "course_deg: 900", "13: mission.course_deg", "at most 360"),
+    "course is empty": (
+        "course_deg: 90",
+        "course_deg:",
+        "13: mission.course_deg",
+        "is empty; must be a number",
+    ),
+    "below ground": ("altitude_m: 300", "altitude_m: 0", "16: mission.altitude_m", "at least 50"),
+    "misspelt key": (
+        "altitude_m: 300",
+        "altitud_m: 300",
+        "16: mission.altitud_m",
+        "did you mean altitude_m?",
+    ),
+    "unknown section": ("aircraft:", "aircaft:", "17: aircaft", "did you mean aircraft?"),
+    "unknown aircraft": ("aerosonde", "concorde", "17: aircraft.model", "'concorde'; known are: aerosonde"),
+    "too fast": (SPEED, "airspeed_mps: 90", "17: aircraft.airspeed_mps", "cannot hold 90 m/s"),
+    "too slow": (SPEED, "airspeed_mps: 10", "17: aircraft.airspeed_mps", "cannot hold 10 m/s"),
+    "speed in quotes": (SPEED, "airspeed_mps: '25'", "17: aircraft.airspeed_mps", "is the text '25'"),
+    "underscore in a number": (SPEED, "airspeed_mps: 2_5", "17: aircraft.airspeed_mps", "is the text '2_5'"),
+    "on is not a number": (SPEED, "airspeed_mps: on", "17: aircraft.airspeed_mps", "is the text 'on'"),
+    "seventh rate": ("rate_hz: 2", "rate_hz: 7", "18: sensor.rate_hz", "does not divide 120 Hz"),
+    "too few rays": ("rays: 360", "rays: 2", "18: sensor.rays", "at least 3"),
+    "rays are fractional": ("rays: 360", "rays: 360.5", "18: sensor.rays", "a whole number"),
+    "sensor is a list": (
+        "{range_m: 3000, rays: 360, rate_hz: 2}",
+        "[3000]",
+        "18: sensor",
+        "must be a mapping",
+    ),
+    "dropout": ("rays: 360", "dropout: 1.5", "18: sensor.dropout", "at most 1"),
+    "unknown planner": ("rolling_window", "astar", "20: planner.kind", "must be one of rolling_window"),
+    "negative clearance": ("clearance_m: 200", "clearance_m: -1", "21: planner.clearance_m", "at least 0"),
+    "planner's misspelt key": ("steps: 8", "stepz: 8", "22: planner.stepz", "did you mean steps?"),
+    "planner's key out of range": ("steps: 8", "steps: 0", "22: planner.steps", "at least 1"),
+    "planner's key of a wrong type": ("steps: 8", "steps: eight", "22: planner.steps", "a whole number"),
+    "planner's keys contradict": (
+        "steps: 8",
+        "planning_window_m: 9000",
+        "22: planner.planning_window_m",
+        "3000",
+    ),
+    "storm": ("speed_mps: 5", "speed_mps: 23", "24: environment.wind.speed_mps", "below 0.9 of the airspeed"),
+    "wind direction": (
+        "from_deg: 270",
+        "from_deg: west",
+        "24: environment.wind.from_deg",
+        "must be a number",
+    ),
+    "turbulence model": ("tustin", "dryden", "25: environment.turbulence.model", "'tustin' or 'milspec'"),
+    "intensity": ("light", "mild", "25: environment.turbulence.intensity", "'light', 'moderate' or 'severe'"),
+    "no tolerance": (
+        "cross_track_m: 10",
+        "cross_track_m: 0",
+        "27: trackability.cross_track_m",
+        "must be greater than 0",
+    ),
+    "altitude tolerance": ("altitude_m: 15", "altitude_m: .nan", "27: trackability.altitude_m", "finite"),
+    "airspeed tolerance": (
+        "airspeed_mps: 2,",
+        "airspeed_mps: -2,",
+        "27: trackability.airspeed_mps",
+        "must be greater than 0",
+    ),
+    "load factor of level flight": (
+        "load_factor: 2.5",
+        "load_factor: 1",
+        "27: trackability.load_factor",
+        "must be greater than 1",
+    ),
+    "misspelt tolerance": (
+        "cross_track_m: 10",
+        "crosstrack_m: 10",
+        "27: trackability.crosstrack_m",
+        "did you mean cross_track_m?",
+    ),
+    "gust's shape": (
+        "one_minus_cosine",
+        "ramp",
+        "26: environment.gust.shape",
+        "'step' or 'one_minus_cosine'",
+    ),
+    "gust without end": (", duration_s: 5", "", "26: environment.gust", "has no duration_s"),
+    "gust of no speed": ("speed_mps: 4", "speed_mps: 0", "26: environment.gust.speed_mps", "greater than 0"),
+    "gust before the start": ("start_s: 60", "start_s: -1", "26: environment.gust.start_s", "at least 0"),
+    "gust's misspelt key": (
+        "duration_s: 5",
+        "duration: 5",
+        "26: environment.gust.duration",
+        "did you mean duration_s?",
+    ),
+    "key given twice": ("seed: 1", "seed: 1\nseed: 2", "4: seed", "is given twice, first in line 3"),
+    "nested key given twice": ("rays: 360", "rays: 3, rays: 4", "18: sensor.rays", "is given twice"),
+    "anchor": ("seed: 1", "seed: &one 1", "3: seed", "has the anchor &one"),
+    "alias": ("seed: 1", "seed: *one", "3: seed", "is the alias *one"),
+    "merge key": ("  steps: 8", "  <<: {steps: 8}", "22: planner", "has the merge key <<"),
+    "tag": ("seed: 1", "seed: !!int 1", "3: seed", "has the tag tag:yaml.org,2002:int"),
+    "python tag": ("seed: 1", "seed: !!python/name:os.system x", "3: seed", "has the tag"),
+    "list as a key": ("seed: 1", "[1, 2]: 1", "3: has a key that is not plain text", ""),
+    "tab": ("  course_deg: 90", "\tcourse_deg: 90", "13: mission", "has a tab; indent with spaces"),
+    "tab elsewhere": (
+        "  course_deg: 90",
+        "  course_deg: 90: 5  # a\tb",
+        "13: mission",
+        "is not YAML (mapping",
+    ),
+    "bad indentation": ("  goal_m", "   goal_m", "14: mission", "is not YAML"),
+    "open bracket": ("[0, 0, 20000, 10000]", "[0, 0, 20000, 10000", "5: area.bounds_m", "is not YAML"),
+    "open quote": ("name: good", "name: 'good", "2: name", "is not YAML"),
+    "control character": ("name: good", "name: go\aod", "2: has the control character 0x07", ""),
+    "too deep": (
+        "seed: 1",
+        f"seed: {'[' * 40}{']' * 40}",
+        "3: seed[0][0]",
+        "is nested deeper than 20 levels",
+    ),
+}
+
+
+def faults_of(path: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """What `fly` says of a file on standard error; it must refuse it and write nothing."""
+    before = sorted(path.parent.rglob("*"))
+    status = main(["fly", str(path), "--out", str(path.parent / "run")])
+    said = capsys.readouterr()
+    assert status == 2
+    assert said.out == ""
+    assert "Traceback" not in said.err
+    assert sorted(path.parent.rglob("*")) == before
+    return said.err.splitlines()
+
+
+def test_the_unspoilt_file_is_valid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "good.yaml"
+    path.write_text(GOOD)
+    assert main(["validate", str(path)]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("old", "new", "place", "sentence"), BROKEN.values(), ids=BROKEN)
+def test_names_line_and_key(
+    old: str, new: str, place: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert GOOD.count(old) >= 1
+    path = tmp_path / "broken.yaml"
+    path.write_text(GOOD.replace(old, new, 1))
+    faults = faults_of(path, capsys)
+    assert 1 <= len(faults) <= 2
+    assert faults[0].startswith(f"{path}:{place}")
+    assert sentence in faults[0]
+
+
+BYTES = {
+    "empty": (b"", ":1: is empty"),
+    "only a comment": (b"# nothing\n", ":1: is empty"),
+    "only spaces": (b"   \n\n", ":1: is empty"),
+    "a word": (b"scenario\n", ":1: is the text 'scenario'; must be a mapping"),
+    "a list": (b"- 1\n- 2\n", ":1: is a list of 2; must be a mapping"),
+    "two documents": (GOOD.encode() + b"---\nseed: 2\n", ":28: a second document begins here"),
+    "Latin-1": (GOOD.replace("good", "gut\xe9").encode("latin-1"), ":2: byte 0xe9 is not UTF-8"),
+    "UTF-16": (GOOD.encode("utf-16"), ": is not a text file"),
+    "binary": (bytes(range(256)) * 50, ": is not a text file"),
+    "deep flow": (b"a: " + b"[" * 200_000, ":1: a[0][0]: is nested deeper"),
+    "deep block": (b"".join(b" " * n + b"a:\n" for n in range(500)), ":22: a.a.a: is nested deeper"),
+    "billion laughs": (b"a: &a [x, x]\nb: [*a, *a]\n", ":1: a: has the anchor &a"),
+    "huge": (b"#" * 33_000_000, ": is larger than 32 MB"),
+}
+
+
+@pytest.mark.parametrize(("content", "sentence"), BYTES.values(), ids=BYTES)
+def test_names_what_is_not_a_scenario_at_all(
+    content: bytes, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_bytes(content)
+    faults = faults_of(path, capsys)
+    assert len(faults) == 1
+    assert faults[0].startswith(f"{path}{sentence}")
+
+
+def test_tells_the_first_of_many_faults_and_how_many_more_there_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "broken.yaml"
+    path.write_text(GOOD.replace("m: ", "metre: "))
+    faults = faults_of(path, capsys)
+    assert len(faults) == 2
+    assert all(fault.startswith(f"{path}:") for fault in faults)
+    assert faults[-1].endswith("more")
+
+
+@pytest.mark.parametrize("name", ["missing.yaml", "."])
+def test_names_a_file_that_cannot_be_read(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (fault,) = faults_of(tmp_path / name, capsys)
+    assert fault.startswith(f"{tmp_path / name}: ")
+    assert "paper_circles" in fault

@@ -1,0 +1,222 @@
+"""The clairvoyant optimum against closed forms, against the worlds' own figures, and against itself."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.optimum import Optimum, shortest_path
+
+WORLDS = Path(__file__).parents[4] / "shared" / "worlds"
+FAMILIES = (
+    *("barn", "circles_high", "ctu_dubins", "dead_ends", "enclosed_goal", "faster_forest", "maze5", "maze8"),
+    *("mrpb", "ompl_circles", "paper_like", "polygon_field", "slots", "spiral", "u_trap", "wall_across"),
+)
+ROUNDING_M = 0.051
+"""The worlds' figures have one decimal."""
+
+AREA = (-100.0, -100.0, 100.0, 100.0)
+WEST, EAST = (-50.0, 0.0), (50.0, 0.0)
+
+
+def disc(east: float, north: float, radius: float) -> Obstacle:
+    return Obstacle(Circle((east, north), radius))
+
+
+def block(west: float, south: float, east: float, north: float) -> Obstacle:
+    return Obstacle(Polygon(((west, south), (east, south), (east, north), (west, north))))
+
+
+def way(
+    *obstacles: Obstacle,
+    clearance: float = 0.0,
+    start: tuple[float, float] = WEST,
+    goal: tuple[float, float] = EAST,
+) -> Optimum:
+    return shortest_path(obstacles, AREA, start, goal, clearance)
+
+
+def test_nothing_in_the_way_is_the_straight_line() -> None:
+    found = way(disc(0.0, 40.0, 20.0), clearance=19.0)
+    assert found.length_m == pytest.approx(100.0, abs=1e-12)
+    assert found.points_m.tolist() == [list(WEST), list(EAST)]
+
+
+@pytest.mark.parametrize("clearance", [0.0, 7.0])
+def test_round_one_circle(clearance: float) -> None:
+    radius = 20.0 + clearance
+    exact = 2 * math.sqrt(50.0**2 - radius**2) + radius * (math.pi - 2 * math.acos(radius / 50.0))
+    assert way(disc(0.0, 0.0, 20.0), clearance=clearance).length_m == pytest.approx(exact, rel=1e-12)
+
+
+def test_round_two_circles_on_one_side() -> None:
+    away, radius = 30.0, 12.0
+    exact = 2 * math.sqrt(away**2 - radius**2) + 40.0 + 2 * radius * math.asin(radius / away)
+    found = way(disc(-20.0, 0.0, 10.0), disc(20.0, 0.0, 10.0), clearance=2.0)
+    assert found.length_m == pytest.approx(exact, rel=1e-12)
+
+
+def test_between_two_circles_the_path_crosses_over() -> None:
+    radius, centre = 10.0, (-20.0, 6.0)
+    to_start = math.dist(centre, WEST)
+    to_middle = math.hypot(*centre)
+    between = math.acos(
+        ((WEST[0] - centre[0]) * -centre[0] + (WEST[1] - centre[1]) * -centre[1]) / (to_start * to_middle)
+    )
+    bend = between - math.acos(radius / to_start) - math.acos(radius / to_middle)
+    half = math.sqrt(to_start**2 - radius**2) + math.sqrt(to_middle**2 - radius**2) + radius * bend
+    found = way(disc(*centre, 10.0), disc(-centre[0], -centre[1], 10.0))
+    assert bend > 0
+    assert found.length_m == pytest.approx(2 * half, rel=1e-12)
+
+
+@pytest.mark.parametrize("clearance", [0.0, 5.0])
+def test_round_a_square(clearance: float) -> None:
+    to_corner = math.hypot(50.0 - 15.0, 15.0)
+    bend = math.atan2(15.0, 35.0) + math.asin(clearance / to_corner)
+    exact = 2 * math.sqrt(to_corner**2 - clearance**2) + 30.0 + 2 * clearance * bend
+    found = way(block(-15.0, -15.0, 15.0, 15.0), clearance=clearance)
+    assert found.length_m == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_wall_that_stands_on_a_circle_closes_its_rim() -> None:
+    away = math.hypot(50.0, 10.0)
+    below = math.pi + 2 * math.atan2(10.0, 50.0) - 2 * math.acos(20.0 / away)
+    exact = 2 * math.sqrt(away**2 - 20.0**2) + 20.0 * below
+    wall = block(-1.0, 0.0, 1.0, 100.0)
+    found = way(disc(0.0, 0.0, 20.0), wall, start=(-50.0, 10.0), goal=(50.0, 10.0))
+    assert found.length_m == pytest.approx(exact, rel=1e-12)
+
+
+def test_two_blocks_that_share_an_edge_leave_no_way_between_them() -> None:
+    found = way(block(-15.0, -15.0, 15.0, 0.0), block(-15.0, 0.0, 15.0, 15.0))
+    assert found.length_m == pytest.approx(way(block(-15.0, -15.0, 15.0, 15.0)).length_m, rel=1e-12)
+
+
+def test_the_border_closes_the_side_where_the_clearance_does_not_fit() -> None:
+    wall = block(-5.0, -20.0, 5.0, 94.0)
+    over, under = way(wall, clearance=5.0), way(wall, clearance=7.0)
+    assert over.length_m is not None
+    assert under.length_m is not None
+    start, goal = (-50.0, 80.0), (50.0, 80.0)
+    near, far = (
+        way(wall, clearance=5.0, start=start, goal=goal),
+        way(wall, clearance=7.0, start=start, goal=goal),
+    )
+    assert near.length_m is not None
+    assert far.length_m is not None
+    assert near.points_m[:, 1].max() == pytest.approx(99.0)
+    assert far.points_m[:, 1].min() == pytest.approx(-27.0)
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "reason"),
+    [
+        ([block(-5.0, -100.0, 5.0, 100.0)], "there is no way"),
+        ([disc(0.0, -60.0, 41.0), disc(0.0, 60.0, 41.0), disc(0.0, 0.0, 19.5)], "there is no way"),
+        ([disc(-50.0, 10.0, 9.5)], "the start is outside the area or nearer than the clearance"),
+        ([block(45.0, -5.0, 55.0, 5.0)], "the goal is outside the area or nearer than the clearance"),
+        ([Obstacle(Circle((0.0, 0.0), 5.0), velocity_mps=(1.0, 0.0))], "an obstacle moves"),
+        ([Obstacle(Circle((0.0, 0.0), 5.0), active_s=(0.0, 9.0))], "an obstacle moves, appears"),
+    ],
+)
+def test_says_why_there_is_none(obstacles: list[Obstacle], reason: str) -> None:
+    found = way(*obstacles, clearance=1.0)
+    assert found.length_m is None
+    assert found.reason.startswith(reason)
+    assert found.points_m.shape == (0, 2)
+
+
+coordinate = st.integers(-40, 40).map(float)
+discs = st.builds(disc, coordinate, coordinate, st.integers(2, 15).map(float))
+blocks = st.builds(
+    lambda east, north, wide, high: block(east, north, east + wide, north + high),
+    *(coordinate, coordinate, st.integers(1, 30), st.integers(1, 30)),
+)
+fields = st.lists(discs | blocks, max_size=7)
+ENDS = {"start": (-90.0, -5.0), "goal": (90.0, 5.0)}
+
+
+@given(field=fields, clearance=st.sampled_from([0.0, 3.0]))
+@settings(max_examples=60, derandomize=True)
+def test_the_drawn_path_keeps_the_clearance_and_has_the_length(
+    field: list[Obstacle], clearance: float
+) -> None:
+    found = way(*field, clearance=clearance, **ENDS)
+    assert found.length_m is not None
+    points = found.points_m
+    drawn = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    assert drawn <= found.length_m * (1 + 1e-12)
+    assert drawn == pytest.approx(found.length_m, rel=1e-4)
+    steps = np.linspace(0.0, 1.0, 50)[:, None, None]
+    between = (points[:-1] + steps * np.diff(points, axis=0)).reshape(-1, 2)
+    for each in field:
+        sagitta = (getattr(each.shape, "radius_m", 0.0) + clearance) * (1 - math.cos(math.radians(0.5)))
+        gap = each.distance(between, np.zeros(len(between))).min()
+        assert gap >= clearance - sagitta - 1e-5
+
+
+@given(field=fields, more=discs | blocks, clearance=st.sampled_from([0.0, 3.0]))
+@settings(max_examples=40, derandomize=True)
+def test_the_way_back_is_as_long_and_an_obstacle_more_makes_it_no_shorter(
+    field: list[Obstacle], more: Obstacle, clearance: float
+) -> None:
+    length = way(*field, clearance=clearance, **ENDS).length_m
+    back = way(*field[::-1], clearance=clearance, start=ENDS["goal"], goal=ENDS["start"]).length_m
+    longer = way(*field, more, clearance=clearance, **ENDS).length_m
+    assert length is not None
+    assert longer is not None
+    assert back == pytest.approx(length, rel=1e-9)
+    assert longer >= length * (1 - 1e-9)
+
+
+def test_three_hundred_obstacles_take_seconds() -> None:
+    random = np.random.default_rng(3)
+    field = []
+    for east, north in random.uniform(-80.0, 80.0, (300, 2)):
+        angles = random.uniform(0.0, math.tau) + math.tau * np.arange(5) / 5
+        ring = tuple((east + 3.0 * math.cos(a), north + 3.0 * math.sin(a)) for a in angles)
+        field.append(Obstacle(Polygon(ring)) if random.random() < 0.5 else disc(east, north, 3.0))
+    begun = time.perf_counter()
+    found = way(*field, start=(-95.0, -95.0), goal=(95.0, 95.0), clearance=0.5)
+    assert time.perf_counter() - begun < 10.0
+    assert found.length_m is not None
+    assert 190.0 * math.sqrt(2) < found.length_m < 1.3 * 190.0 * math.sqrt(2)
+
+
+@pytest.mark.skipif(not WORLDS.is_dir(), reason="the shared worlds are not beside this checkout")
+@pytest.mark.parametrize("family", FAMILIES)
+def test_agrees_with_the_shared_worlds(family: str) -> None:
+    world = json.loads(sorted((WORLDS / family).glob("*.json"))[0].read_text())
+    field = [disc(*circle) for circle in world["circles_m"]]
+    field += [Obstacle(Polygon(tuple(map(tuple, ring)))) for ring in world["polygons_m"]]
+    start, goal = ((world[end][0], world[end][1]) for end in ("start_m", "goal_m"))
+    found = shortest_path(field, tuple(world["bounds_m"]), start, goal, world["clearance_m"])
+    if world["optimum_m"] is None:
+        assert found.length_m is None
+    else:
+        assert found.length_m == pytest.approx(world["optimum_m"], rel=1e-6, abs=ROUNDING_M)
+
+
+@pytest.mark.parametrize(("corners", "waves"), [(4000, 0), (16_000, 40)])
+def test_round_a_polygon_of_thousands_of_corners_in_seconds(corners: int, waves: int) -> None:
+    """One that is convex can be touched at every corner, a coast with bays at few. Both ways follow a convex hull."""
+    turn = np.linspace(0.0, math.tau, corners, endpoint=False)
+    radius = 20.0 + 4.0 * np.sin(waves * turn) + 0.1 * np.sin(25 * waves * turn)
+    ring = np.column_stack((radius * np.cos(turn), radius * np.sin(turn)))
+    begun = time.process_time()
+    found = way(Obstacle(Polygon(tuple(map(tuple, ring.tolist())))), clearance=2.0)
+    assert time.process_time() - begun < 6.0
+    grown = shapely.Polygon(ring).buffer(2.0, quad_segs=64)
+    hull = shapely.union_all([grown, *map(shapely.Point, (WEST, EAST))]).convex_hull.exterior
+    one = abs(hull.project(shapely.Point(WEST)) - hull.project(shapely.Point(EAST)))
+    assert found.length_m == pytest.approx(min(one, hull.length - one), rel=1e-5)

@@ -1,0 +1,382 @@
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from harness.mapping.scan import RangeScan
+from harness.scenario.sections import Sensor
+from harness.world.range_sensor import RangeSensor
+from harness.world.world import Circle, Obstacle, Polygon, Surroundings, World
+
+BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
+EMPTY = World([], BOUNDS)
+
+FloatArray = NDArray[np.float64]
+
+
+def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
+    return RangeSensor(world, Sensor(**{"range_m": 1000.0} | keys), np.random.SeedSequence(seed))
+
+
+def ahead(world: World, heading_rad: float = 0.0) -> float:
+    """What a ray along the heading returns."""
+    scan = sensor(world, field_of_view_deg=1.0, rays=3).scan(0.0, 0.0, heading_rad, 0.0)
+    return float(scan.ranges_m[1])
+
+
+def bits(scan: RangeScan) -> bytes:
+    return scan.ranges_m.tobytes() + scan.directions.tobytes()
+
+
+def star(rng: np.random.Generator, east: float, north: float, size: float) -> Polygon:
+    count = rng.integers(4, 10)
+    turns = (np.arange(count) + rng.uniform(0.0, 0.9, count)) * math.tau / count
+    return Polygon(
+        tuple(
+            (east + size * share * math.cos(turn), north + size * share * math.sin(turn))
+            for turn, share in zip(turns, rng.uniform(0.3, 1.0, count), strict=True)
+        )
+    )
+
+
+def square(east: float, north: float, half: float) -> Polygon:
+    corners = ((-half, -half), (half, -half), (half, half), (-half, half))
+    return Polygon(tuple((east + dx, north + dy) for dx, dy in corners))
+
+
+def random_obstacles(
+    rng: np.random.Generator, count: int, inner: float, outer: float, changing: bool = False
+) -> list[Obstacle]:
+    """Obstacles with centres in a ring round the origin."""
+    obstacles = []
+    for _ in range(count):
+        bearing, away, size = rng.uniform(0.0, math.tau), rng.uniform(inner, outer), rng.uniform(10.0, 200.0)
+        east, north = away * math.sin(bearing), away * math.cos(bearing)
+        shape = Circle((east, north), size) if rng.random() < 0.5 else star(rng, east, north, size)
+        velocity = (
+            tuple(rng.uniform(-20.0, 20.0, 2).tolist()) if changing and rng.random() < 0.5 else (0.0, 0.0)
+        )
+        start = rng.uniform(0.0, 60.0)
+        active = (start, start + rng.uniform(1.0, 60.0)) if changing and rng.random() < 0.5 else None
+        obstacles.append(Obstacle(shape, velocity, active))
+    return obstacles
+
+
+def first_crossing(directions: FloatArray, shape: Any) -> FloatArray:
+    """(n,) distance from the origin along each direction to the edge of a shape, +inf if there is none."""
+    rays = shapely.linestrings(np.stack((np.zeros_like(directions), 5000.0 * directions), axis=1))
+    crossing = shapely.intersection(rays, shape.boundary)
+    distance: FloatArray = np.nan_to_num(shapely.distance(shapely.Point(0.0, 0.0), crossing), nan=math.inf)
+    return distance
+
+
+@settings(max_examples=60)
+@given(
+    seed=st.integers(0, 2**32),
+    count=st.integers(1, 12),
+    field=st.sampled_from([10.0, 90.0, 180.0, 270.0, 359.0, 360.0]),
+    heading=st.floats(-10.0, 10.0),
+)
+def test_ranges_lie_between_those_of_slightly_larger_and_smaller_shapes(
+    seed: int, count: int, field: float, heading: float
+) -> None:
+    obstacles = random_obstacles(np.random.default_rng(seed), count, 0.0, 1200.0)
+    scan = sensor(World(obstacles, BOUNDS), field_of_view_deg=field, rays=60).scan(0.0, 0.0, heading, 0.0)
+    low, high = np.full(60, math.inf), np.full(60, math.inf)
+    for obstacle in obstacles:
+        if isinstance(obstacle.shape, Circle):
+            center, radius = shapely.Point(obstacle.shape.center_m), obstacle.shape.radius_m
+            # Polygons of 512 edges inside and round the circle, which differ by 0.004 m at most.
+            around = center.buffer(radius / math.cos(math.pi / 512), quad_segs=128)
+            within = center.buffer(radius, quad_segs=128)
+        else:
+            exact = shapely.Polygon(obstacle.shape.vertices_m)
+            around, within = (exact.buffer(by, join_style="mitre", mitre_limit=50.0) for by in (1e-6, -1e-6))
+        assume(not around.contains(shapely.Point(0.0, 0.0)) or within.contains(shapely.Point(0.0, 0.0)))
+        both = first_crossing(scan.directions, around), first_crossing(scan.directions, within)
+        low, high = np.minimum(low, np.minimum(*both)), np.minimum(high, np.maximum(*both))
+    assert ((scan.ranges_m >= low - 1e-6) | (low > 1000.0 - 1e-6)).all()
+    assert ((scan.ranges_m <= high + 1e-6) | (high > 1000.0 - 1e-6)).all()
+    assert ((scan.ranges_m <= 1000.0) | np.isinf(scan.ranges_m)).all()
+
+
+@given(
+    bearing=st.floats(0.0, math.tau),
+    away=st.floats(10.0, 900.0),
+    share=st.floats(0.01, 0.99),
+    heading=st.floats(0.0, math.tau),
+)
+def test_hits_on_a_circle_lie_exactly_on_it_and_fill_its_width(
+    bearing: float, away: float, share: float, heading: float
+) -> None:
+    center, radius = np.array([away * math.sin(bearing), away * math.cos(bearing)]), share * away
+    scan = sensor(World([Obstacle(Circle(tuple(center), radius))], BOUNDS)).scan(0.0, 0.0, heading, 0.0)
+    hit = np.isfinite(scan.ranges_m)
+    points = scan.directions[hit] * scan.ranges_m[hit, None]
+    np.testing.assert_allclose(np.hypot(*(points - center).T), radius, rtol=0, atol=1e-9)
+    width = 2 * math.asin(share) / scan.spacing_rad
+    assert math.floor(width - 1e-6) <= hit.sum() <= math.ceil(width + 1e-6)
+
+
+def test_known_distances_ahead() -> None:
+    assert ahead(World([Obstacle(Circle((0.0, 500.0), 100.0))], BOUNDS)) == 400.0
+    assert ahead(World([Obstacle(square(500.0, 10.0, 100.0))], BOUNDS), math.pi / 2) == pytest.approx(400.0)
+    assert ahead(World([Obstacle(Circle((0.0, -500.0), 100.0))], BOUNDS)) == math.inf
+    assert ahead(World([Obstacle(square(0.0, -500.0, 100.0))], BOUNDS)) == math.inf
+
+
+def test_a_ray_that_just_passes_a_circle_does_not_hit_it() -> None:
+    assert ahead(World([Obstacle(Circle((100.001, 500.0), 100.0))], BOUNDS)) == math.inf
+    # Half the chord is sqrt(100^2 - 99.999^2).
+    assert ahead(World([Obstacle(Circle((99.999, 500.0), 100.0))], BOUNDS)) == pytest.approx(
+        500.0 - 0.4472125
+    )
+
+
+def test_a_ray_that_leaves_a_wall_beside_the_sensor_does_not_hit_it() -> None:
+    assert ahead(World([Obstacle(Circle((100.0 + 1e-10, 0.0), 100.0))], BOUNDS), -2e-6) == math.inf
+    for heading in (math.pi / 2 + 1e-6, -math.pi / 2 - 1e-6):
+        assert ahead(World([Obstacle(square(0.0, 100.0 + 1e-9, 100.0))], BOUNDS), heading) == math.inf
+
+
+def test_inside_an_obstacle_a_ray_returns_the_way_out() -> None:
+    assert ahead(World([Obstacle(Circle((0.0, 50.0), 100.0))], BOUNDS)) == 150.0
+    assert ahead(World([Obstacle(Circle((0.0, 50.0), 100.0))], BOUNDS), math.pi) == pytest.approx(50.0)
+    assert ahead(World([Obstacle(square(0.0, 50.0, 100.0))], BOUNDS)) == pytest.approx(150.0)
+
+
+@pytest.mark.parametrize("edge_m", [1e-14, 1e-170])
+def test_an_edge_shorter_than_places_are_told_apart_hides_nothing(edge_m: float) -> None:
+    house = Polygon(((-100.0, 300.0), (0.0, 200.0), (edge_m, 200.0), (100.0, 300.0)))
+    world = World([Obstacle(house), Obstacle(square(0.0, -500.0, 100.0))], BOUNDS)
+    scan = sensor(world, rays=4).scan(30.0, 0.0, math.pi / 4, 0.0)
+    assert scan.nearest_m == pytest.approx(math.hypot(30.0, 200.0))
+    np.testing.assert_allclose(scan.ranges_m, [math.inf, 230.0, math.inf, 400.0])
+
+
+def test_nothing_returns_from_beyond_the_range() -> None:
+    assert ahead(World([Obstacle(square(0.0, 1100.0, 100.0))], BOUNDS)) == 1000.0
+    assert ahead(World([Obstacle(square(0.0, 1100.001, 100.0))], BOUNDS)) == math.inf
+    assert ahead(World([Obstacle(Circle((0.0, 1100.001), 100.0))], BOUNDS)) == math.inf
+
+
+def test_the_nearer_obstacle_hides_the_one_behind() -> None:
+    front, behind = Obstacle(Circle((0.0, 300.0), 100.0)), Obstacle(square(0.0, 700.0, 100.0))
+    for world in (World([front, behind], BOUNDS), World([behind, front], BOUNDS)):
+        scan = sensor(world).scan(0.0, 0.0, 0.0, 0.0)
+        alone = sensor(World([front], BOUNDS)).scan(0.0, 0.0, 0.0, 0.0)
+        assert bits(scan) == bits(alone)
+
+
+def test_no_ray_slips_through_between_two_edges() -> None:
+    rng = np.random.default_rng(3)
+    aimed = 0
+    for _ in range(150):
+        turns = np.linspace(0.0, math.tau, rng.integers(3, 12), endpoint=False) + rng.uniform(0.0, math.tau)
+        east, north = rng.uniform(-250.0, 250.0, 2)
+        corners = np.column_stack((east + 150.0 * np.cos(turns), north + 150.0 * np.sin(turns)))
+        world = World([Obstacle(Polygon(tuple(map(tuple, corners))))], BOUNDS)
+        after = np.roll(corners, -1, axis=0)
+        faces_us = corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0] < 0
+        # A ray to a corner meets it first if the edges on both of its sides face the sensor, or neither does
+        # because the sensor is inside.
+        first = np.flatnonzero(faces_us & np.roll(faces_us, 1)) if faces_us.any() else range(len(corners))
+        for corner in corners[first]:
+            assert ahead(world, math.atan2(*corner)) == pytest.approx(math.hypot(*corner), abs=1e-6)
+            aimed += 1
+    assert aimed > 300
+
+
+@pytest.mark.parametrize(("field", "rays"), [(360.0, 720), (360.0, 7), (120.0, 60), (270.0, 31), (1.0, 3)])
+def test_rays_are_spread_evenly_about_the_nose(field: float, rays: int) -> None:
+    for heading in (0.0, 1.0, -2.0, 7.0):
+        scan = sensor(EMPTY, field_of_view_deg=field, rays=rays).scan(10.0, 20.0, heading, 0.0)
+        spacing = math.radians(field) / rays
+        bearings = heading - math.radians(field) / 2 + (np.arange(rays) + 0.5) * spacing
+        expected = np.column_stack((np.sin(bearings), np.cos(bearings)))
+        np.testing.assert_allclose(scan.directions, expected, rtol=0, atol=1e-12)
+        assert scan.spacing_rad == pytest.approx(spacing)
+        assert 0.0 <= scan.start_rad < math.tau
+        assert math.cos(scan.start_rad - bearings[0]) == pytest.approx(1.0)
+        assert (scan.east_m, scan.north_m, scan.max_range_m) == (10.0, 20.0, 1000.0)
+
+
+def test_what_lies_outside_the_field_of_view_is_not_seen() -> None:
+    world = World([Obstacle(Circle((500.0, 0.0), 100.0)), Obstacle(square(0.0, -500.0, 100.0))], BOUNDS)
+    source = sensor(world, field_of_view_deg=90.0, rays=90)
+    seen = [
+        np.isfinite(source.scan(0.0, 0.0, heading * math.pi / 2, 0.0).ranges_m).sum() for heading in range(4)
+    ]
+    # The circle is 2 asin(1/5) = 23.07 deg wide, the near side of the square 2 atan(1/4) = 28.07 deg.
+    assert seen == [0, 24, 28, 0]
+
+
+def test_moving_obstacles_are_seen_where_they_are() -> None:
+    circle = Obstacle(Circle((0.0, 500.0), 100.0), velocity_mps=(0.0, 10.0), active_s=(100.0, 140.0))
+    polygon = Obstacle(square(0.0, -500.0, 100.0), velocity_mps=(0.0, -10.0))
+    source = sensor(World([circle, polygon], BOUNDS), field_of_view_deg=360.0, rays=4)
+    times = (0.0, 30.0, 99.9, 100.0, 120.0, 140.0, 140.1)
+    scans = [source.scan(0.0, 0.0, math.pi / 4, time).ranges_m for time in times]
+    ahead_m = [math.inf, math.inf, math.inf, 400.0, 600.0, 800.0, math.inf]
+    behind_m = [400.0, 700.0, math.inf, math.inf, math.inf, math.inf, math.inf]
+    np.testing.assert_allclose([scan[1] for scan in scans], ahead_m)
+    np.testing.assert_allclose([scan[3] for scan in scans], behind_m)
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**32), near=st.integers(0, 10), far=st.integers(1, 40), changing=st.booleans())
+def test_obstacles_out_of_range_do_not_change_a_bit(seed: int, near: int, far: int, changing: bool) -> None:
+    rng = np.random.default_rng(seed)
+    obstacles = random_obstacles(rng, near, 0.0, 900.0)
+    # At most 200 m large, and 20 m/s for 60 s: from 2500 m they do not come within 1000 m.
+    beyond = random_obstacles(rng, far, 1201.0, 1600.0) if not changing else []
+    beyond += random_obstacles(rng, far, 3700.0, 4000.0, changing=changing)
+    shuffled = [(obstacles + beyond)[i] for i in rng.permutation(near + len(beyond))]
+    keys: dict[str, Any] = {"range_noise_m": 3.0, "dropout": 0.1, "false_return": 0.1}
+    one, other = sensor(World(obstacles, BOUNDS), **keys), sensor(World(shuffled, BOUNDS), **keys)
+    for number in range(5):
+        heading = rng.uniform(0.0, math.tau)
+        assert bits(one.scan(0.0, 0.0, heading, 12.0 * number)) == bits(
+            other.scan(0.0, 0.0, heading, 12.0 * number)
+        )
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32))
+def test_a_scan_does_not_depend_on_where_the_sensor_was_before(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 30, 0.0, 3000.0, changing=True), BOUNDS)
+    flown = sensor(world)
+    for number in range(60):
+        pose = (20.0 * number, 7.0 * number, 0.1 * number, 1.7 * number)
+        assert bits(flown.scan(*pose)) == bits(sensor(world).scan(*pose))
+
+
+class CountingWorld(World):
+    """Counts how often, and about how many faces, the sensor asks."""
+
+    asked: int = 0
+    faces: int = 0
+
+    def surroundings(
+        self, east_m: float, north_m: float, radius_m: float, start_s: float, stop_s: float
+    ) -> Surroundings:
+        answer = super().surroundings(east_m, north_m, radius_m, start_s, stop_s)
+        faces = answer.faces(start_s)
+        self.asked += 1
+        self.faces = faces.circles_m.shape[1] + faces.edges_m.shape[1]
+        return answer
+
+
+def test_far_obstacles_are_not_touched_by_a_scan() -> None:
+    rng = np.random.default_rng(5)
+    near = [Obstacle(Circle((0.0, 500.0), 100.0)), Obstacle(square(500.0, 0.0, 100.0))]
+    far = [Obstacle(Circle(tuple(rng.uniform(5000.0, 90_000.0, 2)), 100.0)) for _ in range(5000)]
+    far += [Obstacle(square(east, north, 100.0)) for east, north in rng.uniform(5000.0, 90_000.0, (5000, 2))]
+    world = CountingWorld(near + far, BOUNDS)
+    source = sensor(world)
+    for number in range(60):
+        source.scan(1.5 * number, 0.0, 0.0, 0.5 * number)
+    assert (world.asked, world.faces) == (1, 5)
+    source.scan(260.0, 0.0, 0.0, 30.0)
+    assert world.asked == 2
+
+
+@pytest.mark.parametrize(("velocity_mps", "asked"), [((0.0, 0.0), 1), ((0.0, 1.0), 20)])
+def test_only_a_world_that_changes_is_looked_up_again_in_one_place(
+    velocity_mps: tuple[float, float], asked: int
+) -> None:
+    far = Obstacle(Circle((50_000.0, 0.0), 100.0), velocity_mps=velocity_mps)
+    world = CountingWorld([Obstacle(Circle((0.0, 500.0), 100.0)), far], BOUNDS)
+    source = sensor(world)
+    for number in range(20):
+        source.scan(0.0, 0.0, 0.0, 31.0 * number)
+    assert world.asked == asked
+
+
+def test_a_scan_becomes_available_after_the_latency() -> None:
+    scan = sensor(EMPTY, latency_s=0.4).scan(0.0, 0.0, 0.0, 7.0)
+    assert (scan.time_s, scan.available_s) == (7.0, 7.4)
+
+
+def test_a_scan_cannot_be_changed_and_keeps_no_array_of_others() -> None:
+    scan = sensor(EMPTY, rays=3).scan(0.0, 0.0, 0.0, 0.0)
+    for array in (scan.ranges_m, scan.directions):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1.0
+    given_m = np.array([1.0, 2.0, 3.0])
+    copied = dataclasses.replace(scan, ranges_m=given_m)
+    given_m[0] = 9.0
+    assert copied.ranges_m.tolist() == [1.0, 2.0, 3.0]
+
+
+@given(st.integers(0, 10_000), st.sampled_from([360.0, 90.0]))
+@settings(max_examples=40)
+def test_no_return_is_nearer_than_the_scan_says_before_its_rays_are_followed(seed: int, field: float) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
+    scan = sensor(world, field_of_view_deg=field).scan(0.0, 0.0, rng.uniform(0.0, math.tau), 0.0)
+    nearest = scan.nearest_m
+    least = float(scan.ranges_m.min())
+    assert nearest <= least + 1e-6
+    if field == 360.0 and least < math.inf:
+        assert nearest > 0.95 * least - 1.0
+    assert dataclasses.replace(scan, ranges_m=scan.ranges_m + 5.0).nearest_m == least + 5.0
+
+
+def test_a_scan_that_is_kept_holds_on_to_nothing_of_the_world() -> None:
+    scan = sensor(World([Obstacle(Circle((0.0, 500.0), 100.0))], BOUNDS)).scan(0.0, 0.0, 0.0, 0.0)
+    assert any(callable(each) for each in vars(scan).values())
+    kept = scan.kept()
+    assert kept.followed
+    assert not any(callable(each) for each in vars(kept).values())
+
+
+def test_a_scan_that_is_read_late_shows_the_time_at_which_it_was_taken() -> None:
+    moving = Obstacle(Circle((0.0, 500.0), 100.0), velocity_mps=(0.0, 10.0))
+    eye = sensor(World([moving], BOUNDS), rays=3)
+    early = eye.scan(0.0, 0.0, 0.0, 0.0)
+    eye.scan(0.0, 0.0, 0.0, 20.0).ranges_m.sum()
+    assert early.ranges_m[1] == pytest.approx(400.0)
+
+
+def test_flaws_are_drawn_as_scans_are_taken_not_as_they_are_read() -> None:
+    eyes = [sensor(EMPTY, false_return=0.5) for _ in range(2)]
+    first, second = (eyes[0].scan(0.0, 0.0, 0.0, time) for time in (0.0, 0.5))
+    late = second.ranges_m.tolist(), first.ranges_m.tolist()
+    at_once = [eyes[1].scan(0.0, 0.0, 0.0, time).ranges_m.tolist() for time in (0.0, 0.5)]
+    assert late == (at_once[1], at_once[0])
+    assert first.nearest_m == min(at_once[0])
+
+
+@given(seed=st.integers(0, 10_000), field=st.sampled_from([360.0, 90.0]))
+@settings(max_examples=40)
+def test_what_returned_is_told_from_any_origin(seed: int, field: float) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
+    scan = sensor(world, field_of_view_deg=field).scan(40.0, -30.0, rng.uniform(0.0, math.tau), 0.0)
+    expected = (scan.ranges_m < math.inf).nonzero()[0]
+    directions = scan.directions.copy().view(np.complex128).ravel()
+    for origin in (0j, complex(-700.0, 900.0)):
+        rays, places = scan.returned(origin)
+        assert rays.tolist() == expected.tolist()
+        ends = complex(40.0, -30.0) - origin + (directions * scan.ranges_m)[rays]
+        np.testing.assert_allclose(places, ends, rtol=0.0, atol=1e-9)
+
+
+@given(seed=st.integers(0, 10_000))
+@settings(max_examples=40)
+def test_the_nearest_face_is_as_far_as_it_is(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
+    scan = sensor(world).scan(0.0, 0.0, 0.0, 0.0)
+    away_m = abs(world.clearance_at(0.0, 0.0, 0.0))
+    assert scan.nearest_m == (pytest.approx(away_m, abs=1e-6) if away_m <= scan.max_range_m else math.inf)

@@ -1,0 +1,421 @@
+from __future__ import annotations
+
+import importlib.util
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import harness.world.world
+from harness.scenario import obstacles as scenario_obstacles
+from harness.scenario import sections
+from harness.world.world import Circle, Obstacle, Polygon, World
+
+BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
+REFEREE = Path(__file__).parents[4] / "shared" / "tools" / "referee.py"
+
+FloatArray = NDArray[np.float64]
+
+
+@pytest.fixture(params=[512, -1], ids=["few are compared", "all are in a tree"], scope="module", autouse=True)
+def few(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What holds of a world holds whichever way its obstacles are found."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(harness.world.world, "_FEW", request.param)
+        yield
+
+
+def star(rng: np.random.Generator, east: float, north: float, size: float) -> Polygon:
+    """A simple polygon, mostly concave: corners at random distances, in directions less than pi apart."""
+    count = rng.integers(4, 12)
+    turns = (np.arange(count) + rng.uniform(0.0, 0.9, count)) * math.tau / count
+    corners = [
+        (east + size * share * math.cos(turn), north + size * share * math.sin(turn))
+        for turn, share in zip(turns, rng.uniform(0.2, 1.0, count), strict=True)
+    ]
+    return Polygon(tuple(corners if rng.random() < 0.5 else corners[::-1]))
+
+
+def random_obstacles(rng: np.random.Generator, count: int, changing: bool) -> list[Obstacle]:
+    obstacles = []
+    for _ in range(count):
+        east, north, size = *rng.uniform(0.0, 20_000.0, 2), rng.uniform(50.0, 1500.0)
+        shape = Circle((east, north), size) if rng.random() < 0.5 else star(rng, east, north, size)
+        velocity, active = (0.0, 0.0), None
+        if changing and rng.random() < 0.5:
+            velocity = (rng.uniform(-30.0, 30.0), rng.uniform(-30.0, 30.0))
+        if changing and rng.random() < 0.5:
+            start = rng.uniform(0.0, 100.0)
+            active = (start, start + rng.uniform(1.0, 200.0))
+        obstacles.append(Obstacle(shape, velocity, active))
+    return obstacles
+
+
+def track(rng: np.random.Generator, rows: int) -> tuple[FloatArray, FloatArray]:
+    """Points 2.5 m apart on a winding path, 0.1 s apart."""
+    course: FloatArray = np.cumsum(rng.normal(0.0, 0.02, rows)) + rng.uniform(0.0, math.tau)
+    steps = 2.5 * np.column_stack((np.sin(course), np.cos(course)))
+    return rng.uniform(5000.0, 15_000.0, 2) + np.cumsum(steps, axis=0), 0.1 * np.arange(
+        rows, dtype=np.float64
+    )
+
+
+def true_distance(obstacle: Obstacle, east: float, north: float, time: float) -> float:
+    """Signed distance by shapely, for a circle by its centre."""
+    start, stop = obstacle.active_s or (-math.inf, math.inf)
+    if not start <= time <= stop:
+        return math.inf
+    elapsed = time - (start if obstacle.active_s else 0.0)
+    point = shapely.Point(
+        east - obstacle.velocity_mps[0] * elapsed, north - obstacle.velocity_mps[1] * elapsed
+    )
+    if isinstance(obstacle.shape, Circle):
+        return float(point.distance(shapely.Point(obstacle.shape.center_m))) - obstacle.shape.radius_m
+    polygon = shapely.Polygon(obstacle.shape.vertices_m)
+    distance = float(polygon.exterior.distance(point))
+    return -distance if polygon.contains(point) else distance
+
+
+@given(
+    center=st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5)),
+    radius=st.floats(1.0, 2e4),
+    outwards=st.floats(-1.0, 1e5),
+    bearing=st.floats(0.0, math.tau),
+)
+def test_clearance_of_a_circle_is_exact(
+    center: tuple[float, float], radius: float, outwards: float, bearing: float
+) -> None:
+    world = World([Obstacle(Circle(center, radius))], BOUNDS)
+    east, north = (
+        center[0] + (radius + outwards) * math.sin(bearing),
+        center[1] + (radius + outwards) * math.cos(bearing),
+    )
+    assert world.clearance_at(east, north, 0.0) == pytest.approx(outwards, abs=1e-9)
+    assert world.clearance(np.array([[east, north]]), np.zeros(1))[0] == pytest.approx(outwards, abs=1e-9)
+
+
+@given(seed=st.integers(0, 2**32), point=st.tuples(st.floats(-200, 200), st.floats(-200, 200)))
+def test_clearance_of_a_polygon_agrees_with_shapely(seed: int, point: tuple[float, float]) -> None:
+    obstacle = Obstacle(star(np.random.default_rng(seed), 0.0, 0.0, 150.0))
+    assert World([obstacle], BOUNDS).clearance_at(*point, 0.0) == pytest.approx(
+        true_distance(obstacle, *point, 0.0), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("edge_m", [1e-14, 1e-170])
+def test_clearance_of_a_polygon_with_an_edge_of_hardly_any_length(edge_m: float) -> None:
+    house = Obstacle(Polygon(((-100.0, 300.0), (0.0, 200.0), (edge_m, 200.0), (100.0, 300.0))))
+    nearly = World([house], BOUNDS)
+    assert nearly.clearance_at(0.0, 0.0, 0.0) == pytest.approx(200.0)
+    assert nearly.clearance_at(0.0, 290.0, 0.0) == pytest.approx(-10.0)
+
+
+def test_inside_and_outside_are_told_on_lines_through_corners() -> None:
+    arrow = Obstacle(
+        Polygon(((0.0, 2.0), (2.0, 2.0), (2.0, 0.0), (5.0, 3.0), (2.0, 6.0), (2.0, 4.0), (0.0, 4.0)))
+    )
+    world = World([arrow], BOUNDS)
+    for east in np.arange(-1.0, 7.0, 0.5).tolist():
+        for north in np.arange(-1.0, 8.0, 0.5).tolist():
+            truth = true_distance(arrow, east, north, 0.0)
+            assert world.clearance_at(east, north, 0.0) == pytest.approx(truth, abs=1e-12)
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32), count=st.integers(0, 40), changing=st.booleans())
+def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(
+    seed: int, count: int, changing: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    obstacles = random_obstacles(rng, count, changing)
+    points, times = track(rng, 700)
+    clearance = World(obstacles, BOUNDS).clearance(points, times)
+    for row in range(0, 700, 23):
+        east, north = points[row].tolist()
+        truth = min((true_distance(o, east, north, times[row]) for o in obstacles), default=math.inf)
+        assert clearance[row] == pytest.approx(truth, abs=1e-9)
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), moves=st.booleans())
+def test_a_contact_on_the_way_is_found_where_shapely_finds_one(seed: int, moves: bool) -> None:
+    """Thin bodies, met between two fixes: seen from the body, the way is another straight line."""
+    rng = np.random.default_rng(seed)
+    velocity = tuple(rng.uniform(-60.0, 60.0, 2).tolist()) if moves else (0.0, 0.0)
+    turn, thick, at = rng.uniform(0.0, math.pi), rng.uniform(0.05, 1.0), rng.uniform(-4.0, 4.0, 2)
+    along, across = (np.array([math.cos(a), math.sin(a)]) for a in (turn, turn + math.pi / 2))
+    corners = [at + along * i + across * j * thick for i, j in ((-5, -1), (5, -1), (5, 1), (-5, 1))]
+    wall = Obstacle(Polygon(tuple((float(x), float(y)) for x, y in corners)), velocity)
+    world = World([wall], BOUNDS)
+    begin, end = ((*rng.uniform(-4.0, 4.0, 2).tolist(), time_s) for time_s in (0.0, 0.1))
+    before_m, after_m = world.clearance_at(*begin), world.clearance_at(*end)
+    assume(min(before_m, after_m) > 0.0)
+    last = np.array(end[:2]) - 0.1 * np.array(velocity)
+    inside = shapely.LineString([begin[:2], tuple(last)]).intersection(shapely.Polygon(corners)).length
+    assume(inside == 0.0 or inside > 0.01)
+    contact_m = world.contact_between(begin, before_m, end, after_m)
+    assert (contact_m < 0.0) == (inside > 0.0)
+    assert contact_m == math.inf or contact_m >= -thick
+    assert world.contact_between(begin, 0.5 * before_m, end, after_m) < 0.0 or inside == 0.0
+
+
+@pytest.mark.parametrize(
+    ("active_s", "met"),
+    [
+        ((0.0, 1.0), True),
+        ((0.03, 1.0), True),
+        ((0.0, 0.07), True),
+        ((0.03, 0.07), True),
+        ((0.05, 0.06), True),
+        ((0.06, 1.0), False),
+        ((0.06, 0.07), False),
+        ((0.0, 0.04), False),
+    ],
+)
+def test_what_appears_or_goes_on_the_way_is_met_while_it_is_there(
+    active_s: tuple[float, float], met: bool
+) -> None:
+    """A wall that the middle of the way lies in, from 0.046 to 0.054 s."""
+    wall = Polygon(((4.6, -9.0), (5.4, -9.0), (5.4, 9.0), (4.6, 9.0)))
+    world = World([Obstacle(wall, active_s=active_s), Obstacle(Circle((0.0, 50.0), 1.0))], BOUNDS)
+    begin, end = (0.0, 0.0, 0.0), (10.0, 0.0, 0.1)
+    clearance = world.clearance_at(*begin), world.clearance_at(*end)
+    assert (world.contact_between(begin, clearance[0], end, clearance[1]) < 0.0) is met
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32), count=st.integers(1, 40), changing=st.booleans())
+def test_clearance_at_a_point_is_the_row_of_the_track(seed: int, count: int, changing: bool) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, count, changing), BOUNDS)
+    points, times = rng.uniform(0.0, 20_000.0, (100, 2)), rng.uniform(0.0, 300.0, 100)
+    single = [world.clearance_at(x, y, time) for (x, y), time in zip(points.tolist(), times, strict=True)]
+    np.testing.assert_allclose(world.clearance(points, times), single, rtol=0, atol=1e-9)
+
+
+def test_the_deepest_of_overlapping_obstacles_counts() -> None:
+    square = Polygon(((0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0)))
+    small = Polygon(((40.0, 40.0), (60.0, 40.0), (60.0, 60.0), (40.0, 60.0)))
+    circle = Circle((50.0, 50.0), 20.0)
+    for shapes in ((square, small, circle), (circle, small, square), (small, circle, square)):
+        world = World([Obstacle(shape) for shape in shapes], BOUNDS)
+        assert world.clearance_at(50.0, 50.0, 0.0) == -50.0
+        assert world.clearance(np.array([[50.0, 50.0], [50.0, 10.0]]), np.zeros(2)).tolist() == [-50.0, -10.0]
+
+
+def test_clearance_without_obstacles_is_infinite() -> None:
+    empty = World([], BOUNDS)
+    gone = World([Obstacle(Circle((0.0, 0.0), 10.0), active_s=(1.0, 2.0))], BOUNDS)
+    assert empty.clearance_at(0.0, 0.0, 0.0) == math.inf
+    assert gone.clearance_at(0.0, 0.0, 3.0) == math.inf
+    assert empty.clearance(np.zeros((3, 2)), np.zeros(3)).tolist() == [math.inf] * 3
+    assert empty.clearance(np.zeros((0, 2)), np.zeros(0)).shape == (0,)
+
+
+def test_rows_that_are_not_finite_have_no_clearance_and_leave_the_others_alone() -> None:
+    world = World([Obstacle(Circle((100.0, 0.0), 10.0))], BOUNDS)
+    points = np.array([[0.0, 0.0], [math.nan, 0.0], [50.0, 0.0]])
+    clearance = world.clearance(points, np.zeros(3))
+    assert clearance[[0, 2]].tolist() == [90.0, 40.0]
+    assert math.isnan(clearance[1])
+
+
+def test_an_obstacle_is_there_from_the_first_to_the_last_moment_of_its_window() -> None:
+    world = World([Obstacle(Circle((0.0, 0.0), 10.0), active_s=(5.0, 8.0))], BOUNDS)
+    times = np.array([4.999, 5.0, 8.0, 8.001])
+    clearance = world.clearance(np.tile([30.0, 0.0], (4, 1)), times)
+    assert clearance.tolist() == [math.inf, 20.0, 20.0, math.inf]
+    assert [world.clearance_at(30.0, 0.0, time) for time in times] == clearance.tolist()
+
+
+def test_motion_starts_when_the_obstacle_appears() -> None:
+    timed = Obstacle(Circle((0.0, 0.0), 10.0), velocity_mps=(3.0, 4.0), active_s=(5.0, 100.0))
+    always = Obstacle(Circle((0.0, 0.0), 10.0), velocity_mps=(3.0, 4.0))
+    assert timed.displacement_m(7.0) == (6.0, 8.0)
+    assert always.displacement_m(7.0) == (21.0, 28.0)
+    assert World([timed], BOUNDS).clearance_at(6.0, 8.0, 7.0) == -10.0
+    assert World([always], BOUNDS).clearance_at(21.0, 28.0, 7.0) == -10.0
+
+
+def test_max_obstacle_speed_and_next_appearance() -> None:
+    circle = Circle((0.0, 0.0), 10.0)
+    world = World(
+        [
+            Obstacle(circle, velocity_mps=(3.0, -4.0)),
+            Obstacle(circle, active_s=(5.0, 8.0)),
+            Obstacle(circle, velocity_mps=(1.0, 0.0), active_s=(20.0, 30.0)),
+        ],
+        BOUNDS,
+    )
+    assert world.max_obstacle_speed_mps == 5.0
+    assert [world.next_appearance(time) for time in (0.0, 4.9, 5.0, 20.0)] == [5.0, 5.0, 20.0, math.inf]
+    assert World([], BOUNDS).max_obstacle_speed_mps == 0.0
+    assert World([], BOUNDS).next_appearance(0.0) == math.inf
+
+
+@given(seed=st.integers(0, 2**32), gap=st.floats(0.0, 60.0))
+def test_clearance_shrinks_no_faster_than_the_speeds_allow(seed: int, gap: float) -> None:
+    rng = np.random.default_rng(seed)
+    world = World(random_obstacles(rng, 10, changing=True), BOUNDS)
+    east, north = rng.uniform(0.0, 20_000.0, 2)
+    time = rng.uniform(0.0, 100.0)
+    later = min(time + gap, math.nextafter(world.next_appearance(time), 0.0))
+    bound = world.clearance_at(east, north, time) - world.max_obstacle_speed_mps * (later - time)
+    assert world.clearance_at(east, north, later) >= bound - 1e-6
+
+
+def test_the_boundary_belongs_to_the_area() -> None:
+    world = World([], (0.0, 10.0, 100.0, 200.0))
+    assert all(world.inside_bounds(*point) for point in ((0.0, 10.0), (100.0, 200.0), (50.0, 50.0)))
+    outside = ((-0.001, 50.0), (100.001, 50.0), (50.0, 9.999), (50.0, 200.001), (math.nan, 50.0))
+    assert not any(world.inside_bounds(*point) for point in outside)
+
+
+@settings(max_examples=50)
+@given(seed=st.integers(0, 2**32), radius=st.floats(0.0, 8000.0), time=st.floats(0.0, 300.0))
+def test_near_are_the_obstacles_within_the_radius(seed: int, radius: float, time: float) -> None:
+    rng = np.random.default_rng(seed)
+    obstacles = random_obstacles(rng, 30, changing=True)
+    east, north = rng.uniform(0.0, 20_000.0, 2)
+    distances = [true_distance(o, east, north, time) for o in obstacles]
+    near = World(obstacles, BOUNDS).near(east, north, radius, time)
+    assert near == tuple(i for i, distance in enumerate(distances) if distance <= radius)
+
+
+@settings(max_examples=50)
+@given(seed=st.integers(0, 2**32), radius=st.floats(100.0, 8000.0))
+def test_surroundings_hold_every_face_within_the_radius(seed: int, radius: float) -> None:
+    rng = np.random.default_rng(seed)
+    obstacles = random_obstacles(rng, 30, changing=True)
+    world = World(obstacles, BOUNDS)
+    east, north = rng.uniform(0.0, 20_000.0, 2)
+    surroundings = world.surroundings(east, north, radius, 50.0, 90.0)
+    for time in (50.0, 63.0, 90.0):
+        faces = surroundings.faces(time)
+        circles = {tuple(circle) for circle in faces.circles_m.T.round(6)}
+        edges = {tuple(edge) for edge in faces.edges_m.T.round(6)}
+        for obstacle in obstacles:
+            if not obstacle.active(time):
+                continue
+            shift = np.array(obstacle.displacement_m(time))
+            if isinstance(obstacle.shape, Circle):
+                circle = (
+                    *(np.array(obstacle.shape.center_m) + shift).round(6),
+                    round(obstacle.shape.radius_m, 6),
+                )
+                assert circle in circles or true_distance(obstacle, east, north, time) > radius
+                continue
+            corners = np.array(obstacle.shape.vertices_m) + shift
+            for start, end in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+                edge = tuple(np.concatenate((start, end)).round(6))
+                line = shapely.LineString([start, end])
+                assert edge in edges or line.distance(shapely.Point(east, north)) > radius
+
+
+def test_exact_geometry_is_asked_only_of_obstacles_that_may_be_nearest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(7)
+    far = [star(rng, east, north, 50.0) for east, north in rng.uniform(10_000.0, 20_000.0, (2000, 2))]
+    world = World([*map(Obstacle, far), Obstacle(star(rng, 500.0, 500.0, 50.0))], BOUNDS)
+    asked: list[Polygon] = []
+    exact = Polygon.distance
+
+    def spy(self: Polygon, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
+        asked.append(self)
+        return exact(self, east_m, north_m)
+
+    monkeypatch.setattr(Polygon, "distance", spy)
+    times = 0.1 * np.arange(100, dtype=np.float64)
+    world.clearance(np.column_stack((25.0 * times, np.zeros(100))), times)
+    world.clearance_at(0.0, 0.0, 0.0)
+    world.near(0.0, 0.0, 1000.0, 0.0)
+    assert len(asked) == 5  # a bound and an answer for the track and for the point; the near one
+    assert not set(asked) & set(far)
+
+
+def test_from_scenario_takes_shape_motion_and_window() -> None:
+    circle = scenario_obstacles.Circle(center_m=(1.0, 2.0), radius_m=3.0)
+    polygon = scenario_obstacles.Polygon(vertices_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
+    scenario: Any = SimpleNamespace(
+        area=sections.Area(bounds_m=BOUNDS),
+        obstacles=(
+            scenario_obstacles.Obstacle(circle=circle, velocity_mps=(4.0, 5.0), active_s=(6.0, 7.0)),
+            scenario_obstacles.Obstacle(polygon=polygon),
+        ),
+    )
+    world = World.from_scenario(scenario)
+    assert world.bounds_m == BOUNDS
+    assert world.obstacles == (
+        Obstacle(Circle((1.0, 2.0), 3.0), (4.0, 5.0), (6.0, 7.0)),
+        Obstacle(Polygon(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))),
+    )
+
+
+def test_an_obstacle_without_a_shape_is_an_error() -> None:
+    shapeless = SimpleNamespace(circle=None, polygon=None, velocity_mps=None, active_s=None)
+    scenario: Any = SimpleNamespace(area=SimpleNamespace(bounds_m=BOUNDS), obstacles=(shapeless,))
+    with pytest.raises(ValueError, match="needs a circle or a polygon"):
+        World.from_scenario(scenario)
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, math.inf, math.nan])
+def test_a_circle_without_a_radius_is_an_error(radius: float) -> None:
+    with pytest.raises(ValueError, match="positive radius"):
+        Circle((0.0, 0.0), radius)
+
+
+@pytest.mark.parametrize("vertices", [((0.0, 0.0), (1.0, 0.0)), ((0.0, 0.0), (1.0, 0.0), (math.nan, 1.0))])
+def test_a_polygon_without_three_finite_vertices_is_an_error(
+    vertices: tuple[tuple[float, float], ...],
+) -> None:
+    with pytest.raises(ValueError, match="three finite vertices"):
+        Polygon(vertices)
+
+
+@pytest.mark.parametrize("velocity", [(math.nan, 0.0), (0.0, math.inf)])
+def test_an_obstacle_that_moves_beyond_all_measure_is_an_error(velocity: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="finite velocity"):
+        Obstacle(Circle((0.0, 0.0), 1.0), velocity)
+
+
+@pytest.mark.parametrize("first", [-math.inf, math.nan])
+def test_an_obstacle_appears_at_a_finite_time(first: float) -> None:
+    with pytest.raises(ValueError, match="finite velocity and first time"):
+        Obstacle(Circle((0.0, 0.0), 1.0), active_s=(first, math.inf))
+
+
+@pytest.mark.skipif(not REFEREE.exists(), reason="the independent referee is not beside this repository")
+def test_clearance_agrees_with_the_independent_referee() -> None:
+    spec = importlib.util.spec_from_file_location("referee", REFEREE)
+    assert spec is not None
+    assert spec.loader is not None
+    referee = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(referee)
+    rng = np.random.default_rng(11)
+    obstacles = random_obstacles(rng, 25, changing=True)
+    world = World(obstacles, BOUNDS)
+    for time in np.arange(0.0, 300.0, 20.0):
+        point = shapely.Point(rng.uniform(0.0, 20_000.0, 2))
+        shapes = [referee.geometry_of(_as_in_a_file(o), time) for o in obstacles]
+        truth = min((float(s.distance(point)) for s in shapes if s is not None), default=math.inf)
+        clearance = world.clearance_at(point.x, point.y, time)
+        # The referee's circles are polygons of 1024 edges, up to 1500 m in radius: 0.007 m short.
+        assert max(clearance, 0.0) == pytest.approx(truth, abs=0.01)
+        assert (clearance < 0) == any(s is not None and s.contains(point) for s in shapes)
+
+
+def _as_in_a_file(obstacle: Obstacle) -> dict[str, Any]:
+    shape = obstacle.shape
+    keys: dict[str, Any] = {"velocity_mps": obstacle.velocity_mps, "active_s": obstacle.active_s}
+    if isinstance(shape, Circle):
+        return keys | {"circle": {"center_m": shape.center_m, "radius_m": shape.radius_m}}
+    return keys | {"polygon": {"vertices_m": shape.vertices_m}}

@@ -1,0 +1,446 @@
+"""Bug1, Bug2 and TangentBug against what geometry says: their lengths, what they reach, what they prove."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from planner import contract
+from planner.baselines.bug1 import Bug1, Bug1Config
+from planner.baselines.bug2 import Bug2, Bug2Config, crossings
+from planner.baselines.tangent_bug import Following, TangentBug, TangentBugConfig
+from planner.baselines.walk import Enclosed, mark_at
+from planner.geometry.curves import Point, pose_at
+from planner.geometry.margin import margin_of
+from planner.interface import (
+    BoolArray,
+    FloatArray,
+    Mission,
+    MovingEdges,
+    Plan,
+    Planner,
+    PlanRequest,
+    PlanStatus,
+)
+from planner.world_stability import SETTLED_S
+
+MakePoints = Callable[..., FloatArray]
+
+MISSION = Mission(
+    goal_m=(17_000.0, 5000.0),
+    goal_radius_m=100.0,
+    bounds_m=(0.0, 0.0, 20_000.0, 10_000.0),
+    clearance_m=200.0,
+    turn_radius_m=150.0,
+    speed_mps=25.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    sensor_range_m=3000.0,
+)
+KEEP = MISSION.clearance_m + margin_of(MISSION)
+START = (3000.0, 5000.0)
+SPACING = 50.0
+
+MAKE: dict[str, Callable[[Mission], Planner]] = {
+    "bug1": lambda mission: Bug1(Bug1Config(), mission),
+    "bug2": lambda mission: Bug2(Bug2Config(), mission),
+    "tangent_bug": lambda mission: TangentBug(TangentBugConfig(), mission),
+}
+KINDS = tuple(MAKE)
+
+
+class Range:
+    """A seen world: the edge points that have been within range, no matter what hides them."""
+
+    spacing_m = SPACING
+    last_removal_revision = 0
+    moving: tuple[MovingEdges, ...] = ()
+    last_contradiction_s = -math.inf
+
+    def __init__(self, points: FloatArray, range_m: float) -> None:
+        self._points, self._range = points, range_m
+        self._order: list[FloatArray] = []
+        self._unseen = np.ones(len(points), dtype=np.bool_)
+
+    @property
+    def revision(self) -> int:
+        return len(self._order)
+
+    def look(self, place: Point) -> None:
+        distance = np.hypot(self._points[:, 0] - place[0], self._points[:, 1] - place[1])
+        fresh = self._unseen & (distance < self._range)
+        if fresh.any():
+            self._order.append(self._points[fresh])
+            self._unseen &= ~fresh
+
+    def edges_since(self, revision: int) -> FloatArray:
+        fresh = self._order[max(revision, 0) :]
+        return np.concatenate(fresh) if fresh else np.zeros((0, 2))
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.zeros(len(points_m), dtype=np.bool_)
+
+
+class Unsettled(Range):
+    """The same, but something appeared in space seen to be free."""
+
+    last_contradiction_s = 2000.0
+
+
+class TakingBack(Range):
+    """The same; some of what was seen is taken back."""
+
+    before = 0
+
+    @property
+    def revision(self) -> int:
+        return self.before + len(self._order)
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return super().edges_since(revision - self.before)
+
+
+class Vanishing(TakingBack):
+    """The same, until all that has been seen has gone."""
+
+    looks = 260
+
+    def look(self, place: Point) -> None:
+        self.looks -= 1
+        if self.looks:
+            super().look(place) if self.looks > 0 else None
+            return
+        self.before = self.last_removal_revision = self.revision + 1
+        self._order.clear()
+
+
+class Opening(TakingBack):
+    """The same, until a part of the wall in the west of the goal is taken back."""
+
+    looks = 0
+
+    def look(self, place: Point) -> None:
+        super().look(place)
+        self.looks -= 1
+        if not self.looks:
+            self._order = [each[~self._opens(each)] for each in self._order]
+            self._unseen &= ~self._opens(self._points)
+            self.before = 1
+            self.last_removal_revision = self.revision
+
+    def _opens(self, points: FloatArray) -> BoolArray:
+        east, north = MISSION.goal_m
+        return (points[:, 0] < east) & (np.abs(points[:, 1] - north) < 4.0 * KEEP)
+
+
+class Walk(NamedTuple):
+    status: PlanStatus
+    reason: str
+    length_m: float
+    track_m: FloatArray
+    plans: tuple[Plan, ...]
+
+
+def walk(
+    kind: str,
+    points: FloatArray,
+    start: Point = START,
+    mission: Mission = MISSION,
+    step_m: float = 50.0,
+    most_m: float = 400_000.0,
+    world: type[Range] = Range,
+) -> Walk:
+    """Flies a planner's path without error until it is at the goal or says that it never will be."""
+    planner, seen = MAKE[kind](mission), world(points, mission.sensor_range_m)
+    place, direction, station, length = start, (1.0, 0.0), 0.0, 0.0
+    flown: Plan | None = None
+    track, plans = [start], list[Plan]()
+    while length < most_m:
+        seen.look(place)
+        plan = planner.plan(PlanRequest(length / mission.speed_mps, place, direction, seen, flown, station))
+        if plan.status is PlanStatus.FOUND:
+            flown, station = plan, 0.0
+            plans.append(plan)
+        if plan.status is PlanStatus.UNREACHABLE or flown is None or flown.path is None:
+            return Walk(plan.status, plan.reason, length, np.array(track), tuple(plans))
+        station += step_m
+        length += step_m
+        x, y, ux, uy = pose_at(flown.path, station)
+        place, direction = (x, y), (ux, uy)
+        track.append(place)
+        if math.dist(place, mission.goal_m) <= mission.goal_radius_m:
+            return Walk(PlanStatus.FOUND, "reached", length, np.array(track), tuple(plans))
+    return Walk(PlanStatus.NO_PATH, "still under way", length, np.array(track), tuple(plans))
+
+
+def nearest_m(track: FloatArray, points: FloatArray) -> float:
+    return float(shapely.distance(shapely.LineString(track), shapely.MultiPoint(points)))
+
+
+def around_a_circle(kind: str, radius: float, to_center: float, straight: float) -> float:
+    """Length of each algorithm's way round a circle whose centre lies on the straight line."""
+    hugged = {"bug1": 3.0 * math.pi * radius, "bug2": math.pi * radius}
+    if kind in hugged:
+        return straight - 2.0 * radius + hugged[kind]
+    ways = 0.0
+    for leg in (to_center, straight - to_center):
+        touch = math.sqrt(leg**2 - radius**2)
+        ways += touch + radius * (0.5 * math.pi - math.acos(radius / leg))
+    return ways
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_way_round_a_circle_has_the_length_that_geometry_gives(kind: str, ring: MakePoints) -> None:
+    points = ring(10_000.0, 5000.0, 1500.0, SPACING)
+    # Seen from the start, so that TangentBug takes the tangent at once.
+    mission = replace(MISSION, sensor_range_m=10_000.0)
+    flight = walk(kind, points, mission=mission)
+    assert flight.reason == "reached"
+    expected = around_a_circle(kind, 1500.0 + KEEP, 7000.0, 14_000.0) - MISSION.goal_radius_m
+    assert flight.length_m == pytest.approx(expected, abs=0.004 * expected + 50.0)
+    assert nearest_m(flight.track_m, points) > MISSION.clearance_m + 0.5 * margin_of(MISSION)
+
+
+@pytest.mark.parametrize("range_m", [4000.0, 6000.0, 7000.0])
+def test_tangent_bug_takes_no_way_round_for_a_way_across_a_dent(range_m: float, ring: MakePoints) -> None:
+    """Nearly a whole round ahead along the boundary is in sight: right behind."""
+    points = np.concatenate([ring(*circle, SPACING) for circle in contract.CIRCLES])
+    mission = replace(contract.MISSION, sensor_range_m=range_m)
+    flight = walk("tangent_bug", points, contract.START, mission)
+    assert flight.reason == "reached"
+    assert flight.length_m < 1.1 * math.dist(contract.START, mission.goal_m)
+
+
+@pytest.mark.parametrize("aside", [-800.0, 800.0])
+def test_bug1_returns_to_the_nearest_point_by_the_shorter_way(aside: float, ring: MakePoints) -> None:
+    radius = 1500.0 + KEEP
+    flight = walk("bug1", ring(10_000.0, 5000.0 + aside, 1500.0, SPACING))
+    back = math.sqrt(radius**2 - aside**2)
+    to_goal = math.atan2(-aside, MISSION.goal_m[0] - 10_000.0)
+    turn = abs(math.atan2(-aside, -back) - to_goal) % math.tau
+    way_back = radius * min(turn, math.tau - turn)
+    last = math.hypot(MISSION.goal_m[0] - 10_000.0, aside) - radius - MISSION.goal_radius_m
+    expected = 7000.0 - back + math.tau * radius + way_back + last
+    assert flight.reason == "reached"
+    assert flight.length_m == pytest.approx(expected, abs=0.004 * expected + 50.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_free_way_is_one_straight_line(kind: str) -> None:
+    flight = walk(kind, np.zeros((0, 2)))
+    assert flight.reason == "reached"
+    assert len(flight.plans) == 1
+    assert flight.plans[0].path is not None
+    np.testing.assert_allclose(flight.plans[0].path.segments, [[*START, 1.0, 0.0, 0.0, 14_000.0]])
+    np.testing.assert_allclose(flight.plans[0].waypoints_m, [START, MISSION.goal_m])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_trap_open_to_the_start_is_left(kind: str, wall: MakePoints) -> None:
+    corners = [(9000.0, 3000.0), (12_000.0, 3000.0), (12_000.0, 7000.0), (9000.0, 7000.0)]
+    points = np.concatenate([wall(a, b, SPACING) for a, b in pairwise(corners)])
+    flight = walk(kind, points)
+    assert flight.reason == "reached"
+    assert nearest_m(flight.track_m, points) > MISSION.clearance_m
+    # The way out leads back past the open end of an arm.
+    assert flight.track_m[:, 0].max() > 12_000.0
+    assert flight.length_m > 14_000.0 + 4000.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("enclosed", ["goal", "start"])
+def test_an_enclosure_is_proved_by_going_round_it(kind: str, enclosed: str, ring: MakePoints) -> None:
+    center = MISSION.goal_m if enclosed == "goal" else START
+    flight = walk(kind, ring(*center, 2000.0, SPACING))
+    assert flight.status is PlanStatus.UNREACHABLE
+    assert f"encloses the goal at a distance of {KEEP:.0f} m" in flight.reason
+    round_m = math.tau * (2000.0 + KEEP if enclosed == "goal" else 2000.0 - KEEP)
+    # From within a hollow boundary all of it is in sight: TangentBug goes round on chords.
+    assert flight.length_m > (0.8 if enclosed == "start" and kind == "tangent_bug" else 0.98) * round_m
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("enclosed", ["goal", "start"])
+def test_no_enclosure_is_proved_soon_after_something_appeared(
+    kind: str, enclosed: str, ring: MakePoints
+) -> None:
+    """It is gone round again meanwhile: what closes the way may go again."""
+    closed = ring(*(MISSION.goal_m if enclosed == "goal" else START), 2000.0, SPACING)
+    at_once, later = walk(kind, closed), walk(kind, closed, world=Unsettled)
+    assert at_once.status is later.status is PlanStatus.UNREACHABLE
+    assert at_once.length_m / MISSION.speed_mps < Unsettled.last_contradiction_s + SETTLED_S
+    assert later.length_m / MISSION.speed_mps > Unsettled.last_contradiction_s + SETTLED_S
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("share", [0.8, 0.95, 1.0])
+def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: float, ring: MakePoints) -> None:
+    """At the end of the round as well as where it has been passed by."""
+    closed = ring(*MISSION.goal_m, 2000.0, SPACING)
+    flight = walk(kind, closed)
+    looks = round(share * len(flight.track_m))
+    world = type("Opens", (Opening,), {"looks": looks})
+    again = walk(kind, closed, world=world)
+    assert again.reason == "reached"
+    assert looks < len(again.track_m) < 3 * len(flight.track_m)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_wall_across_the_area_is_proved_along_the_bounds(kind: str, wall: MakePoints) -> None:
+    flight = walk(kind, wall((10_000.0, 0.0), (10_000.0, 10_000.0), SPACING))
+    assert flight.status is PlanStatus.UNREACHABLE
+    x, y = flight.track_m.T
+    assert (x >= 0.0).all()
+    assert ((y >= 0.0) & (y <= 10_000.0)).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("gap_m", "status"), [(2.2 * KEEP, PlanStatus.FOUND), (1.8 * KEEP, PlanStatus.UNREACHABLE)]
+)
+def test_a_gap_is_taken_where_it_is_wide_enough(
+    kind: str, gap_m: float, status: PlanStatus, wall: MakePoints
+) -> None:
+    walls = [
+        wall((10_000.0, 0.0), (10_000.0, 3000.0), SPACING),
+        wall((10_000.0, 3000.0 + gap_m), (10_000.0, 10_000.0), SPACING),
+    ]
+    assert walk(kind, np.concatenate(walls)).status is status
+
+
+@pytest.mark.parametrize("kind", ["bug1", "bug2"])
+def test_the_side_is_the_given_one(kind: str, ring: MakePoints) -> None:
+    points = ring(10_000.0, 5000.0, 1500.0, SPACING)
+    left = walk(kind, points)
+    right_turning: Planner = (
+        Bug1(Bug1Config(turn="right"), MISSION) if kind == "bug1" else Bug2(Bug2Config(turn="right"), MISSION)
+    )
+    seen = Range(points, 20_000.0)
+    seen.look(START)
+    path = right_turning.plan(PlanRequest(0.0, START, (1.0, 0.0), seen)).path
+    assert path is not None
+    places = np.array([pose_at(path, s)[:2] for s in np.arange(0.0, 8000.0, 100.0)])
+    assert places[-1, 1] < 5000.0 - 1000.0
+    first_aside = left.track_m[np.abs(left.track_m[:, 1] - 5000.0) > 1000.0][0]
+    assert first_aside[1] > 5000.0
+
+
+@pytest.mark.parametrize("kind", ["bug1", "bug2"])
+def test_an_obstacle_is_known_only_on_contact(kind: str, ring: MakePoints) -> None:
+    flight = walk(kind, ring(10_000.0, 5000.0, 1500.0, SPACING))
+    east, north = flight.track_m[flight.track_m[:, 0] < 10_000.0 - 1500.0 - KEEP - 50.0].T
+    assert len(east) > 100
+    np.testing.assert_allclose(north, 5000.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("bearing_deg", [0.0, 30.0, 60.0, 90.0, -30.0, -60.0, -90.0])
+@pytest.mark.parametrize("away_m", [400.0, 700.0, 1000.0])
+def test_a_boundary_that_is_seen_past_the_other_side_has_not_been_followed(
+    side: float, bearing_deg: float, away_m: float, ring: MakePoints
+) -> None:
+    """What is followed lies behind a small obstacle, and the horizon reaches round it more than once."""
+    planner, radius = TangentBug(TangentBugConfig(), MISSION), 30.0 + KEEP
+    seen = Range(ring(10_000.0, 5000.0, 30.0, SPACING), MISSION.sensor_range_m)
+    place, turn = (10_000.0 - radius - away_m, 5000.0), math.radians(bearing_deg)
+    seen.look(place)
+    planner.known.take_in(seen)
+    anchor = (10_000.0 + radius * math.cos(turn), 5000.0 + radius * math.sin(turn))
+    hit = mark_at(planner.boundary(anchor, side, KEEP), 0.0)
+    legs = list(planner._follow(place, Following(hit, side, anchor, 0.0, False, 7000.0)))
+    assert math.tau * radius < planner.horizon_m
+    assert not isinstance(legs[1].state, Enclosed)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_obstacle_that_has_gone_is_not_followed_on(kind: str, wall: MakePoints) -> None:
+    """What is left of the way is flown straight: neither along the border nor back to where it was."""
+    flight = walk(kind, wall((10_000.0, 500.0), (10_000.0, 9500.0), SPACING), world=Vanishing)
+    assert flight.reason == "reached"
+    assert flight.length_m < 50.0 * 260 + math.dist(flight.track_m[260], MISSION.goal_m) + 500.0
+
+
+@pytest.mark.parametrize("depth_m", [0.5, 2.0, 6.0, 12.0, 20.0, 30.0, 100.0])
+@pytest.mark.parametrize("kind", KINDS)
+def test_an_obstacle_that_the_line_grazes_encloses_nothing(
+    kind: str, depth_m: float, ring: MakePoints
+) -> None:
+    """The line leaves the boundary at so small an angle that the next points of it still lie ahead."""
+    (start_x, y), (goal_x, _) = START, MISSION.goal_m
+    middle = 0.5 * (start_x + goal_x)
+    assert walk(kind, ring(middle, y - 1500.0 - KEEP + depth_m, 1500.0, SPACING)).reason == "reached"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_plan_begins_at_the_aircraft_and_is_in_one_piece(kind: str, ring: MakePoints) -> None:
+    flight = walk(
+        kind, np.concatenate([ring(9000.0, 5300.0, 1200.0, SPACING), ring(12_500.0, 4200.0, 900.0, SPACING)])
+    )
+    assert flight.reason == "reached"
+    for plan in flight.plans:
+        assert plan.path is not None
+        rows = plan.path.segments
+        assert np.hypot(*(flight.track_m - rows[0, :2]).T).min() < 1e-6
+        np.testing.assert_allclose(np.hypot(rows[:, 2], rows[:, 3]), 1.0, atol=1e-9)
+        ends = np.array([pose_at(plan.path, s)[:2] for s in np.cumsum(rows[:, 5])])
+        np.testing.assert_allclose(ends[:-1], rows[1:, :2], atol=1e-3)
+        np.testing.assert_allclose(plan.waypoints_m[-1], ends[-1], atol=1e-6)
+
+
+circles = st.lists(
+    st.tuples(st.floats(4500.0, 15_500.0), st.floats(0.0, 10_000.0), st.floats(300.0, 2500.0)),
+    min_size=1,
+    max_size=7,
+)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=8, derandomize=True, suppress_health_check=list(HealthCheck))
+@given(world=circles)
+def test_the_goal_is_reached_where_there_is_a_way_and_only_there(
+    kind: str, ring: MakePoints, world: list[tuple[float, float, float]]
+) -> None:
+    points = np.concatenate([ring(x, y, radius, SPACING) for x, y, radius in world])
+    ends = shapely.MultiPoint([START, MISSION.goal_m])
+    assume(float(shapely.distance(ends, shapely.MultiPoint(points))) > 1.1 * KEEP)
+
+    def connected(keep: float) -> bool:
+        grown = shapely.buffer(shapely.MultiPoint(points), keep, quad_segs=32)
+        free = shapely.difference(shapely.box(*MISSION.bounds_m), grown)
+        return any(
+            shapely.intersects(part, shapely.Point(START))
+            and shapely.intersects(part, shapely.Point(MISSION.goal_m))
+            for part in shapely.get_parts(free)
+        )
+
+    # Discs, not walls: what is a way by a hair's breadth is left out, and so is one along the bounds.
+    assume(connected(0.9 * KEEP) == connected(1.1 * KEEP))
+    flight = walk(kind, points)
+    assert flight.reason == "reached" if connected(KEEP) else flight.status is PlanStatus.UNREACHABLE
+    assert nearest_m(flight.track_m, points) > MISSION.clearance_m
+
+
+@pytest.mark.parametrize("curvature", [0.0, 1 / 700.0, -1 / 700.0])
+def test_crossings_of_a_segment_lie_on_the_line(curvature: float) -> None:
+    segment = (0.0, -100.03, 0.6, 0.8, curvature, 3000.0)
+    found = crossings(segment, (0.0, 0.0), (0.0, 1.0))
+    station = np.linspace(0.0, 3000.0, 30_001)
+    _, y, tx, ty, _, _ = segment
+    if curvature:
+        heights = (
+            y + (ty * np.sin(curvature * station) + tx * (1.0 - np.cos(curvature * station))) / curvature
+        )
+    else:
+        heights = y + ty * station
+    crossed = station[:-1][np.sign(heights[:-1]) != np.sign(heights[1:])]
+    assert len(found) == len(crossed)
+    np.testing.assert_allclose(found, crossed, atol=0.2)

@@ -1,0 +1,154 @@
+"""Distances and crossings against shapely on dense samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from planner.geometry.clearance import distances, first_breach, first_entry, inside_bounds
+from planner.geometry.curves import Pose, along, full_turn, pose_at
+from planner.interface import FloatArray, Path
+
+Integrated = Callable[..., FloatArray]
+SEEDS = st.integers(0, 2**32 - 1)
+PIECES = st.lists(
+    st.tuples(st.sampled_from([0.0, 1 / 900.0, -1 / 500.0, 1 / 200.0, -1 / 150.0]), st.floats(1.0, 900.0)),
+    min_size=1,
+    max_size=6,
+)
+STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1000.0)]))
+
+
+def path_of(pieces: list[tuple[float, float]]) -> Path:
+    pose = Pose(0.0, 0.0, 0.6, 0.8)
+    rows = []
+    for curvature, length in pieces:
+        rows.append((*pose, curvature, length))
+        pose = along(rows[-1], length)
+    return Path(np.array(rows))
+
+
+def dense_line(path: Path, integrated: Integrated) -> shapely.LineString:
+    segments = [tuple(row) for row in path.segments.tolist()]
+    return shapely.LineString(integrated(path.segments[0, :4].tolist(), segments, 0.5)[:, :2])
+
+
+@settings(max_examples=60)
+@given(pieces=PIECES, seed=SEEDS)
+def test_distances_and_their_stations(
+    pieces: list[tuple[float, float]], seed: int, integrated: Integrated
+) -> None:
+    path = path_of(pieces)
+    points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (40, 2))
+    distance, station = distances(path, points)
+    line = dense_line(path, integrated)
+    np.testing.assert_allclose(distance, shapely.distance(line, shapely.points(points)), atol=2e-3)
+    assert (station >= 0.0).all()
+    assert (station <= path.length_m + 1e-6).all()
+    places = np.array([pose_at(path, s)[:2] for s in station])
+    np.testing.assert_allclose(np.hypot(*(places - points).T), distance, atol=1e-6)
+
+
+@settings(max_examples=60)
+@given(pieces=PIECES, seed=SEEDS, radius=st.floats(1.0, 500.0))
+def test_a_breach_is_told_where_and_only_where_there_is_one(
+    pieces: list[tuple[float, float]], seed: int, radius: float, integrated: Integrated
+) -> None:
+    path = path_of(pieces)
+    points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (6, 2))
+    nearest = shapely.distance(dense_line(path, integrated), shapely.points(points))
+    assume(np.abs(nearest - radius).min() > 0.01)
+    station = first_breach(path, points, radius)
+    assert math.isfinite(station) == (nearest < radius).any()
+    if math.isfinite(station):
+        place = np.array(pose_at(path, station)[:2])
+        assert np.hypot(*(points - place).T).min() < radius
+    for i, each in enumerate(points):
+        alone = first_breach(path, each[None], radius)
+        assert math.isfinite(alone) == (nearest[i] < radius)
+        assert station <= alone
+
+
+def test_the_first_of_several_breaches_counts() -> None:
+    points = np.array([(800.0, 10.0), (300.0, -20.0), (500.0, 90.0)])
+    assert first_breach(STRAIGHT, points, 50.0) == pytest.approx(300.0)
+    assert first_breach(STRAIGHT, points, np.array([50.0, 15.0, 100.0])) == pytest.approx(500.0)
+    assert first_breach(STRAIGHT, points, 50.0, from_m=400.0) == pytest.approx(800.0)
+    assert first_breach(STRAIGHT, points, 5.0) == math.inf
+    assert first_breach(STRAIGHT, np.zeros((0, 2)), 5.0) == math.inf
+
+
+def test_a_second_pass_is_a_breach_where_the_first_does_not_count() -> None:
+    # Out past the point at 10 m, round to the left, and back past it at 190 m less far than is to be kept.
+    rows = [(0.0, 0.0, 1.0, 0.0, 0.0, 1000.0), (1000.0, 0.0, 1.0, 0.0, 1 / 100.0, 100.0 * math.pi)]
+    path = Path(np.array([*rows, (1000.0, 200.0, -1.0, 0.0, 0.0, 1000.0)]))
+    point = np.array([(500.0, 90.0)])
+    back = 1000.0 + 100.0 * math.pi + 500.0
+    assert first_breach(path, point, 150.0) == pytest.approx(500.0)
+    assert first_breach(path, point, 150.0, from_m=1000.0) == pytest.approx(back)
+    assert first_breach(path, point, 150.0, from_m=back + 200.0) == math.inf
+
+
+@settings(max_examples=100)
+@given(pieces=PIECES, seed=SEEDS, full=st.booleans())
+def test_inside_bounds(
+    pieces: list[tuple[float, float]], seed: int, full: bool, integrated: Integrated
+) -> None:
+    path = path_of(pieces)
+    if full:
+        end = along(path.segments[-1], float(path.segments[-1, 5]))
+        path = Path(np.array([*path.segments.tolist(), full_turn(end, 300.0, 1.0)]))
+    xmin, ymin, xmax, ymax = dense_line(path, integrated).bounds
+    # Bounds about the path, some of them a little too narrow.
+    slack = np.random.default_rng(seed).choice([0.05, 0.5, 500.0, 500.0, -0.05, -5.0], 4)
+    bounds = (xmin - slack[0], ymin - slack[1], xmax + slack[2], ymax + slack[3])
+    assert inside_bounds(path, bounds) == bool((slack > 0.0).all())
+
+
+def test_the_boundary_belongs_to_the_area() -> None:
+    assert inside_bounds(STRAIGHT, (0.0, 0.0, 1000.0, 10.0))
+    assert not inside_bounds(STRAIGHT, (0.0, 0.0, 999.9, 10.0))
+    assert not inside_bounds(STRAIGHT, (0.1, -1.0, 1000.0, 10.0))
+
+
+@settings(max_examples=150)
+@given(seed=SEEDS, count=st.integers(1, 8))
+def test_first_entry_against_shapely(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(-1000.0, 1000.0, (2, 2)).tolist()
+    points, radius = rng.uniform(-1000.0, 1000.0, (count, 2)), rng.uniform(20.0, 300.0, count)
+    line = shapely.LineString([a, b])
+    assume(line.length > 1.0)
+    # Judged apart: a start inside a disc, and lines that hardly touch one.
+    assume((np.hypot(*(points - a).T) > radius).all())
+    assume((np.abs(shapely.distance(line, shapely.points(points)) - radius) > 1.0).all())
+    # Circles of 4 * 200 chords are 2 mm too small at most.
+    discs = [shapely.Point(p).buffer(r, quad_segs=200) for p, r in zip(points, radius, strict=True)]
+    entries = [line.intersection(disc).distance(shapely.Point(a)) for disc in discs]
+    entries = [entry if math.isfinite(entry) else math.inf for entry in entries]
+    distance, index = first_entry((a[0], a[1]), (b[0], b[1]), points, radius)
+    assert math.isfinite(distance) == any(math.isfinite(entry) for entry in entries)
+    if math.isinf(distance):
+        assert index == -1
+    else:
+        assert distance == pytest.approx(min(entries), abs=0.2)
+        assert entries[index] == pytest.approx(distance, abs=0.2)
+
+
+def test_a_disc_about_the_start_bars_only_the_way_deeper_into_it() -> None:
+    disc = np.array([(30.0, 0.0)])
+    assert first_entry((0.0, 0.0), (500.0, 0.0), disc, 50.0) == (0.0, 0)
+    assert first_entry((0.0, 0.0), (-500.0, 0.0), disc, 50.0) == (math.inf, -1)
+    assert first_entry((0.0, 0.0), (0.0, 500.0), disc, 50.0) == (math.inf, -1)
+    assert first_entry((0.0, 0.0), (100.0, 500.0), disc, 50.0) == (0.0, 0)
+
+
+def test_no_points_and_no_line_are_clear() -> None:
+    assert first_entry((0.0, 0.0), (10.0, 0.0), np.zeros((0, 2)), 50.0) == (math.inf, -1)
+    assert first_entry((5.0, 5.0), (5.0, 5.0), np.array([(5.0, 5.0)]), 50.0) == (math.inf, -1)

@@ -1,0 +1,459 @@
+"""Curves against numerical integration and brute force."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from planner.geometry.curves import (
+    Limits,
+    Point,
+    Pose,
+    Segment,
+    along,
+    between,
+    end_of,
+    fillet,
+    full_turn,
+    moved,
+    on_loiter,
+    onward,
+    onward_in_turn,
+    place_on,
+    pose_at,
+    sample,
+    turn_onto,
+    turns_onto,
+)
+from planner.geometry.stations import places_along, poses_at, turn_centres
+from planner.interface import FloatArray, Path
+
+Integrated = Callable[..., FloatArray]
+AssertFlyable = Callable[[Path, float], None]
+
+EAST = Pose(0.0, 0.0, 1.0, 0.0)
+ANGLES = st.floats(-math.pi, math.pi)
+POSES = st.builds(
+    lambda x, y, course: Pose(x, y, math.cos(course), math.sin(course)),
+    st.floats(-5e3, 5e3),
+    st.floats(-5e3, 5e3),
+    ANGLES,
+)
+PIECES = st.lists(
+    st.tuples(st.sampled_from([0.0, 1 / 900.0, -1 / 500.0, 1 / 200.0, -1 / 150.0]), st.floats(1.0, 900.0)),
+    min_size=1,
+    max_size=6,
+)
+WALKS = st.lists(st.tuples(st.floats(600.0, 5000.0), st.floats(-2.2, 2.2)), min_size=1, max_size=6)
+
+
+def joined(start: Pose, pieces: list[tuple[float, float]]) -> list[Segment]:
+    segments: list[Segment] = []
+    pose = start
+    for curvature, length in pieces:
+        segments.append((*pose, curvature, length))
+        pose = along(segments[-1], length)
+    return segments
+
+
+def corners(start: Pose, walk: list[tuple[float, float]]) -> list[Point]:
+    """Nodes of a polyline from a pose: legs and the turns before them."""
+    x, y = start[:2]
+    course = math.atan2(start.tangent_north, start.tangent_east)
+    nodes = []
+    for leg, turn in walk:
+        course += turn
+        x, y = x + leg * math.cos(course), y + leg * math.sin(course)
+        nodes.append((x, y))
+    return nodes
+
+
+@given(start=POSES, pieces=PIECES)
+def test_joined_segments_are_where_integration_says(
+    start: Pose, pieces: list[tuple[float, float]], integrated: Integrated
+) -> None:
+    segments = joined(start, pieces)
+    dense = integrated(start, segments, 0.2)
+    np.testing.assert_allclose(end_of(Path(np.array(segments))), dense[-1], atol=1e-3)
+
+
+@given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0), more=st.floats(0.0, 1.0))
+def test_pose_sample_and_stretch_agree(
+    start: Pose, pieces: list[tuple[float, float]], share: float, more: float, integrated: Integrated
+) -> None:
+    path = Path(np.array(joined(start, pieces)))
+    begin = share * path.length_m
+    stop = begin + more * (path.length_m - begin)
+    assume(stop - begin > 1e-3)
+    stretch = between(path, begin, stop)
+    assert sum(segment[5] for segment in stretch) == pytest.approx(stop - begin, abs=1e-5)
+    np.testing.assert_allclose(stretch[0][:4], pose_at(path, begin), atol=1e-5)
+    np.testing.assert_allclose(along(stretch[-1], stretch[-1][5]), pose_at(path, stop), atol=1e-4)
+    np.testing.assert_allclose(integrated(stretch[0][:4], stretch, 0.2)[-1], pose_at(path, stop), atol=1e-3)
+    points = sample(path, 20.0)
+    np.testing.assert_allclose(points[0], start[:2], atol=1e-9)
+    np.testing.assert_allclose(points[-1], end_of(path)[:2], atol=1e-6)
+    assert np.hypot(*np.diff(points, axis=0).T).max() <= 20.0 + 1e-9
+    middle = shapely.Point(pose_at(path, begin)[:2])
+    # The chord of 20 m of the tightest arc here lies 0.33 m from it.
+    assert shapely.LineString(points).distance(middle) < 0.34
+
+
+@given(start=POSES, pieces=PIECES, deviation=st.floats(0.01, 5.0))
+def test_sample_keeps_chords_near_their_arcs(
+    start: Pose, pieces: list[tuple[float, float]], deviation: float, integrated: Integrated
+) -> None:
+    segments = joined(start, pieces)
+    line = shapely.LineString(sample(Path(np.array(segments)), math.inf, deviation))
+    dense = integrated(start, segments, 2.0)[:, :2]
+    assert shapely.distance(line, shapely.points(dense)).max() <= deviation + 0.02
+
+
+def test_stations_beyond_the_ends_are_the_ends() -> None:
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 100.0)]))
+    assert pose_at(path, -5.0) == (0.0, 0.0, 1.0, 0.0)
+    assert pose_at(path, 105.0) == (100.0, 0.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_full_turn_ends_where_it_began_and_stays_on_its_side(side: float) -> None:
+    pose = Pose(10.0, 20.0, 0.6, 0.8)
+    path = Path(np.array([full_turn(pose, 150.0, side)]), loiter=True)
+    np.testing.assert_allclose(end_of(path), pose, atol=1e-9)
+    offset = sample(path, 5.0) - (10.0, 20.0)
+    assert (side * (0.6 * offset[:, 1] - 0.8 * offset[:, 0]) > -1e-9).all()
+    assert path.length_m == pytest.approx(math.tau * 150.0)
+
+
+def shortest_turn_by_search(pose: Pose, target: Point, radius: float) -> float:
+    """Length of the shortest turn that points at the target, found by following both turns in small steps."""
+    lengths = [math.inf]
+    for side in (1.0, -1.0):
+        turn = np.linspace(0.0, math.tau, 20_001)
+        course = math.atan2(pose.tangent_north, pose.tangent_east) + side * turn
+        x = pose.east_m - side * radius * pose.tangent_north + side * radius * np.sin(course)
+        y = pose.north_m + side * radius * pose.tangent_east - side * radius * np.cos(course)
+        dx, dy = target[0] - x, target[1] - y
+        off = side * (np.cos(course) * dy - np.sin(course) * dx)
+        ahead = np.cos(course) * dx + np.sin(course) * dy > 0.0
+        # The first place with the target straight ahead: there it passes from the inner to the outer side.
+        found = np.flatnonzero((off[:-1] > 0.0) & (off[1:] <= 0.0) & ahead[:-1])
+        if len(found):
+            i = found[0]
+            lengths.append(radius * turn[i] + math.hypot(dx[i], dy[i]))
+    return min(lengths)
+
+
+@given(pose=POSES, away=st.floats(10.0, 3000.0), bearing=ANGLES, radius=st.floats(100.0, 600.0))
+def test_turn_onto_is_the_shorter_tangent(pose: Pose, away: float, bearing: float, radius: float) -> None:
+    target = (pose.east_m + away * math.cos(bearing), pose.north_m + away * math.sin(bearing))
+    centres = [
+        (pose.east_m - side * radius * pose.tangent_north, pose.north_m + side * radius * pose.tangent_east)
+        for side in (1.0, -1.0)
+    ]
+    outside = [math.dist(centre, target) - radius for centre in centres]
+    assume(min(abs(gap) for gap in outside) > 0.01 * radius)
+    # Straight ahead and a whole turn differ by less than rounding.
+    off = pose.tangent_east * math.sin(bearing) - pose.tangent_north * math.cos(bearing)
+    assume(abs(off) > 0.01)
+    segments = turn_onto(pose, target, radius)
+    assert segments is not None
+    length = sum(segment[5] for segment in segments)
+    assert length == pytest.approx(shortest_turn_by_search(pose, target, radius), abs=2e-3 * radius)
+    np.testing.assert_allclose(along(segments[-1], segments[-1][5])[:2], target, atol=1e-5)
+
+
+def test_turn_onto_goes_straight_at_what_lies_ahead() -> None:
+    segments = turn_onto(Pose(0.0, 0.0, 0.6, 0.8), (600.0, 800.0), 100.0)
+    assert segments is not None
+    assert sum(segment[5] for segment in segments) == pytest.approx(1000.0)
+
+
+def assert_room_to_roll(path: Path, roll_m: float, before: float) -> None:
+    """A left and a right turn are parted by a straight run, also that which ends at the start."""
+    last, straight = before, 0.0
+    for *_, curvature, length in path.segments.tolist():
+        if curvature == 0.0:
+            straight += length
+            continue
+        if curvature * last < 0.0:
+            assert straight >= roll_m - 1e-5
+        last, straight = curvature, 0.0
+
+
+@given(
+    start=POSES,
+    walk=WALKS,
+    limits=st.builds(Limits, st.floats(50.0, 300.0), st.sampled_from([0.0, 60.0])),
+    cut=st.floats(0.0, 500.0),
+    before=st.sampled_from([-1.0, 0.0, 1.0]),
+)
+def test_a_fillet_is_smooth_and_passes_its_corners_as_near_as_asked(
+    start: Pose,
+    walk: list[tuple[float, float]],
+    limits: Limits,
+    cut: float,
+    before: float,
+    assert_flyable: AssertFlyable,
+) -> None:
+    nodes = corners(start, walk)
+    path = fillet(start, nodes, limits, cut, before / limits.radius_m)
+    assume(path is not None)
+    assert path is not None
+    assert_flyable(path, limits.radius_m)
+    assert_room_to_roll(path, limits.roll_m, before)
+    np.testing.assert_allclose(path.segments[0, :4], start, atol=1e-5)
+    np.testing.assert_allclose(end_of(path)[:2], nodes[-1], atol=1e-4)
+    line = shapely.LineString(sample(path, 50.0, 0.01))
+    # The first turn changes the course on which the first corner is met: corners after it are judged.
+    for into, corner, after in zip(nodes, nodes[1:], nodes[2:], strict=False):
+        ax, ay = corner[0] - into[0], corner[1] - into[1]
+        bx, by = after[0] - corner[0], after[1] - corner[1]
+        turn = abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))
+        tightest = limits.radius_m * (1.0 / math.cos(0.5 * turn) - 1.0)
+        assert line.distance(shapely.Point(corner)) <= max(cut, tightest) + 0.05
+
+
+@given(radius=st.floats(50.0, 300.0), turn=st.floats(0.2, 2.2), cut=st.floats(1.0, 400.0))
+def test_one_corner_is_cut_by_what_is_asked_and_room_allows(radius: float, turn: float, cut: float) -> None:
+    leg = 4000.0
+    nodes = [(leg, 0.0), (leg + leg * math.cos(turn), leg * math.sin(turn))]
+    path = fillet(EAST, nodes, Limits(radius, 50.0), cut)
+    assert path is not None
+    sharpness = 1.0 / math.cos(0.5 * turn) - 1.0
+    # No corner takes more than half of the leg that leads to it, unless the turn radius needs it.
+    widest = 0.5 * leg / math.tan(0.5 * turn)
+    assert 1.0 / path.max_curvature_1pm == pytest.approx(max(radius, min(cut / sharpness, widest)), rel=1e-6)
+
+
+def test_a_turn_against_the_one_before_begins_after_the_room_to_roll() -> None:
+    limits = Limits(100.0, 40.0)
+    behind_right = [(-1000.0, -500.0)]
+    at_once = fillet(EAST, behind_right, limits, 0.0)
+    against = fillet(EAST, behind_right, limits, 0.0, 1.0 / 100.0)
+    assert at_once is not None
+    assert against is not None
+    assert at_once.segments[0, 4] == pytest.approx(-0.01)
+    np.testing.assert_allclose(against.segments[0], (0.0, 0.0, 1.0, 0.0, 0.0, 40.0))
+    assert against.segments[1, 4] == pytest.approx(-0.01)
+
+
+def test_a_first_corner_against_the_turn_before_leaves_the_room_to_roll() -> None:
+    limits = Limits(100.0, 40.0)
+    nodes = [(100.0, 0.0), (100.0, -1000.0)]
+    at_once = fillet(EAST, nodes, limits, 0.0)
+    assert at_once is not None
+    assert_room_to_roll(at_once, 40.0, -1.0)
+    # The corner needs all of the first leg: a left turn before it leaves no room.
+    assert fillet(EAST, nodes, limits, 0.0, 1.0 / 100.0) is None
+
+
+@pytest.mark.parametrize(
+    ("nodes", "radius"),
+    [
+        ([(1000.0, 0.0), (1000.0, 90.0), (2000.0, 90.0)], 100.0),  # a step too narrow for its two turns
+        ([(1000.0, 0.0), (0.0, 0.0)], 10.0),  # straight back
+        ([(1000.0, 0.0), (1000.0, 0.0)], 10.0),  # a leg of no length
+        ([(0.0, 0.0)], 10.0),  # the start itself
+    ],
+)
+def test_what_cannot_be_rounded_has_no_fillet(nodes: list[Point], radius: float) -> None:
+    assert fillet(EAST, nodes, Limits(radius, 0.0), 50.0) is None
+
+
+def test_a_node_at_the_start_has_no_fillet_whatever_the_course() -> None:
+    for i in range(200):
+        start = Pose(10.0 * i, 7.0 * i, math.cos(i), math.sin(i))
+        path = fillet(start, [start[:2], (start[0] + 1000.0, start[1])], Limits(100.0, 10.0), 50.0)
+        assert path is None or path.length_m > 600.0
+
+
+def test_a_straight_run_through_nodes_is_straight() -> None:
+    path = fillet(EAST, [(300.0, 0.0), (700.0, 0.0), (1000.0, 0.0)], Limits(100.0, 50.0), 50.0)
+    assert path is not None
+    assert path.max_curvature_1pm == 0.0
+    assert path.length_m == pytest.approx(1000.0)
+
+
+def test_the_curvature_at_a_place_is_that_of_its_segment() -> None:
+    path = Path(np.array(joined(EAST, [(0.0, 100.0), (0.01, 50.0), (-0.02, 30.0)])))
+    assert [place_on(path, s)[1] for s in (50.0, 120.0, 160.0, 999.0)] == [0.0, 0.01, -0.02, -0.02]
+    assert place_on(path, 120.0)[0] == pose_at(path, 120.0)
+
+
+def test_stations_on_a_loiter_go_round_and_round() -> None:
+    turn = math.tau * 150.0
+    rows = [(0.0, 0.0, 1.0, 0.0, 0.0, 400.0), full_turn(Pose(400.0, 0.0, 1.0, 0.0), 150.0, 1.0)]
+    path = Path(np.array(rows), loiter=True)
+    assert on_loiter(path, 300.0) == 300.0
+    for turns in range(4):
+        assert on_loiter(path, 450.0 + turns * turn) == pytest.approx(450.0)
+    straight = Path(path.segments)
+    assert on_loiter(straight, 400.0 + 2.5 * turn) == 400.0 + 2.5 * turn
+
+
+@settings(max_examples=60)
+@given(start=POSES, pieces=PIECES, shares=st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
+def test_poses_at_many_stations_are_those_of_integration(
+    start: Pose, pieces: list[tuple[float, float]], shares: list[float], integrated: Integrated
+) -> None:
+    path = Path(np.array(joined(start, pieces)))
+    stations = np.array(shares) * path.length_m
+    found = poses_at(path, stations)
+    assert found.shape == (len(shares), 4)
+    for station, pose in zip(stations.tolist(), found, strict=True):
+        kept = between(path, 0.0, station)
+        expected = integrated(start, kept, 0.5)[-1] if kept else np.array(start)
+        np.testing.assert_allclose(pose[:2], expected[:2], atol=5e-3)
+        np.testing.assert_allclose(pose[2:], expected[2:], atol=1e-6)
+        np.testing.assert_allclose(pose, pose_at(path, station), atol=1e-6)
+    end_m = float(stations.max())
+    even = np.linspace(0.0, end_m, len(shares) + 1)
+    np.testing.assert_allclose(places_along(path, end_m, len(shares)), poses_at(path, even)[:, :2], atol=1e-6)
+
+
+def test_a_path_may_be_given_column_by_column() -> None:
+    rows = joined(EAST, [(0.0, 100.0), (0.01, 50.0)])
+    stations = np.array([30.0, 120.0])
+    by_columns = poses_at(Path(np.asfortranarray(rows)), stations)
+    np.testing.assert_array_equal(by_columns, poses_at(Path(np.array(rows)), stations))
+
+
+@settings(max_examples=60)
+@given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0))
+# Its length less that of the first segment is more than that of the last, by a rounding.
+@example(
+    start=Pose(0.0, 0.0, 1.0, 0.0),
+    pieces=[(0.0, 124.35687337714592), (1 / 900.0, 899.7551453830558)],
+    share=1.0,
+)
+def test_turns_off_a_path_begin_after_a_straight_where_it_turns_the_other_way(
+    start: Pose, pieces: list[tuple[float, float]], share: float
+) -> None:
+    path = Path(np.array(joined(start, pieces)))
+    station = share * path.length_m
+    pose, bend = place_on(path, station)
+    centres = turn_centres(path, np.array([0.0, station]), 100.0, 15.0)
+    assert centres.shape == (2, 2, 2)
+    for side, centre in zip((1.0, -1.0), centres[1], strict=True):
+        begins = along((*pose, 0.0, 0.0), 15.0) if side * bend < 0.0 else pose
+        across = along((*begins, side / 100.0, 0.0), 100.0 * math.pi)
+        np.testing.assert_allclose(centre, np.add(begins[:2], across[:2]) / 2.0, atol=1e-6)
+
+
+@settings(max_examples=60)
+@given(
+    start=POSES,
+    pieces=PIECES,
+    side=st.sampled_from([1.0, -1.0]),
+    share=st.floats(0.0, 1.0),
+    further=st.floats(1.0, 4000.0),
+)
+def test_onward_goes_round_the_loiter_as_integration_does(
+    start: Pose,
+    pieces: list[tuple[float, float]],
+    side: float,
+    share: float,
+    further: float,
+    integrated: Integrated,
+) -> None:
+    before = joined(start, pieces)
+    turn = full_turn(along(before[-1], before[-1][5]), 150.0, side)
+    path = Path(np.array([*before, turn]), loiter=True)
+    station = share * path.length_m
+    stretch = onward(path, station, further)
+    assert sum(segment[5] for segment in stretch) == pytest.approx(further, abs=1e-4)
+    # The truth: the path with so many turns at its end that it cannot run out.
+    endless = Path(np.array([*before, *[turn] * 8]))
+    np.testing.assert_allclose(stretch[0][:4], pose_at(endless, station), atol=1e-5)
+    end = integrated(pose_at(endless, station), stretch, 0.5)[-1]
+    truth = integrated(start, between(endless, 0.0, station + further), 0.5)[-1]
+    np.testing.assert_allclose(end, truth, atol=2e-2)
+    np.testing.assert_allclose(
+        along(stretch[-1], stretch[-1][5]), pose_at(path, on_loiter(path, station + further)), atol=1e-4
+    )
+
+
+def test_onward_stops_at_the_end_of_a_path_without_loiter() -> None:
+    path = Path(np.array([(*EAST, 0.0, 100.0), (100.0, 0.0, 1.0, 0.0, 0.01, 50.0)]))
+    assert sum(segment[5] for segment in onward(path, 30.0, 1000.0)) == pytest.approx(120.0)
+
+
+@given(pose=POSES, away=st.floats(1.0, 3000.0), bearing=ANGLES, radius=st.floats(50.0, 800.0))
+@settings(max_examples=60)
+def test_turns_onto_are_one_to_each_side_the_shorter_first(
+    pose: Pose, away: float, bearing: float, radius: float, integrated: Integrated
+) -> None:
+    target = (pose.east_m + away * math.cos(bearing), pose.north_m + away * math.sin(bearing))
+    ways = turns_onto(pose, target, radius)
+    lengths = [sum(segment[5] for segment in way) for way in ways]
+    assert all(a <= b + 1e-9 for a, b in itertools.pairwise(lengths))
+    for way in ways:
+        end = integrated(pose, way, 0.5)[-1]
+        assert math.dist(end[:2], target) < 1e-2
+    centres = [
+        (pose.east_m - s * radius * pose.tangent_north, pose.north_m + s * radius * pose.tangent_east)
+        for s in (1.0, -1.0)
+    ]
+    assert len(ways) == sum(math.dist(centre, target) > radius for centre in centres)
+    assert len({math.copysign(1.0, way[0][4]) for way in ways if way[0][4]}) == sum(
+        bool(way[0][4]) for way in ways
+    )
+
+
+@given(start=POSES, to=POSES, pieces=PIECES)
+def test_moved_segments_are_the_same_curve_from_another_pose(
+    start: Pose, to: Pose, pieces: list[tuple[float, float]]
+) -> None:
+    segments = joined(start, pieces)
+    elsewhere = moved(segments, to)
+    np.testing.assert_allclose(elsewhere[0][:4], to, atol=1e-9)
+    np.testing.assert_array_equal(np.array(elsewhere)[:, 4:], np.array(segments)[:, 4:])
+    for before, after in itertools.pairwise(elsewhere):
+        np.testing.assert_allclose(along(before, before[5]), after[:4], atol=1e-6)
+    # Turned as a whole: distances from the first place stay.
+    away, there = (np.hypot(*(np.array(rows)[:, :2] - rows[0][:2]).T) for rows in (segments, elsewhere))
+    np.testing.assert_allclose(there, away, atol=1e-6)
+    np.testing.assert_allclose(moved(elsewhere, start), segments, atol=1e-5)
+
+
+@given(start=POSES, pieces=PIECES)
+def test_what_is_moved_again_and_again_keeps_its_size(start: Pose, pieces: list[tuple[float, float]]) -> None:
+    first = joined(start, pieces)
+    segments = first
+    for _ in range(100):
+        # As an aircraft does that begins each plan on the one before.
+        segments = moved(segments, Pose(*segments[0][:4]))
+    np.testing.assert_allclose(segments, first, atol=1e-6)
+
+
+@given(
+    curvature=st.floats(1e-4, 1e-2).flatmap(lambda bend: st.sampled_from((bend, -bend))),
+    course=st.floats(-math.pi, math.pi),
+    share=st.floats(0.001, 0.999),
+)
+def test_a_turn_comes_by_each_of_its_poses(curvature: float, course: float, share: float) -> None:
+    pose = Pose(300.0, -200.0, math.cos(course), math.sin(course))
+    round_m = math.tau / abs(curvature)
+    to = along((*pose, curvature, round_m), share * round_m)
+    arc = onward_in_turn(pose, curvature, to)
+    assert arc is not None
+    assert len(arc) == 1
+    assert arc[0][:5] == (*pose, curvature)
+    assert arc[0][5] == pytest.approx(share * round_m)
+
+
+def test_only_on_a_turn_there_is_a_way_on_in_it() -> None:
+    pose = Pose(0.0, 0.0, 1.0, 0.0)
+    assert onward_in_turn(pose, 0.0, pose) is None
+    assert onward_in_turn(pose, 0.01, pose) == []
+    beside = Pose(100.0, 101.0, 0.0, 1.0)
+    assert onward_in_turn(pose, 0.01, beside) is None
+    assert onward_in_turn(pose, 0.01, Pose(100.0, 100.0, 0.0, -1.0)) is None

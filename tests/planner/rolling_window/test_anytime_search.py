@@ -1,0 +1,301 @@
+"""Thinking in portions finds what thinking at once finds, and no portion is larger than asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator
+from itertools import pairwise
+from typing import cast
+
+import numpy as np
+import pytest
+
+from planner.geometry.course import Course
+from planner.geometry.curves import Pose
+from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges, Path
+from planner.memory import ObstacleMemory
+from planner.rolling_window.anytime_search import AnytimeSearch
+from planner.rolling_window.local_planning import Attempt, LocalPlanning, Now, Start
+from planner.rolling_window.multi_step_search import Track
+from planner.rolling_window.route_optimisation import Route
+from planner.rolling_window.window import Tally, Window
+
+MakePoints = Callable[..., FloatArray]
+Known = Callable[[FloatArray], MapView]
+
+MISSION = Mission(
+    goal_m=(12_000.0, 0.0),
+    goal_radius_m=100.0,
+    bounds_m=(-4000.0, -8000.0, 16_000.0, 8000.0),
+    clearance_m=200.0,
+    turn_radius_m=150.0,
+    speed_mps=25.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    sensor_range_m=8000.0,
+)
+START = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
+
+
+@pytest.fixture
+def trap(wall: MakePoints, known: Known) -> MapView:
+    """A U that is open towards the start, and a wall behind it."""
+    corners = [(2000.0, 2000.0), (6000.0, 2000.0), (6000.0, -2000.0), (2000.0, -2000.0)]
+    sides = [wall(a, b, 50.0) for a, b in pairwise(corners)]
+    return known(np.concatenate([*sides, wall((8000.0, -5000.0), (8000.0, 1500.0), 50.0)]))
+
+
+def planning(
+    seen: MapView, closed: Callable[[], bool] = lambda: False
+) -> tuple[LocalPlanning, AnytimeSearch]:
+    memory = ObstacleMemory(MISSION.clearance_m)
+    memory.take_in(seen)
+    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    return local, AnytimeSearch(local, len(memory.points_m), 0, closed)
+
+
+def deliberation(seen: MapView, closed: Callable[[], bool] = lambda: False) -> AnytimeSearch:
+    return planning(seen, closed)[1]
+
+
+def all_courses(thinking: AnytimeSearch, work: int, start: Callable[[], Start]) -> tuple[list[Course], int]:
+    courses, portions = [], 0
+    while not thinking.done:
+        courses += list(thinking.courses(start(), None, work))
+        portions += 1
+        assert portions < 10_000
+    return courses, portions
+
+
+def test_in_portions_and_at_once_the_same_is_found(trap: MapView) -> None:
+    at_once, one = all_courses(deliberation(trap), 10**9, lambda: START)
+    slowly, many = all_courses(deliberation(trap), 5, lambda: START)
+    assert one == 1
+    assert many > 10
+    assert [course.nodes for course in slowly] == [course.nodes for course in at_once]
+    assert at_once[0].shortest
+    assert at_once[0].nodes[-1] == MISSION.goal_m
+
+
+def test_a_portion_is_hardly_larger_than_asked_for(trap: MapView) -> None:
+    """It ends with the step that makes it full, or with the route that is optimised."""
+    local, thinking = planning(trap)
+    portions = 0
+    while not thinking.done:
+        before = local.tally.done
+        list(thinking.courses(START, None, 800.0))
+        assert local.tally.done - before < 2 * 800.0
+        portions += 1
+    assert portions > 7
+
+
+def test_what_is_found_late_begins_where_the_aircraft_has_got_to(trap: MapView) -> None:
+    flown = 0.0
+
+    def start() -> Start:
+        nonlocal flown
+        flown += 12.5
+        return Start((flown, 0.0), Pose(flown, 0.0, 1.0, 0.0))
+
+    thinking = deliberation(trap)
+    while not thinking.done:
+        begin = start()
+        for course in thinking.courses(begin, None, 5):
+            assert course.path.segments[0, :2].tolist() == list(begin.pose[:2])
+    assert flown > 50.0
+
+
+def test_walled_in_the_proof_ends_it(ring: MakePoints, known: Known) -> None:
+    asked = 0
+
+    def closed() -> bool:
+        nonlocal asked
+        asked += 1
+        return True
+
+    courses, _ = all_courses(deliberation(known(ring(0.0, 0.0, 3000.0, 50.0)), closed), 40, lambda: START)
+    assert courses == []
+    assert asked
+
+
+class Growing:
+    """Edge points of which more and more are in sight."""
+
+    spacing_m, last_removal_revision = 50.0, 0
+    moving: tuple[MovingEdges, ...] = ()
+    last_contradiction_s = -math.inf
+
+    def __init__(self, *scans: FloatArray) -> None:
+        self._scans, self.revision = scans, 1
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return np.concatenate([np.zeros((0, 2)), *self._scans[max(revision, 0) : self.revision]])
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.ones(len(points_m), dtype=np.bool_)
+
+
+def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(wall: MakePoints) -> None:
+    """The near end of a wall is passed although more of the wall behind that end is seen before the search ends."""
+    across = wall((3000.0, -700.0), (3000.0, 6000.0), 50.0)
+    behind = wall((3000.0, -700.0), (6000.0, -700.0), 50.0)
+    seen, memory = Growing(across, behind), ObstacleMemory(MISSION.clearance_m)
+    memory.take_in(seen)
+    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    thinking = AnytimeSearch(local, len(memory.points_m), 0, lambda: False)
+    assert not list(thinking.courses(START, None, 2))
+    seen.revision = 2
+    memory.take_in(seen)
+    later = Start((100.0, 0.0), Pose(100.0, 0.0, 1.0, 0.0))
+    course = next(iter(thinking.courses(later, None, 10**6)))
+    assert course.known == len(across)
+    assert course.shortest
+    assert min(north for _, north in course.nodes) < -800.0
+    assert course.path.length_m < 12_500.0
+
+
+def test_among_many_edge_points_a_portion_leads_less_far(wall: MakePoints, known: Known) -> None:
+    portions = {}
+    for spacing_m in (50.0, 2.5):
+        seen = known(wall((6000.0, -5000.0), (6000.0, 5500.0), spacing_m))
+        _, portions[spacing_m] = all_courses(deliberation(seen), 1000, lambda: START)
+    assert portions[2.5] > 2 * portions[50.0]
+
+
+@pytest.mark.parametrize("flown_before", [False, True])
+def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
+    wall: MakePoints, known: Known, flown_before: bool
+) -> None:
+    memory = ObstacleMemory(MISSION.clearance_m)
+    memory.take_in(known(wall((6000.0, -2000.0), (6000.0, 2100.0), 50.0)))
+    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    if flown_before:
+        for share in np.linspace(0.3, 1.0, 60).tolist():
+            local.trail.add((6000.0 * share, -2200.0 * share))
+    thinking = AnytimeSearch(local, len(memory.points_m), 0, lambda: False)
+    course = next(iter(thinking.courses(START, None, 10**6)))
+    assert (course.nodes[0][1] > 0.0) is flown_before
+
+
+def test_no_other_way_round_is_taken_while_a_narrower_one_leads_on(wall: MakePoints, known: Known) -> None:
+    memory = ObstacleMemory(MISSION.clearance_m)
+    # Too narrow for all of the margin.
+    gap = [wall((6000.0, side * 3000.0), (6000.0, side * 207.0), 50.0) for side in (-1.0, 1.0)]
+    memory.take_in(known(np.concatenate(gap)))
+    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    straight = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 12_000.0)]))
+    through = Course(straight, (MISSION.goal_m,), memory.known, shortest=True)
+
+    def found(flown: Course | None) -> list[Course]:
+        return list(AnytimeSearch(local, memory.known, 0, lambda: False).courses(START, flown, 10**6))
+
+    assert found(None)[0].path.length_m > 13_000.0
+    first, second, *_ = found(through)
+    assert first.path.length_m < 12_100.0
+    assert second.nodes == found(None)[0].nodes
+
+
+def test_a_way_that_waited_for_narrower_ones_begins_where_the_aircraft_has_got_to(
+    wall: MakePoints, known: Known
+) -> None:
+    gap = [wall((6000.0, side * 3000.0), (6000.0, side * 207.0), 50.0) for side in (-1.0, 1.0)]
+    local, thinking = planning(known(np.concatenate(gap)))
+    straight = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 12_000.0)]))
+    through = Course(straight, (MISSION.goal_m,), local.known, shortest=True)
+    flown_m, begun = 0.0, []
+    while not thinking.done:
+        flown_m += 12.5
+        start = Start((flown_m, 0.0), Pose(flown_m, 0.0, 1.0, 0.0))
+        courses = thinking.courses(start, through, 200.0)
+        begun += [(float(course.path.segments[0, 0]), flown_m) for course in courses]
+    assert len(begun) > 1
+    assert [found_m for found_m, _ in begun] == [now_m for _, now_m in begun]
+
+
+@pytest.mark.parametrize("gap_m", [0.0, 600.0])
+def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_is_none(
+    gap_m: float, ring: MakePoints, wall: MakePoints, known: Known
+) -> None:
+    """A room with columns, its door behind the aircraft."""
+    west, east, north = -3000.0, 6000.0, 4500.0
+    corners = [(west, 0.5 * gap_m), (west, north), (east, north), (east, -north), (west, -north)]
+    walls = [wall(a, b, 50.0) for a, b in pairwise([*corners, (west, -0.5 * gap_m)])]
+    columns = [(float(x), float(y)) for x in range(-2000, 5500, 1200) for y in range(-3500, 4000, 1200)]
+    rings = [ring(x, y, 200.0, 50.0) for x, y in columns if math.hypot(x, y) > 700.0]
+    local, thinking = planning(known(np.concatenate([*walls, *rings])))
+    courses, _ = all_courses(thinking, 10**9, lambda: START)
+    assert local.tally.done < (400_000.0 if gap_m else 100_000.0)
+    assert (len(thinking.tracks) > 0) == (len(courses) > 0) == (gap_m > 0.0)
+    shortest = (
+        3000.0
+        + math.dist((west, 0.0), (west - 200.0, north))
+        + 9400.0
+        + math.dist((6200.0, 4700.0), (12e3, 0))
+    )
+    for course in courses:
+        assert course.nodes[-1] == MISSION.goal_m
+        assert course.path.length_m < 1.06 * shortest
+
+
+@pytest.mark.parametrize(("flown_m", "again"), [(30_000.0, False), (9_000.0, True)])
+def test_a_way_much_longer_than_the_one_flown_is_looked_for_once_more(
+    flown_m: float, again: bool, trap: MapView, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What lies around the start is looked at as well."""
+    looked_round: list[int] = []
+    nearest = Window.nearest_obstacles
+
+    def counted(window: Window, most: int) -> list[int]:
+        looked_round.append(most)
+        return nearest(window, most)
+
+    monkeypatch.setattr(Window, "nearest_obstacles", counted)
+    flown = Course(Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, flown_m)])), (MISSION.goal_m,), 0, shortest=True)
+    assert list(deliberation(trap).courses(START, flown, 10**9))
+    assert bool(looked_round) == again
+
+
+class TightNearObstacles:
+    """Finds a short way that has room for its turns only further from obstacles, and a long one near them."""
+
+    known, points_m, tally = 0, np.zeros((0, 2)), Tally()
+
+    def attempts(self) -> list[Attempt]:
+        return [Attempt(60.0, 6.0), Attempt(60.0, 2.4), Attempt(110.0, 6.0)]
+
+    def route(
+        self, attempt: Attempt, effort: int, now: Now, tracks: list[Track], closed: Callable[[], bool]
+    ) -> Generator[None, None, Route | None]:
+        tracks.append(Track((START.position, MISSION.goal_m), 6400.0, 0.0))
+        yield
+        if attempt.margin_m < 6.0:
+            return None
+        length = 14_000.0 if attempt.distance_m == 60.0 else 6500.0
+        return Route((MISSION.goal_m,), Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)])))
+
+
+@pytest.mark.parametrize("roomy", [False, True])
+def test_the_widest_ways_are_looked_for_first_where_that_is_asked_for(roomy: bool) -> None:
+    asked: list[Attempt] = []
+
+    class InVain(TightNearObstacles):
+        def route(self, attempt: Attempt, *_: object) -> Generator[None, None, Route | None]:
+            asked.append(attempt)
+            yield
+            return None
+
+        def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
+            yield
+            return None
+
+    local = InVain()
+    thinking = AnytimeSearch(cast(LocalPlanning, local), 0, 0, lambda: False, roomy=roomy)
+    assert not list(thinking.courses(START, None, math.inf))
+    widest = max(local.attempts(), key=lambda each: each.distance_m)
+    assert (asked[0] == widest) is roomy
+
+
+def test_a_long_way_waits_where_a_much_shorter_one_had_no_room_for_its_turns() -> None:
+    thinking = AnytimeSearch(cast(LocalPlanning, TightNearObstacles()), 0, 0, lambda: False)
+    lengths = [course.path.length_m for course in thinking.courses(START, None, math.inf)]
+    assert lengths == [6500.0, 14_000.0]

@@ -1,0 +1,320 @@
+"""What is certified lies in space seen to be free, and nothing longer could have been."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.geometry.curves import Limits, along, between, end_of, pose_at, sample
+from planner.geometry.stations import poses_at
+from planner.interface import BoolArray, FloatArray, MovingEdges, Path
+from planner.rolling_window.certificate import DISC, Certified, Certifier, disc_radius_m, least_sensor_range_m
+from planner.rolling_window.route_optimisation import Terrain
+
+AssertFlyable = Callable[[Path, float], None]
+
+RADIUS, ROLL, SPACING, HORIZON, KEEP = 100.0, 15.0, 20.0, 2000.0, 40.0
+LIMITS = Limits(RADIUS, ROLL)
+CERTIFIER = Certifier(LIMITS, KEEP, HORIZON, SPACING)
+DISC_M = disc_radius_m(RADIUS, KEEP)
+WIDE = (-1e4, -1e4, 1e4, 1e4)
+STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 1500.0)]))
+PIECES = st.lists(
+    st.tuples(st.sampled_from([0.0, 1 / 300.0, -1 / 180.0, 1 / 120.0, -1 / 100.0]), st.floats(50.0, 500.0)),
+    min_size=1,
+    max_size=5,
+)
+
+
+class FreeDiscs:
+    """Space seen to be free: some discs."""
+
+    spacing_m, revision, last_removal_revision = SPACING, 0, 0
+    moving: tuple[MovingEdges, ...] = ()
+    last_contradiction_s = -math.inf
+
+    def __init__(self, discs: FloatArray) -> None:
+        self._discs = discs
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return np.zeros((0, 2))
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        free = np.zeros(len(points_m), dtype=np.bool_)
+        for x, y, radius in self._discs:
+            free |= np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) < radius
+        return free
+
+    def depth_m(self, points_m: FloatArray) -> FloatArray:
+        """(k,) how far points lie outside of all discs; 0 or less inside."""
+        x, y, radius = self._discs.T[:, :, None]
+        outside = np.hypot(points_m[:, 0] - x, points_m[:, 1] - y) - radius
+        nearest: FloatArray = outside.min(axis=0)
+        return nearest
+
+
+def terrain(points: FloatArray | None = None) -> Terrain:
+    points = np.zeros((0, 2)) if points is None else points
+    return Terrain(points, np.full(len(points), KEEP), WIDE)
+
+
+def bent(pieces: list[tuple[float, float]]) -> Path:
+    rows = []
+    pose: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
+    for curvature, length in pieces:
+        rows.append((*pose, curvature, length))
+        pose = along(rows[-1], length)
+    return Path(np.array(rows))
+
+
+def filled_disc(path: Path, radius: float, spacing: float) -> FloatArray:
+    """A dense sample of the disc about the middle of a path's closing turn."""
+    x, y, tx, ty, curvature, _ = path.segments[-1]
+    middle = (x - ty / curvature, y + tx / curvature)
+    axis = np.arange(-radius, radius + spacing, spacing)
+    dx, dy = (each.ravel() for each in np.meshgrid(axis, axis))
+    inside = dx * dx + dy * dy <= radius * radius
+    places: FloatArray = np.column_stack((dx[inside], dy[inside])) + middle
+    return places
+
+
+def assert_certified(
+    found: Certified, path: Path, seen: FreeDiscs, points: FloatArray, flyable: AssertFlyable
+) -> None:
+    """Free all along and in the whole disc, at its distance from points, and in one piece with the path."""
+    flyable(found.path, RADIUS)
+    assert found.path.loiter
+    closing = found.path.segments[-1]
+    assert closing[5] == pytest.approx(math.tau * RADIUS)
+    assert abs(closing[4]) == pytest.approx(1.0 / RADIUS)
+    # Between the places that were asked it may be hidden by half their distance at most.
+    assert seen.depth_m(sample(found.path, 2.0)).max() <= SPACING
+    assert seen.depth_m(filled_disc(found.path, DISC_M - SPACING, 4.0)).max() <= SPACING
+    line = shapely.LineString(sample(found.path, 5.0, 0.01))
+    assert shapely.distance(line, shapely.points(points)).min(initial=math.inf) >= KEEP - 0.02
+    stations = np.linspace(0.0, found.loiter_entry_m, 50)
+    np.testing.assert_allclose(poses_at(found.path, stations), poses_at(path, stations), atol=1e-6)
+
+
+def disc_is_free(path: Path, station: float, side: float, seen: FreeDiscs) -> bool:
+    x, y, tx, ty = pose_at(path, station)
+    probe = Path(np.array([(x, y, tx, ty, side / RADIUS, 1.0)]))
+    return bool(seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all())
+
+
+@settings(max_examples=80)
+@given(pieces=PIECES, seed=st.integers(0, 2**32 - 1), count=st.integers(1, 8))
+def test_what_is_certified_is_free_everywhere(
+    pieces: list[tuple[float, float]], seed: int, count: int, assert_flyable: AssertFlyable
+) -> None:
+    rng = np.random.default_rng(seed)
+    path = bent(pieces)
+    on_it = poses_at(path, rng.uniform(0.0, path.length_m, count))[:, :2]
+    discs = np.column_stack((on_it + rng.normal(0.0, 80.0, (count, 2)), rng.uniform(150.0, 500.0, count)))
+    seen = FreeDiscs(np.concatenate((discs, [(0.0, 0.0, 60.0)])))
+    points = rng.uniform(-1500.0, 1500.0, (40, 2))
+    line = shapely.LineString(sample(path, 10.0, 0.1))
+    points = points[shapely.distance(line, shapely.points(points)) > KEEP + 1.0]
+    found = CERTIFIER.certify(path, seen, terrain(points))
+    if found is not None:
+        assert_certified(found, path, seen, points, assert_flyable)
+        return
+    # Nothing: then no disc beside the part of the path that is free is free of points and seen through.
+    # Where even the coarse places are free the answer would have been another.
+    free_to = CERTIFIER.seen_free_to_m(path, seen)
+    for station in free_to - 50.0 * np.arange(int(free_to / 50.0) + 1):
+        for side in (1.0, -1.0):
+            if not disc_is_free(path, station, side, seen):
+                continue
+            pose = pose_at(path, station)
+            turn = Path(np.array([(*pose, side / RADIUS, math.tau * RADIUS)]))
+            bends = [row[4] for row in between(path, station, station + 1e-3)]
+            opposite = any(side * bend < 0.0 for bend in bends) or side * path.segments[-1, 4] < 0.0
+            assert opposite or not terrain(points).admits(turn)
+
+
+@settings(max_examples=60)
+@given(free_m=st.floats(300.0, 1800.0))
+def test_it_is_the_last_turn_off_the_path_that_is_free(free_m: float, assert_flyable: AssertFlyable) -> None:
+    # Free space ends in a straight front across the path (a very large disc).
+    far = 1e7
+    seen = FreeDiscs(np.array([(free_m - far, 0.0, far)]))
+    found = CERTIFIER.certify(STRAIGHT, seen, terrain())
+    assert found is not None
+    assert_certified(found, STRAIGHT, seen, np.zeros((0, 2)), assert_flyable)
+    furthest = min(free_m - DISC_M, STRAIGHT.length_m)
+    # The best on a grid of stations half a radius, or a 32nd of the free part, apart.
+    step = max(0.5 * RADIUS, free_m / 32)
+    assert furthest - step - SPACING <= found.loiter_entry_m <= furthest + SPACING
+
+
+def test_it_turns_to_the_side_that_is_free() -> None:
+    for side in (1.0, -1.0):
+        corridor = [(x, side * 90.0, 220.0) for x in np.arange(0.0, 1500.0, 50.0)]
+        found = CERTIFIER.certify(STRAIGHT, FreeDiscs(np.array(corridor)), terrain())
+        assert found is not None
+        assert found.path.segments[-1, 4] * side > 0.0
+
+
+def test_an_edge_point_in_the_turn_forbids_it_though_it_was_seen_free() -> None:
+    seen = FreeDiscs(np.array([(0.0, 0.0, 1e5)]))
+    found = CERTIFIER.certify(STRAIGHT, seen, terrain())
+    assert found is not None
+    assert found.loiter_entry_m == STRAIGHT.length_m
+    # The only turn where the points are not is at the beginning.
+    walls = np.array([(x, y) for x in np.arange(130.0, 1800.0, 20.0) for y in (-60.0, 60.0)])
+    less = CERTIFIER.certify(STRAIGHT, seen, terrain(walls))
+    assert less is None or less.loiter_entry_m < 130.0
+
+
+@given(length=st.floats(50.0, HORIZON))
+def test_a_path_is_not_free_beyond_its_end(length: float) -> None:
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)]))
+    only_the_end_hidden = FreeDiscs(np.array([(-1e6, 0.0, 1e6 + length - 0.1)]))
+    assert length - 1e-9 < CERTIFIER.seen_free_to_m(path, only_the_end_hidden) <= length
+    assert CERTIFIER.seen_free_to_m(path, FreeDiscs(np.array([(0.0, 0.0, 1e6)]))) == length
+
+
+@pytest.mark.parametrize("free", [0.0, 50.0, 0.9 * RADIUS])
+def test_where_nothing_is_free_there_is_none(free: float) -> None:
+    assert CERTIFIER.certify(STRAIGHT, FreeDiscs(np.array([(0.0, 0.0, free)])), terrain()) is None
+
+
+def test_a_tip_inside_the_circle_but_not_on_it_forbids_the_turn() -> None:
+    # Free is a ring along the turning circle; its middle is not seen.
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 10.0)]))
+    angle = np.arange(0.0, math.tau, 0.1)
+    for side in (1.0, -1.0):
+        ring = np.column_stack((RADIUS * np.cos(angle), side * RADIUS + RADIUS * np.sin(angle)))
+        seen = FreeDiscs(np.column_stack((ring, np.full(len(ring), 50.0))))
+        assert CERTIFIER.certify(path, seen, terrain()) is None
+
+
+def test_a_turn_against_the_bend_of_the_path_begins_after_room_to_roll(assert_flyable: AssertFlyable) -> None:
+    path = bent([(1 / 200.0, 300.0), (0.0, 1.0)])
+    seen = FreeDiscs(np.array([(100.0, 0.0, 3000.0)]))
+    x, y, tx, ty = pose_at(path, path.length_m)
+    # Points to the left of the end leave only turns to the right.
+    beside = 130.0 * np.array([-ty, tx]) + (x, y)
+    along_it = np.array([(tx, ty)]) * np.arange(0.0, 170.0, 20.0)[:, None]
+    found = CERTIFIER.certify(path, seen, terrain(beside + along_it))
+    assert found is not None
+    assert_certified(found, path, seen, beside + along_it, assert_flyable)
+    bends = [row[4] for row in found.path.segments.tolist()]
+    assert all(a * b >= 0.0 for a, b in pairwise(bends))
+
+
+def test_a_turn_that_begins_after_room_to_roll_is_free_where_it_is_flown() -> None:
+    fine, roll = 4.0, 60.0
+    certifier = Certifier(Limits(RADIUS, roll), KEEP, HORIZON, fine)
+    path = bent([(1 / 200.0, 300.0)])
+    x, y, tx, ty = pose_at(path, path.length_m)
+    # Free is the path, and the disc of a right turn that begins at its end without rolling.
+    on_it = sample(path, 5.0)
+    disc = (x + RADIUS * ty, y - RADIUS * tx, DISC_M + fine)
+    seen = FreeDiscs(np.array([*((east, north, 15.0) for east, north in on_it), disc]))
+    found = certifier.certify(path, seen, terrain())
+    assert found is None or seen.depth_m(sample(found.path, 2.0)).max() <= fine
+
+
+def test_a_turn_off_a_straight_begins_at_once() -> None:
+    certifier = Certifier(Limits(RADIUS, 60.0), KEEP, HORIZON, 4.0)
+    end_m = STRAIGHT.length_m
+    on_it = np.array([(x, 0.0, 15.0) for x in np.arange(0.0, end_m + 5.0, 5.0)])
+    seen = FreeDiscs(np.concatenate((on_it, [(end_m, -RADIUS, DISC_M + 1.0)])))
+    found = certifier.certify(STRAIGHT, seen, terrain())
+    assert found is not None
+    assert found.loiter_entry_m == end_m
+    assert len(found.path.segments) == 2
+
+
+def test_no_further_than_the_horizon() -> None:
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
+    found = CERTIFIER.certify(path, FreeDiscs(np.array([(0.0, 0.0, 1e5)])), terrain())
+    assert found is not None
+    assert found.loiter_entry_m == pytest.approx(HORIZON)
+    assert math.dist(end_of(found.path)[:2], (HORIZON, 0.0)) < 1e-6
+
+
+@pytest.mark.parametrize(("clearance_m", "radius_m"), [(40.0, 120.0), (6.0, 104.0), (0.0, 104.0)])
+def test_the_disc_is_larger_than_the_turn(clearance_m: float, radius_m: float) -> None:
+    assert disc_radius_m(100.0, clearance_m) == pytest.approx(radius_m)
+
+
+def test_the_least_sensor_range_reaches_over_a_turn_to_the_side() -> None:
+    least = least_sensor_range_m(100.0, 40.0, 25.0, 2.0)
+    assert least == pytest.approx(2.0 * DISC * 100.0 + 40.0 + 50.0)
+
+
+def test_nothing_is_certified_beyond_where_a_path_is_cut() -> None:
+    space = FreeDiscs(np.array([(700.0, 0.0, 3000.0)]))
+    whole = CERTIFIER.certify(STRAIGHT, space, terrain())
+    cut = CERTIFIER.certify(STRAIGHT, space, terrain(), 600.0)
+    assert whole is not None
+    assert cut is not None
+    assert whole.loiter_entry_m > 1400.0
+    assert 500.0 < cut.loiter_entry_m <= 600.0
+    for least_m in (0.0, 0.3 * RADIUS):
+        least = CERTIFIER.certify(STRAIGHT, space, terrain(), least_m)
+        assert least is not None
+        assert least.loiter_entry_m == least_m
+
+
+OVER_M, AREA = 1400.0, (-10.0, -30.0, 1450.0, 500.0)
+
+
+class FreeBox(FreeDiscs):
+    """Free are all places of a rectangle."""
+
+    def __init__(self, low: tuple[float, float], high: tuple[float, float]) -> None:
+        self._low, self._high = low, high
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        free: BoolArray = np.all((points_m >= self._low) & (points_m <= self._high), axis=1)
+        return free
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "free"),
+    [
+        ((0.0, -30.0), (OVER_M, 20.0), True),
+        ((0.0, -30.0), (OVER_M - 1.0, 20.0), False),
+        ((0.0, -30.0), (OVER_M, 19.0), False),
+        ((0.0, -19.0), (OVER_M, 20.0), False),
+    ],
+)
+def test_a_path_is_certified_until_the_flight_is_over_where_it_and_its_sides_are_free(
+    low: tuple[float, float], high: tuple[float, float], free: bool
+) -> None:
+    found = CERTIFIER.certify_up_to(OVER_M, STRAIGHT, FreeBox(low, high), AREA)
+    assert (found is not None) is free
+    if found is not None:
+        assert found.path is STRAIGHT
+        assert found.loiter_entry_m == OVER_M
+
+
+@pytest.mark.parametrize(("reach_m", "free"), [(750.0, True), (650.0, False)])
+def test_no_path_is_certified_to_its_end_over_what_is_hidden_in_between(reach_m: float, free: bool) -> None:
+    seen = FreeDiscs(np.array([(0.0, 0.0, reach_m), (OVER_M, 0.0, reach_m)]))
+    assert (CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, WIDE) is not None) is free
+
+
+def test_outside_of_the_area_nothing_has_to_be_free() -> None:
+    seen = FreeBox((0.0, -5.0), (OVER_M, 20.0))
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, -5.0, 1450.0, 500.0)) is not None
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, 1.0, 1450.0, 500.0)) is None
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, (-10.0, -5.0, OVER_M - 1.0, 500.0)) is None
+
+
+def test_no_path_is_certified_to_its_end_beyond_the_horizon() -> None:
+    near = Certifier(LIMITS, KEEP, OVER_M - 1.0, SPACING)
+    seen = FreeBox((-1e4, -1e4), (1e4, 1e4))
+    assert near.certify_up_to(OVER_M, STRAIGHT, seen, WIDE) is None
+    assert CERTIFIER.certify_up_to(OVER_M, STRAIGHT, seen, WIDE) is not None

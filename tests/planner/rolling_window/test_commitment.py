@@ -1,0 +1,111 @@
+"""What of a course is flown: to a turn that keeps its distance, or to the goal where the whole of it may be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.geometry.course import Course
+from planner.geometry.curves import Pose
+from planner.interface import FloatArray, MapView, Mission, Path, PlanRequest
+from planner.memory import ObstacleMemory
+from planner.rolling_window.commitment import Commitment
+from planner.rolling_window.committed_plan import CommittedPlan
+from planner.rolling_window.local_planning import LocalPlanning, Start
+
+Known = Callable[[FloatArray], MapView]
+MakePoints = Callable[..., FloatArray]
+
+MISSION = Mission(
+    goal_m=(1000.0, 0.0),
+    goal_radius_m=50.0,
+    clearance_m=40.0,
+    sensor_range_m=3000.0,
+    speed_mps=25.0,
+    turn_radius_m=100.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    bounds_m=(-500.0, -500.0, 1500.0, 500.0),
+)
+LEAST_M = 400.0
+OVER_M = 1000.0 - (50.0 - 3.0)
+"""Station of the course at which an aircraft that is off it by the tracking error is at the goal all the same."""
+NARROW = replace(MISSION, bounds_m=(-500.0, -150.0, 1500.0, 150.0))
+"""No room to turn in it."""
+
+
+def to_goal(length_m: float = 1000.0) -> Course:
+    """Straight east to the goal."""
+    east, north = MISSION.goal_m
+    return Course(
+        Path(np.array([(east - length_m, north, 1.0, 0.0, 0.0, length_m)])), (MISSION.goal_m,), 0, True
+    )
+
+
+def committed(
+    seen: MapView, mission: Mission, course: Course, cut_m: float = math.inf
+) -> tuple[Commitment, CommittedPlan | None]:
+    memory = ObstacleMemory(mission.clearance_m)
+    memory.take_in(seen)
+    local = LocalPlanning(mission, memory, window_m=1000.0, margin_m=10.0, steps=3, candidates=3)
+    commitment = Commitment(mission, memory, local, LEAST_M)
+    east, north = course.path.segments[0, :2].tolist()
+    start = Start((east, north), Pose(east, north, 1.0, 0.0))
+    request = PlanRequest(0.0, (east, north), (1.0, 0.0), seen)
+    return commitment, commitment.effect(request, start, course, [], cut_m)
+
+
+@pytest.mark.parametrize(("room_m", "fits"), [(41.0, False), (42.5, False), (43.5, True)])
+def test_a_turn_keeps_the_clearance_and_the_tracking_error(
+    room_m: float, fits: bool, known: Known, wall: MakePoints
+) -> None:
+    beside = 2.0 * MISSION.turn_radius_m + room_m
+    walls = [wall((-300.0, side * beside), (1300.0, side * beside), 5.0) for side in (1.0, -1.0)]
+    course = replace(to_goal(), to_goal=False)
+    _, found = committed(known(np.concatenate(walls)), MISSION, course)
+    assert (found is not None) is fits
+    if found is not None:
+        assert found.path.loiter
+
+
+def test_where_no_turn_leads_on_the_goal_is_flown_to(known: Known) -> None:
+    commitment, found = committed(known(np.zeros((0, 2))), NARROW, to_goal())
+    assert found is not None
+    assert commitment.leads_on(found)
+    assert not found.path.loiter
+    assert found.loiter_entry_m == pytest.approx(OVER_M)
+    assert found.plan.wants_more_time is False
+
+
+def test_near_the_goal_a_turn_is_kept_in_reserve_where_there_is_room(known: Known) -> None:
+    commitment, found = committed(known(np.zeros((0, 2))), MISSION, to_goal(0.5 * LEAST_M))
+    assert found is not None
+    assert commitment.leads_on(found)
+    assert found.path.loiter
+
+
+@pytest.mark.parametrize(("cut_m", "flown"), [(OVER_M - 0.1, False), (OVER_M + 0.1, True)])
+def test_no_further_than_something_is_in_the_way(cut_m: float, flown: bool, known: Known) -> None:
+    _, found = committed(known(np.zeros((0, 2))), NARROW, to_goal(), cut_m)
+    assert (found is not None) is flown
+
+
+def test_a_course_that_ends_elsewhere_is_not_flown_to_its_end(known: Known) -> None:
+    open_space = known(np.zeros((0, 2)))
+    assert committed(open_space, NARROW, replace(to_goal(), nodes=((900.0, 0.0),)))[1] is None
+    assert committed(open_space, NARROW, replace(to_goal(), to_goal=False))[1] is None
+
+
+@pytest.mark.parametrize("side", range(4))
+def test_nor_nearer_to_the_border_than_an_aircraft_may_be_off_it(side: int, known: Known) -> None:
+    reaches = (0.0, 0.0, OVER_M, 0.0)
+    for off_m, flown in ((2.9, False), (3.1, True)):
+        bounds = list(NARROW.bounds_m)
+        bounds[side] = reaches[side] + (off_m if side >= 2 else -off_m)
+        mission = replace(NARROW, bounds_m=(bounds[0], bounds[1], bounds[2], bounds[3]))
+        _, found = committed(known(np.zeros((0, 2))), mission, to_goal())
+        assert (found is not None) is flown

@@ -1,0 +1,137 @@
+"""The watch over a plan in effect."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from planner.geometry.course import Course
+from planner.geometry.curves import Pose, pose_at
+from planner.interface import Mission, Path, Plan, PlanStatus
+from planner.rolling_window.committed_plan import CUT, UNHURRIED, CommittedPlan, PlanMonitor
+
+STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
+TURN = (2000.0, 0.0, 1.0, 0.0, 0.01, 2.0 * math.pi * 100.0)
+COMMITTED = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 2000.0), TURN]), loiter=True)
+EDGES = np.array([(1000.0, 900.0), (5000.0, 100.0), (1500.0, -50.0)])
+
+
+MISSION = Mission(
+    goal_m=(9000.0, 0.0),
+    goal_radius_m=50.0,
+    clearance_m=200.0,
+    sensor_range_m=3000.0,
+    speed_mps=25.0,
+    turn_radius_m=100.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    bounds_m=(-1e5, -1e5, 1e5, 1e5),
+)
+
+
+def watching() -> PlanMonitor:
+    return PlanMonitor(MISSION, keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0, lead_m=50.0, step_m=500.0)
+
+
+def effect(known: int) -> CommittedPlan:
+    course = Course(STRAIGHT, ((9000.0, 0.0),), known, shortest=True)
+    return CommittedPlan(Plan(PlanStatus.FOUND, "", path=COMMITTED), COMMITTED, course, 2000.0)
+
+
+@pytest.mark.parametrize(("known", "cut", "broken"), [(3, False, False), (2, True, True), (1, True, True)])
+def test_a_plan_is_cut_by_what_came_in_while_it_was_looked_for(known: int, cut: bool, broken: bool) -> None:
+    watch = watching()
+    watch.begin(effect(known), EDGES)
+    assert math.isfinite(watch.cut_m) is cut
+    assert watch.broken is broken
+    if cut:
+        assert 1200.0 <= watch.cut_m <= 1500.0
+
+
+def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
+    way, roll = (0.0, 0.0, 1.0, 0.0, 0.001, 400.0), 40.0
+    x, y, ux, uy = pose_at(Path(np.array([way])), 400.0)
+    turn = (x + roll * ux, y + roll * uy, ux, uy, -0.01, 2.0 * math.pi * 100.0)
+    path = Path(np.array([way, (x, y, ux, uy, 0.0, roll), turn]), loiter=True)
+    flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=path), path, effect(3).course, 400.0)
+    for station, lengths in ((100.0, [300.0, roll, turn[5]]), (410.0, [30.0, turn[5]]), (450.0, [turn[5]])):
+        left = flown.left(station)
+        assert left.segments[:, 5].tolist() == pytest.approx(lengths)
+        for before, after in itertools.pairwise(left.segments):
+            assert pose_at(Path(before[None]), before[5])[:2] == pytest.approx(after[:2])
+
+
+def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_near_it() -> None:
+    flown, aircraft = effect(3), Pose(400.0, 4.0, 1.0, 0.0)
+    for near_m, north in ((4.5, 0.0), (3.5, 4.0)):
+        onward = flown.onward_from(aircraft, 400.0, 300.0, near_m)
+        assert onward == [pytest.approx((400.0, north, 1.0, 0.0, 0.0, 300.0))]
+
+
+def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:
+    flown, watch = effect(3), watching()
+    watch.begin(flown, EDGES[:0])
+    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(5000.0, 100.0)]))
+    assert watch.cut_m == math.inf
+    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 401.0)]))
+    assert not watch.broken
+    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 399.0)]))
+    assert watch.broken
+
+
+def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
+    course = effect(3).course
+    flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=STRAIGHT), STRAIGHT, course, 8953.0)
+    assert flown.left(400.0).length_m == pytest.approx(8600.0)
+    assert flown.turn.length_m == 0.0
+    assert [flown.over(station) for station in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
+    assert not effect(3).over(1e6)
+    watch = watching()
+    watch.begin(flown, EDGES[:0])
+    assert not watch.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 301.0)]))
+    assert not watch.broken
+    watch.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 299.0)]))
+    assert watch.broken
+
+
+def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
+    watch = watching()
+    course = effect(4).course  # one of the four is gone; the last of the edges is new
+    assert watch.cut_at(course, EDGES) == math.inf
+    assert 1200.0 <= watch.cut_at(course, EDGES, gone=2) <= 1500.0
+    watch.begin(effect(4), EDGES, gone=9)
+    assert watch.broken
+
+
+def test_a_cut_beyond_the_turn_does_not_break_the_plan() -> None:
+    watch = watching()
+    watch.begin(effect(1), EDGES[:2])
+    assert 4700.0 <= watch.cut_m <= 5000.0
+    assert not watch.broken
+
+
+def test_the_window_rolls_on_the_sooner_the_nearer_something_is_wrong() -> None:
+    flown, watch = effect(3), watching()
+    assert not watch.due(flown, 0.0, 1e4, newly_cut=False)  # all is well, and the turn far ahead
+    assert watch.due(flown, 300.0, 500.0, newly_cut=False)  # the turn comes nearer: a rolling step
+    assert not watch.due(flown, 300.0, 499.0, newly_cut=False)
+    assert watch.due(flown, 1100.0, 60.0, newly_cut=False)  # it is near
+    assert not watch.due(flown, 1100.0, 40.0, newly_cut=False)
+    watch.begin(effect(1), EDGES[:2])
+    least_m = CUT * watch.cut_m
+    assert not watch.due(effect(1), 0.0, 0.9 * 50.0, newly_cut=False)
+    assert watch.due(effect(1), 0.0, max(least_m, 50.0), newly_cut=False)
+    assert watch.due(effect(1), 1100.0, 0.0, newly_cut=True)
+
+
+def test_a_way_that_grazes_what_cuts_it_is_looked_at_again_later() -> None:
+    flown, watch = effect(1), watching()
+    watch.begin(flown, EDGES[:2])
+    since_m = 0.5 * (CUT + UNHURRIED) * flown.loiter_entry_m
+    assert watch.due(flown, 0.0, since_m, newly_cut=False)
+    watch.lengthened_m = 0.0
+    assert not watch.due(flown, 0.0, since_m, newly_cut=False)
+    assert watch.due(flown, 0.0, UNHURRIED * watch.cut_m, newly_cut=False)

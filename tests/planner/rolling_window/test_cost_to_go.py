@@ -1,0 +1,97 @@
+"""Distances to the goal on a grid against plane geometry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from planner.geometry.curves import Point
+from planner.interface import FloatArray
+from planner.rolling_window import cost_to_go
+from planner.rolling_window.cost_to_go import CostToGo
+from planner.rolling_window.window import Tally
+
+MakePoints = Callable[..., FloatArray]
+START, GOAL = (1000.0, 2500.0), (9000.0, 2500.0)
+BOUNDS = (0.0, 0.0, 10_000.0, 5000.0)
+KEEP = 200.0
+
+
+def spread(points: FloatArray, tally: Tally | None = None, keep: float = KEEP) -> CostToGo:
+    to_go = CostToGo(START, GOAL, BOUNDS, points, np.full(len(points), keep), tally or Tally())
+    assert all(step is None for step in to_go.spread())
+    return to_go
+
+
+@given(st.tuples(st.floats(100.0, 9900.0), st.floats(100.0, 4900.0)))
+def test_in_the_open_it_is_the_distance(place: Point) -> None:
+    far = np.array([(0.0, 0.0), (10_000.0, 0.0), (0.0, 5000.0), (10_000.0, 5000.0)])
+    assume(np.hypot(*(far - place).T).min() > KEEP)
+    straight = math.dist(place, GOAL)
+    # Both ends lie somewhere in their cells, and what a level is short of is made up for after five.
+    assert straight <= spread(far)(place) <= straight + 3.0 * KEEP / cost_to_go.CELLS
+
+
+def test_round_a_wall(wall: MakePoints) -> None:
+    to_go = spread(wall((5000.0, 0.0), (5000.0, 4000.0), 50.0))
+    way = math.dist(START, (4800.0, 4200.0)) + 400.0 + math.dist((5200.0, 4200.0), GOAL)
+    assert 0.92 * way < to_go(START) < 1.01 * way
+
+
+@settings(max_examples=60)
+@given(seed=st.integers(0, 10_000), count=st.integers(5, 120))
+def test_no_way_is_told_only_where_there_is_none(seed: int, count: int) -> None:
+    points = np.random.default_rng(seed).uniform((0.0, 0.0), (10_000.0, 5000.0), (count, 2))
+    ends = shapely.points([START, GOAL])
+    solid = shapely.union_all(shapely.buffer(shapely.points(points), KEEP, quad_segs=64))
+    assume(not shapely.intersects(ends, solid).any())
+    parts = shapely.get_parts(shapely.box(*BOUNDS).difference(solid))
+    joined = any(shapely.contains(part, ends).all() for part in parts)
+    told = spread(points)(START) < math.inf
+    assert told or not joined
+    narrower = shapely.union_all(shapely.buffer(shapely.points(points), 0.6 * KEEP, quad_segs=64))
+    parts = shapely.get_parts(shapely.box(*BOUNDS).buffer(KEEP).difference(narrower))
+    assert not told or any(shapely.contains(part, ends).all() for part in parts)
+
+
+@pytest.mark.parametrize(("gap_m", "way"), [(0.0, False), (200.0, False), (410.0, True)])
+def test_a_gap_is_open_from_twice_the_distance_on(gap_m: float, way: bool, wall: MakePoints) -> None:
+    low, high = 2200.0 - 0.5 * gap_m, 2200.0 + 0.5 * gap_m
+    below, above = wall((5000.0, 0.0), (5000.0, low), 50.0), wall((5000.0, high), (5000.0, 5000.0), 50.0)
+    points = np.concatenate((below, above))
+    assert (spread(points)(START) < math.inf) is way
+
+
+def test_a_coarse_grid_closes_nothing_that_is_open(wall: MakePoints, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cost_to_go, "MOST_CELLS", 200)
+    below, above = wall((5000.0, 0.0), (5000.0, 2000.0), 50.0), wall((5000.0, 2410.0), (5000.0, 5000.0), 50.0)
+    points = np.concatenate((below, above))
+    assert math.dist(START, GOAL) <= spread(points)(START) < math.inf
+
+
+def test_ends_nearer_to_something_than_is_kept_are_open(ring: MakePoints) -> None:
+    """As the search has it, from such points no more is kept than the distance of the ends."""
+    points = np.concatenate((ring(1000.0, 2700.0, 100.0, 30.0), ring(9000.0, 2300.0, 90.0, 30.0)))
+    room = np.min([np.hypot(*(points - end).T) for end in (START, GOAL)], axis=0) - 1e-3
+    to_go = CostToGo(START, GOAL, BOUNDS, points, np.minimum(KEEP, room), Tally())
+    for _ in to_go.spread():
+        pass
+    assert to_go(START) < 1.1 * math.dist(START, GOAL)
+
+
+def test_no_step_of_work_is_large(ring: MakePoints) -> None:
+    points = np.concatenate(
+        [ring(x, y, 150.0, 10.0) for x in range(2000, 8000, 900) for y in range(400, 5000, 900)]
+    )
+    tally = Tally()
+    to_go = CostToGo(START, GOAL, BOUNDS, points, np.full(len(points), KEEP), tally)
+    before, largest = 0.0, 0.0
+    for _ in to_go.spread():
+        before, largest = tally.done, max(largest, tally.done - before)
+    assert 0.0 < largest < 1000.0

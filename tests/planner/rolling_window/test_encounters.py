@@ -1,0 +1,150 @@
+"""Where obstacles that move are met, against brute-force simulation in time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from planner.interface import FloatArray, Mission, MovingEdges, PlanRequest
+from planner.rolling_window.encounters import (
+    EARLIEST,
+    FASTEST,
+    LATER_S,
+    LATEST,
+    encounters,
+    meeting_s,
+    met_at,
+)
+
+SPEED, SPACING = 25.0, 20.0
+SEEDS = st.integers(0, 2**32 - 1)
+PACES = st.floats(0.0, FASTEST * SPEED)
+COURSES = st.floats(0.0, math.tau)
+
+
+def obstacle(seed: int, pace: float, course: float, time_s: float = 0.0) -> MovingEdges:
+    """A round outline some way off (0, 0)."""
+    rng = np.random.default_rng(seed)
+    angle, away, radius = rng.uniform(0.0, math.tau), rng.uniform(300.0, 2000.0), rng.uniform(20.0, 250.0)
+    angles = np.linspace(0.0, math.pi, 24) + rng.uniform(0.0, math.tau)
+    centre = away * np.array((math.cos(angle), math.sin(angle)))
+    points = centre + radius * np.column_stack((np.cos(angles), np.sin(angles)))
+    return MovingEdges(time_s, points, (pace * math.cos(course), pace * math.sin(course)))
+
+
+def simulated_s(offset: FloatArray, velocity: FloatArray, speed: float) -> float:
+    """When an aircraft that heads straight for where it will be is as far off as a point that moves."""
+    times = np.linspace(0.0, 2000.0, 400_001)
+    away = np.hypot(offset[0] + velocity[0] * times, offset[1] + velocity[1] * times)
+    return float(times[np.argmax(speed * times >= away)])
+
+
+@settings(max_examples=20)
+@given(seed=SEEDS, pace=PACES, course=COURSES)
+def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float) -> None:
+    each = obstacle(seed, pace, course)
+    velocity = np.array(each.velocity_mps)
+    told = meeting_s(each.points_m, velocity, SPEED)
+    for i in (0, 11, 23):
+        assert told[i] == pytest.approx(simulated_s(each.points_m[i], velocity, SPEED), abs=0.006)
+
+
+@example(seed=1, pace=15.0, course=0.3, share=EARLIEST, later=0.0)
+@example(seed=1, pace=15.0, course=0.3, share=LATEST, later=LATER_S)
+@settings(max_examples=30)
+@given(
+    seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, LATER_S)
+)
+def test_whoever_flies_to_any_point_of_the_outline_meets_it_where_it_is_drawn(
+    seed: int, pace: float, course: float, share: float, later: float
+) -> None:
+    """Straight, a little slower for the way round or the wind, or a little faster."""
+    each = obstacle(seed, pace, course)
+    drawn = met_at(each, (0.0, 0.0), 0.0, SPEED, SPACING)
+    velocity = np.array(each.velocity_mps)
+    for point in each.points_m[::5]:
+        straight_s = simulated_s(point, velocity, SPEED)
+        met = point + velocity * (share * straight_s + (later if share > 1.0 else 0.0))
+        # Steps in time, and one point a cell.
+        assert np.hypot(*(drawn - met).T).min() <= 0.5 * SPACING + 0.5 * SPACING * math.sqrt(2.0) + 1.0
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, pace=PACES, course=COURSES)
+def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
+    seed: int, pace: float, course: float
+) -> None:
+    each = obstacle(seed, pace, course)
+    velocity = np.array(each.velocity_mps)
+    straight_s = meeting_s(each.points_m, velocity, SPEED)
+    for place in met_at(each, (0.0, 0.0), 0.0, SPEED, SPACING):
+        # The point that it comes from, and when that is there.
+        along = (place - each.points_m) @ velocity / max(pace * pace, 1e-12)
+        after_s = np.clip(along, EARLIEST * straight_s, LATEST * straight_s + LATER_S)
+        off = np.hypot(*(each.points_m + after_s[:, None] * velocity - place).T)
+        assert off.min() < 1e-6
+
+
+@given(seed=SEEDS)
+def test_obstacles_at_rest_stay_where_they_are(seed: int) -> None:
+    each = obstacle(seed, 0.0, 0.0)
+    drawn = met_at(each, (0.0, 0.0), 1000.0, SPEED, SPACING)
+    assert {tuple(place) for place in drawn.tolist()} <= {tuple(place) for place in each.points_m.tolist()}
+    away = np.hypot(*(each.points_m[:, None] - drawn).transpose(2, 0, 1)).min(axis=1)
+    assert away.max() <= 0.5 * SPACING * math.sqrt(2.0)
+
+
+@given(seed=SEEDS, pace=st.floats(FASTEST * SPEED, 1e4), course=COURSES)
+def test_faster_ones_are_met_after_a_bounded_time(seed: int, pace: float, course: float) -> None:
+    each = obstacle(seed, pace, course)
+    away = np.hypot(*each.points_m.T)
+    told = meeting_s(each.points_m, np.array(each.velocity_mps), SPEED)
+    assert np.isfinite(told).all()
+    assert (told <= away / (SPEED * (1.0 - FASTEST)) + 1e-9).all()
+    assert (told >= away / (SPEED * (1.0 + FASTEST)) - 1e-9).all()
+
+
+@given(seed=SEEDS, pace=PACES, course=COURSES, age_s=st.floats(0.0, 30.0))
+def test_what_was_seen_a_while_ago_has_moved_on_since(
+    seed: int, pace: float, course: float, age_s: float
+) -> None:
+    old = obstacle(seed, pace, course, time_s=100.0 - age_s)
+    moved = old.points_m + age_s * np.array(old.velocity_mps)
+    new = MovingEdges(100.0, moved, old.velocity_mps)
+    here = (500.0, -300.0)
+    one, other = (met_at(each, here, 100.0, SPEED, SPACING) for each in (old, new))
+    apart = np.hypot(*(one[:, None] - other).transpose(2, 0, 1))
+    assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < SPACING
+    assert len(other) < 24 * 200
+
+
+def test_as_the_aircraft_comes_nearer_the_places_draw_together() -> None:
+    angles = np.linspace(0.0, math.pi, 24)
+    points = np.column_stack((50.0 * np.cos(angles), 1000.0 + 50.0 * np.sin(angles)))
+    each = MovingEdges(0.0, points, (6.0, 0.0))
+    widths = [
+        float(np.ptp(met_at(each, (0.0, 900.0 - away), 0.0, SPEED, SPACING)[:, 0]))
+        for away in (50.0, 300.0, 800.0)
+    ]
+    assert 100.0 <= widths[0] < widths[1] < widths[2]
+    assert widths[0] < 100.0 + 6.0 * (LATER_S + 5.0)
+
+
+def test_each_obstacle_has_its_outline() -> None:
+    class Seen:
+        moving = (obstacle(1, 5.0, 0.3), obstacle(2, 3.0, 2.0))
+
+    mission = Mission(
+        (0.0, 9000.0), 50.0, (-9e3, -9e3, 9e3, 9e3), 2.0 * SPACING, 100.0, SPEED, 0.5, 1.0, 1500.0
+    )
+    request = PlanRequest(7.0, (10.0, 20.0), (0.0, 1.0), Seen())  # type: ignore[arg-type]
+    outlines = encounters(request, mission)
+    assert len(outlines) == 2
+    for outline, each in zip(outlines, Seen.moving, strict=True):
+        np.testing.assert_array_equal(outline, met_at(each, (10.0, 20.0), 7.0, SPEED, SPACING))
+    assert len(encounters(request, replace(mission, clearance_m=8.0 * SPACING))[0]) < len(outlines[0])

@@ -1,0 +1,358 @@
+"""Evading: the room that ways keep from what stands and what moves, and which way is flown for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from planner.geometry.curves import Limits, onward, pose_at, sample
+from planner.geometry.stations import poses_at
+from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
+from planner.rolling_window.encounters import EARLIEST, LATEST
+from planner.rolling_window.escape import CLEARER, EVADING_S, HOLD_SHARES
+from planner.rolling_window.evasion import (
+    AHEAD_S,
+    LATER,
+    UNKNOWN_MPS,
+    UNKNOWN_S,
+    Threats,
+    clearest,
+    far_side,
+    rolled_out,
+)
+from planner.rolling_window.planner import RollingWindow
+from tests.planner.rolling_window.test_rolling_window import (
+    MISSION,
+    Seen,
+    first_request,
+    nothing,
+    planner,
+    request_on,
+)
+
+MakePoints = Callable[..., FloatArray]
+AssertFlyable = Callable[[Path, float], None]
+
+LIMITS = Limits(230.0, 30.0)
+SPEED, STEP = 25.0, 15.0
+PREFIX = [(0.0, 0.0, 1.0, 0.0, 0.0, 50.0)]
+WIDE = (-1e5, -1e5, 1e5, 1e5)
+NONE, NOTHING = np.zeros((0, 5)), np.zeros((0, 2))
+
+
+def threats(still: FloatArray | None = None, moving: FloatArray = NONE) -> Threats:
+    return Threats(NOTHING if still is None else still, moving, SPEED, STEP)
+
+
+def moving(points: FloatArray, velocity: tuple[float, float]) -> FloatArray:
+    return np.column_stack((points, np.broadcast_to((*velocity, 0.0), (len(points), 3))))
+
+
+def room_by_hand(path: Path, of: Threats) -> float:
+    """At every place, and for what moves at every moment of a fine grid of those at which it may be met."""
+    stations = np.arange(0.0, AHEAD_S * SPEED, STEP)
+    room = math.inf
+    for station, place in zip(stations, poses_at(path, stations)[:, :2], strict=True):
+        away = [np.hypot(*(of.still_m - place).T)]
+        for share in np.linspace(EARLIEST, LATEST, 40):
+            now = of.moving[:, :2] + of.moving[:, 2:4] * share * station / SPEED
+            away.append(np.hypot(*(now - place).T))
+        room = min(room, np.concatenate(away).min(initial=math.inf) + LATER * station)
+    return room
+
+
+PLACE = st.tuples(st.floats(-800, 1200), st.floats(-900, 900))
+VELOCITY = st.tuples(st.floats(-12, 12), st.floats(-12, 12))
+
+
+@given(
+    st.lists(PLACE, max_size=8),
+    st.lists(st.tuples(PLACE, VELOCITY), max_size=5),
+    st.sampled_from([-1 / 230.0, -1 / 1000.0, 0.0, 1 / 400.0]),
+)
+# Far from one thing, what is nearer to the way must not be stepped over: not even where it comes to meet one.
+@example([(0.0, 60.0), (600.0, 5.0)], [], 0.0)
+@example([(0.0, 60.0)], [((1150.0, 5.0), (-12.0, 0.0))], 0.0)
+@settings(max_examples=60)
+def test_room_is_the_least_distance_from_what_stands_and_from_what_is_met(
+    still: list[tuple[float, float]],
+    met: list[tuple[tuple[float, float], tuple[float, float]]],
+    curvature: float,
+) -> None:
+    of = threats(
+        np.array(still, dtype=float).reshape(-1, 2),
+        np.array([(*place, *velocity, 0.0) for place, velocity in met], dtype=float).reshape(-1, 5),
+    )
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 800.0)]))
+    room, by_hand = of.room_m(path), room_by_hand(path, of)
+    # Between two moments of the grid what moves comes nearer by less than this.
+    assert room <= by_hand + 1e-9
+    assert room == pytest.approx(by_hand, abs=4.0) or room == by_hand == math.inf
+    if room < math.inf:
+        assert of.room_m(path, least_m=room + 1.0) < room + 1.0
+
+
+@given(PLACE, st.sampled_from([-1 / 230.0, 0.0]))
+@settings(max_examples=40)
+def test_from_what_has_just_appeared_it_keeps_further(place: tuple[float, float], curvature: float) -> None:
+    """It is met wherever it can get to."""
+    path = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 800.0)]))
+    unknown = threats(moving=np.array([(*place, 0.0, 0.0, UNKNOWN_MPS)]))
+    stations = np.arange(0.0, AHEAD_S * SPEED, STEP)
+    away = np.hypot(*(poses_at(path, stations)[:, :2] - place).T)
+    reach = UNKNOWN_MPS * np.minimum(LATEST * stations / SPEED, UNKNOWN_S)
+    assert unknown.room_m(path) == pytest.approx((away - reach + LATER * stations).min())
+
+
+@pytest.mark.parametrize("bearing", [0.3, 2.0, 4.0])
+@pytest.mark.parametrize("clockwise", [1.0, -1.0])
+def test_the_far_side_of_a_circle_is_where_it_is(bearing: float, clockwise: float) -> None:
+    """Half of it is seen from far away."""
+    middle, position = (
+        np.array((100.0, -50.0)),
+        (100.0 + 1e5 * math.cos(bearing), -50.0 + 1e5 * math.sin(bearing)),
+    )
+    angle = bearing + clockwise * np.linspace(-0.5, 0.5, 19) * math.pi
+    face = middle + 80.0 * np.column_stack((np.cos(angle), np.sin(angle)))
+    behind = far_side(face, position)
+    np.testing.assert_allclose(np.hypot(*(behind - middle).T), 80.0)
+    assert np.hypot(*(behind - face[9]).T).max() == pytest.approx(160.0)
+
+
+def test_round_a_loiter_circle_room_is_that_of_the_place_it_will_be_at() -> None:
+    """What comes to a circle is met only where it comes while the aircraft is there."""
+    circle = Path(np.array([(0.0, 0.0, 1.0, 0.0, 1 / 100.0, math.tau * 100.0)]), loiter=True)
+    assert threats(np.array([(0.0, 200.0)])).room_m(circle) == pytest.approx(LATER * 100.0 * math.pi, abs=2.0)
+    # 200 m to the north after half a turn, 12.6 s: what is there by then, and what has gone by then.
+    comes = moving(np.array([(400.0, 200.0)]), (-400.0 / 12.6, 0.0))
+    goes = moving(np.array([(0.0, 200.0)]), (0.0, 20.0))
+    assert threats(moving=comes).room_m(circle) < 30.0
+    assert threats(moving=goes).room_m(circle) > 100.0
+
+
+@pytest.mark.parametrize("curvature", [0.0, 1 / 230.0, -1 / 300.0])
+def test_ways_can_be_flown_and_end_in_a_turn(curvature: float, assert_flyable: AssertFlyable) -> None:
+    prefix = [(*PREFIX[0][:4], curvature, 50.0)]
+    ways = list(rolled_out(prefix, LIMITS))
+    for path in ways:
+        assert path.loiter
+        assert_flyable(path, 230.0)
+        np.testing.assert_array_equal(path.segments[0], prefix[0])
+    ends = np.array([pose_at(path, 700.0)[:2] for path in ways])
+    assert len(np.unique(ends.round(1), axis=0)) > 0.5 * len(ways)
+    assert np.ptp(ends[:, 1]) > 900.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("curvature", [0.0, 1 / 230.0, -1 / 300.0])
+def test_it_passes_aside_where_a_turn_has_no_room(
+    side: float, curvature: float, wall: MakePoints, ring: MakePoints, assert_flyable: AssertFlyable
+) -> None:
+    """In a corridor as wide as a turn radius something stands ahead, nearer to one wall."""
+    walls = [wall((-300.0, y), (3000.0, y), 12.0) for y in (-150.0, 150.0)]
+    still = np.concatenate((*walls, ring(420.0, 60.0 * side, 30.0, 12.0)))
+    prefix = [(*PREFIX[0][:4], curvature, 50.0)]
+    straight = Path(np.array([*prefix, (*pose_at(Path(np.array(prefix)), 50.0), 0.0, 900.0)]))
+    path = clearest(rolled_out(prefix, LIMITS), WIDE, threats(still), threats(still).room_m(straight))
+    assert path is not None
+    assert_flyable(path, 230.0)
+    rooms = [threats(still).room_m(way) for way in rolled_out(prefix, LIMITS)]
+    assert threats(still).room_m(path) == max(rooms) > 30.0
+    # Of a straight line it would pass by the middle of the corridor; it passes on the side that is free.
+    assert (pose_at(path, 420.0).north_m * side) < 0.0
+
+
+def test_it_stays_in_the_area() -> None:
+    ways = list(rolled_out(PREFIX, LIMITS))
+    path = clearest(ways, (-1000.0, -100.0, 1000.0, 600.0), threats(), 1.0)
+    assert path is not None
+    assert path.segments[-1, 4] > 0.0  # to the left, for to the right there is no room
+    assert clearest(ways, (0.0, 0.0, 1.0, 1.0), threats(), 1.0) is None
+
+
+MISSION_HERE = replace(MISSION, turn_radius_m=230.0, clearance_m=60.0, sensor_range_m=2000.0)
+
+
+class Partly(Seen):
+    """What lies to one side has not been seen."""
+
+    hidden: Callable[[FloatArray], BoolArray] = staticmethod(lambda north: north > math.inf)
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return ~self.hidden(points_m[:, 1])
+
+
+def flown_straight(seen: Seen) -> tuple[RollingWindow, Plan]:
+    pilot = planner(MISSION_HERE)
+    plan = pilot.plan(first_request(seen))
+    assert plan.status is PlanStatus.FOUND
+    pilot.plan(request_on(plan, 12.5, seen))
+    return pilot, plan
+
+
+def test_it_gives_way_to_what_will_be_in_the_way(ring: MakePoints) -> None:
+    """Something crosses from the left; where it is now nothing will be by then."""
+    seen = Seen(nothing())
+    pilot, plan = flown_straight(seen)
+    outline, velocity, time_s = ring(475.0, 220.0, 60.0, 12.0), (0.0, -11.0), 1.0
+    seen.moving = (MovingEdges(time_s, outline, velocity),)
+    assert plan.path is not None
+    here = 25.0 * time_s
+
+    def nearest_m(path: Path, from_m: float) -> float:
+        return min(
+            float(
+                np.hypot(*(outline + np.array(velocity) * s - pose_at(path, from_m + SPEED * s)[:2]).T).min()
+            )
+            for s in np.arange(0.0, 25.0, 0.25)
+        )
+
+    assert nearest_m(plan.path, here) < 60.0
+    answer = pilot.plan(request_on(plan, here, seen))
+    assert answer.path is not None
+    assert nearest_m(answer.path, 0.0) > 60.0
+
+
+@settings(max_examples=25)
+@given(st.lists(st.tuples(st.floats(150, 900), st.floats(-400, 400)), min_size=1, max_size=12))
+def test_where_something_has_appeared_what_is_flown_keeps_away_to_the_end_of_its_turn(
+    places: list[tuple[float, float]],
+) -> None:
+    seen = Seen(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.show(np.array(places))
+    seen.last_contradiction_s = 1.0
+    answer = pilot.plan(request_on(plan, 25.0, seen))
+    assert plan.path is not None
+
+    def room_m(path: Path) -> float:
+        line = shapely.LineString(sample(path, 20.0, 0.01))
+        return float(shapely.distance(line, shapely.points(places)).min())
+
+    flown = Path(np.array(onward(plan.path, 25.0, plan.path.length_m - 25.0)))
+    least_m = HOLD_SHARES[-1] * pilot._local.path_keeps_m
+    ways = rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits)
+    if max(room_m(flown), *(room_m(way) for way in ways)) > least_m + 0.05:
+        assert room_m(answer.path or flown) > least_m - 0.05
+
+
+@pytest.mark.parametrize("place", [(400.0, 110.0), (600.0, -130.0)])
+def test_a_plan_is_left_where_what_has_just_appeared_beside_it_may_come_to_it(
+    place: tuple[float, float], ring: MakePoints
+) -> None:
+    """Further off than the clearance, if it stood still: of that nothing is known yet."""
+    seen = Seen(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.moving = (MovingEdges(1.0, ring(*place, 30.0, 12.0), (0.0, 0.0)),)
+    request = request_on(plan, 25.0, seen)
+    answer, near = pilot.plan(request), pilot._escapes.threats(request)
+    assert near is not None
+    assert answer.path is not None
+    assert near.room_m(answer.path) >= MISSION_HERE.clearance_m
+
+
+class HalfOpen(Seen):
+    """Nothing is known of what lies further east than some place."""
+
+    to_m = 1200.0
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return points_m[:, 0] < self.to_m
+
+
+@pytest.mark.parametrize("appears", [False, True])
+def test_a_plan_is_not_prolonged_to_where_what_has_just_appeared_may_come(
+    appears: bool, ring: MakePoints
+) -> None:
+    seen = HalfOpen(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.to_m = 4000.0
+    if appears:
+        seen.moving = (MovingEdges(24.0, ring(1200.0, -115.0, 30.0, 12.0), (0.0, 0.0)),)
+    answer = pilot.plan(request_on(plan, 600.0, seen))
+    assert answer.status is (PlanStatus.NO_BETTER if appears else PlanStatus.FOUND)
+
+
+@pytest.mark.parametrize("seed", [889, 902, 1087])
+def test_where_all_that_is_wanted_cannot_be_kept_the_clearest_way_is_flown(
+    seed: int, ring: MakePoints
+) -> None:
+    """But for so much less as another has to keep more. Of nothing it is certain that it is free."""
+    rng = np.random.default_rng(seed)
+    seen = Partly(nothing())
+    pilot, plan = flown_straight(seen)
+    for _ in range(rng.integers(1, 4)):
+        east, north, radius = rng.uniform(150, 800), rng.uniform(-500, 500), rng.uniform(40, 150)
+        course, speed = rng.uniform(0, 2 * math.pi), rng.uniform(3, 10)
+        velocity = (speed * math.cos(course), speed * math.sin(course))
+        seen.moving += (MovingEdges(1.0, ring(east, north, radius, 12.0), velocity),)
+    seen.hidden = lambda north: north < math.inf
+    request = request_on(plan, 25.0, seen)
+    answer, near = pilot.plan(request), pilot._escapes.threats(request)
+    assert near is not None
+    assert plan.path is not None
+    flown = answer.path or Path(np.array(onward(plan.path, 25.0, AHEAD_S * SPEED)))
+    ways = rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits)
+    keeps_m = pilot._local.path_keeps_m
+    best_m = max(near.room_m(way, later=0.5 * LATER) for way in ways)
+    assert 0.5 * keeps_m < best_m < keeps_m
+    assert near.room_m(flown) > best_m - CLEARER * keeps_m
+
+
+@pytest.mark.parametrize("appeared", [False, True])
+def test_where_not_all_stood_still_a_broken_certificate_is_no_fault_of_the_planner(
+    appeared: bool, ring: MakePoints
+) -> None:
+    """Edges were taken back, or something appeared, long before: it keeps as clear as it can."""
+    seen = Seen(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.show(np.array([(5000.0, 5000.0)]))
+    if appeared:
+        seen.last_contradiction_s = 1.0
+    else:
+        seen.last_removal_revision = seen.revision
+    pilot.plan(request_on(plan, 25.0, seen))
+    seen.show(ring(200.0, 0.0, 160.0, 12.0))
+    answer = pilot.plan(request_on(plan, 50.0, seen)._replace(time_s=2.0 + EVADING_S))
+    assert answer.reason.startswith("something is in the way; ")
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_it_evades_into_space_that_was_seen_to_be_free(side: float, wall: MakePoints) -> None:
+    """Ahead stands a wall, and there is room to either side of it."""
+    seen = Partly(nothing())
+    pilot, plan = flown_straight(seen)
+    seen.show(wall((400.0, -150.0), (400.0, 150.0), 12.0))
+    seen.last_contradiction_s, seen.hidden = 1.0, lambda north: north * side > 20.0
+    answer = pilot.plan(request_on(plan, 25.0, seen))
+    assert answer.path is not None
+    places = poses_at(answer.path, np.arange(0.0, answer.path.length_m, 10.0))
+    assert not seen.hidden(places[:, 1]).any()
+
+
+def test_a_plan_is_left_in_time_for_what_comes_to_it(ring: MakePoints) -> None:
+    """Flown and met as told: the plan of an aircraft that goes straight, and something that comes from ahead."""
+    mission = replace(MISSION, turn_radius_m=230.0, clearance_m=60.0, sensor_range_m=2000.0)
+    seen, pilot = Seen(nothing()), planner(mission)
+    outline, velocity = ring(2500.0, 0.0, 80.0, 20.0), np.array((-9.0, 0.0))
+    plan, station, nearest = pilot.plan(first_request(seen)), 0.0, math.inf
+    for step in range(160):
+        time_s = 0.5 * step
+        now = outline + velocity * time_s
+        request = request_on(plan, station, seen)._replace(time_s=time_s)
+        away = np.hypot(*(now - request.position_m).T).min()
+        nearest = min(nearest, float(away))
+        if away < 1000.0:
+            seen.moving = (MovingEdges(time_s, now, (-9.0, 0.0)),)
+        answer = pilot.plan(request)
+        if answer.status is PlanStatus.FOUND:
+            plan, station = answer, 0.0
+        station += 0.5 * 25.0
+    assert nearest > 0.9 * mission.clearance_m

@@ -1,0 +1,162 @@
+"""The search over poses finds ways where turning is tight, and only ways that can be flown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+
+from planner.geometry.curves import Limits, Point, Pose, end_of, sample
+from planner.interface import FloatArray, Path
+from planner.rolling_window.cost_to_go import CostToGo
+from planner.rolling_window.pose_search import AWAY, search_poses
+from planner.rolling_window.route_optimisation import Route, Terrain, optimise
+from planner.rolling_window.window import Tally
+
+MakePoints = Callable[..., FloatArray]
+AssertFlyable = Callable[[Path, float], None]
+
+WIDE = (-1e5, -1e5, 1e5, 1e5)
+RADIUS, KEEP = 200.0, 60.0
+LIMITS = Limits(RADIUS, 50.0)
+
+
+def terrain(points: FloatArray, bounds: tuple[float, float, float, float] = WIDE) -> Terrain:
+    return Terrain(points, np.full(len(points), KEEP), bounds)
+
+
+def distances_to_go(
+    start: Pose, goal: Point, points: FloatArray, bounds: tuple[float, float, float, float]
+) -> CostToGo:
+    near = (-6000.0, -6000.0, 6000.0, 6000.0) if bounds == WIDE else bounds
+    to_go = CostToGo(start[:2], goal, near, points, np.full(len(points), KEEP), Tally())
+    for _ in to_go.spread():
+        pass
+    return to_go
+
+
+def searched(
+    start: Pose,
+    curvature: float,
+    goal: Point,
+    points: FloatArray,
+    bounds: tuple[float, float, float, float] = WIDE,
+) -> Route | None:
+    """What the search finds, led by the distances to go."""
+    to_go = distances_to_go(start, goal, points, bounds)
+    search = search_poses(start, curvature, goal, LIMITS, terrain(points, bounds), to_go)
+    while True:
+        try:
+            next(search)
+        except StopIteration as end:
+            found: Route | None = end.value
+            return found
+
+
+def found_way(
+    start: Pose,
+    goal: Point,
+    points: FloatArray,
+    assert_flyable: AssertFlyable,
+    bounds: tuple[float, float, float, float] = WIDE,
+) -> Path | None:
+    """The path found, after a look at whether it can be flown."""
+    found = searched(start, 0.0, goal, points, bounds)
+    if found is None:
+        return None
+    nodes, path = found.nodes, found.path
+    if nodes[-1] != goal:
+        to_go = distances_to_go(start, goal, points, bounds)
+        assert to_go(nodes[-1]) < to_go(start[:2]) - AWAY * RADIUS
+    assert_flyable(path, RADIUS)
+    np.testing.assert_allclose(path.segments[0, :4], start, atol=1e-6)
+    np.testing.assert_allclose(end_of(path)[:2], nodes[-1], atol=1e-4)
+    line = shapely.LineString(sample(path, 50.0, 0.01))
+    assert shapely.distance(line, shapely.points(points)).min(initial=math.inf) >= KEEP - 0.02
+    assert shapely.box(*bounds).buffer(1e-6).covers(line)
+    return path
+
+
+def test_in_the_open_it_is_the_turn_onto_the_goal(assert_flyable: AssertFlyable) -> None:
+    path = found_way(Pose(0.0, 0.0, 1.0, 0.0), (0.0, 3000.0), np.zeros((0, 2)), assert_flyable)
+    assert path is not None
+    centre_to_goal = math.hypot(0.0, 3000.0 - RADIUS)
+    straight = math.sqrt(centre_to_goal**2 - RADIUS**2)
+    turn = math.pi / 2 + math.asin(RADIUS / centre_to_goal)
+    assert abs(path.length_m - straight - turn * RADIUS) < 1e-6
+
+
+def lane(wall: MakePoints, half_m: float) -> FloatArray:
+    """A lane from west to east that opens at x = 700."""
+    sides = [wall((-2000.0, side), (700.0, side), 20.0) for side in (-half_m, half_m)]
+    return np.concatenate(sides)
+
+
+def test_finds_a_way_where_no_straight_sided_curve_does(
+    wall: MakePoints, assert_flyable: AssertFlyable
+) -> None:
+    # The goal lies right behind, in sight, but the lane is too narrow to turn in: out, round and back in.
+    points, start, goal = lane(wall, 300.0), Pose(0.0, 0.0, 1.0, 0.0), (-1000.0, 0.0)
+    assert optimise(start, 0.0, [(0.0, 0.0), goal], LIMITS, 50.0, terrain(points)) is None
+    path = found_way(start, goal, points, assert_flyable)
+    assert path is not None
+    # To turn round takes a circle: one reaches out of the opening by no less than half of its width.
+    assert sample(path, 10.0)[:, 0].max() > 700.0 - RADIUS
+    assert path.length_m < 4000.0
+
+
+def test_turns_into_an_opening_that_has_to_be_met_right(
+    wall: MakePoints, assert_flyable: AssertFlyable
+) -> None:
+    # A way out to the left that a turn at once would miss, and that a corner in its middle has no room for.
+    points = np.concatenate(
+        (
+            wall((-400.0, 150.0), (450.0, 150.0), 15.0),
+            wall((900.0, 150.0), (900.0, -150.0), 15.0),
+            wall((800.0, 150.0), (900.0, 150.0), 15.0),
+            wall((-400.0, -150.0), (900.0, -150.0), 15.0),
+        )
+    )
+    start, goal = Pose(0.0, 0.0, 1.0, 0.0), (0.0, 1500.0)
+    assert optimise(start, 0.0, [(0.0, 0.0), goal], LIMITS, 50.0, terrain(points)) is None
+    assert found_way(start, goal, points, assert_flyable) is not None
+
+
+def test_boxed_in_there_is_no_way(ring: MakePoints, assert_flyable: AssertFlyable) -> None:
+    points = ring(0.0, 0.0, 700.0, 20.0)
+    assert found_way(Pose(0.0, 0.0, 1.0, 0.0), (3000.0, 0.0), points, assert_flyable) is None
+
+
+def test_the_area_is_not_left(assert_flyable: AssertFlyable) -> None:
+    start, goal, bounds = Pose(0.0, 0.0, 1.0, 0.0), (-3000.0, 0.0), (-5000.0, -450.0, 5000.0, 250.0)
+    path = found_way(start, goal, np.zeros((0, 2)), assert_flyable, bounds)
+    assert path is not None
+    assert path.segments[0, 4] < 0.0
+    assert found_way(start, goal, np.zeros((0, 2)), assert_flyable, (-5000.0, -190.0, 5000.0, 190.0)) is None
+
+
+@settings(max_examples=40)
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 12))
+@example(seed=351985684, count=11)  # far enough on, but not at the goal
+def test_whatever_is_found_can_be_flown(seed: int, count: int, assert_flyable: AssertFlyable) -> None:
+    rng = np.random.default_rng(seed)
+    points = np.column_stack((rng.uniform(150.0, 2500.0, count), rng.uniform(-700.0, 700.0, count)))
+    course = float(rng.uniform(-math.pi, math.pi))
+    start = Pose(0.0, 0.0, math.cos(course), math.sin(course))
+    bounds = (-1000.0, -1000.0, 3500.0, 1000.0)
+    assume(found_way(start, (3000.0, 0.0), points, assert_flyable, bounds) is not None)
+
+
+@pytest.mark.parametrize("before", [1.0, -1.0])
+def test_a_turn_never_follows_the_opposite_one_at_once(before: float) -> None:
+    for goal in ((300.0, 2000.0), (300.0, -2000.0), (-1000.0, 50.0), (-1000.0, -50.0)):
+        found = searched(Pose(0.0, 0.0, 1.0, 0.0), before / RADIUS, goal, np.zeros((0, 2)))
+        assert found is not None
+        bends = [before / RADIUS, *found.path.segments[:, 4].tolist()]
+        assert all(a * b >= 0.0 for a, b in pairwise(bends))

@@ -1,0 +1,361 @@
+"""The planner of the paper as a planner: asked with edge points given directly."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from planner.geometry.curves import end_of, pose_at, sample
+from planner.geometry.stations import poses_at
+from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
+from planner.rolling_window.config import RollingWindowConfig
+from planner.rolling_window.planner import RollingWindow
+
+MakePoints = Callable[..., FloatArray]
+AssertFlyable = Callable[[Path, float], None]
+
+MISSION = Mission(
+    goal_m=(20_000.0, 0.0),
+    goal_radius_m=300.0,
+    bounds_m=(-2000.0, -12_000.0, 22_000.0, 12_000.0),
+    clearance_m=200.0,
+    turn_radius_m=150.0,
+    speed_mps=25.0,
+    roll_in_s=1.0,
+    tracking_error_m=3.0,
+    sensor_range_m=8000.0,
+)
+MARGIN = 20.0
+SPACING = 50.0
+
+
+class Seen:
+    """Edge points of the true world that have come into range, and nothing else."""
+
+    spacing_m = SPACING
+    last_removal_revision = 0
+    moving: tuple[MovingEdges, ...] = ()
+    last_contradiction_s = -math.inf
+
+    def __init__(self, truth: FloatArray, range_m: float = MISSION.sensor_range_m) -> None:
+        self.revision = 0
+        self._hidden, self._range_m = truth, range_m
+        self._shown: list[tuple[int, FloatArray]] = []
+
+    def look(self, east_m: float, north_m: float) -> None:
+        near = np.hypot(self._hidden[:, 0] - east_m, self._hidden[:, 1] - north_m) < self._range_m
+        if near.any():
+            self.show(self._hidden[near])
+            self._hidden = self._hidden[~near]
+
+    def show(self, points: FloatArray) -> None:
+        self.revision += 1
+        self._shown.append((self.revision, points))
+
+    def edges_since(self, revision: int) -> FloatArray:
+        return np.concatenate([np.zeros((0, 2)), *(p for at, p in self._shown if at > revision)])
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return np.ones(len(points_m), dtype=np.bool_)
+
+
+def nothing() -> FloatArray:
+    return np.zeros((0, 2))
+
+
+def seen_at_once(points: FloatArray) -> Seen:
+    seen = Seen(nothing())
+    seen.show(points)
+    return seen
+
+
+def planner(mission: Mission = MISSION) -> RollingWindow:
+    return RollingWindow(RollingWindowConfig().resolved(mission), mission)
+
+
+def first_request(seen: Seen, position: tuple[float, float] = (0.0, 0.0)) -> PlanRequest:
+    return PlanRequest(0.0, position, (1.0, 0.0), seen)
+
+
+def request_on(plan: Plan, station: float, seen: Seen) -> PlanRequest:
+    """The request of an aircraft that flies a plan without error."""
+    assert plan.path is not None
+    pose = pose_at(plan.path, station)
+    return PlanRequest(station / 25.0, pose[:2], pose[2:], seen, plan, station)
+
+
+def flight(
+    truth: FloatArray, mission: Mission = MISSION, step_m: float = 100.0, pilot: RollingWindow | None = None
+) -> tuple[FloatArray, list[Plan], Plan]:
+    """Places flown through without error, plans flown, and the last one, until the goal is reached."""
+    seen, pilot = Seen(truth, mission.sensor_range_m), pilot or planner(mission)
+    seen.look(0.0, 0.0)
+    plan = pilot.plan(first_request(seen))
+    assert plan.status is PlanStatus.FOUND
+    places, plans, station = [(0.0, 0.0)], [plan], 0.0
+    while math.dist(places[-1], mission.goal_m) > mission.goal_radius_m:
+        assert len(places) < 1500, "does not arrive"
+        station += step_m
+        request = request_on(plan, station, seen)
+        places.append(request.position_m)
+        seen.look(*request.position_m)
+        answer = pilot.plan(request)
+        if answer.status is PlanStatus.FOUND:
+            assert answer.path is not None
+            # The new plan is flown from here on without a jump.
+            start = pose_at(answer.path, 0.0)
+            np.testing.assert_allclose(start[:2], request.position_m, atol=1e-4)
+            np.testing.assert_allclose(start[2:], request.direction, atol=1e-5)
+            plan, station = answer, 0.0
+            plans.append(plan)
+        else:
+            assert answer.path is None
+    return np.array(places), plans, plan
+
+
+def room(line: FloatArray, points: FloatArray) -> float:
+    return float(shapely.distance(shapely.LineString(line), shapely.points(points)).min(initial=math.inf))
+
+
+def test_straight_in_the_open(assert_flyable: AssertFlyable) -> None:
+    plan = planner().plan(first_request(Seen(nothing())))
+    assert plan.status is PlanStatus.FOUND
+    assert plan.path is not None
+    assert_flyable(plan.path, MISSION.turn_radius_m)
+    # Straight as far as the sensor sees, and then a turn that can be flown for ever.
+    assert plan.path.loiter
+    *ahead, turn = plan.path.segments
+    assert all(segment[4] == 0.0 for segment in ahead)
+    assert sum(segment[5] for segment in ahead) == pytest.approx(MISSION.sensor_range_m)
+    assert turn[5] == pytest.approx(math.tau * MISSION.turn_radius_m)
+    np.testing.assert_allclose(plan.waypoints_m, [(0.0, 0.0), MISSION.goal_m])
+    assert "20.0 km to go" in plan.reason
+
+
+def test_passes_a_circle_at_the_wanted_clearance(ring: MakePoints, assert_flyable: AssertFlyable) -> None:
+    points = ring(5000.0, 500.0, 2000.0, SPACING)
+    plan = planner().plan(first_request(seen_at_once(points)))
+    assert plan.status is PlanStatus.FOUND
+    assert plan.path is not None
+    assert_flyable(plan.path, MISSION.turn_radius_m)
+    near = room(sample(plan.path, 50.0, 0.01), points)
+    assert MISSION.clearance_m <= near < MISSION.clearance_m + 2.0 * MARGIN
+    # To the south, the shorter way.
+    assert plan.waypoints_m[1:-1, 1].max() < 0.0
+    assert "right" in plan.reason
+
+
+def test_flies_round_what_comes_into_view(ring: MakePoints) -> None:
+    points = np.concatenate((ring(9000.0, 500.0, 2000.0, SPACING), ring(15_000.0, -2200.0, 2000.0, SPACING)))
+    places, plans, _ = flight(points)
+    assert len(plans) >= 2
+    assert MISSION.clearance_m - 0.5 <= room(places, points) < MISSION.clearance_m + 2.0 * MARGIN
+    assert np.hypot(*np.diff(places, axis=0).T).sum() < 1.03 * 20_000.0
+
+
+@settings(max_examples=12)
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 6))
+def test_arrives_through_fields_of_separate_circles(
+    seed: int, count: int, ring: MakePoints, assert_flyable: AssertFlyable
+) -> None:
+    rng = np.random.default_rng(seed)
+    circles = np.column_stack(
+        (
+            rng.uniform(3000.0, 17_000.0, count),
+            rng.uniform(-5000.0, 5000.0, count),
+            rng.uniform(300.0, 2000.0, count),
+        )
+    )
+    ends = np.hypot(circles[:, :1] - (0.0, 20_000.0), circles[:, 1:2]) - circles[:, 2:]
+    assume(ends.min() > 700.0)
+    apart = np.hypot(*(circles[:, None, :2] - circles[None, :, :2]).transpose(2, 0, 1))
+    apart -= circles[:, None, 2] + circles[None, :, 2]
+    assume(count == 1 or apart[np.triu_indices(count, 1)].min() > 600.0)
+    points = np.concatenate([ring(x, y, r, SPACING) for x, y, r in circles.tolist()])
+    places, plans, _ = flight(points)
+    assert room(places, points) >= MISSION.clearance_m - 0.5
+    for plan in plans:
+        assert plan.path is not None
+        assert_flyable(plan.path, MISSION.turn_radius_m)
+        xmin, ymin, xmax, ymax = shapely.LineString(sample(plan.path, 100.0, 0.1)).bounds
+        assert xmin >= MISSION.bounds_m[0] - 1e-6
+        assert ymin >= MISSION.bounds_m[1] - 1e-6
+        assert xmax <= MISSION.bounds_m[2] + 1e-6
+        assert ymax <= MISSION.bounds_m[3] + 1e-6
+        if not plan.path.loiter:
+            np.testing.assert_allclose(end_of(plan.path)[:2], MISSION.goal_m, atol=1e-3)
+            np.testing.assert_allclose(plan.waypoints_m[-1], MISSION.goal_m)
+        np.testing.assert_allclose(plan.waypoints_m[0], plan.path.segments[0, :2], atol=1e-3)
+
+
+def test_a_plan_is_kept_while_nothing_changes(ring: MakePoints) -> None:
+    seen, pilot = seen_at_once(ring(9000.0, 500.0, 2000.0, SPACING)), planner()
+    plan = pilot.plan(first_request(seen))
+    for station in (0.0, 10.0, 50.0, 200.0):
+        answer = pilot.plan(request_on(plan, station, seen))
+        assert answer.status is PlanStatus.KEPT
+        assert answer.path is None
+        assert len(answer.waypoints_m) == 0
+    # From then on it is only prolonged: the same track points, the same way, as far as can be certified.
+    course, station, prolonged = plan.waypoints_m[1:].tolist(), 0.0, 0
+    while math.dist(pose_at(plan.path or Path(nothing()), station)[:2], MISSION.goal_m) > 500.0:
+        station += 250.0
+        answer = pilot.plan(request_on(plan, station, seen))
+        assert answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER, PlanStatus.FOUND)
+        if answer.path is None or plan.path is None:
+            continue
+        assert [node for node in answer.waypoints_m[1:].tolist() if node not in course] == []
+        overlap = np.linspace(0.0, 2000.0, 5)
+        np.testing.assert_allclose(
+            poses_at(answer.path, overlap), poses_at(plan.path, station + overlap), atol=1e-3
+        )
+        plan, station, prolonged = answer, 0.0, prolonged + 1
+    assert 1 <= prolonged <= 40
+
+
+def test_new_points_on_the_plan_bring_a_new_one(ring: MakePoints) -> None:
+    seen, pilot = Seen(nothing()), planner()
+    plan = pilot.plan(first_request(seen))
+    points = ring(2500.0, 100.0, 600.0, SPACING)
+    seen.show(points)
+    request = request_on(plan, 500.0, seen)
+    answer = pilot.plan(request)
+    assert answer.status is PlanStatus.FOUND
+    assert answer.path is not None
+    assert room(sample(answer.path, 50.0, 0.01), points) >= MISSION.clearance_m
+    # It leaves the old plan a second of flight ahead of the aircraft, not at it.
+    np.testing.assert_allclose(
+        pose_at(answer.path, 20.0), pose_at(plan.path or Path(nothing()), 520.0), atol=1e-6
+    )
+
+
+def looks_again_after_m(wall: FloatArray, more: float) -> float:
+    """How far is flown before a course that a wall cuts again, grown to one side, is searched for anew."""
+    seen, pilot = Seen(nothing()), planner()
+    plan = pilot.plan(first_request(seen))
+    seen.show(wall)
+    plan = pilot.plan(request_on(plan, 200.0, seen))
+    assert plan.status is PlanStatus.FOUND
+    assert pilot.plan(request_on(plan, 0.0, seen)).status is PlanStatus.KEPT
+    seen.show(wall[wall[:, 1].argmax()][None] + (0.0, more))
+    for i in range(1, 100):
+        if pilot.plan(request_on(plan, 12.5 * i, seen)).status is not PlanStatus.KEPT:
+            return 12.5 * i
+    raise AssertionError("the course is not searched for anew")
+
+
+def test_a_course_that_is_only_grazed_is_searched_for_anew_less_soon(wall: MakePoints) -> None:
+    """A little more of the end of a wall costs little; a wall that made the way much longer may be a dead end."""
+    short = wall((6000.0, -3000.0), (6000.0, 0.0), SPACING)
+    long = wall((6000.0, -3000.0), (6000.0, 2500.0), SPACING)
+    assert looks_again_after_m(short, 60.0) > 1.5 * looks_again_after_m(long, 60.0)
+
+
+def test_new_points_beside_the_plan_do_not(ring: MakePoints) -> None:
+    seen, pilot = Seen(nothing()), planner()
+    plan = pilot.plan(first_request(seen))
+    seen.show(ring(2500.0, 1500.0, 600.0, SPACING))
+    assert pilot.plan(request_on(plan, 100.0, seen)).status is PlanStatus.KEPT
+
+
+def test_a_late_plan_leaves_the_old_one_after_its_latency() -> None:
+    mission = replace(MISSION, compute_latency_s=4.0)
+    seen, pilot = Seen(nothing()), planner(mission)
+    plan = pilot.plan(first_request(seen))
+    assert plan.path is not None
+    seen.show(np.array([(3000.0, 20.0)]))
+    answer = pilot.plan(request_on(plan, 500.0, seen))
+    assert answer.path is not None
+    np.testing.assert_allclose(pose_at(answer.path, 100.0), pose_at(plan.path, 600.0), atol=1e-6)
+
+
+def test_off_the_path_a_plan_begins_at_the_aircraft() -> None:
+    seen, pilot = Seen(nothing()), planner()
+    plan = pilot.plan(first_request(seen))
+    seen.show(np.array([(2000.0, 0.0)]))
+    off = request_on(plan, 500.0, seen)._replace(position_m=(500.0, 80.0), direction=(0.8, 0.6))
+    answer = pilot.plan(off)
+    assert answer.path is not None
+    np.testing.assert_allclose(pose_at(answer.path, 0.0), (500.0, 80.0, 0.8, 0.6), atol=1e-6)
+
+
+def test_a_plan_shows_how_it_came_about(ring: MakePoints) -> None:
+    plan = planner().plan(first_request(seen_at_once(ring(6000.0, 0.0, 1000.0, SPACING))))
+    assert plan.picture is not None
+    picture = plan.picture()
+    np.testing.assert_allclose(picture.guide_m, [(0.0, 0.0), MISSION.goal_m])
+    assert picture.window_m == MISSION.sensor_range_m
+    np.testing.assert_allclose(picture.candidates[0], plan.waypoints_m)
+    assert len(picture.candidates) > 1
+    half = math.asin(1200.0 / 6000.0)
+    right, left = picture.sectors[0, :2], picture.sectors[0, 2:]
+    assert math.atan2(right[1], right[0]) == pytest.approx(half, abs=0.01)
+    assert math.atan2(left[1], left[0]) == pytest.approx(-half, abs=0.01)
+
+
+def test_a_boundary_close_by_is_kept(ring: MakePoints) -> None:
+    # Round the south is shorter, but there the area ends.
+    mission = replace(MISSION, bounds_m=(-2000.0, -2100.0, 22_000.0, 12_000.0))
+    points = ring(9000.0, 100.0, 2000.0, SPACING)
+    places, _, plan = flight(points, mission)
+    assert places[:, 1].min() > -2100.0
+    assert places[:, 1].max() > 2200.0
+    assert room(places, points) >= 199.5
+    assert plan.status is PlanStatus.FOUND
+
+
+def test_walled_in_nothing_is_planned_through_the_wall(ring: MakePoints) -> None:
+    points = ring(0.0, 0.0, 900.0, SPACING)
+    answer = planner().plan(first_request(seen_at_once(points)))
+    # A way out there is not; a turn for ever there may be.
+    assert answer.path is None or answer.path.loiter
+    if answer.path is not None:
+        assert shapely.Point(0.0, 0.0).buffer(900.0).covers(shapely.LineString(sample(answer.path, 10.0)))
+
+
+def test_same_requests_same_plans(ring: MakePoints) -> None:
+    points = np.concatenate((ring(7000.0, 300.0, 2000.0, SPACING), ring(13_000.0, -1500.0, 1500.0, SPACING)))
+    (first, first_plans, _), (second, second_plans, _) = flight(points), flight(points)
+    assert first.tobytes() == second.tobytes()
+    assert [plan.reason for plan in first_plans] == [plan.reason for plan in second_plans]
+
+
+def test_defaults_are_derived_from_the_mission() -> None:
+    config = RollingWindowConfig().resolved(MISSION)
+    assert (config.planning_window_m, config.margin_m, config.rolling_step_m) == (8000.0, 20.0, 500.0)
+    tight = RollingWindowConfig().resolved(replace(MISSION, clearance_m=20.0))
+    assert tight.margin_m == 6.0  # twice the tracking error
+    own = RollingWindowConfig(
+        planning_window_m=4000.0, margin_m=0.0, rolling_step_m=99.0, steps=5, candidates=2
+    )
+    assert own.resolved(MISSION) == own
+    assert RollingWindowConfig(planning_window_m=4000.0).resolved(MISSION).rolling_step_m == 250.0
+    assert config.resolved(MISSION) == config
+
+
+@pytest.mark.parametrize("margin_m", [0.0, 0.1])
+def test_the_least_margins_are_flown(margin_m: float, ring: MakePoints) -> None:
+    places, _, _ = flight(
+        ring(6000.0, 0.0, 800.0, 50.0), pilot=RollingWindow(RollingWindowConfig(margin_m=margin_m), MISSION)
+    )
+    assert float(np.hypot(places[:, 0] - 6000.0, places[:, 1]).min()) > 800.0 + MISSION.clearance_m - 1.0
+
+
+def test_a_planning_window_beyond_the_sensor_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"planning_window_m is 9000, more than sensor.range_m 8000"):
+        RollingWindowConfig(planning_window_m=9000.0).resolved(MISSION)
+
+
+def test_every_key_is_described() -> None:
+    for field in dataclasses.fields(RollingWindowConfig):
+        assert len(field.metadata["doc"]) > 20
+        assert field.metadata["unit"] in {"m", "1"}
+        assert {"minimum", "above"} & field.metadata.keys()

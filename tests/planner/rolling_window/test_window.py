@@ -1,0 +1,169 @@
+"""Guide vector, free sectors and their edges against brute force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from planner.interface import FloatArray
+from planner.rolling_window.window import SectorEdge, Window, free_sectors, guide_vector
+
+MakePoints = Callable[..., FloatArray]
+SPACING = 25.0
+KEEP = 110.0
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def window_of(*obstacles: FloatArray, keep_m: float = KEEP) -> Window:
+    """A window in which each array of edge points is one obstacle, labelled 0, 1, ..."""
+    points = np.concatenate(obstacles) if obstacles else np.zeros((0, 2))
+    labels: NDArray[np.intp] = np.repeat(np.arange(len(obstacles)), [len(each) for each in obstacles])
+    return Window((0.0, 0.0), points, labels, SPACING, np.full(len(points), keep_m))
+
+
+def bearing(east: float, north: float) -> float:
+    return math.atan2(north, east)
+
+
+def assert_tangent(edge: SectorEdge, window: Window, origin: tuple[float, float]) -> None:
+    """An edge is free as far as it touches, and touches there."""
+    touch = (origin[0] + edge.ux * edge.touch_m, origin[1] + edge.uy * edge.touch_m)
+    assert math.hypot(edge.ux, edge.uy) == pytest.approx(1.0)
+    nearest = np.hypot(*(window.points_m - touch).T).min()
+    assert nearest == pytest.approx(KEEP, rel=1e-3)
+    line = shapely.LineString([origin, touch])
+    assert shapely.distance(line, shapely.points(window.points_m)).min() > KEEP * (1.0 - 1e-6)
+    assert edge.clear_m >= edge.touch_m
+    if math.isfinite(edge.clear_m):
+        clear = (origin[0] + edge.ux * edge.clear_m, origin[1] + edge.uy * edge.clear_m)
+        line = shapely.LineString([origin, clear])
+        assert shapely.distance(line, shapely.points(window.points_m)).min() > KEEP * (1.0 - 1e-6)
+
+
+@given(x=st.floats(-1e5, 1e5), y=st.floats(-1e5, 1e5), gx=st.floats(-1e5, 1e5), gy=st.floats(-1e5, 1e5))
+def test_the_guide_vector_leads_to_the_goal(x: float, y: float, gx: float, gy: float) -> None:
+    ux, uy, length = guide_vector((x, y), (gx, gy))
+    assert math.hypot(ux, uy) == pytest.approx(1.0)
+    assert x + ux * length == pytest.approx(gx, abs=1e-6)
+    assert y + uy * length == pytest.approx(gy, abs=1e-6)
+
+
+def test_at_the_goal_the_guide_vector_has_no_length() -> None:
+    assert guide_vector((3.0, 4.0), (3.0, 4.0))[2] == 0.0
+
+
+@given(seed=SEEDS, count=st.integers(1, 12))
+def test_free_sectors_are_the_bearings_on_which_a_ray_meets_nothing(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    points, keep = rng.uniform(-2000.0, 2000.0, (count, 2)), rng.uniform(20.0, 400.0, count)
+    origin = rng.uniform(-500.0, 500.0, 2)
+    assume((np.hypot(*(points - origin).T) - keep).min() > 1.0)
+    sectors = free_sectors(points, keep, (float(origin[0]), float(origin[1])))
+    angles = rng.uniform(-math.pi, math.pi, 180)
+    rays = np.column_stack((np.cos(angles), np.sin(angles)))
+    lines = shapely.linestrings(np.stack((np.broadcast_to(origin, (180, 2)), origin + 9e3 * rays), axis=1))
+    room = shapely.distance(lines[:, None], shapely.points(points)) - keep
+    surely: NDArray[np.bool_] = (np.abs(room) > 1e-3).all(axis=1)
+    right = np.arctan2(sectors[:, 1], sectors[:, 0])
+    width = (np.arctan2(sectors[:, 3], sectors[:, 2]) - right) % math.tau
+    inside: NDArray[np.bool_] = np.any((angles[:, None] - right) % math.tau <= width, axis=1)
+    np.testing.assert_array_equal(inside[surely], np.all(room > 0.0, axis=1)[surely])
+    # Sectors do not overlap and are parted by obstacles.
+    assert width.sum() < math.tau
+
+
+def test_nothing_in_the_window_cuts_no_sector() -> None:
+    assert free_sectors(np.zeros((0, 2)), KEEP, (0.0, 0.0)).shape == (0, 4)
+
+
+def test_fans_that_overlap_leave_one_sector(ring: MakePoints) -> None:
+    ahead, behind_it = ring(3000.0, 0.0, 400.0, SPACING), ring(6000.0, 500.0, 900.0, SPACING)
+    beside = ring(0.0, 3000.0, 400.0, SPACING)
+    assert len(free_sectors(np.concatenate((ahead, behind_it)), KEEP, (0.0, 0.0))) == 1
+    assert len(free_sectors(np.concatenate((ahead, beside)), KEEP, (0.0, 0.0))) == 2
+
+
+def test_within_a_closed_ring_there_is_no_free_sector(ring: MakePoints) -> None:
+    assert len(free_sectors(ring(0.0, 0.0, 900.0, SPACING), KEEP, (100.0, 50.0))) == 0
+
+
+@pytest.mark.parametrize("east", [-3000.0, 3000.0])
+def test_the_edges_of_a_lone_disc_are_its_two_tangents(east: float) -> None:
+    window = window_of(np.array([(east, 700.0)]))
+    edges = window.sector_edges((0.0, 0.0), [0])
+    away = math.hypot(east, 700.0)
+    half = math.asin(KEEP / away)
+    offs = sorted((bearing(e.ux, e.uy) - bearing(east, 700.0) + math.pi) % math.tau - math.pi for e in edges)
+    assert offs == pytest.approx([-half, half], abs=1e-6)
+    for edge in edges:
+        assert edge.touch_m == pytest.approx(math.sqrt(away**2 - KEEP**2), rel=1e-9)
+        assert edge.clear_m == math.inf
+
+
+@given(
+    away=st.floats(1500.0, 6000.0),
+    turn=st.floats(-math.pi, math.pi),
+    radius=st.floats(100.0, 1200.0),
+)
+def test_the_edges_of_a_lone_circle_end_its_fan(
+    away: float, turn: float, radius: float, ring: MakePoints
+) -> None:
+    window = window_of(ring(away * math.cos(turn), away * math.sin(turn), radius, SPACING))
+    edges = window.sector_edges((0.0, 0.0), [0])
+    offs = [(bearing(e.ux, e.uy) - turn + math.pi) % math.tau - math.pi for e in edges]
+    dx, dy = window.points_m.T
+    middle = (np.arctan2(dy, dx) - turn + math.pi) % math.tau - math.pi
+    half = np.arcsin(KEEP / np.hypot(dx, dy))
+    assert min(offs) == pytest.approx((middle - half).min(), abs=1e-5)
+    assert max(offs) == pytest.approx((middle + half).max(), abs=1e-5)
+    for edge in edges:
+        assert_tangent(edge, window, (0.0, 0.0))
+        assert math.isinf(edge.clear_m)
+
+
+def random_window(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> Window:
+    """A window with so many rings and walls, some of which overlap; there is room about its centre."""
+    rng = np.random.default_rng(seed)
+    obstacles = []
+    for _ in range(count):
+        east, north = rng.uniform(-3000.0, 3000.0, 2).tolist()
+        if rng.random() < 0.5:
+            obstacles.append(ring(east, north, float(rng.uniform(80.0, 600.0)), SPACING))
+        else:
+            dx, dy = rng.uniform(-900.0, 900.0, 2).tolist()
+            obstacles.append(wall((east, north), (east + dx, north + dy), SPACING))
+    window = window_of(*obstacles)
+    assume(np.hypot(*window.points_m.T).min() > KEEP + 5.0)
+    return window
+
+
+@settings(max_examples=60)
+@given(seed=SEEDS, count=st.integers(2, 6))
+def test_every_edge_is_free_and_tangent(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> None:
+    window = random_window(seed, count, ring, wall)
+    for label in range(count):
+        for edge in window.sector_edges((0.0, 0.0), [label]):
+            assert_tangent(edge, window, (0.0, 0.0))
+
+
+def test_hidden_edges_are_not_returned_but_those_of_what_hides_them(ring: MakePoints) -> None:
+    near, far = ring(2000.0, 0.0, 900.0, SPACING), ring(6000.0, 0.0, 300.0, SPACING)
+    window = window_of(near, far)
+    from_far = window.sector_edges((0.0, 0.0), [1])
+    assert from_far
+    assert sorted(from_far) == sorted(window.sector_edges((0.0, 0.0), [0]))
+    assert max(edge.touch_m for edge in from_far) < 3000.0
+
+
+def test_an_edge_ends_where_the_next_obstacle_begins(ring: MakePoints) -> None:
+    window = window_of(np.array([(2000.0, 0.0)]), ring(6000.0, 0.0, 900.0, SPACING))
+    for edge in window.sector_edges((0.0, 0.0), [0]):
+        assert_tangent(edge, window, (0.0, 0.0))
+        assert 4000.0 < edge.clear_m < 6000.0
