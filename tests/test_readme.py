@@ -1,4 +1,4 @@
-"""README's commands and examples, run as they are written."""
+"""The READMEs' commands and examples, run as they are written."""
 
 from __future__ import annotations
 
@@ -19,17 +19,33 @@ from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+ROOMS = ("planner", "aircraft", "harness", "scenarios")
+READMES = {
+    str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
+    for path in (
+        ROOT / "README.md",
+        *(each for room in ROOMS for each in sorted((ROOT / room).rglob("README.md"))),
+    )
+}
+README = READMES["README.md"]
+CAMPAIGNS, HARNESS = READMES["harness/campaign/README.md"], READMES["harness/README.md"]
 SET_UP = "python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt "
+MOST_LINES = 250
 FLY, TESTS = (line for line in README.splitlines() if line.startswith(SET_UP))
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language: str, readme: str = README) -> list[str]:
     """The code blocks of a language."""
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```$", readme, re.MULTILINE | re.DOTALL)
 
 
-COMMANDS = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("wayproof ")]
+COMMANDS = [
+    line
+    for readme in READMES.values()
+    for block in blocks("sh", readme)
+    for line in block.splitlines()
+    if line.startswith("wayproof ")
+]
 
 
 def wayproof(arguments: str, folder: Path, *, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
@@ -101,15 +117,15 @@ def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_pat
 
 
 def test_ones_own_campaign_is_flown_and_a_row_of_it_flown_again(tmp_path: Path) -> None:
-    (scenario,), (campaign,) = blocks("yaml"), blocks("yml")
+    (scenario,), (campaign,) = blocks("yaml"), blocks("yml", CAMPAIGNS)
     (tmp_path / "my_world.yaml").write_text(scenario)
     (tmp_path / "my_campaign.yaml").write_text(campaign)
-    assert "`wayproof sweep my_campaign.yaml`" in README
+    assert "`wayproof sweep my_campaign.yaml`" in CAMPAIGNS
     flown = wayproof("sweep my_campaign.yaml", tmp_path)
     assert (flown.returncode, flown.stderr) == (0, "")
     assert flown.stdout.startswith("my_campaign: 12 runs")
     again = "fly --from runs/my_campaign/results.parquet --run 7"
-    assert f"`wayproof {again}`" in README
+    assert f"`wayproof {again}`" in CAMPAIGNS
     metrics = json.loads(wayproof(f"{again} --no-recording --json", tmp_path).stdout)
     rows = pq.read_table(tmp_path / "runs/my_campaign/results.parquet").to_pylist()
     assert metrics["digest"] == rows[7]["digest"]
@@ -139,8 +155,8 @@ def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tm
 
 
 def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
-    (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", README)
-    (shown,) = (block for block in blocks("text") if "mildest failure" in block)
+    (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", HARNESS)
+    (shown,) = (block for block in blocks("text", HARNESS) if "mildest failure" in block)
     searched = wayproof(command, tmp_path)
     assert (searched.returncode, searched.stderr) == (0, "")
     names = [line[:29].strip() for line in shown.splitlines()[2:5]]
@@ -180,23 +196,46 @@ def test_ones_own_planner_is_found_and_flown(tmp_path: Path) -> None:
 
 def test_the_scenarios_named_are_those_there_are() -> None:
     for path in (ROOT / "scenarios").glob("*.yaml"):
-        assert f"`{path.stem}`" in README
+        assert f"`{path.stem}`" in READMES["scenarios/README.md"]
 
 
-def test_files_and_pictures_named_are_there() -> None:
-    named = [
-        name.strip("`!()[]")
-        for name in re.findall(r"\]\((\.[^)]+)\)|`((?:planner|aircraft|harness|tests)/[\w./]+)`", README)
-        for name in name
-        if name
-    ]
-    assert len(named) > 8
-    assert [name for name in named if not (ROOT / name).exists()] == []
+@pytest.mark.parametrize("name", READMES)
+def test_files_and_pictures_named_are_there(name: str) -> None:
+    text, folder = READMES[name], (ROOT / name).parent
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    near = [link.partition("#")[0] for link in links if not link.startswith(("https://", "#"))]
+    named = re.findall(r"`((?:planner|aircraft|harness|scenarios|tests)/[\w./]+)`", text)
+    assert near + named != []
+    assert [link for link in near if not (folder / link).exists()] == []
+    assert [path for path in named if not (ROOT / path).exists()] == []
+
+
+@pytest.mark.parametrize("name", READMES)
+def test_links_lead_to_headings(name: str) -> None:
+    folder = (ROOT / name).parent
+    for link in re.findall(r"\]\(([^)]*#[^)]+)\)", READMES[name]):
+        if not link.startswith("https://"):
+            path, _, anchor = link.partition("#")
+            target = READMES[str((folder / path).resolve().relative_to(ROOT)) if path else name]
+            headings = re.findall(r"^#+ (.+)$", target, re.MULTILINE)
+            assert anchor in {
+                re.sub(r"[^\w -]", "", each.lower()).strip().replace(" ", "-") for each in headings
+            }
+
+
+def test_every_picture_is_shown_and_small() -> None:
     pictures = list((ROOT / ".pictures").iterdir())
     assert [each.name for each in pictures if each.stat().st_size >= 150 * 1024] == []
-    assert {f".pictures/{each.name}" for each in pictures} <= {
-        *re.findall(r"\]\((\.pictures/[^)]+)\)", README)
+    shown = {
+        Path(path).name for text in READMES.values() for path in re.findall(r"\.pictures/([^)]+)\)", text)
     }
+    assert {each.name for each in pictures} == shown
+
+
+def test_the_top_readme_is_short_and_leads_to_all_others() -> None:
+    assert len(README.splitlines()) <= MOST_LINES
+    assert [name for name in READMES if name != "README.md" and f"]({name})" not in README] == []
+    assert "`git clone <this repository>`" in README
 
 
 def test_readme_keeps_a_mistake_off_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
