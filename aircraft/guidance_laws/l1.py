@@ -1,0 +1,355 @@
+"""L1: the guidance that ArduPilot flies, legs between waypoints and circles around a point.
+
+On a leg the aircraft turns on the circle through a point of the leg that is the distance L1 away, and an integrator
+takes out what is left over. On a circle it does so until a PD law of the distance from the circle asks for a tighter
+turn; that law then holds the circle, with the centripetal acceleration fed forward.
+
+Source: S. Park, J. Deyst and J. P. How, "A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900:
+a = 2 V^2 / L1 sin(Nu); capture limit, integrator, circle law, indecision and floors as ArduPilot 4.6 has them. Right is
+positive: roll, acceleration, Nu; the cross-track error of a leg alone is positive to its LEFT, as there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from aircraft.guidance_laws.key import key
+
+GRAVITY_MPS2 = 9.80665
+ONE_OVER_PI = 0.3183099
+"""1/pi to the digits that the autopilot uses."""
+TWO_PI = 6.2832
+"""2 pi to the digits that the autopilot uses for the circle law."""
+QUARTER_TURN = 1.5708
+"""Largest Nu on a leg, rad, likewise."""
+HALF_RIGHT_SINE = 0.7071
+"""Sine of the steepest angle to a leg; and the cosine, behind a leg's beginning, from which on the law aims there."""
+SLOW_MPS = 0.1
+"""Least ground speed on a leg; a slower or backwards flight counts as this fast along the nose."""
+MIN_CIRCLE_SPEED_MPS = 1.0
+"""Least ground speed on a circle."""
+NEAR_CENTRE_M = 0.1
+"""Nearer to the centre of a circle than this the way to it is not defined."""
+SHORT_LEG_M = 1e-6
+"""A shorter leg has no direction."""
+PAST_LEG_S = 3.0
+"""This much flying time beyond a leg's end the law aims at the end."""
+INTEGRATOR_RANGE_RAD = math.radians(5.0)
+"""The integrator works below this Nu1."""
+INTEGRATOR_LIMIT_RAD = 0.1
+MAX_UPDATE_S = 0.1
+"""The integrator takes a longer time since the last call for this one."""
+STALE_S = 1.0
+"""After a longer time since the last call on a leg the integrator begins at 0."""
+INDECISION_RAD = 0.9 * math.pi
+"""Beyond this Nu the target is behind, and the last direction to turn in is kept."""
+INDECISION_CD = 12000
+"""That holds where the nose is more than this off the target, hundredths of a degree."""
+
+
+@dataclass(frozen=True)
+class L1Config:
+    """Keys of `guidance.kind: l1`; defaults are those of ArduPilot's parameters."""
+
+    period_s: float = key(
+        17.0, "period of the track error's decay (NAVL1_PERIOD)", "s", minimum=1.0, maximum=1000.0
+    )
+    damping: float = key(
+        0.75, "damping ratio of the track error's decay (NAVL1_DAMPING)", "1", minimum=0.1, maximum=2.0
+    )
+    integrator_gain: float = key(
+        0.02,
+        "gain of the cross-track integrator on legs (NAVL1_XTRACK_I); 0: none",
+        "1/s",
+        minimum=0.0,
+        maximum=0.1,
+    )
+    loiter_bank_limit_deg: float = key(
+        0.0,
+        "bank at sea level above which a circle grows with altitude (NAVL1_LIM_BANK); 0: every circle does",
+        "deg",
+        minimum=0.0,
+        maximum=89.0,
+    )
+
+    def parameters(self, target_airspeed_mps: float = 0.0) -> L1Parameters:
+        """What the law needs: these keys and the airspeed that is held, 0 where nobody says it."""
+        return L1Parameters(
+            self.period_s,
+            self.damping,
+            self.integrator_gain,
+            math.radians(self.loiter_bank_limit_deg),
+            target_airspeed_mps,
+        )
+
+
+class L1Parameters(NamedTuple):
+    """Constants of one flight: the keys of `L1Config`, and what they do not say."""
+
+    period_s: float
+    damping: float
+    integrator_gain: float
+    loiter_bank_limit_rad: float
+    target_airspeed_mps: float
+    """The airspeed that is held; 0 where nobody says it."""
+
+
+class L1Motion(NamedTuple):
+    """How the aircraft moves."""
+
+    east_m: float
+    north_m: float
+    velocity_east_mps: float
+    velocity_north_mps: float
+    yaw_rad: float
+    yaw_cd: int
+    """The same in hundredths of a degree, as the autopilot keeps it."""
+    eas2tas: float
+    """True over equivalent airspeed, 1 at sea level."""
+
+
+class L1Memory(NamedTuple):
+    """What the law keeps from one call to the next."""
+
+    last_nu_rad: float = 0.0
+    integrator_rad: float = 0.0
+    last_gain: float = 0.0
+    """The integrator begins at 0 when its gain has changed."""
+
+
+class L1Leg(NamedTuple):
+    """A leg, from A to B."""
+
+    from_east_m: float
+    from_north_m: float
+    to_east_m: float
+    to_north_m: float
+    min_distance_m: float
+    """Least L1 distance; 0 from the autopilot's plain missions."""
+
+
+class L1Circle(NamedTuple):
+    """A circle to loiter on."""
+
+    centre_east_m: float
+    centre_north_m: float
+    radius_m: float
+    direction: float
+    """+1 clockwise (right turns), -1 counter-clockwise."""
+
+
+class L1Output(NamedTuple):
+    """The lateral acceleration, and what it comes from."""
+
+    lateral_acceleration_mps2: float
+    roll_cd: int
+    """Roll angle of a coordinated turn, hundredths of a degree."""
+    bearing_rad: float
+    """Direction to the point that is aimed at; on a circle, to its centre."""
+    bearing_error_rad: float
+    """Nu as it enters the law; 0 where the circle is held."""
+    crosstrack_m: float
+    """On a leg positive to its LEFT; on a circle positive outside."""
+    distance_m: float
+    """The L1 distance."""
+    target_bearing_cd: int
+    """Direction to B, or to the centre, hundredths of a degree."""
+    circling: bool
+    """The circle is held; before, it is approached."""
+    radius_m: float
+    """Radius of the circle that is flown, grown with altitude; 0 on a leg."""
+    turn_distance_m: float
+    """Distance before a waypoint at which a turn by 90 degrees begins; 0 on a circle."""
+
+
+def follow_leg(
+    at: L1Motion, leg: L1Leg, since_s: float, memory: L1Memory, has: L1Parameters
+) -> tuple[L1Output, L1Memory]:
+    """The law on a leg.
+
+    Args:
+        at: the aircraft now.
+        leg: where from and where to.
+        since_s: time since the last call on a leg.
+        memory: as the last call left it.
+        has: parameters of the flight.
+
+    Returns:
+        What to fly until the next call, and the memory for it.
+    """
+    fresh, since = since_s > STALE_S, min(since_s, MAX_UPDATE_S)
+    east, north, speed = leg_velocity(at)
+    distance = max(ONE_OVER_PI * has.damping * has.period_s * speed, leg.min_distance_m)
+    leg_east, leg_north, length = leg_direction(at, leg)
+    from_east, from_north = at.east_m - leg.from_east_m, at.north_m - leg.from_north_m
+    left = from_north * leg_east - from_east * leg_north
+    along = from_east * leg_east + from_north * leg_north
+    away = math.sqrt(from_east * from_east + from_north * from_north)
+    to_east, to_north = leg.to_east_m - at.east_m, leg.to_north_m - at.north_m
+
+    integrator, gain = 0.0 if fresh else memory.integrator_rad, memory.last_gain
+    if away > distance and along / max(away, 1.0) < -HALF_RIGHT_SINE:
+        nu, bearing = aim_at(-from_east, -from_north, east, north)
+    elif along > length + PAST_LEG_S * speed:
+        nu, bearing = aim_at(to_east, to_north, east, north)
+    else:
+        sine = left / max(distance, 0.1)
+        intercept = math.asin(min(max(sine, -HALF_RIGHT_SINE), HALF_RIGHT_SINE))
+        if has.integrator_gain <= 0.0 or has.integrator_gain != gain:
+            integrator, gain = 0.0, has.integrator_gain
+        elif abs(intercept) < INTEGRATOR_RANGE_RAD:
+            integrator += intercept * has.integrator_gain * since
+            integrator = min(max(integrator, -INTEGRATOR_LIMIT_RAD), INTEGRATOR_LIMIT_RAD)
+        intercept += integrator
+        across, ahead = north * leg_east - east * leg_north, east * leg_east + north * leg_north
+        nu = intercept + math.atan2(across, ahead)
+        bearing = wrapped(math.atan2(leg_east, leg_north) + intercept)
+    target_cd = bearing_cd(to_east, to_north)
+    nu = decided(nu, memory.last_nu_rad, target_cd, at.yaw_cd)
+    used = min(max(nu, -QUARTER_TURN), QUARTER_TURN)
+    acceleration = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
+    output = L1Output(
+        acceleration,
+        roll_of(acceleration),
+        bearing,
+        used,
+        left,
+        distance,
+        target_cd,
+        False,
+        0.0,
+        min(90.0 * at.eas2tas * at.eas2tas, distance),
+    )
+    return output, L1Memory(nu, integrator, gain)
+
+
+def follow_circle(
+    at: L1Motion, circle: L1Circle, memory: L1Memory, has: L1Parameters
+) -> tuple[L1Output, L1Memory]:
+    """The law on a circle.
+
+    Args:
+        at: the aircraft now.
+        circle: where, how large, which way round.
+        memory: as the last call left it.
+        has: parameters of the flight.
+
+    Returns:
+        What to fly until the next call, and the memory for it.
+    """
+    radius = flown_radius(circle.radius_m, at.eas2tas, has)
+    omega = TWO_PI / has.period_s
+    east, north = at.velocity_east_mps, at.velocity_north_mps
+    over_ground = math.sqrt(east * east + north * north)
+    speed = max(over_ground, MIN_CIRCLE_SPEED_MPS)
+    distance = ONE_OVER_PI * has.damping * has.period_s * speed
+    out_east, out_north = at.east_m - circle.centre_east_m, at.north_m - circle.centre_north_m
+    away = math.sqrt(out_east * out_east + out_north * out_north)
+    target_cd = bearing_cd(circle.centre_east_m - at.east_m, circle.centre_north_m - at.north_m)
+    if away > NEAR_CENTRE_M:
+        out_east, out_north = out_east / away, out_north / away
+    elif over_ground < SLOW_MPS:
+        out_east, out_north = math.sin(at.yaw_rad), math.cos(at.yaw_rad)
+    else:
+        out_east, out_north = east / over_ground, north / over_ground
+    across = out_north * east - out_east * north
+    inwards = -(out_east * east + out_north * north)
+    nu = decided(math.atan2(across, inwards), memory.last_nu_rad, target_cd, at.yaw_cd)
+    used = min(max(nu, -0.5 * math.pi), 0.5 * math.pi)
+    capture = 4.0 * has.damping * has.damping * speed * speed / distance * math.sin(used)
+
+    error = away - radius
+    correction = omega * omega * error - 2.0 * has.damping * omega * inwards
+    around = circle.direction * across
+    if inwards < 0.0 and around < 0.0:
+        # Away from the centre and the wrong way round: never turn away from the circle.
+        correction = max(correction, 0.0)
+    centripetal = around * around / max(0.5 * radius, radius + error)
+    hold = circle.direction * (correction + centripetal)
+    circling = not (error > 0.0 and circle.direction * capture < circle.direction * hold)
+    acceleration = hold if circling else capture
+    output = L1Output(
+        acceleration,
+        roll_of(acceleration),
+        math.atan2(-out_east, -out_north),
+        0.0 if circling else used,
+        error,
+        distance,
+        target_cd,
+        circling,
+        radius,
+        0.0,
+    )
+    return output, L1Memory(nu, memory.integrator_rad, memory.last_gain)
+
+
+def leg_velocity(at: L1Motion) -> tuple[float, float, float]:
+    """East and north of the ground velocity that a leg is flown with, and its speed, m/s."""
+    east, north = at.velocity_east_mps, at.velocity_north_mps
+    speed = math.sqrt(east * east + north * north)
+    if speed < SLOW_MPS or abs(wrapped(math.atan2(east, north) - at.yaw_rad)) >= 0.5 * math.pi:
+        return SLOW_MPS * math.sin(at.yaw_rad), SLOW_MPS * math.cos(at.yaw_rad), SLOW_MPS
+    return east, north, speed
+
+
+def leg_direction(at: L1Motion, leg: L1Leg) -> tuple[float, float, float]:
+    """East and north of a leg's unit direction, and its length, m."""
+    east, north = leg.to_east_m - leg.from_east_m, leg.to_north_m - leg.from_north_m
+    length = math.sqrt(east * east + north * north)
+    if length >= SHORT_LEG_M:
+        return east / length, north / length, length
+    east, north = leg.to_east_m - at.east_m, leg.to_north_m - at.north_m
+    away = math.sqrt(east * east + north * north)
+    if away >= SHORT_LEG_M:
+        return east / away, north / away, length
+    return math.sin(at.yaw_rad), math.cos(at.yaw_rad), length
+
+
+def aim_at(to_east: float, to_north: float, east_mps: float, north_mps: float) -> tuple[float, float]:
+    """Nu towards a point, and the direction to it, rad."""
+    across = north_mps * to_east - east_mps * to_north
+    return math.atan2(across, east_mps * to_east + north_mps * to_north), math.atan2(to_east, to_north)
+
+
+def decided(nu_rad: float, last_nu_rad: float, target_cd: int, yaw_cd: int) -> float:
+    """Nu, or the last one where the target is behind and Nu has just changed sides."""
+    off = (target_cd - yaw_cd) % 36000
+    if off > 18000:
+        off -= 36000
+    behind = abs(nu_rad) > INDECISION_RAD and abs(last_nu_rad) > INDECISION_RAD
+    return last_nu_rad if behind and abs(off) > INDECISION_CD and nu_rad * last_nu_rad < 0.0 else nu_rad
+
+
+def flown_radius(radius_m: float, eas2tas: float, has: L1Parameters) -> float:
+    """The radius of a circle at altitude, m: it grows as the air thins, beyond what the bank limit leaves."""
+    grown = radius_m * eas2tas * eas2tas
+    if has.loiter_bank_limit_rad <= 0.0 or has.target_airspeed_mps <= 0.0:
+        return grown
+    at_sea_level = has.target_airspeed_mps**2 / (GRAVITY_MPS2 * math.tan(has.loiter_bank_limit_rad))
+    return grown if at_sea_level > radius_m else max(at_sea_level * eas2tas * eas2tas, radius_m)
+
+
+def bearing_cd(to_east: float, to_north: float) -> int:
+    """Direction to a point in whole hundredths of a degree, in (-18000, 18000]."""
+    angle = 0.5 * math.pi + math.atan2(-to_north, to_east)
+    if angle < 0.0:
+        angle += 2.0 * math.pi
+    whole = int(angle * 18000.0 / math.pi + 0.5) % 36000
+    return whole - 36000 if whole > 18000 else whole
+
+
+def roll_of(acceleration_mps2: float) -> int:
+    """Roll angle of a coordinated turn in whole hundredths of a degree, cut towards 0."""
+    return int(100.0 * math.degrees(math.atan(acceleration_mps2 / GRAVITY_MPS2)))
+
+
+def wrapped(angle_rad: float) -> float:
+    """The same direction within half a turn of 0, rad."""
+    inside = math.fmod(angle_rad, 2.0 * math.pi)
+    if inside > math.pi:
+        return inside - 2.0 * math.pi
+    if inside < -math.pi:
+        return inside + 2.0 * math.pi
+    return inside

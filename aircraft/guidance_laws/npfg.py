@@ -1,0 +1,387 @@
+"""NPFG: the nonlinear path following guidance that PX4 flies, for light and for excessive wind.
+
+A look-ahead angle bends the wanted course from straight at the path, far away, to along the path. The wind triangle
+turns course into air velocity; where the wind leaves no solution the air velocity fades to one that drifts least. A
+proportional law turns the true air velocity to it, and the path's curvature is fed forward.
+
+Source: T. Stastny and R. Siegwart, "On Flying Backwards: Preventing Run-away of Small, Low-speed, Fixed-wing UAVs in
+Strong Winds", IROS 2019, arXiv 1908.01381; T. Stastny, PhD thesis, ETH Zurich 2020, Paper III; the bounds of the period
+and the floors of small speeds as PX4 1.15 has them. Right is positive: roll, acceleration, curvature, track error.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from aircraft.guidance_laws.key import key
+
+GRAVITY_MPS2 = 9.80665
+FEASIBILITY_BUFFER_MPS = 1.5
+"""A bearing is feasible in full if the airspeed exceeds the wind that must be beaten by this much."""
+SLOW_MPS = 1.0
+"""Below this ground speed the track error bound no longer shrinks in proportion to speed."""
+TRACK_KEEPING_SHARE = 0.5
+"""Share of the track error bound from which on track keeping asks for its full ground speed."""
+MAX_SWITCH_DISTANCE_M = 500.0
+"""Largest distance before a waypoint at which the next leg may begin."""
+SMALL = 1e-6
+"""Time constants, speeds (m/s) and rates (rad/s) below this count as zero."""
+LEAST_DAMPING = 0.5
+"""Below this damping the lower bound of the period for curved paths does not apply."""
+
+
+@dataclass(frozen=True)
+class NpfgConfig:
+    """Keys of `guidance.kind: npfg`; defaults are those of PX4's parameters."""
+
+    period_s: float = key(
+        10.0, "period of the track error's decay (NPFG_PERIOD)", "s", minimum=1.0, maximum=1000.0
+    )
+    damping: float = key(
+        0.7, "damping ratio of the track error's decay (NPFG_DAMPING)", "1", minimum=0.1, maximum=1.0
+    )
+    lower_period_bound: bool = key(
+        True, "lengthen the period to what the roll time constant allows (NPFG_LB_PERIOD)"
+    )
+    upper_period_bound: bool = key(
+        True, "shorten the period to what a curved path in wind needs (NPFG_UB_PERIOD)"
+    )
+    min_ground_speed_on: bool = key(True, "raise the airspeed to keep a least ground speed (NPFG_EN_MIN_GSP)")
+    track_keeping: bool = key(
+        True, "raise the airspeed to stay on the track in excessive wind (NPFG_TRACK_KEEP)"
+    )
+    wind_regulation: bool = key(True, "let the law raise the airspeed at all (NPFG_WIND_REG)")
+    min_ground_speed_mps: float = key(
+        5.0, "least ground speed along the path (FW_GND_SPD_MIN)", "m/s", minimum=0.0
+    )
+    max_track_keeping_speed_mps: float = key(
+        5.0, "largest ground speed that track keeping asks for (NPFG_GSP_MAX_TK)", "m/s", minimum=0.0
+    )
+    roll_time_constant_s: float = key(0.5, "time constant of roll (NPFG_ROLL_TC)", "s", minimum=0.0)
+    switch_distance_multiplier: float = key(
+        0.32,
+        "share of the track error bound at which the next leg begins (NPFG_SW_DST_MLT)",
+        "1",
+        minimum=0.1,
+        maximum=1.0,
+    )
+    period_safety_factor: float = key(
+        1.5,
+        "the lower bound of the period is multiplied by this (NPFG_PERIOD_SF)",
+        "1",
+        minimum=1.0,
+        maximum=10.0,
+    )
+
+    def parameters(
+        self, nominal_airspeed_mps: float, max_airspeed_mps: float, roll_limit_rad: float
+    ) -> NpfgParameters:
+        """What the law needs: these keys and the aircraft's speeds and roll limit."""
+        return NpfgParameters(
+            self.period_s,
+            self.damping,
+            self.lower_period_bound,
+            self.upper_period_bound,
+            self.min_ground_speed_on,
+            self.track_keeping,
+            self.wind_regulation,
+            self.min_ground_speed_mps,
+            self.max_track_keeping_speed_mps,
+            self.roll_time_constant_s,
+            self.switch_distance_multiplier,
+            self.period_safety_factor,
+            roll_limit_rad,
+            nominal_airspeed_mps,
+            max_airspeed_mps,
+        )
+
+
+class NpfgParameters(NamedTuple):
+    """Constants of one flight: the keys of `NpfgConfig`, and what they do not say."""
+
+    period_s: float
+    damping: float
+    lower_period_bound: bool
+    upper_period_bound: bool
+    min_ground_speed_on: bool
+    track_keeping: bool
+    wind_regulation: bool
+    min_ground_speed_mps: float
+    max_track_keeping_speed_mps: float
+    roll_time_constant_s: float
+    switch_distance_multiplier: float
+    period_safety_factor: float
+    roll_limit_rad: float
+    nominal_airspeed_mps: float
+    max_airspeed_mps: float
+
+
+class NpfgInput(NamedTuple):
+    """Where the aircraft is, how it moves over the ground, the wind, and the nearest point of the path."""
+
+    east_m: float
+    north_m: float
+    velocity_east_mps: float
+    velocity_north_mps: float
+    wind_east_mps: float
+    """The direction the wind blows towards."""
+    wind_north_mps: float
+    path_east_m: float
+    path_north_m: float
+    tangent_east: float
+    """The path's unit tangent at that point."""
+    tangent_north: float
+    right_curvature_1pm: float
+    """The path's curvature there, positive for a right turn."""
+
+
+class NpfgOutput(NamedTuple):
+    """The roll command and the air velocity wanted, with every quantity they come from."""
+
+    lateral_acceleration_mps2: float
+    feedforward_mps2: float
+    """The part of a path's curvature, before it is scaled by feasibility and proximity."""
+    roll_rad: float
+    airspeed_mps: float
+    heading_rad: float
+    """Direction of the wanted air velocity."""
+    course_rad: float
+    """Direction of the wanted ground velocity."""
+    track_error_m: float
+    """Distance from the path, positive to its right."""
+    track_error_bound_m: float
+    """From this distance on the law aims straight at the path."""
+    look_ahead_rad: float
+    """0 straight at the path, pi/2 along it."""
+    track_proximity: float
+    """1 on the path, 0 at the bound and beyond."""
+    feasibility: float
+    """Of the bearing: 1 if it can be made good in this wind, 0 if not."""
+    feasibility_on_track: float
+    """Likewise of the path's tangent."""
+    min_ground_speed_mps: float
+    period_s: float
+    """The period within its bounds."""
+    gain_1ps: float
+    time_constant_s: float
+    switch_distance_m: float
+    air_velocity_east_mps: float
+    """The wanted air velocity."""
+    air_velocity_north_mps: float
+
+
+def npfg(at: NpfgInput, has: NpfgParameters) -> NpfgOutput:
+    """The law; it has no memory.
+
+    Args:
+        at: aircraft, wind and path now.
+        has: parameters of the flight.
+
+    Returns:
+        What to fly until the next call.
+    """
+    wind_east, wind_north = at.wind_east_mps, at.wind_north_mps
+    tangent_east, tangent_north = at.tangent_east, at.tangent_north
+    air_east, air_north = at.velocity_east_mps - wind_east, at.velocity_north_mps - wind_north
+    airspeed = math.sqrt(air_east * air_east + air_north * air_north)
+    wind = math.sqrt(wind_east * wind_east + wind_north * wind_north)
+    ground_speed = math.sqrt(at.velocity_east_mps**2 + at.velocity_north_mps**2)
+    error = tangent_north * (at.east_m - at.path_east_m) - tangent_east * (at.north_m - at.path_north_m)
+    on_track = feasibility(airspeed, wind, wind_east, wind_north, tangent_east, tangent_north)
+
+    period = adapted_period(has, abs(error), ground_speed, airspeed, wind, at.right_curvature_1pm, on_track)
+    time_constant = period * has.damping
+    gain = 4.0 * math.pi * has.damping / period
+    bound = track_error_bound(ground_speed, time_constant)
+    share = min(abs(error) / bound, 1.0)
+    look_ahead = look_ahead_angle(share)
+    proximity = math.sin(look_ahead) ** 2
+
+    # The bearing: along the path, less the part that leads back to it.
+    along = math.sin(look_ahead)
+    back = math.cos(look_ahead) if error < 0.0 else -math.cos(look_ahead)
+    bearing_east = along * tangent_east + back * tangent_north
+    bearing_north = along * tangent_north - back * tangent_east
+    bearing = feasibility(airspeed, wind, wind_east, wind_north, bearing_east, bearing_north)
+    combined = bearing * on_track
+    least = min_ground_speed(has, share, combined)
+    wanted_east, wanted_north = air_velocity(
+        has, least, wind, wind_east, wind_north, bearing_east, bearing_north
+    )
+
+    forward = curvature_feedforward(at, airspeed, error)
+    acceleration = turning(gain, airspeed, air_east, air_north, wanted_east, wanted_north)
+    acceleration += combined * proximity * forward
+    roll = math.atan(acceleration / GRAVITY_MPS2)
+    return NpfgOutput(
+        acceleration,
+        forward,
+        min(max(roll, -has.roll_limit_rad), has.roll_limit_rad),
+        math.sqrt(wanted_east * wanted_east + wanted_north * wanted_north),
+        math.atan2(wanted_east, wanted_north),
+        math.atan2(bearing_east, bearing_north),
+        error,
+        bound,
+        look_ahead,
+        proximity,
+        bearing,
+        on_track,
+        least,
+        period,
+        gain,
+        time_constant,
+        min(MAX_SWITCH_DISTANCE_M, has.switch_distance_multiplier * bound),
+        wanted_east,
+        wanted_north,
+    )
+
+
+def feasibility(
+    airspeed_mps: float, wind_mps: float, wind_east: float, wind_north: float, east: float, north: float
+) -> float:
+    """How well a direction over the ground can be made good: 1 in light wind, 0 where the wind is too strong."""
+    against = wind_mps
+    if wind_east * east + wind_north * north >= 0.0:
+        against = abs(wind_north * east - wind_east * north)
+    share = min(max((airspeed_mps - against) / FEASIBILITY_BUFFER_MPS, 0.0), 1.0)
+    return math.sin(0.5 * math.pi * share) ** 2
+
+
+def track_error_bound(ground_speed_mps: float, time_constant_s: float) -> float:
+    """Distance from the path at which the law aims straight at it, m."""
+    if ground_speed_mps > SLOW_MPS:
+        return ground_speed_mps * time_constant_s
+    return 0.5 * time_constant_s * (1.0 + ground_speed_mps * ground_speed_mps)
+
+
+def look_ahead_angle(share: float) -> float:
+    """Angle between the bearing and the shortest way to the path, rad, of the share of the track error bound."""
+    return 0.5 * math.pi * (1.0 - share) ** 2
+
+
+def adapted_period(
+    has: NpfgParameters,
+    distance_m: float,
+    ground_speed_mps: float,
+    airspeed_mps: float,
+    wind_mps: float,
+    curvature_1pm: float,
+    on_track: float,
+) -> float:
+    """The period between what roll can follow and what a curved path in wind needs, s."""
+    if not has.lower_period_bound or has.roll_time_constant_s <= SMALL:
+        return has.period_s
+    rate = abs(curvature_1pm) * airspeed_mps
+    if wind_mps > airspeed_mps or airspeed_mps < SMALL:
+        rate *= 2.0
+    else:
+        rate *= 2.0 * (1.0 - math.sqrt(1.0 - wind_mps / airspeed_mps))
+    straight = math.pi * has.roll_time_constant_s / has.damping
+    curved = straight
+    if rate >= SMALL and has.damping >= LEAST_DAMPING:
+        curved = on_track * 4.0 * math.pi * has.roll_time_constant_s * has.damping
+        curved += (1.0 - on_track) * straight
+    safety = has.period_safety_factor
+    bound = track_error_bound(ground_speed_mps, safety * straight * has.damping)
+    near = math.sin(look_ahead_angle(min(distance_m / bound, 1.0))) ** 2
+    lower = near * safety * curved + (1.0 - near) * safety * straight
+    period = max(has.period_s, lower)
+    if has.upper_period_bound and rate > SMALL and on_track > 0.0:
+        upper = 4.0 * math.pi * has.damping / (rate * on_track)
+        if period > upper:
+            period = near * max(lower, upper) + (1.0 - near) * period
+    return period
+
+
+def min_ground_speed(has: NpfgParameters, share: float, feasible: float) -> float:
+    """The least ground speed along the bearing, m/s: the one of the aircraft, or what track keeping asks for."""
+    least = 0.0
+    if has.wind_regulation and has.min_ground_speed_on:
+        least = has.min_ground_speed_mps
+    if has.wind_regulation and has.track_keeping:
+        eagerness = min(share / TRACK_KEEPING_SHARE, 1.0)
+        least = max(least, (1.0 - feasible) * has.max_track_keeping_speed_mps * eagerness)
+    return least
+
+
+def air_velocity(
+    has: NpfgParameters,
+    least_mps: float,
+    wind_mps: float,
+    wind_east: float,
+    wind_north: float,
+    east: float,
+    north: float,
+) -> tuple[float, float]:
+    """East and north of the air velocity that makes a bearing good, or comes nearest to it, m/s."""
+    along = wind_east * east + wind_north * north
+    across = wind_north * east - wind_east * north
+    nominal, largest = has.nominal_airspeed_mps, has.max_airspeed_mps
+    asks = has.wind_regulation and (has.min_ground_speed_on or has.track_keeping)
+    speed = 0.0  # of the wind triangle; 0: none
+    if asks and least_mps > along:
+        speed = math.sqrt((least_mps - along) ** 2 + across * across)
+        if speed > largest:
+            if not solvable(largest, wind_mps, along, across):
+                return against_wind(largest, wind_mps, wind_east, wind_north, east, north)
+            speed = largest
+        elif speed <= nominal:
+            speed = nominal
+    elif solvable(nominal, wind_mps, along, across):
+        speed = nominal
+    elif not has.wind_regulation:
+        return against_wind(nominal, wind_mps, wind_east, wind_north, east, north)
+    elif not solvable(largest, wind_mps, along, across):
+        return against_wind(largest, wind_mps, wind_east, wind_north, east, north)
+    elif along <= 0.0:
+        return wind_east, wind_north  # as flown: to face the wind it would be the other way round
+    ahead = math.sqrt(max(speed * speed - across * across, 0.0))
+    return ahead * east + across * north, ahead * north - across * east
+
+
+def solvable(airspeed_mps: float, wind_mps: float, along_mps: float, across_mps: float) -> bool:
+    """Whether the wind triangle has a solution that moves along the bearing."""
+    return abs(across_mps) < airspeed_mps and (along_mps > 0.0 or wind_mps < airspeed_mps)
+
+
+def against_wind(
+    airspeed_mps: float, wind_mps: float, wind_east: float, wind_north: float, east: float, north: float
+) -> tuple[float, float]:
+    """The air velocity where a bearing cannot be made good: it drifts least, and fades to the wind triangle, m/s."""
+    reach = math.sqrt(max(wind_mps * wind_mps - airspeed_mps * airspeed_mps, 0.0))
+    to_east, to_north = reach * east - wind_east, reach * north - wind_north
+    length = math.sqrt(to_east * to_east + to_north * to_north)
+    scale = airspeed_mps / length if length > 0.0 else 0.0
+    return scale * to_east, scale * to_north
+
+
+def curvature_feedforward(at: NpfgInput, airspeed_mps: float, error_m: float) -> float:
+    """Lateral acceleration that holds the path's curvature in the wind, m/s^2."""
+    curvature = at.right_curvature_1pm
+    if curvature == 0.0:
+        return 0.0
+    # On the circle through the aircraft, which has no less than half of the path's radius.
+    curvature /= max(1.0 - curvature * error_m, 0.5 * abs(curvature))
+    along = at.wind_east_mps * at.tangent_east + at.wind_north_mps * at.tangent_north
+    across = at.wind_north_mps * at.tangent_east - at.wind_east_mps * at.tangent_north
+    ahead = math.sqrt(max(airspeed_mps * airspeed_mps - across * across, 0.0))
+    speed = at.velocity_east_mps * at.tangent_east + at.velocity_north_mps * at.tangent_north
+    return airspeed_mps * (1.0 + along / max(ahead, SMALL)) * curvature * max(speed, 0.0)
+
+
+def turning(
+    gain_1ps: float,
+    airspeed_mps: float,
+    air_east: float,
+    air_north: float,
+    wanted_east: float,
+    wanted_north: float,
+) -> float:
+    """Lateral acceleration that turns the air velocity to the wanted one, m/s^2."""
+    across = air_north * wanted_east - air_east * wanted_north
+    if air_east * wanted_east + air_north * wanted_north < 0.0:
+        return gain_1ps * airspeed_mps * (-1.0 if across < 0.0 else 1.0)
+    length = math.sqrt(wanted_east * wanted_east + wanted_north * wanted_north)
+    return gain_1ps * across / length if length > 0.0 else 0.0

@@ -1,0 +1,102 @@
+"""Pure pursuit: the circle through the aircraft, along its course, and through a point of the path ahead.
+
+Source: R. C. Coulter, "Implementation of the Pure Pursuit Path Tracking Algorithm", CMU-RI-TR-92-01, 1992: the arc to a
+goal point at the look-ahead distance L has the curvature 2 x / L^2, with x the goal's offset across the course. As a
+lateral acceleration this is 2 V^2 / L sin(eta), that of S. Park, J. Deyst and J. P. How, AIAA 2004-4900. Right is
+positive: roll, acceleration, curvature.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from aircraft.guidance_laws.key import key
+
+GRAVITY_MPS2 = 9.80665
+LEAST_CRAB_COSINE = 0.2
+"""Least cosine of the angle between course and heading with which bank is worked out."""
+SLOW_MPS = 1.0
+"""Ground speeds below this count as this."""
+
+
+@dataclass(frozen=True)
+class PurePursuitConfig:
+    """Keys of `guidance.kind: pure_pursuit`."""
+
+    look_ahead_s: float | None = key(
+        None,
+        "look-ahead distance in flying time over the ground; default: 2.8 over the aircraft's guidance bandwidth",
+        "s",
+        above=0.0,
+    )
+    min_look_ahead_m: float = key(1.0, "least look-ahead distance", "m", above=0.0)
+
+    def parameters(self, bandwidth_radps: float) -> PurePursuitParameters:
+        """What the law needs: these keys and the aircraft's bandwidth."""
+        ahead = 2.0 * math.sqrt(2.0) / bandwidth_radps if self.look_ahead_s is None else self.look_ahead_s
+        return PurePursuitParameters(ahead, self.min_look_ahead_m)
+
+
+class PurePursuitParameters(NamedTuple):
+    """Constants of one flight."""
+
+    look_ahead_s: float
+    min_look_ahead_m: float
+
+
+class PurePursuitOutput(NamedTuple):
+    """The turn towards the goal point."""
+
+    lateral_acceleration_mps2: float
+    """Across the course."""
+    right_curvature_1pm: float
+    """Of the arc to the goal point, positive for a right turn."""
+    roll_rad: float
+    """Bank of a coordinated turn with this acceleration at the crab angle of now, not limited."""
+
+
+def look_ahead_distance(
+    velocity_east_mps: float, velocity_north_mps: float, has: PurePursuitParameters
+) -> float:
+    """How far ahead the goal point is sought, m."""
+    speed = math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps)
+    return max(speed * has.look_ahead_s, has.min_look_ahead_m)
+
+
+def pure_pursuit(
+    to_goal_east_m: float,
+    to_goal_north_m: float,
+    velocity_east_mps: float,
+    velocity_north_mps: float,
+    heading_rad: float,
+    look_ahead_m: float,
+) -> PurePursuitOutput:
+    """The law; it has no memory.
+
+    Args:
+        to_goal_east_m: the way from the aircraft to the goal point.
+        to_goal_north_m: likewise.
+        velocity_east_mps: ground velocity.
+        velocity_north_mps: likewise.
+        heading_rad: of the nose.
+        look_ahead_m: the look-ahead distance; of the goal only the direction counts beside it. To one more than a
+            right angle off the course the turn is as hard as to one at a right angle.
+
+    Returns:
+        Acceleration, curvature and roll.
+    """
+    east, north = velocity_east_mps, velocity_north_mps
+    speed = max(math.sqrt(east * east + north * north), SLOW_MPS)
+    away = math.sqrt(to_goal_east_m * to_goal_east_m + to_goal_north_m * to_goal_north_m)
+    sine = 0.0
+    if away > 0.0:
+        sine = (north * to_goal_east_m - east * to_goal_north_m) / (speed * away)
+        if east * to_goal_east_m + north * to_goal_north_m < 0.0:
+            sine = -1.0 if sine < 0.0 else 1.0
+    curvature = 2.0 * sine / look_ahead_m
+    acceleration = speed * speed * curvature
+    ahead = (east * math.sin(heading_rad) + north * math.cos(heading_rad)) / speed
+    roll = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead, LEAST_CRAB_COSINE)))
+    return PurePursuitOutput(acceleration, curvature, roll)

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from aircraft.guidance_laws.npfg import NpfgConfig, NpfgInput, npfg
+from aircraft.guidance_laws.pure_pursuit import (
+    PurePursuitConfig,
+    look_ahead_distance,
+    pure_pursuit,
+)
+from aircraft.guidance_laws.vector_field import (
+    Motion,
+    VectorFieldConfig,
+    follow_line,
+    follow_orbit,
+    line_course,
+)
+
+GRAVITY_MPS2 = 9.80665
+FIELD = VectorFieldConfig().parameters(25.0, 0.6, math.radians(45.0), 0.1)
+
+
+def test_the_field_of_a_line_is_that_of_the_book() -> None:
+    # chi = chi_q - chi_inf 2/pi atan(k_path e)
+    gain = FIELD.path_gain_1pm
+    assert gain == pytest.approx(0.01, rel=0.01)
+    assert line_course(1.0 / gain, 0.0, 1.0, FIELD) == pytest.approx(-math.radians(25.0))
+    assert line_course(1e9, 1.0, 0.0, FIELD) == pytest.approx(math.radians(40.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_on_an_orbit_the_bank_is_that_of_the_turn(direction: float) -> None:
+    at = Motion(0.0, 200.0, 25.0 * direction, 0.0, 0.5 * math.pi * direction)
+    output = follow_orbit(at, 0.0, 0.0, 200.0, direction, 0.0, FIELD)
+    assert output.error_m == 0.0
+    assert output.roll_rad == pytest.approx(direction * math.atan(625.0 / (GRAVITY_MPS2 * 200.0)))
+
+
+def test_far_from_an_orbit_the_field_leads_to_its_centre() -> None:
+    at = Motion(0.0, 1e7, 0.0, -25.0, math.pi)
+    output = follow_orbit(at, 0.0, 0.0, 200.0, 1.0, 0.0, FIELD)
+    assert math.cos(output.course_rad) == pytest.approx(-1.0, abs=1e-6)
+
+
+def test_the_integrator_waits_while_the_roll_is_cut() -> None:
+    at = Motion(5000.0, 0.0, 0.0, 25.0, 0.0)
+    output = follow_line(at, 0.0, 0.0, 0.0, 1.0, 0.01, FIELD)
+    assert output.saturated
+    assert output.integral_rad == 0.01
+    assert output.roll_rad == pytest.approx(-math.radians(45.0))
+
+
+def test_pure_pursuit_turns_on_the_arc_through_the_goal() -> None:
+    # The goal on a circle of 300 m that the aircraft is on: the arc is that circle.
+    angle = 0.4
+    east, north = 300.0 * (1.0 - math.cos(angle)), 300.0 * math.sin(angle)
+    output = pure_pursuit(east, north, 0.0, 20.0, 0.0, math.hypot(east, north))
+    assert output.right_curvature_1pm == pytest.approx(1.0 / 300.0)
+    assert output.roll_rad == pytest.approx(math.atan(400.0 / (300.0 * GRAVITY_MPS2)))
+
+
+def test_pure_pursuit_looks_ahead_by_time() -> None:
+    has = PurePursuitConfig().parameters(0.5)
+    assert look_ahead_distance(12.0, 16.0, has) == pytest.approx(20.0 * 4.0 * math.sqrt(2.0))
+
+
+def test_npfg_on_its_path_in_calm_air_asks_for_the_curvature() -> None:
+    at = NpfgInput(0.0, 0.0, 0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0 / 150.0)
+    output = npfg(at, NpfgConfig().parameters(25.0, 30.0, math.radians(50.0)))
+    assert output.lateral_acceleration_mps2 == pytest.approx(625.0 / 150.0)
+    assert output.track_proximity == 1.0
+
+
+def test_npfg_flies_nowhere_slower_than_the_wind_allows() -> None:
+    # A wind of twice the airspeed, against the path: the nose stays in the wind.
+    at = NpfgInput(0.0, 0.0, 0.0, -25.0, 0.0, -50.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    output = npfg(at, NpfgConfig().parameters(25.0, 25.0, math.radians(50.0)))
+    assert output.feasibility == 0.0
+    assert output.heading_rad == pytest.approx(0.0, abs=1e-9)
+    assert output.airspeed_mps == pytest.approx(25.0)
