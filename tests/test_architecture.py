@@ -33,6 +33,9 @@ ALLOWED = {
         "yaml",
         "matplotlib",
         "jinja2",
+        "fastkml",
+        "foxglove_schemas_protobuf",
+        "mcap_protobuf",
         "distributed",
         "planner",
         "aircraft",
@@ -53,6 +56,8 @@ ONLY_IN = {
         "harness/falsify/search.py",
     ),
     "distributed": ("harness/campaign/workers.py",),
+    "mcap_protobuf": ("harness/run_files/exports/recordings.py",),
+    "foxglove_schemas_protobuf": ("harness/run_files/exports/recordings.py",),
     "numba": ("planner/compiled.py",),
     "ompl": ("planner/baselines/dubins_tree.py",),
     "harness.cli.app": ("harness/__main__.py",),
@@ -70,6 +75,9 @@ LATE = {
     "jinja2": ("harness/report/page.py",),
     "ompl": (),
     "distributed": (),
+    "fastkml": (),
+    "mcap_protobuf": (),
+    "foxglove_schemas_protobuf": (),
 }
 
 LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {

@@ -1,19 +1,22 @@
-"""The command `export`: a run's path for other tools."""
+"""The command `export`: a run for other tools."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
 from harness.cli.options import bad_input
+from harness.cli.standard_output import to_nowhere
 
 
 def export(
     run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A run folder.")],
     form: Annotated[
-        Literal["plan", "waypoints", "geojson", "kml", "acmi"], typer.Option("--format", help="The format.")
+        Literal["plan", "waypoints", "geojson", "kml", "gpx", "csv", "acmi", "mcap"],
+        typer.Option("--format", help="The format."),
     ],
     what: Annotated[Literal["flown", "planned"], typer.Option(help="The track, or the plans in effect.")] = (
         "flown"
@@ -22,19 +25,27 @@ def export(
         float,
         typer.Option(metavar="T", min=0.0, help="Points nearer to the path, seen from above, are left out."),
     ] = 0.25,
+    ground_m: Annotated[
+        float | None,
+        typer.Option(
+            metavar="G",
+            help="Altitude of the ground at both ends: a plan or a waypoints file then begins with a takeoff and ends "
+            "with a landing.",
+        ),
+    ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: standard output.")] = None,
 ) -> int:
-    """Writes the flown or planned path for QGroundControl, MAVLink, maps (GeoJSON, KML) or Tacview (ACMI).
+    """Writes a run for QGroundControl, MAVLink, maps, GPS tools, spreadsheets, Tacview (acmi) or Foxglove (mcap).
 
     For example: wayproof export runs/my_run --format plan --out way.plan
     """
     from harness.files.errors import RunFolderError
     from harness.files.input_file import InputError
-    from harness.run_files.path_export import exported
+    from harness.run_files.exports.export import exported
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
     try:
-        text = exported(load_run(run_dir), form, what, tolerance_m)
+        file = exported(load_run(run_dir), form, what, tolerance_m, ground_m)
     except InputError:
         raise
     except RunFolderError as error:
@@ -42,7 +53,18 @@ def export(
     except WRONG_CONTENT as error:
         raise bad_input(damaged(run_dir, error)) from error
     if out is None:
-        typer.echo(text, nl=False)
+        _write(file.content)
     else:
-        out.write_text(text, encoding="utf-8", newline="\n")
+        out.write_bytes(file.content)
+    if file.left_out is not None:
+        typer.echo(file.left_out, err=True)
     return 0
+
+
+def _write(content: bytes) -> None:
+    """Writes to standard output, where a reader that goes away is no fault."""
+    try:
+        sys.stdout.buffer.write(content)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        to_nowhere(sys.stdout)

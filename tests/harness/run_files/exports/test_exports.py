@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
 from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
+from xml.etree import ElementTree
 
-import fastkml
 import geojson
+import gpxpy
 import numpy as np
 import pytest
 import shapely
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 from pydantic import BaseModel, ConfigDict, Field
 from pymavlink import mavwp
 from pyproj import CRS, Geod, Transformer
+from scipy.spatial.transform import Rotation
 
 from harness.cli.app import main
 from harness.flight.record import FloatArray
+from harness.run_files.exports.exported_path import planned_points
 from harness.run_files.run_folder import Run, load_run
-from harness.run_files.run_paths import planned_points
 from harness.scenario.scenario import parse_scenario
 
 Export = Callable[..., str]
@@ -69,7 +76,7 @@ def in_plane(run: Run, latitude_deg: list[float], longitude_deg: list[float]) ->
 def line_of(run: Run, what: str) -> shapely.LineString:
     """What should have been exported."""
     flown = np.column_stack((run.track.east_m, run.track.north_m))
-    return shapely.LineString(planned_points(run) if what == "planned" else flown)
+    return shapely.LineString(planned_points(run)[0] if what == "planned" else flown)
 
 
 def assert_same_line(points: FloatArray, line: shapely.LineString) -> None:
@@ -107,8 +114,8 @@ class PlanMission(BaseModel):
 
 class PlanFence(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid")
-    circles: list[float]
-    polygons: list[float]
+    circles: list[dict[str, Any]]
+    polygons: list[dict[str, Any]]
     version: Literal[2]
 
 
@@ -161,27 +168,156 @@ def test_geojson_is_read_by_geojson(what: str, export: Export, run: Run) -> None
     longitude, latitude, altitude = zip(*feature.geometry.coordinates, strict=True)
     assert_same_line(in_plane(run, list(latitude), list(longitude)), line_of(run, what))
     assert np.array(altitude) == pytest.approx(450.0, abs=1.0)
+    figures = feature.properties.pop("coordinateProperties")
     assert feature.properties == {"name": "far", "what": what, "airspeed_mps": 25.0}
+    assert {len(column) for column in figures.values()} == {len(longitude)}
+    assert figures["time_s"] == sorted(figures["time_s"])
+    assert_dates(figures["times"], figures["time_s"], run)
+    assert ("clearance_m" in figures) is (what == "flown")
 
 
 @pytest.mark.parametrize("what", ["flown", "planned"])
-def test_kml_is_read_by_fastkml(what: str, export: Export, run: Run) -> None:
-    document = fastkml.KML.parse(export("kml", what), strict=True)
-    (placemark,) = fastkml.utils.find_all(document, of_type=fastkml.Placemark)
-    assert isinstance(placemark, fastkml.Placemark)
-    assert placemark.name == f"far, {what}"
-    line = placemark.kml_geometry
-    assert isinstance(line, fastkml.LineString)
-    assert line.geometry is not None
-    assert line.altitude_mode == fastkml.enums.AltitudeMode.absolute
-    longitude, latitude, altitude = zip(*line.geometry.coords, strict=True)
-    assert_same_line(in_plane(run, list(latitude), list(longitude)), line_of(run, what))
+def test_kml_is_what_the_standard_says(what: str, export: Export, run: Run) -> None:
+    names = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
+    root = ElementTree.parse(export("kml", what)).getroot()
+    (placemark,) = root.findall(".//k:Placemark", names)
+    assert placemark.findtext("k:name", None, names) == f"far, {what}"
+    assert [data.get("name") for data in placemark.iterfind(".//k:Data", names)] == [
+        "airspeed_mps",
+        "altitude_m",
+        "flight_time_s",
+    ]
+    if what == "planned":
+        (line,) = placemark.findall("k:LineString", names)
+        rows = [row.split(",") for row in (line.findtext("k:coordinates", "", names)).split()]
+    else:
+        (line,) = placemark.findall("gx:Track", names)
+        rows = [(row.text or "").split() for row in line.iterfind("gx:coord", names)]
+        whens = [datetime.fromisoformat(when.text or "") for when in line.iterfind("k:when", names)]
+        assert len(whens) == len(rows)
+        assert abs(whens[0] - datetime.fromisoformat(str(run.manifest["started_utc"]))).total_seconds() < 1.0
+        flight_s = (whens[-1] - whens[0]).total_seconds()
+        assert flight_s == pytest.approx(run.metrics["flight_time_s"], abs=1.0)
+    assert line.findtext("k:altitudeMode", None, names) == "absolute"
+    longitude, latitude, altitude = np.array(rows, dtype=np.float64).T.tolist()
+    assert_same_line(in_plane(run, latitude, longitude), line_of(run, what))
     assert np.array(altitude) == pytest.approx(450.0, abs=1.0)
+
+
+def assert_dates(dates: list[str], times_s: list[float], run: Run) -> None:
+    """Dates are the run's start and the simulated time since."""
+    started = datetime.fromisoformat(str(run.manifest["started_utc"]))
+    since = [(datetime.fromisoformat(date) - started).total_seconds() for date in dates]
+    assert since == pytest.approx(times_s, abs=2e-3)
+
+
+@pytest.mark.parametrize("what", ["flown", "planned"])
+def test_gpx_is_read_by_gpxpy(what: str, export: Export, run: Run) -> None:
+    document = gpxpy.parse(Path(export("gpx", what)).read_text(), version="1.1")
+    ((segment,),) = (track.segments for track in document.tracks)
+    assert [track.name for track in document.tracks] == [f"far, {what}"]
+    places = [[getattr(point, name) for point in segment.points] for name in ("latitude", "longitude")]
+    assert_same_line(in_plane(run, *places), line_of(run, what))
+    heights = [point.elevation for point in segment.points]
+    assert heights == pytest.approx([450.0] * len(heights), abs=1.0)
+    assert document.length_2d() == pytest.approx(run.metrics["flown_length_m"], rel=0.01)
+    times = [point.time for point in segment.points if point.time is not None]
+    assert len(times) == len(heights)
+    assert times == sorted(times)
+    assert (times[-1] - times[0]).total_seconds() == pytest.approx(run.metrics["flight_time_s"], rel=0.01)
+
+
+@pytest.mark.parametrize("what", ["flown", "planned"])
+def test_csv_is_read_by_numpy(what: str, export: Export, run: Run) -> None:
+    table = np.genfromtxt(export("csv", what, "--tolerance-m", "0"), delimiter=",", names=True)
+    assert table.dtype.names is not None
+    assert table.dtype.names[:6] == ("x_m", "y_m", "altitude_m", "latitude_deg", "longitude_deg", "time_s")
+    points = np.column_stack((table["x_m"], table["y_m"]))
+    assert_same_line(points, line_of(run, what))
+    degrees = in_plane(run, table["latitude_deg"].tolist(), table["longitude_deg"].tolist())
+    assert np.hypot(*(degrees - points).T).max() < 1e-2
+    if what == "flown":
+        rows = np.searchsorted(run.track.time_s, table["time_s"])
+        for name in table.dtype.names[6:]:
+            assert table[name] == pytest.approx(getattr(run.track, name)[rows], nan_ok=True), name
+
+
+def test_mcap_is_read_by_mcap_and_by_rerun(export: Export, run: Run, tmp_path: Path) -> None:
+    file = Path(export("mcap"))
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        messages = [
+            (channel.topic, message.log_time, decoded)
+            for _, channel, message, decoded in reader.iter_decoded_messages()
+        ]
+    assert summary is not None
+    assert {
+        channel.topic: summary.schemas[channel.schema_id].name for channel in summary.channels.values()
+    } == {
+        "/aircraft/pose": "foxglove.PoseInFrame",
+        "/aircraft/location": "foxglove.LocationFix",
+        "/plan": "foxglove.SceneUpdate",
+        "/world": "foxglove.SceneUpdate",
+        "/log": "foxglove.Log",
+    }
+    poses = [decoded.pose for topic, _, decoded in messages if topic == "/aircraft/pose"]
+    assert [pose.position.x for pose in poses] == run.track.east_m.tolist()
+    assert [pose.position.y for pose in poses] == run.track.north_m.tolist()
+    turns = Rotation.from_quat([[getattr(pose.orientation, axis) for axis in "xyzw"] for pose in poses])
+    nose, left_wing = turns.apply([1.0, 0.0, 0.0]), turns.apply([0.0, 1.0, 0.0])
+    assert np.degrees(np.arctan2(nose[:, 0], nose[:, 1])) % 360.0 == pytest.approx(run.track.heading_deg)
+    assert np.degrees(np.arcsin(nose[:, 2])) == pytest.approx(run.track.pitch_deg)
+    banked = np.abs(run.track.roll_deg) > 5.0
+    assert banked.any()
+    assert (np.sign(left_wing[banked, 2]) == np.sign(run.track.roll_deg[banked])).all()
+    fixes = [decoded for topic, _, decoded in messages if topic == "/aircraft/location"]
+    places = in_plane(run, [fix.latitude for fix in fixes], [fix.longitude for fix in fixes])
+    assert np.hypot(*(places - np.column_stack((run.track.east_m, run.track.north_m))).T).max() < 1e-2
+    times = [time_ns for topic, time_ns, _ in messages if topic == "/aircraft/pose"]
+    assert np.diff(times) / 1e9 == pytest.approx(np.diff(run.track.time_s), abs=1e-6)
+    rerun = str(Path(sys.executable).with_name("rerun"))
+    command = [rerun, "mcap", "convert", str(file), "-o", str(tmp_path / "a.rrd")]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert "error" not in said.stderr.lower()
+    assert (tmp_path / "a.rrd").stat().st_size > 10_000
+
+
+def test_a_plan_with_a_ground_takes_off_and_lands(export: Export, run: Run) -> None:
+    loader = mavwp.MAVWPLoader()
+    loader.load(export("waypoints", "flown", "--ground-m", "120"))
+    items = [loader.wp(i) for i in range(loader.count())]
+    assert [item.command for item in (*items[:3], *items[-3:])] == [16, 22, 16, 189, 31, 21]
+    assert [item.z for item in (items[0], items[1], items[-2], items[-1])] == [120.0, 450.0, 160.0, 120.0]
+    place = in_plane(run, [item.x for item in items], [item.y for item in items])
+    climb_m, glide_m = (math.dist(place[a], place[b]) for a, b in ((0, 1), (-2, -1)))
+    assert math.degrees(math.atan2(330.0, climb_m)) == pytest.approx(8.0, abs=0.1)
+    assert math.degrees(math.atan2(40.0, glide_m)) == pytest.approx(5.0, abs=0.1)
+    plan = Plan.model_validate_json(Path(export("plan", "planned", "--ground-m", "120")).read_text())
+    assert [item.command for item in plan.mission.items][-3:] == [189, 31, 21]
+    assert plan.mission.plannedHomePosition[2] == 120.0
+
+
+def test_fences_of_a_plan_are_the_area_and_what_stands_in_it(export: Export, run: Run) -> None:
+    fence = Plan.model_validate_json(Path(export("plan")).read_text()).geoFence
+    (area,) = fence.polygons
+    assert area["inclusion"] is True
+    corners = in_plane(run, *(list(column) for column in zip(*area["polygon"], strict=True)))
+    assert corners == pytest.approx(
+        np.array([[80e3, 60e3], [88e3, 60e3], [88e3, 68e3], [80e3, 68e3]]), abs=0.01
+    )
+    (circle,) = fence.circles
+    assert circle["inclusion"] is False
+    assert circle["circle"]["radius"] == 400.0
+    (centre,) = in_plane(run, *([value] for value in circle["circle"]["center"]))
+    assert centre == pytest.approx([83500.0, 63600.0], abs=0.01)
 
 
 def test_planned_path_goes_on_where_one_plan_takes_over_from_another(run: Run) -> None:
     assert len(run.plans) > 5
-    steps = np.diff(planned_points(run), axis=0)
+    points, rows = planned_points(run)
+    assert (np.diff(rows) > 0).all()
+    steps = np.diff(points, axis=0)
     length = np.hypot(*steps.T)
     assert length.min() > 0.5
     assert length.max() < 10.0
@@ -222,7 +358,7 @@ def test_acmi_has_every_row_with_true_heading(export: Export, run: Run) -> None:
 
 
 @pytest.mark.parametrize("what", ["flown", "planned"])
-@pytest.mark.parametrize("form", ["plan", "waypoints", "geojson"])
+@pytest.mark.parametrize("form", ["plan", "waypoints", "geojson", "csv"])
 def test_what_is_exported_can_be_checked_and_is_trackable(
     form: str, what: str, export: Export, run: Run, tmp_path: Path
 ) -> None:
@@ -257,8 +393,13 @@ def test_standard_output_has_the_file_and_nothing_else(
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--format", "acmi", "--what", "planned"], "an ACMI file holds what was flown; a plan has no times"),
+        (
+            ["--format", "acmi", "--what", "planned"],
+            "a file of the format acmi holds the whole flight; leave --what out",
+        ),
         (["--format", "shapefile"], "'shapefile' is not one of"),
+        (["--format", "gpx", "--ground-m", "3"], "--ground-m adds takeoff and landing to a mission"),
+        (["--format", "plan", "--ground-m", "450"], "--ground-m is 450 m, the run flew at 450 m"),
         (["--format", "kml", "--tolerance-m", "-1"], "greater than or equal to 0"),
         ([], "Missing option"),
     ],

@@ -1,0 +1,1 @@
+"""A run in the files of other tools: missions, maps, tables, recordings."""
