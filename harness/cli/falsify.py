@@ -58,7 +58,10 @@ def falsify(
     ] = None,
     as_json: JsonOption = False,
 ) -> int:
-    """The mildest condition that makes the run fail, and the scenario that does.
+    """Look for the mildest condition that makes the run fail, and write the scenario that does.
+
+    The answer is the mildest failure found: with one key no failing stretch wider than the widest untried gap,
+    which is printed, is missed; more --runs make that gap smaller.
 
     LO is the mild end; LO > HI where smaller is harder. Of several keys, a condition is as hard as the key that is
     furthest from its mild end.
@@ -101,7 +104,7 @@ def _search(
     def loaded(replaced: Any) -> Scenario:
         return load(scenario, [*fixed, *replaced])
 
-    varied = vary_of(loaded, ranges, [name for name, _ in fixed])
+    varied = vary_of(loaded, ranges, [name for name, _ in fixed], tolerance)
     folder = out or Path("runs") / loaded(()).name / _folder_name(varied)
     flights = 0
 

@@ -29,6 +29,23 @@ Flown: TypeAlias = Callable[[Scenario], Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
+class Band:
+    """Conditions of one key that were tried one beside the other and had the same outcome.
+
+    Attributes:
+        failed: whether they failed.
+        mildest: the value of the mildest.
+        hardest: the value of the hardest.
+        conditions: how many.
+    """
+
+    failed: bool
+    mildest: float
+    hardest: float
+    conditions: int
+
+
+@dataclass(frozen=True)
 class Breaking:
     """What was found.
 
@@ -39,12 +56,17 @@ class Breaking:
         until: what was looked for.
         vary: the keys.
         tolerance: a displacement was narrowed down to this.
-        conditions: how many were tried.
-        settled: whether the search came to its end within its conditions.
+        allowed: at most so many conditions were to be tried.
+        conditions: how many were tried. Fewer than allowed where nothing was left to try.
+        settled: whether the search did all its steps within its conditions, and narrowed down what failed.
         evolved: conditions that were tried away from the diagonal by differential evolution.
         verdict: `found`, `not_found` or `fails_at_the_mild_end`.
-        found: the flight that failed under the mildest condition.
+        found: the flight that failed under the mildest condition of those tried.
         passes: values of the hardest condition that passed and is no harder in any key.
+        passes_above: values of the hardest condition that passed and is no milder in any key.
+        milder: how many milder conditions were tried. All passed.
+        widest_gap: with one key, the two neighbouring values with most room between them that no flight has
+            tried, of all up to the mildest failure.
         not_monotone: how many pairs there are of a condition that failed and one, harder or equal in every
             key, that passed.
         example: values of such a pair.
@@ -57,15 +79,32 @@ class Breaking:
     until: Until
     vary: tuple[Vary, ...]
     tolerance: float
+    allowed: int
     conditions: int
     settled: bool
     evolved: int
     verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
     found: Trial | None
     passes: tuple[float, ...] | None
+    passes_above: tuple[float, ...] | None
+    milder: int
+    widest_gap: tuple[float, float] | None
     not_monotone: int
     example: tuple[tuple[float, ...], tuple[float, ...]] | None
     trials: tuple[Trial, ...]
+
+    @property
+    def bands(self) -> tuple[Band, ...]:
+        """With one key, every condition tried: neighbours with the same outcome make a band, mild ones first."""
+        verdicts: dict[tuple[Point, float], bool] = {}
+        for each in self.trials:
+            condition = each.displacement, each.values[0]
+            verdicts[condition] = verdicts.get(condition, False) or each.failed
+        bands = []
+        for failed, group in itertools.groupby(sorted(verdicts.items()), key=lambda item: item[1]):
+            values = [value for (_, value), _ in group]
+            bands.append(Band(failed, values[0], values[-1], len(values)))
+        return tuple(bands)
 
     def plain(self) -> dict[str, Any]:
         """The content of `falsify.json`: all but the flights, which are in `falsify.csv`."""
@@ -76,6 +115,7 @@ class Breaking:
             "complete": True,
             "command": command,
             **content,
+            "bands": [asdict(each) for each in self.bands] if len(self.vary) == 1 else None,
             "flights": len(self.trials),
         }
 
@@ -135,7 +175,7 @@ def falsify(
     with SearchFolder(out, vary) as folder:
         searched = _searched(judge, vary, conditions, tolerance, base.seed)
         folder.take_over()
-        result = _breaking(base, vary, until, tolerance, searched, trials)
+        result = _breaking(base, vary, until, conditions, tolerance, searched, trials)
         if result.found is not None:
             failing = scenario_at(load, vary, result.found.displacement)
             (out / FALSIFIED).write_text(
@@ -193,6 +233,7 @@ def _breaking(
     base: Scenario,
     vary: Sequence[Vary],
     until: Until,
+    allowed: int,
     tolerance: float,
     searched: Searched,
     trials: Sequence[Trial],
@@ -201,6 +242,7 @@ def _breaking(
         return tuple(each.value(place) for each, place in zip(vary, point, strict=True))
 
     mildest, passed, pairs = searched.mildest, searched.passed_below, searched.not_monotone
+    above, gap = searched.passed_above, searched.widest_gap
     found = next((each for each in trials if each.failed and each.displacement == mildest), None)
     example = (values(pairs[0][0]), values(pairs[0][1])) if pairs else None
     return Breaking(
@@ -210,6 +252,7 @@ def _breaking(
         until=until,
         vary=tuple(vary),
         tolerance=tolerance,
+        allowed=allowed,
         conditions=len(searched.verdicts),
         settled=searched.settled,
         evolved=searched.evolved,
@@ -220,6 +263,9 @@ def _breaking(
         else "fails_at_the_mild_end",
         found=found,
         passes=values(passed) if passed else None,
+        passes_above=values(above) if above else None,
+        milder=searched.milder,
+        widest_gap=(vary[0].value(gap[0]), vary[0].value(gap[1])) if gap else None,
         not_monotone=len(pairs),
         example=example,
         trials=tuple(trials),

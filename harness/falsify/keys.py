@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import math
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
@@ -26,27 +28,33 @@ class Vary:
         mild: its mild end.
         hard: its hard end; below `mild` where smaller is harder.
         whole: whether it takes whole numbers alone.
+        decimals: places after the point to which a value between the ends is rounded before it is flown.
     """
 
     key: str
     mild: float
     hard: float
     whole: bool = False
+    decimals: int | None = None
 
     def value(self, displacement: float) -> float:
         """Its value at a displacement from 0 (mild) to 1 (hard)."""
-        value = self.hard if displacement == 1.0 else self.mild + displacement * (self.hard - self.mild)
-        return round(value) if self.whole else value
+        if displacement in (0.0, 1.0):
+            return self.hard if displacement else self.mild
+        value = self.mild + displacement * (self.hard - self.mild)
+        if self.whole:
+            return round(value)
+        return value if self.decimals is None else round(value, self.decimals)
 
     def snapped(self, displacement: float) -> float:
-        """The displacement of the value that is flown in place of one that is not whole."""
-        return (
-            (self.value(displacement) - self.mild) / (self.hard - self.mild) if self.whole else displacement
-        )
+        """The displacement of the value that is flown in place of one that is not whole, or not rounded."""
+        if displacement in (0.0, 1.0) or not (self.whole or self.decimals is not None):
+            return displacement
+        return (self.value(displacement) - self.mild) / (self.hard - self.mild)
 
 
 def vary_of(
-    load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = ()
+    load: Load, given: Sequence[tuple[str, float, float]], fixed: Sequence[str] = (), tolerance: float = 0.01
 ) -> tuple[Vary, ...]:
     """The keys to vary, once every combination of their ends has been found to be a scenario.
 
@@ -54,6 +62,8 @@ def vary_of(
         load: makes the scenario.
         given: key path, mild end and hard end of each.
         fixed: paths of keys that have been given a value.
+        tolerance: a displacement is narrowed down to this share of its range; values are flown rounded to a
+            hundredth of that, so that what is printed is what was flown.
 
     Raises:
         InputError: too many keys, one twice, with a value or without a range, or an end that makes no scenario.
@@ -77,8 +87,11 @@ def vary_of(
             raise InputError(
                 f"command line: --vary {key}: both ends are {mild:g}; give two, as {key}=0:{mild or 1:g}"
             )
-    first = load([(key, _text(mild)) for key, mild, _ in given])
-    vary = tuple(Vary(key, mild, hard, _is_whole(first, key)) for key, mild, hard in given)
+    first = load([(key, number_text(mild)) for key, mild, _ in given])
+    vary = tuple(
+        Vary(key, mild, hard, _is_whole(first, key), _decimals(abs(hard - mild) * tolerance / 100.0))
+        for key, mild, hard in given
+    )
     diagonal = [(step / STEPS,) * len(vary) for step in range(STEPS + 1)]
     for point in dict.fromkeys([*itertools.product((0.0, 1.0), repeat=len(vary)), *diagonal]):
         scenario_at(load, vary, point)
@@ -91,7 +104,7 @@ def scenario_at(load: Load, vary: Sequence[Vary], point: Point) -> Scenario:
     Raises:
         InputError: there is none.
     """
-    return load([(each.key, _text(each.value(place))) for each, place in zip(vary, point, strict=True)])
+    return load([(each.key, number_text(each.value(place))) for each, place in zip(vary, point, strict=True)])
 
 
 def _spelt(option: str, key: str) -> str:
@@ -108,6 +121,11 @@ def _is_whole(scenario: Scenario, key: str) -> bool:
     return isinstance(value, int)
 
 
-def _text(value: float) -> str:
+def number_text(value: float) -> str:
     """A number as YAML, a whole one without a point; it reads back the same bit for bit."""
     return str(int(value)) if float(value).is_integer() and abs(value) < 1e15 else repr(value)
+
+
+def _decimals(step: float) -> int:
+    """Places after the point of the largest power of ten that is no larger than a step."""
+    return -math.floor(math.log10(max(step, sys.float_info.min)))

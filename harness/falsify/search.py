@@ -1,7 +1,7 @@
 """The search for the mildest condition that fails: pure, seeded, and bounded by a count of conditions.
 
 A condition is a point of the unit cube: each key's displacement from its mild end (0) to its hard end (1). Its
-mildness is the largest of them. Three steps:
+mildness is the largest of them. Four steps:
 
 1. Along the diagonal, where all keys get harder together: both ends, evenly spaced points, then bisection of
    the mildest change from passing to failing. Where every key only makes it harder, no condition milder than
@@ -10,13 +10,17 @@ mildness is the largest of them. Three steps:
    that this argument leaves out. It needs no gradient and no model of a yes or no, and its population is
    seeded. What passes is ranked by how near it came to failing.
 3. With several keys, each key is taken back towards its mild end while the condition still fails.
+4. What is left of the conditions looks for failures that are milder still. With one key the widest gap between
+   two conditions below the failure is halved, so that a failing island wider than the last such gap is found;
+   with several keys Sobol points fill the cube below it. A failure found here is narrowed down like the first.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
@@ -39,6 +43,9 @@ NO_CONDITION: Final = 2.0
 
 LEAST: Final = 2
 """Fewer conditions than the two ends of the diagonal make no search."""
+
+DRAWS: Final = 64
+"""So many Sobol points in a row that bring no new condition end the search: whole numbers leave no others."""
 
 
 @dataclass(frozen=True)
@@ -64,13 +71,15 @@ class Searched:
 
     Attributes:
         verdicts: of every condition tried, in order.
-        settled: whether the search came to its end within its conditions.
+        settled: whether steps 1 to 3 were done whole, and each later failure was narrowed down.
         evolved: conditions that the differential evolution tried.
+        spent: whether every condition that was allowed has been tried.
     """
 
     verdicts: Mapping[Point, Verdict]
     settled: bool
     evolved: int
+    spent: bool
 
     @property
     def mildest(self) -> Point | None:
@@ -90,6 +99,26 @@ class Searched:
         return max(below, key=lambda point: (sum(point), point), default=None)
 
     @property
+    def passed_above(self) -> Point | None:
+        """The hardest condition that passed although it is no milder in any key than the mildest failure."""
+        found = self.mildest
+        above = [passed for failed, passed in self.not_monotone if failed == found]
+        return max(above, key=lambda point: (sum(point), point), default=None)
+
+    @property
+    def milder(self) -> int:
+        """How many conditions milder than the mildest failure were tried, all of which passed."""
+        found = self.mildest
+        edge = math.inf if found is None else max(found)
+        return sum(max(point) < edge for point in self.verdicts)
+
+    @property
+    def widest_gap(self) -> tuple[float, float] | None:
+        """With one key, the widest gap between two conditions that were tried, up to the mildest failure."""
+        gaps = _gaps(self.verdicts, self.mildest) if all(len(point) == 1 for point in self.verdicts) else []
+        return max(gaps, key=lambda gap: (gap[1] - gap[0], gap), default=None)
+
+    @property
     def not_monotone(self) -> tuple[tuple[Point, Point], ...]:
         """Pairs of a condition that failed and one that passed although it is no milder in any key."""
         failed = [point for point, verdict in self.verdicts.items() if verdict.failed]
@@ -104,12 +133,12 @@ def search(
 
     Args:
         keys: how many, at least 1.
-        judge: tries a condition; called once for each. Where there is none it raises InputError: away from the
-            diagonal such a place is passed over.
+        judge: tries a condition; called once for each. Where there is none it raises InputError: after step 1
+            such a place is passed over.
         conditions: at most so many are tried, at least LEAST.
         tolerance: a displacement is narrowed down to this.
         seed: of the differential evolution.
-        snap: the condition that is tried in place of a point, for keys that are whole numbers.
+        snap: the condition that is tried in place of a point, for keys that take whole or round numbers.
 
     Raises:
         ValueError: too few conditions, or a tolerance that is not between 0 and 1.
@@ -118,20 +147,23 @@ def search(
         raise ValueError(
             f"needs {LEAST} conditions or more and a tolerance between 0 and 1: {conditions}, {tolerance}"
         )
-    tries = _Tries(judge, snap, conditions)
-    evolved, settled = 0, True
-    try:
+    tries, evolved = _Tries(judge, snap, conditions), 0
+    with suppress(_SpentError):
         reached = _along_the_diagonal(keys, tries, tolerance)
-        if keys > 1 and reached > 0.0:
+        tries.off_the_diagonal = True
+        if keys == 1 or reached == 0.0:
+            tries.settled = True
+            _between_what_passed(tries, tolerance)
+        else:
             before = len(tries.verdicts)
             edge = 1.0 if math.isinf(reached) else reached - tolerance
-            tries.off_the_diagonal = True
-            settled = _anywhere_below(keys, tries, edge, tolerance, seed)
+            evolution = _anywhere_below(keys, tries, edge, tolerance, seed)
             evolved = len(tries.verdicts) - before
             _taken_back(tries, tolerance)
-    except _SpentError:
-        settled = False
-    return Searched(tries.verdicts, settled, evolved)
+            tries.settled = evolution
+            _in_the_cube_below(keys, tries, tolerance, seed)
+            tries.settled = True
+    return Searched(tries.verdicts, tries.settled, evolved, tries.left == 0)
 
 
 class _SpentError(Exception):
@@ -145,8 +177,10 @@ class _Tries:
         self._judge, self._snap = judge, snap
         self._none: set[Point] = set()
         self.left = conditions
+        self.settled = False
+        """As in `Searched`, so far."""
         self.off_the_diagonal = False
-        """From then on a place where there is no scenario is passed over; before, that is an error."""
+        """Set after step 1. From then on a place where there is no scenario is passed over; before it is an error."""
         self.verdicts: dict[Point, Verdict] = {}
 
     def snapped(self, point: Point) -> Point:
@@ -154,7 +188,7 @@ class _Tries:
 
     def untried(self, points: Iterable[Point]) -> set[Point]:
         """The new conditions among some points."""
-        return {self._snap(point) for point in points} - self.verdicts.keys()
+        return {self._snap(point) for point in points} - self.verdicts.keys() - self._none
 
     def verdict(self, point: Point) -> Verdict:
         """Raises _SpentError where a new condition is one too many."""
@@ -176,7 +210,14 @@ class _Tries:
         return self.verdicts[place]
 
     def mildest(self) -> Point | None:
-        return Searched(self.verdicts, True, 0).mildest
+        return Searched(self.verdicts, True, 0, False).mildest
+
+    @contextmanager
+    def narrowing(self) -> Iterator[None]:
+        """A failure is being narrowed down: until that has ended the search is not settled."""
+        before, self.settled = self.settled, False
+        yield
+        self.settled = before
 
 
 def _along_the_diagonal(keys: int, tries: _Tries, tolerance: float) -> float:
@@ -285,6 +326,47 @@ def _least(tries: _Tries, point: Point, key: int, tolerance: float) -> Point:
         return mild
     least = _bisected(tries, point, 0.0, point[key], tolerance, range(key, key + 1))
     return tries.snapped(_with(point, key, least))
+
+
+def _between_what_passed(tries: _Tries, tolerance: float) -> None:
+    """One key: halves the widest gap up to the mildest failure, until none is wider than the tolerance."""
+    while True:
+        gaps = [
+            (low, high)
+            for low, high in _gaps(tries.verdicts, tries.mildest())
+            if high - low > tolerance and tries.untried([(0.5 * (low + high),)])
+        ]
+        if not gaps:
+            return
+        low, high = max(gaps, key=lambda gap: (gap[1] - gap[0], gap))
+        middle = 0.5 * (low + high)
+        if tries.verdict((middle,)).failed:
+            with tries.narrowing():
+                _bisected(tries, (0.0,), low, middle, tolerance, range(1))
+
+
+def _gaps(verdicts: Iterable[Point], found: Point | None) -> list[tuple[float, float]]:
+    """With one key, what lies between neighbouring conditions up to the mildest failure."""
+    places = sorted(point[0] for point in verdicts if found is None or point <= found)
+    return list(itertools.pairwise(places))
+
+
+def _in_the_cube_below(keys: int, tries: _Tries, tolerance: float, seed: int) -> None:
+    """Several keys: Sobol points in the cube below the mildest failure, until no new condition is left."""
+    from scipy.stats import qmc
+
+    points = qmc.Sobol(keys, rng=np.random.default_rng([seed, keys]))
+    in_vain = 0
+    while in_vain < DRAWS:
+        found = tries.mildest()
+        edge = 1.0 if found is None else max(found) - tolerance
+        if edge <= 0.0:
+            return
+        point = tuple(float(each) for each in edge * points.random(1)[0])
+        in_vain = 0 if tries.untried([point]) else in_vain + 1
+        if tries.verdict(point).failed:
+            with tries.narrowing():
+                _taken_back(tries, tolerance)
 
 
 def _with(point: Point, key: int, displacement: float) -> Point:

@@ -38,7 +38,9 @@ def broken(file: Path, *ranges: tuple[str, float, float], **other: Any) -> Break
         return load_scenario(file, replaced)
 
     out = other.pop("out", file.parent / "out")
-    return falsify(load, vary_of(load, ranges), out, **({"flown": flown} | other))
+    return falsify(
+        load, vary_of(load, ranges, (), other.get("tolerance", 0.01)), out, **({"flown": flown} | other)
+    )
 
 
 def stand_in(outcome: str = "reached", /, **other: Any) -> dict[str, Any]:

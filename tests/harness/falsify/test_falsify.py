@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from aircraft.airframes import AircraftError
 from harness.cli.app import main
 from harness.cli.falsify_terminal import breaking_rows, last_line
 from harness.falsify.folder import FALSIFIED, INDEX, PICTURES, TRIALS
-from harness.falsify.keys import scenario_at, vary_of
+from harness.falsify.keys import number_text, scenario_at, vary_of
 from harness.files.strict_yaml import InputError
 from harness.scenario.scenario import Scenario, load_scenario
 from tests.harness.breaking import WAY_M, broken, flown, stand_in
@@ -28,7 +30,9 @@ def test_the_time_that_is_too_short_is_found(to_break: Path) -> None:
     needed_s = WAY_M / 25.0
     assert needed_s - 280 * 0.005 - 0.5 <= result.found.values[0] <= needed_s <= result.passes[0] + 0.5
     assert result.found.outcome == "timeout"
-    assert last_line(result) == f"falsified: mission.time_limit_s={result.found.values[0]:.6g}"
+    value = number_text(result.found.values[0])
+    told = f", the mildest failure found in {result.conditions} conditions"
+    assert last_line(result) == f"falsified: mission.time_limit_s={value}{told}"
 
     rows = list(csv.DictReader((to_break.parent / "out" / TRIALS).read_text().splitlines()))
     assert len(rows) == result.conditions == len(result.trials)
@@ -63,7 +67,7 @@ def test_nothing_fails_and_it_is_said(to_break: Path) -> None:
     result = broken(to_break, ("mission.time_limit_s", 300.0, 200.0), conditions=3)
     assert (result.verdict, result.found, result.conditions) == ("not_found", None, 3)
     assert last_line(result) == "not falsified: nothing failed in 3 flights"
-    assert breaking_rows(result)["mildest failure"] == "none: every condition tried was reached"
+    assert breaking_rows(result)["mildest found"] == "none: every condition tried was reached"
     assert sorted(path.name for path in (to_break.parent / "out").iterdir()) == [TRIALS, INDEX]
 
 
@@ -84,7 +88,9 @@ def test_a_condition_fails_when_one_of_its_seeds_does(to_break: Path) -> None:
     assert result.found is not None
     assert (result.found.values, result.found.seed) == ((4.0,), 6)
     assert [trial.seed for trial in result.trials if trial.condition == 0] == [4, 5, 6, 7]
-    assert breaking_rows(result)["tried"] == f"{result.conditions} conditions, {len(result.trials)} flights"
+    assert breaking_rows(result)["tried"].startswith(
+        f"{result.conditions} conditions, {len(result.trials)} flights"
+    )
     assert [trial.seed for trial in result.trials if trial.condition == 1] == [4, 5, 6]
     assert load_scenario(to_break.parent / "out" / FALSIFIED).seed == 6
 
@@ -133,9 +139,55 @@ def test_what_is_not_monotone_is_reported(to_break: Path) -> None:
     result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=island)
     assert result.found is not None
     assert result.found.values == (2.0,)
+    assert result.passes_above == (8.0,)
     assert result.example is not None
     assert result.example[0][0] < result.example[1][0]
-    assert "but passes at" in breaking_rows(result)["not monotone"]
+    rows = breaking_rows(result)
+    assert rows["passes above"] == "at 8, which is harder"
+    below = result.found.displacement
+    assert result.milder == sum(trial.displacement < below for trial in result.trials) > 10
+    assert rows["passes below"].endswith(f"so do all {result.milder} milder conditions that were tried")
+    assert rows["in order"].startswith(f"passes 0 to 1.9375 ({result.milder}), fails 2 to 3 (")
+    assert rows["in order"].endswith(f"passes 4 to 8 ({result.bands[-1].conditions})")
+    assert sum(band.conditions for band in result.bands) == result.conditions == 39
+    assert rows["tried"].startswith("39 conditions of 40 allowed: none is left")
+    low, high = result.widest_gap or (0.0, 0.0)
+    assert (rows["widest untried gap"], high - low) == (f"{low} to {high} below the failure", 0.0625)
+    index = json.loads((to_break.parent / "out" / INDEX).read_text())
+    assert index["bands"][0] == {
+        "failed": False,
+        "mildest": 0.0,
+        "hardest": 1.9375,
+        "conditions": result.milder,
+    }
+
+
+@given(st.floats(0.3, 7.7))
+@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_value_that_is_printed_fails_when_it_is_typed_in(to_break: Path, edge: float) -> None:
+    def over(scenario: Scenario) -> dict[str, Any]:
+        return stand_in("collision" if scenario.sensor.range_noise_m >= edge else "reached")
+
+    for tolerance in (0.01, 0.0007):
+        result = broken(to_break, ("sensor.range_noise_m", 0.0, 8.0), flown=over, tolerance=tolerance)
+        printed = last_line(result).removeprefix("falsified: sensor.range_noise_m=").split(",")[0]
+        assert float(printed) >= edge, "not the edge rounded down"
+        assert float(printed) - edge <= 8.0 * tolerance
+        assert len(printed) <= 7, "and not sixteen digits"
+        passes = breaking_rows(result)["passes below"].removeprefix("at ").split(";")[0]
+        assert float(passes) < edge
+
+
+def test_count_and_sentence_agree_with_few_conditions_for_two_keys(to_break: Path) -> None:
+    keys = ("sensor.range_noise_m", 0.0, 8.0), ("sensor.dropout", 0.0, 0.5)
+    result = broken(to_break, *keys, flown=lambda scenario: stand_in(), conditions=16)
+    rows = breaking_rows(result)
+    assert (rows["tried"], result.settled) == ("16 conditions", False)
+    assert rows["not settled"] == "the conditions ran out first; give more with --runs"
+    few = broken(to_break, ("sensor.rays", 90.0, 91.0), flown=lambda scenario: stand_in(), conditions=16)
+    rows = breaking_rows(few)
+    assert "not settled" not in rows
+    assert rows["tried"].startswith("2 conditions of 16 allowed: none is left to try that differs")
 
 
 def test_whole_numbers_stay_whole(to_break: Path) -> None:
@@ -172,7 +224,9 @@ def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     assert max(map(len, said.out.splitlines())) <= 80
     found = json.loads(Path("runs/straight/falsify-mission.time_limit_s/falsify.json").read_text())
     (value,) = found["found"]["values"]
-    assert said.out.splitlines()[-1] == f"falsified: mission.time_limit_s={value:.6g}"
+    assert said.out.splitlines()[-1] == (
+        f"falsified: mission.time_limit_s={value}, the mildest failure found in 9 conditions"
+    )
     assert WAY_M / 25.0 - 10.0 < value < WAY_M / 25.0 + 3.0
     again = [
         "fly",

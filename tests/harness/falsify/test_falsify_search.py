@@ -37,7 +37,9 @@ def test_one_key_is_narrowed_down_to_the_tolerance(edge: float, tolerance: float
     assert result.passed_below[0] < edge <= result.mildest[0]
     assert result.mildest[0] - result.passed_below[0] <= tolerance
     assert result.settled
-    assert len(asked) == len(set(asked)) <= STEPS + 1 + math.ceil(math.log2(1 / STEPS / tolerance) + 1)
+    bracket = STEPS + 1 + math.ceil(math.log2(1 / STEPS / tolerance) + 1)
+    assert all(point <= result.mildest for point in asked[bracket:]), "what is left looks below"
+    assert len(asked) == len(set(asked)) <= 40
     assert result.not_monotone == ()
 
 
@@ -48,7 +50,62 @@ def test_the_ends_come_first_and_may_be_all_there_is() -> None:
     assert never.mildest is None
     assert never.settled
     assert asked[:2] == [(0.0,), (1.0,)]
-    assert sorted(asked) == [(step / STEPS,) for step in range(STEPS + 1)]
+    assert sorted(asked[: STEPS + 1]) == [(step / STEPS,) for step in range(STEPS + 1)]
+    assert (len(asked), never.spent, never.widest_gap) == (40, True, (0.75, 0.78125))
+
+
+Islands = st.lists(st.tuples(st.floats(0.01, 0.95), st.floats(0.005, 0.2)), min_size=1, max_size=4)
+
+
+@given(Islands, st.integers(12, 60), st.sampled_from([0.03, 0.01]))
+@settings(max_examples=80)
+def test_of_several_failing_islands_none_wider_than_the_widest_gap_is_milder(
+    islands: list[tuple[float, float]], conditions: int, tolerance: float
+) -> None:
+    def fails(point: Point) -> bool:
+        return any(start <= point[0] <= start + width for start, width in islands)
+
+    result, asked = found(fails, conditions=conditions, tolerance=tolerance)
+    assert result.widest_gap is not None
+    gap = result.widest_gap[1] - result.widest_gap[0]
+    edge = 1.0 if result.mildest is None else result.mildest[0]
+    for start, width in islands:
+        assert width <= gap or start + width > edge - tolerance, "no failure as wide as that lies below"
+    assert result.spent == (len(asked) == conditions)
+    if not result.spent:
+        assert gap <= tolerance, "conditions are left only where nothing is left to try"
+    if result.mildest is not None:
+        assert fails(result.mildest)
+        assert result.milder == sum(point < result.mildest for point in asked)
+        assert not any(fails(point) for point in asked if point < result.mildest)
+        if result.settled:
+            assert result.passed_below is not None
+            assert result.mildest[0] - result.passed_below[0] <= tolerance
+        above = [point for point in asked if point > result.mildest and not fails(point)]
+        assert result.passed_above == max(above, default=None)
+
+
+def test_an_island_below_the_first_bracket_is_found_with_the_conditions_that_are_left() -> None:
+    def fails(point: Point) -> bool:
+        return 0.65 <= point[0] <= 0.69 or 0.725 <= point[0] <= 0.74 or point[0] >= 0.758
+
+    result, asked = found(fails)
+    assert result.mildest is not None
+    assert 0.65 <= result.mildest[0] <= 0.66, "not 0.758, where the bisection ends"
+    assert (len(asked), result.passed_above, result.settled) == (40, (0.7578125,), True)
+    few, _ = found(fails, conditions=14)
+    assert few.mildest is not None
+    assert few.mildest[0] > 0.725, "fewer conditions find less"
+
+
+def test_a_failure_found_last_that_could_not_be_narrowed_down_is_not_settled() -> None:
+    def fails(point: Point) -> bool:
+        return 0.05 <= point[0] <= 0.07 or point[0] >= 0.5
+
+    results = [found(fails, conditions=conditions)[0] for conditions in range(9, 41)]
+    opened = [each for each in results if each.mildest is not None and each.mildest[0] < 0.1]
+    assert (opened[0].settled, opened[-1].settled) == (False, True)
+    assert all(each.spent for each in results if not each.settled)
 
 
 def test_a_failure_between_ends_that_pass_is_found_and_said_to_be_odd() -> None:
@@ -75,7 +132,7 @@ def test_the_conditions_are_counted() -> None:
 @pytest.mark.parametrize("conditions", range(2, 14))
 def test_settled_is_a_scan_in_eighths_and_nothing_less(conditions: int) -> None:
     result, asked = found(lambda point: False, conditions=conditions)
-    assert len(asked) == min(conditions, STEPS + 1), "none is left over"
+    assert len(asked) == conditions, "none is left over"
     assert result.settled == (conditions >= STEPS + 1)
 
 
@@ -100,9 +157,25 @@ def test_whole_numbers_need_no_more_conditions_than_there_are_of_them(whole: int
 
 def test_without_conditions_for_the_evolution_it_is_not_settled() -> None:
     result, _ = found(lambda point: False, keys=2, conditions=STEPS + 1 + POPULATION)
-    assert (result.evolved, result.settled) == (0, False)
+    assert (result.evolved, result.settled, result.spent) == (0, False, True)
     result, _ = found(lambda point: False, keys=2, conditions=80)
-    assert (result.evolved >= POPULATION, result.settled) == (True, True)
+    assert (result.evolved >= POPULATION, result.settled, result.spent) == (True, True, True)
+
+
+@pytest.mark.parametrize(("keys", "conditions"), [(2, 16), (2, 80), (3, 16), (3, 120)])
+def test_with_several_keys_every_condition_is_used_or_nothing_is_left(keys: int, conditions: int) -> None:
+    def fails(point: Point) -> bool:
+        return 0.6 <= point[0] <= 0.7 or min(point) > 0.9
+
+    for seed in range(4):
+        result, asked = found(fails, keys, conditions, seed=seed)
+        assert (len(asked), result.spent) == (conditions, True)
+
+    def whole(point: Point) -> Point:
+        return tuple(round(place) for place in point)
+
+    corners = search(keys, lambda point: Verdict(False, 1.0), conditions, 0.01, 1, whole)
+    assert (len(corners.verdicts), corners.spent, corners.settled) == (2**keys, False, True)
 
 
 @given(st.lists(st.floats(0.05, 0.95), min_size=2, max_size=3), st.integers(0, 3))
