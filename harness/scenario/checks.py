@@ -3,11 +3,79 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import Final
 
+from aircraft.frames import LocalPlane
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.sections import Area, MissionSpec, Point
 from harness.scenario.validation import KeyFault
+
+PLANE_RIGHT_M: Final = 1.0
+"""The local plane must put every point of the area this near to where the geodesic has it."""
+
+SURELY_RIGHT_M: Final = 250_000.0
+"""Up to this distance from an origin within `SURELY_RIGHT_DEG` of the equator the plane is off by 0.22 m at most."""
+
+SURELY_RIGHT_DEG: Final = 80.0
+"""At this latitude the pole is 1,117 km away, far beyond `SURELY_RIGHT_M`."""
+
+POLE_ROOM_M: Final = 10_000.0
+"""No area comes nearer to a pole: there, longitude turns too fast for the guidance's patches of 500 m of the plane."""
+
+SIDE_POINTS: Final = 16
+"""So many points of each side of an area are held against the geodesic; the error grows with the distance."""
+
+
+def check_local_plane(area: Area) -> None:
+    """The local plane about the area's origin is right wherever the area reaches.
+
+    Raises:
+        KeyFault: it is not; the sentence has the place and the error.
+    """
+    xmin, ymin, xmax, ymax = area.bounds_m
+    reach_m = math.hypot(max(abs(xmin), abs(xmax)), max(abs(ymin), abs(ymax)))
+    latitude_deg, longitude_deg = area.origin.latitude_deg, area.origin.longitude_deg
+    if reach_m <= SURELY_RIGHT_M and abs(latitude_deg) <= SURELY_RIGHT_DEG:
+        return
+    import pyproj
+
+    geod, plane = pyproj.Geod(ellps="WGS84"), LocalPlane(latitude_deg, longitude_deg)
+    for name, sign in (("north", 1.0), ("south", -1.0)):
+        pole_m = sign * geod.inv(longitude_deg, latitude_deg, longitude_deg, sign * 90.0)[2]
+        outside_m = math.hypot(max(xmin, -xmax, 0.0), max(ymin - pole_m, pole_m - ymax, 0.0))
+        if outside_m < POLE_ROOM_M:
+            raise KeyFault(
+                ("area", "origin"),
+                f"the {name} pole lies at [0, {pole_m:.0f}] of the plane about it, closer than {POLE_ROOM_M:.0f} m to "
+                "area.bounds_m; move the area away from the pole",
+            )
+
+    def off_m(place: Point) -> float:
+        point_deg = plane.geodetic(*place)
+        azimuth_deg, _, length_m = geod.inv(longitude_deg, latitude_deg, point_deg[1], point_deg[0])
+        azimuth = math.radians(azimuth_deg)
+        found = length_m * math.sin(azimuth), length_m * math.cos(azimuth)
+        return math.dist(place, found) if abs(point_deg[0]) <= 90.0 else math.inf
+
+    worst = max(_outline(area), key=off_m)
+    if not (error_m := off_m(worst)) <= PLANE_RIGHT_M:
+        told = f"{error_m:.3g} m" if math.isfinite(error_m) else "kilometres"
+        raise KeyFault(
+            ("area", "origin"),
+            f"the plane about it is off by {told} at {[round(each) for each in worst]} of "
+            f"area.bounds_m; it must be right to {PLANE_RIGHT_M:g} m: lay the origin nearer to its middle, or take a "
+            "smaller area",
+        )
+
+
+def _outline(area: Area) -> Iterator[Point]:
+    """Points all round the area."""
+    xmin, ymin, xmax, ymax = area.bounds_m
+    for step in range(SIDE_POINTS + 1):
+        share = step / SIDE_POINTS
+        east, north = xmin + share * (xmax - xmin), ymin + share * (ymax - ymin)
+        yield from ((east, ymin), (east, ymax), (xmin, north), (xmax, north))
 
 
 def check_start_and_goal(

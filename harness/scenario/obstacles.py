@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated
 
 from pydantic import ConfigDict, FailFast, Strict, field_validator, model_validator
@@ -17,10 +18,11 @@ class Circle(Section):
 
 
 class Polygon(Section):
-    """A simple polygon, convex or not, its vertices in either direction; kept without a closing vertex."""
+    """A simple polygon, convex or not, its vertices in either direction; kept without repeated vertices."""
 
     vertices_m: Annotated[tuple[Point, ...], Strict(False), FailFast()] = key(
-        "Vertices in order round the shape: east, north; the first may be repeated at the end.",
+        "Vertices in order round the shape: east, north. One that repeats the vertex before it, or the first at the "
+        "end, is dropped.",
         unit="m",
         min_length=3,
     )
@@ -30,12 +32,9 @@ class Polygon(Section):
     def _enclose_an_area(cls, vertices_m: tuple[Point, ...]) -> tuple[Point, ...]:
         import shapely
 
-        for index, vertex in enumerate(vertices_m):
-            if index and vertex == vertices_m[index - 1]:
-                raise ValueError(
-                    f"vertex {index} repeats vertex {index - 1}, {list(vertex)}; leave one of them out"
-                )
-        ring = vertices_m[:-1] if vertices_m[0] == vertices_m[-1] else vertices_m
+        ring = tuple(vertex for vertex, _ in itertools.groupby(vertices_m))
+        if len(ring) > 1 and ring[0] == ring[-1]:
+            ring = ring[:-1]
         if len(ring) < 3:
             raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
         shape = shapely.Polygon(ring)

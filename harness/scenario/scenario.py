@@ -18,7 +18,7 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node
 from harness.files.yaml_pieces import dump_in_pieces
 from harness.scenario import planner_keys
-from harness.scenario.checks import check_start_and_goal
+from harness.scenario.checks import check_local_plane, check_start_and_goal
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.sections import (
     AircraftSpec,
@@ -93,6 +93,7 @@ class Scenario(Section):
             airspeed_mps=0.1 * self.aircraft.airspeed_mps,
             load_factor=_limit_load_factor(self.aircraft),
         )
+        check_local_plane(self.area)
         check_start_and_goal(self.area, self.obstacles, self.mission, self.planner.clearance_m)
         object.__setattr__(self, "planner", planner_keys.resolved(self.planner, mission_of(self)))
         return self

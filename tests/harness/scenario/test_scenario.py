@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pyproj
 import pytest
 import yaml
 from hypothesis import given
@@ -16,6 +19,7 @@ from hypothesis import strategies as st
 import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
+from aircraft.frames import LocalPlane
 from harness.files.strict_yaml import InputError
 from harness.scenario.scenario import (
     LEAST_CLEARANCE,
@@ -119,6 +123,85 @@ def test_a_closing_vertex_is_dropped() -> None:
     assert closed == parse_scenario(LEAST + polygon % "")
     assert closed.obstacles[0].polygon
     assert len(closed.obstacles[0].polygon.vertices_m) == 3
+
+
+@pytest.mark.parametrize(
+    "ring",
+    [
+        "[5000, 5000], [5000, 5000], [6000, 5000], [6000, 6000]",
+        "[5000, 5000], [6000, 5000], [6000, 5000], [6000, 5000], [6000, 6000]",
+        "[5000, 5000], [6000, 5000], [6000, 6000], [6000, 6000], [5000, 5000], [5000, 5000]",
+    ],
+)
+def test_repeated_vertices_are_dropped(ring: str) -> None:
+    polygon = "obstacles: [{polygon: {vertices_m: [%s]}}]\n"
+    clean = parse_scenario(LEAST + polygon % "[5000, 5000], [6000, 5000], [6000, 6000]")
+    assert parse_scenario(LEAST + polygon % ring) == clean
+
+
+@pytest.mark.parametrize(
+    ("origin", "bounds", "sentence"),
+    [
+        (
+            "{latitude_deg: 85, longitude_deg: 8}",
+            "[0, 0, 100000, 600000]",
+            "3: area.origin: the north pole lies at [0, 558456] of the plane about it, closer than 10000 m to "
+            "area.bounds_m; move the area away from the pole",
+        ),
+        (
+            "{latitude_deg: -84.5, longitude_deg: 8}",
+            "[-2000, -620000, 9000, -500000]",
+            "the south pole lies at [0, -6",
+        ),
+        (
+            "{latitude_deg: 85, longitude_deg: 8}",
+            "[15000, 0, 100000, 900000]",
+            "3: area.origin: the plane about it is off by kilometres at [15000, 900000]",
+        ),
+        (
+            "{latitude_deg: 0, longitude_deg: 8}",
+            "[-1000, -1000, 600000, 600000]",
+            "m at [600000, 600000] of area.bounds_m; it must be right to 1 m: lay the origin nearer to its middle",
+        ),
+        ("{latitude_deg: 47, longitude_deg: 8}", "[0, 0, 1000000, 20000]", "is off by"),
+    ],
+)
+def test_an_area_where_the_plane_is_off_by_a_metre_is_refused(
+    origin: str, bounds: str, sentence: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_scenario(in_area(origin, bounds))
+    assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("origin", "bounds"),
+    [
+        ("{latitude_deg: 85, longitude_deg: 8}", "[0, 0, 100000, 450000]"),
+        ("{latitude_deg: 0, longitude_deg: -180}", "[-250000, -250000, 250000, 250000]"),
+        ("{latitude_deg: 47, longitude_deg: 8}", "[0, 0, 300000, 300000]"),
+    ],
+)
+def test_a_large_area_where_the_plane_is_right_is_taken(origin: str, bounds: str) -> None:
+    xmin, ymin, xmax, ymax = parse_scenario(in_area(origin, bounds)).area.bounds_m
+    where = parse_scenario(in_area(origin, bounds)).area.origin
+    plane = LocalPlane(where.latitude_deg, where.longitude_deg)
+    geod = pyproj.Geod(ellps="WGS84")
+    for east, north in itertools.product(np.linspace(xmin, xmax, 7), np.linspace(ymin, ymax, 7)):
+        lat, lon = plane.geodetic(east, north)
+        azimuth, _, length = geod.inv(where.longitude_deg, where.latitude_deg, lon, lat)
+        assert length * math.sin(math.radians(azimuth)) == pytest.approx(east, abs=1.0)
+        assert length * math.cos(math.radians(azimuth)) == pytest.approx(north, abs=1.0)
+
+
+def in_area(origin: str, bounds: str) -> str:
+    xmin, ymin, *_ = (float(each) for each in bounds.strip("[]").split(","))
+    return f"""
+schema: wayproof/scenario/1
+name: far
+area: {{bounds_m: {bounds}, origin: {origin}}}
+mission: {{start_m: [{xmin + 200}, {ymin + 200}], goal_m: [{xmin + 5000}, {ymin + 5000}]}}
+""".lstrip()
 
 
 @pytest.mark.parametrize("own", ["active_s: [60, 120]", "velocity_mps: [3, 0]"])

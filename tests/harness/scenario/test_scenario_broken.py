@@ -106,23 +106,23 @@ BROKEN = {
         "9: obstacles[1].polygon.vertices_m",
         "has 2 distinct vertices",
     ),
-    "closed twice": (
-        SQUARE,
-        "[[12000, 3000], [14000, 3000], [14000, 5000], [12000, 3000], [12000, 3000]]",
-        "9: obstacles[1].polygon.vertices_m",
-        "vertex 4 repeats vertex 3",
-    ),
     "polygon without area": (
         SQUARE,
         "[[12000, 3000], [13000, 3000], [14000, 3000]]",
         "9: obstacles[1].polygon.vertices_m",
         "encloses no area",
     ),
-    "repeated vertex": (
+    "one vertex, repeated": (
         SQUARE,
-        "[[12000, 3000], [12000, 3000], [14000, 3000], [14000, 5000]]",
+        "[[12000, 3000], [12000, 3000], [12000, 3000]]",
         "9: obstacles[1].polygon.vertices_m",
-        "vertex 1 repeats vertex 0",
+        "has 1 distinct vertices; must be at least 3",
+    ),
+    "a spike out and back": (
+        SQUARE,
+        "[[12000, 3000], [14000, 3000], [16000, 3000], [14000, 3000], [14000, 5000]]",
+        "9: obstacles[1].polygon.vertices_m",
+        "crosses or touches itself",
     ),
     "stops before it starts": ("[60, 600]", "[600, 60]", "10: obstacles[1].active_s", "start < stop"),
     "starts before time": ("[60, 600]", "[-1, 60]", "10: obstacles[1].active_s[0]", "at least 0"),
