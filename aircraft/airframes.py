@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
 from aircraft.autopilot import Gains
+from aircraft.card_cache import cached, figure
 from aircraft.guidance import GuidanceLimits
 from aircraft.model_files import AircraftError as AircraftError
 from aircraft.model_files import ModelFiles, model_files
@@ -139,8 +140,6 @@ def airframe(name: str) -> Airframe:
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
     """
-    from aircraft.card_cache import cached
-
     try:
         found = model_files(name)
     except AircraftError as error:
@@ -153,17 +152,29 @@ def airframe(name: str) -> Airframe:
 
         return survey(entry, found)
 
-    measured = cached(f"{found.name}-airframe", found.digest(), surveyed)
-    banks = tuple((float(speed), float(bank)) for speed, bank in measured["level_banks"])
-    low, high = measured["airspeed_range_mps"]
-    figures = {key: value for key, value in measured.items() if key in _MEASURED}
+    return cached(f"{found.name}-airframe", found.digest(), surveyed, partial(_of_survey, entry, found))
+
+
+def _of_survey(entry: Entry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
+    """The airframe that a survey measured.
+
+    Raises:
+        KeyError, TypeError, ValueError: it is no survey.
+    """
+    banks = tuple((figure(speed), figure(bank)) for speed, bank in measured["level_banks"])
+    low, high = map(figure, measured["airspeed_range_mps"])
+    figures = {key: figure(measured[key]) for key in _MEASURED}
+    gains = Gains(**{name: figure(gain, -math.inf) for name, gain in measured["gains"].items()})
+    speeds = [speed for speed, _ in banks]
+    if not (low <= high and speeds and speeds == sorted(speeds) and figures["mass_kg"] > 0.0):
+        raise ValueError("speeds out of order, or no mass")
     return Airframe(
         name=found.name,
         summary=entry.summary,
         files=found,
         airspeed_range_mps=(low, high),
         level_banks=banks,
-        gains=Gains(**measured["gains"]),
+        gains=gains,
         verified=entry.verified,
         **figures,
     )

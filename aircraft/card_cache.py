@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
+
+MAX_BYTES = 10_000_000
+"""A cache file has a few thousand bytes; of one that has more no more than this is read."""
+
+Card = TypeVar("Card")
 
 
 def cache_folder() -> Path:
@@ -18,26 +24,41 @@ def cache_folder() -> Path:
     return base / "wayproof"
 
 
-def cached(title: str, digest: str, measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """The result of a measurement, from the cache if it is there.
+def cached(
+    title: str, digest: str, measure: Callable[[], dict[str, Any]], read: Callable[[dict[str, Any]], Card]
+) -> Card:
+    """What is read from the result of a measurement, which comes from the cache if it is there.
 
-    Both ways give the same values: JSON keeps every bit of a float. A cache that cannot be read or written
-    costs time and nothing else.
+    Both ways give the same values: JSON keeps every bit of a float. A cache that cannot be read or written, or
+    holds what no measurement gives, costs time and nothing else.
 
     Args:
         title: what was measured of what, for the file's name.
         digest: of everything that the result depends on.
         measure: measures; its result consists of what JSON has.
+        read: makes what is wanted of a result; raises KeyError, TypeError or ValueError where it is none.
     """
     file = cache_folder() / f"{title}-{digest[:16]}.json"
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
-        kept = json.loads(file.read_text("utf-8"))
-        if kept["digest"] == digest and isinstance(kept["result"], dict):
-            return dict(kept["result"])
+        with file.open("rb") as opened:
+            kept = json.loads(opened.read(MAX_BYTES))
+        if kept["digest"] == digest:
+            return read(kept["result"])
     result: dict[str, Any] = json.loads(json.dumps(measure()))
     with suppress(OSError):
         _write(file, json.dumps({"digest": digest, "result": result}, indent=1))
-    return result
+    return read(result)
+
+
+def figure(value: object, least: float = 0.0) -> float:
+    """A number of a result.
+
+    Raises:
+        ValueError: it is not a finite number of at least `least`.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < math.inf:
+        raise ValueError(f"is {value!r}")
+    return float(value)
 
 
 def _write(file: Path, text: str) -> None:

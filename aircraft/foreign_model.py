@@ -13,6 +13,9 @@ from pathlib import Path, PurePath
 
 MAX_FILES = 1000
 MAX_BYTES = 5_000_000
+"""Of an XML file."""
+MAX_FOLDER_BYTES = 200_000_000
+"""Of all files together, pictures and meshes that JSBSim does not read among them: each goes into the digest."""
 MAX_ENTITY = 100
 MAX_DEPTH = 60
 """Of elements; the deepest of JSBSim's own models has 13."""
@@ -24,10 +27,10 @@ def faults(folder: Path) -> Iterator[str]:
     Args:
         folder: of a model, of engines or of systems. Only regular files count; other things are never opened.
     """
-    files = 0
+    files = size = 0
     for home, inner, names in os.walk(folder):
         for path in (Path(home, name) for name in inner):
-            if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+            if _leads_out(path, folder):
                 yield f"{path}: is a link that leads out of the folder; must be a folder itself"
         for name in sorted(names):
             path = Path(home, name)
@@ -35,8 +38,24 @@ def faults(folder: Path) -> Iterator[str]:
             if files > MAX_FILES:
                 yield f"{folder}: has more than {MAX_FILES} files; must be the folder of one aircraft"
                 return
-            if name.lower().endswith(".xml") and path.is_file():
+            if _leads_out(path, folder):
+                yield f"{path}: is a link that leads out of the folder; must be a file itself"
+                continue
+            if not path.is_file():
+                continue
+            size += path.stat().st_size
+            if size > MAX_FOLDER_BYTES:
+                yield (
+                    f"{path}: with it the files of {folder} have {size / 1e6:.0f} MB; "
+                    f"must be at most {MAX_FOLDER_BYTES // 10**6} MB together"
+                )
+                return
+            if name.lower().endswith(".xml"):
                 yield from _file_faults(path)
+
+
+def _leads_out(path: Path, folder: Path) -> bool:
+    return path.is_symlink() and not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 
 def _file_faults(path: Path) -> Iterator[str]:

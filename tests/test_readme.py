@@ -48,7 +48,7 @@ COMMANDS = [
 ]
 
 
-def wayproof(arguments: str, folder: Path, *, path: Path = ROOT) -> subprocess.CompletedProcess[str]:
+def wayproof(arguments: str, folder: Path, *, path: Path = ROOT, timeout_s: float = 120) -> subprocess.CompletedProcess[str]:
     """Runs the command in a folder, the packages taken from `path`."""
     return subprocess.run(
         [sys.executable, "-m", "harness", *shlex.split(arguments)],
@@ -56,7 +56,7 @@ def wayproof(arguments: str, folder: Path, *, path: Path = ROOT) -> subprocess.C
         env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, dict.fromkeys((path, ROOT))))},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=timeout_s,
         check=False,
     )
 
@@ -157,7 +157,7 @@ def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tm
 def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
     (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", HARNESS)
     (shown,) = (block for block in blocks("text", HARNESS) if "mildest failure" in block)
-    searched = wayproof(command, tmp_path)
+    searched = wayproof(command, tmp_path, timeout_s=600)
     assert (searched.returncode, searched.stderr) == (0, "")
     names = [line[:29].strip() for line in shown.splitlines()[2:5]]
     assert [line[:29].strip() for line in searched.stdout.splitlines()[2:5]] == names

@@ -12,7 +12,7 @@ from functools import partial
 from typing import Any, Final
 
 from aircraft.airframes import AircraftError, Airframe, airframe
-from aircraft.card_cache import cached
+from aircraft.card_cache import cached, figure
 from aircraft.envelope import performance
 from aircraft.guidance import UPDATE_RATE_HZ
 from aircraft.guidance_law import GRAVITY_MPS2
@@ -66,7 +66,7 @@ def envelope_card(
         if report is not None:
             report(done, len(speeds), f"{frame.name} at {speed:g} m/s")
         title = f"{frame.name}-envelope-{FORMAT}-{speed:g}-{'-'.join(f'{wind:g}' for wind in winds)}"
-        pages.append(cached(title, digest, partial(_page, frame, speed, winds)))
+        pages.append(cached(title, digest, partial(_page, frame, speed, winds), _read))
     return {
         "aircraft": frame.name,
         "mass_kg": frame.mass_kg,
@@ -77,6 +77,25 @@ def envelope_card(
         "verified": frame.verified,
         "at": pages,
     }
+
+
+_PAGE: Final = ("airspeed_mps", "roll_in_s", "level_bank_deg")
+_TURN: Final = ("bank_deg", "radius_m", "load_factor", "altitude_lost_m", "airspeed_lost_mps")
+_TRACKED: Final = ("wind_mps", "planned_radius_m", "tightest_radius_m")
+
+
+def _read(page: dict[str, Any]) -> dict[str, Any]:
+    """A page as it was measured.
+
+    Raises:
+        KeyError, TypeError, ValueError: it is none.
+    """
+    parts = ([page], _PAGE), (page["turns"], _TURN), (page["tracked"], _TRACKED)
+    for row, keys in ((row, keys) for rows, keys in parts for row in rows):
+        for key in keys:
+            if row[key] is not None or key not in ("radius_m", "tightest_radius_m"):
+                figure(row[key], -math.inf)
+    return page
 
 
 def _page(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, Any]:

@@ -140,6 +140,35 @@ def test_a_link_that_leads_out_of_the_folder_is_refused(tmp_path: Path) -> None:
         airframe(str(home))
 
 
+@pytest.mark.parametrize("name", ["engine.xml", "notes.txt"])
+def test_a_file_link_that_leads_out_of_the_folder_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "secret").write_text("<electric_engine/>")
+    home = own_model(tmp_path, "mine")
+    (home / name).symlink_to(tmp_path / "secret")
+    with pytest.raises(
+        AircraftError, match=rf"{name}: is a link that leads out of the folder; must be a file"
+    ):
+        airframe(str(home))
+    (home / name).unlink()
+    (home / "inner.txt").write_text("")
+    (home / name).symlink_to("inner.txt")
+    assert model_files(str(home)).name == "mine", "a link to a file beside it is one of the folder's own"
+
+
+@pytest.mark.parametrize("names", [("mesh.ac",), ("a.png", "sub/b.png")])
+def test_a_folder_of_too_many_bytes_is_refused_before_they_are_read(
+    tmp_path: Path, names: tuple[str, ...]
+) -> None:
+    """The files are sparse: they need no room, but reading them would take minutes and gigabytes."""
+    home = own_model(tmp_path, "mine")
+    for name in names:
+        (home / name).parent.mkdir(exist_ok=True)
+        with (home / name).open("wb") as file:
+            file.truncate(2**32 if len(names) == 1 else 150_000_000)
+    with pytest.raises(AircraftError, match=r" MB; must be at most 200 MB together"):
+        airframe(str(home))
+
+
 def test_the_digest_changes_with_engines_that_lie_beside_the_model(tmp_path: Path) -> None:
     (tmp_path / "engine").mkdir()
     engine = tmp_path / "engine" / "motor.xml"
