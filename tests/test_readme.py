@@ -48,7 +48,9 @@ COMMANDS = [
 ]
 
 
-def wayproof(arguments: str, folder: Path, *, path: Path = ROOT, timeout_s: float = 120) -> subprocess.CompletedProcess[str]:
+def wayproof(
+    arguments: str, folder: Path, *, path: Path = ROOT, timeout_s: float = 120
+) -> subprocess.CompletedProcess[str]:
     """Runs the command in a folder, the packages taken from `path`."""
     return subprocess.run(
         [sys.executable, "-m", "harness", *shlex.split(arguments)],
