@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,11 +16,11 @@ from harness.analysis.smoothness import (
     stations_in_effect,
     window_m,
 )
-from harness.analysis.trackability import Corner, FlightLimits, legs, saturated
+from harness.analysis.trackability import AsGiven, FlightLimits, legs, saturated
 from harness.flight.record import Flight, FloatArray, Outcome, digest
 
 
-def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()) -> dict[str, Any]:
+def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) -> dict[str, Any]:
     """All figures of a flight, ready for JSON: a figure that does not exist is None, never NaN or infinity.
 
     Distances are of the flown track as logged. `planned_length_m` is the curve length of those parts of the
@@ -37,7 +36,7 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
     Args:
         flight: the flight; its track has at least one row.
         limits: what the flight is measured against.
-        corners: of a path that was given, in order.
+        given: the path as given that the flight follows; None where a planner made the path.
 
     Raises:
         ValueError: the track is empty.
@@ -50,7 +49,7 @@ def metrics(flight: Flight, limits: FlightLimits, corners: Sequence[Corner] = ()
     window = window_m(track)
     planned = planned_profile(track, flight.plans, window)
     lost_control = flight.outcome is Outcome.LOST_CONTROL
-    verdicts = legs(track, flight.plans, limits, lost_control, corners)
+    verdicts = legs(track, flight.plans, limits, lost_control, given)
     followed = track.cross_track_m[track.plan_index >= 0]
     planned_m = planned_length_m(flight)
     return {

@@ -54,7 +54,7 @@ class FlightLimits:
 
     Attributes:
         altitude_m: altitude to be held, above mean sea level.
-        clearance_m: wanted distance from every obstacle edge; the most by which a corner may be cut.
+        clearance_m: wanted distance from every obstacle edge.
         bank_limit_rad: largest roll command of the guidance.
         turn_radius_m: smallest radius a plan may have, in the flight's wind and turbulence.
         tracking_error_m: cross-track error that the guidance is to stay within.
@@ -109,6 +109,26 @@ class Corner(Protocol):
         """How far from it the plan passes."""
         ...
 
+    @property
+    def half_m(self) -> float:
+        """So far before and after that the plan is off the legs that meet at it."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class AsGiven:
+    """A path that was given and how it was flown, row by row of the track.
+
+    Attributes:
+        corners: that are cut, in order; each ends a leg.
+        deviation_m: (n,) distance between the track and the path as given.
+        allowed_m: (n,) what it may be.
+    """
+
+    corners: Sequence[Corner]
+    deviation_m: FloatArray
+    allowed_m: FloatArray
+
 
 @dataclass(frozen=True)
 class Leg:
@@ -124,13 +144,14 @@ class Leg:
             airspeed is not judged.
         max_load_factor: largest load factor, averaged over `LOAD_S`.
         corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
+        max_deviation_m: largest distance from the path as given; None where a planner made the path.
         trackable: whether all of them stayed within what they may be.
         cause: why not; None where trackable. The first that applies of:
             "lost control";
             "planner too late": the aircraft was off the plan already when it took effect;
             "sensor horizon": a turn too tight, near an obstacle that the sensor shows too late for any other;
-            "turn radius too tight": the plan bends more than the bank limit allows in calm air, or cuts a
-            corner by more than the clearance;
+            "turn radius too tight": the plan bends more than the bank limit allows in calm air, or is further from
+            the path as given than it may be, which it is at corners;
             "speed or throttle saturation": the airspeed is off by more than it may be, or the throttle at a
             stop while altitude is lost;
             "wind drift": the bank is used up in a turn that only the wind makes too tight, or the aircraft is
@@ -150,6 +171,7 @@ class Leg:
     max_airspeed_error_mps: float | None
     max_load_factor: float
     corner_cut_m: float
+    max_deviation_m: float | None
     trackable: bool
     cause: str | None
 
@@ -159,7 +181,7 @@ def legs(
     plans: Sequence[AcceptedPlan],
     limits: FlightLimits,
     lost_control: bool = False,
-    corners: Sequence[Corner] = (),
+    given: AsGiven | None = None,
 ) -> tuple[Leg, ...]:
     """Judges a flight leg by leg.
 
@@ -168,20 +190,27 @@ def legs(
         plans: `plans[i]` is the plan of rows with `plan_index` i.
         limits: what to judge by.
         lost_control: the flight ended so; its last leg is then not trackable.
-        corners: of the only plan, in order; each ends a leg.
+        given: the path as given that the only plan follows.
 
     Returns:
         The legs in order of time; empty where no plan was flown.
     """
+    corners = given.corners if given else ()
     ends = np.array([corner.arc_length_m for corner in corners])
     leg = track.plan_index + np.searchsorted(ends, track.arc_length_m) if corners else track.plan_index
-    stretches = _stretches(track, leg)
-    reached = np.searchsorted(np.maximum.accumulate(track.arc_length_m), ends) - 1
-    judged = []
-    for first, last in stretches:
-        passed = [c.cut_m for c, row in zip(corners, reached, strict=True) if first <= row <= last]
+    along = np.maximum.accumulate(np.nan_to_num(track.arc_length_m))
+    reached = np.searchsorted(along, ends) - 1
+    judged, over_m = [], -math.inf
+    for first, last in _stretches(track, leg):
+        passed = [c for c, row in zip(corners, reached, strict=True) if first <= row <= last]
+        cut_m = max((corner.cut_m for corner in passed), default=0.0)
         lost = lost_control and last == len(track) - 1
-        judged.append(_judge(track, first, last, plans, limits, lost, max(passed, default=0.0)))
+        verdict = _judge(track, first, last, plans, limits, lost, cut_m)
+        if given is not None:
+            # All of a corner belongs to the leg that it ends.
+            since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if passed else math.inf
+            verdict = _judged_as_given(verdict, given, (along > since_m) & (along <= over_m))
+        judged.append(verdict)
     return tuple(judged)
 
 
@@ -230,8 +259,6 @@ def _judge(
         cause = "lost control"
     elif off.max() > threshold:
         cause = _cause(track, _before_peak(track, first + int(off.argmax()), threshold), plans, limits)
-    elif cut_m > limits.clearance_m:
-        cause = "turn radius too tight"
     elif load > limits.max_load_factor:
         cause = "load factor"
     elif slow.max() > limits.max_airspeed_error_mps:
@@ -250,9 +277,18 @@ def _judge(
         max_airspeed_error_mps=float(slow.max()) if np.isfinite(slow.max()) else None,
         max_load_factor=load,
         corner_cut_m=cut_m,
+        max_deviation_m=None,
         trackable=cause is None,
         cause=cause,
     )
+
+
+def _judged_as_given(leg: Leg, given: AsGiven, rows: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Leg:
+    """A leg that is not trackable either where it is too far from the path as given, which is at a corner."""
+    off = np.nan_to_num(given.deviation_m[rows])
+    kept = bool((off <= given.allowed_m[rows]).all())
+    cause = leg.cause if kept or leg.cause else "turn radius too tight"
+    return replace(leg, max_deviation_m=float(off.max(initial=0.0)), trackable=cause is None, cause=cause)
 
 
 def _before_peak(track: Track, peak: int, threshold_m: float) -> Track:

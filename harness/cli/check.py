@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,8 +11,7 @@ import typer
 from harness.cli.options import FAILED, bad_input, flag, print_json, setting
 
 if TYPE_CHECKING:
-    from harness.run_files.path_files import GivenPath
-    from harness.scenario.scenario import Scenario
+    from harness.run.path_check import CheckedPath, PathCheck
 
 
 def check(
@@ -33,12 +31,34 @@ def check(
     turbulence: Annotated[
         str | None, typer.Option(metavar="INTENSITY", help="light, moderate or severe; milspec:light.")
     ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WORLD", help="A scenario whose obstacles, bounds, air and altitude it is flown in."
+        ),
+    ] = None,
     clearance_m: Annotated[
         float | None, typer.Option(metavar="C", help="Free room about the path. Default: one turn radius.")
     ] = None,
     tolerance_m: Annotated[
         float | None,
-        typer.Option(metavar="T", help="Allowed cross-track error. Default: a tenth of C in calm air."),
+        typer.Option(metavar="T", help="How far off it may be. Default: a tenth of C in calm air."),
+    ] = None,
+    corner_m: Annotated[
+        float | None,
+        typer.Option(
+            metavar="R",
+            min=0.0,
+            help="How far off corners may be passed. Default: T; at waypoints of a mission the acceptance radius of "
+            "the file, else C.",
+        ),
+    ] = None,
+    polygons: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="What polygons beside a drawn path are: exclusion (default), inclusion or none.",
+        ),
     ] = None,
     seed: Annotated[int | None, typer.Option(metavar="N", help="Of the turbulence.")] = None,
     settings: Annotated[
@@ -52,57 +72,67 @@ def check(
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
     as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
 ) -> int:
-    """Flies a path as it is given and says where it can be tracked, and why not elsewhere.
+    """Flies a path and says whether it can be flown as given, and where and why not.
+
+    A drawn line is to be flown as drawn; a mission's corners may be cut. Obstacles (of WORLD, or --set obstacles=...),
+    fences and bounds that were named must not be touched or crossed.
 
     For example: wayproof check survey.plan --aircraft aerosonde --wind 8,270
 
     Exit status:
 
-    0 trackable
+    0 trackable, no contact, no fence or bound crossed
 
-    1 flown, but not trackable
+    1 flown, but not so
 
     2 bad input or usage, nothing flown
     """
+    from harness.run.path_check import asked, origin_of
     from harness.run_files.path_files import read_path
 
-    given = read_path(path, any_altitude=altitude_m is not None)
+    if polygons not in (None, "exclusion", "inclusion", "none"):
+        raise typer.BadParameter(f"{polygons!r} is not exclusion, inclusion or none", param_hint="--polygons")
+    world = None if scenario is None else _world(scenario)
+    given = read_path(path, altitude_m is not None, origin_of(world), polygons)
     sections: dict[str, dict[str, Any]] = {
         "aircraft": _given(model=aircraft, airspeed_mps=airspeed_mps),
-        "mission": _given(altitude_m=altitude_m if altitude_m is not None else given.altitude_m),
         "planner": _given(clearance_m=clearance_m),
         "trackability": _given(cross_track_m=tolerance_m),
         "environment": _given(wind=_wind(wind), turbulence=_turbulence(turbulence)),
     }
-    scenario = _scenario(path, given, sections, [] if seed is None else [("seed", str(seed))], settings or [])
-    folder = out or Path("runs") / "check" / f"{scenario.name}-{Path(aircraft).name}"
-    metrics = _fly(scenario, given, folder, recording=not no_recording, silent=quiet)
+    overrides = [] if seed is None else [("seed", str(seed))]
+    check = asked(
+        given,
+        sections,
+        [*overrides, *map(setting, settings or [])],
+        world=world,
+        altitude_m=altitude_m,
+        corner_m=corner_m,
+        name=_name(path),
+    )
+    folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}"
+    flown = _fly(check, folder, recording=not no_recording, silent=quiet)
     if as_json:
-        print_json(metrics)
+        print_json(flown.metrics)
     elif not quiet:
         from harness.cli.check_terminal import verdict_rows
         from harness.cli.terminal import print_table
 
-        print_table(f"{path.name}: {aircraft}, {scenario.aircraft.airspeed_mps:g} m/s", verdict_rows(metrics))
+        speed_mps = check.scenario.aircraft.airspeed_mps
+        print_table(f"{path.name}: {aircraft}, {speed_mps:g} m/s", verdict_rows(flown.metrics))
         typer.echo(f"run folder: {folder}")
-    return 0 if metrics["trackable"] else FAILED
+    return 0 if flown.ok else FAILED
 
 
-def _scenario(
-    path: Path,
-    given: GivenPath,
-    sections: Mapping[str, Mapping[str, Any]],
-    overrides: list[tuple[str, str]],
-    settings: list[str],
-) -> Scenario:
-    from harness.run.path_flight import scenario_for
+def _world(scenario: str) -> Path:
+    from harness.scenario.shipped import scenario_path
 
-    name = re.sub(r"[^a-z0-9._-]+", "-", path.stem.lower()).strip("-.") or "path"
-    where = given.origin_deg
-    area = {"area": {"origin": {"latitude_deg": where[0], "longitude_deg": where[1]}}} if where else {}
-    return scenario_for(
-        name[:100], given.points_m, {**sections, **area}, [*overrides, *map(setting, settings)]
-    )
+    return scenario_path(scenario)
+
+
+def _name(path: Path) -> str:
+    """The name of a path's scenario."""
+    return (re.sub(r"[^a-z0-9._-]+", "-", path.stem.lower()).strip("-.") or "path")[:100]
 
 
 def _given(**keys: Any) -> dict[str, Any]:
@@ -127,9 +157,7 @@ def _turbulence(text: str | None) -> dict[str, str] | None:
     return {"model": model if colon else "tustin", "intensity": intensity}
 
 
-def _fly(
-    scenario: Scenario, given: GivenPath, folder: Path, *, recording: bool, silent: bool
-) -> dict[str, Any]:
+def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> CheckedPath:
     """Flies into a folder, with a progress bar where a person looks on."""
     from contextlib import nullcontext
 
@@ -138,12 +166,12 @@ def _fly(
     from aircraft.airframes import AircraftError
     from harness.cli.terminal import progress_bar
     from harness.files.errors import RunFolderError
-    from harness.run.path_flight import check_path
+    from harness.run.path_check import fly_check
 
-    length_m = float(np.hypot(*np.diff(given.points_m, axis=0).T).sum())
+    length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
     try:
         with nullcontext() if silent else progress_bar(length_m) as report:
-            return check_path(scenario, given.points_m, folder, recording, report)
+            return fly_check(check, folder, recording, report)
     except (AircraftError, RunFolderError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:

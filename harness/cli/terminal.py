@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
+from harness.files.wording import tallied
+
 Report: TypeAlias = Callable[[float, float, str], None]
 """Takes simulated time (s), distance to go (m) and what is being done."""
 
@@ -135,14 +137,10 @@ def _tracked(metrics: Mapping[str, Any]) -> str:
         return "yes"
     legs = metrics["trackability"]
     bad = [leg for leg in legs if not leg["trackable"]]
-    return f"no: {len(bad)} of {len(legs)} legs, {causes(bad)}" if bad else "no: no plan was flown"
-
-
-def causes(bad: Sequence[Mapping[str, Any]]) -> str:
-    """The causes of legs that are not trackable, each once, with the number of legs."""
-    every = [leg["cause"] for leg in bad]
-    times = {cause: every.count(cause) for cause in dict.fromkeys(every)}
-    return ", ".join(f"{cause} ({count} legs)" if count > 1 else cause for cause, count in times.items())
+    causes = [leg["cause"] for leg in bad]
+    return (
+        f"no: {len(bad)} of {len(legs)} legs, {tallied(causes, 'legs')}" if bad else "no: no plan was flown"
+    )
 
 
 def envelope_tables(card: Mapping[str, Any]) -> list[tuple[str, Sequence[str], list[Sequence[str]]]]:

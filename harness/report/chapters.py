@@ -104,11 +104,19 @@ def run_chapter(scenario: Scenario, flight: Entry, optimum: Optimum) -> Chapter:
     assert drawn is not None
     assert flight.run is not None
     folder = flight.run.folder
-    path = figures.planner_figure(scene, drawn, 0)
+    metrics = flight.run.metrics
+    if "check" in metrics:
+        from harness.report.path_figure import path_figure
+
+        path = path_figure(scene, drawn, flight.run.plans[0].waypoints_m, metrics)
+        caption = f"The path of {scene.name} as given, and the track that was flown over it."
+    else:
+        path = figures.planner_figure(scene, drawn, 0)
+        turn = ", and its tightest planned turn" if drawn.planned.tightest is not None else ""
+        caption = f"The track from S to G in {scene.name}{turn}."
     strips = figures.profiles(scene, [(0, drawn)])
-    turn = ", and its tightest planned turn" if drawn.planned.tightest is not None else ""
     pictures = [
-        _picture(folder / "path", path, f"The track from S to G in {scene.name}{turn}."),
+        _picture(folder / "path", path, caption),
         _picture(folder / "profiles", strips, PROFILES),
     ]
     return Chapter(scene.name, _facts(scene, optimum), [flight.row], pictures, optimum.reason)

@@ -93,9 +93,9 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 def overview(scene: Scene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
     keys = _keys(scene, [run for _, run in runs])
-    with styled(_map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(keys)) / 2)) as figure:
+    with styled(map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(keys)) / 2)) as figure:
         axes = figure.add_subplot()
-        legend = _map(axes, scene)
+        legend = draw_map(axes, scene)
         for index, run in runs:
             legend.append(_flown(axes, scene, run, index, DASHES[index % len(DASHES)]))
         axes.set_title(scene.name)
@@ -113,11 +113,11 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
     """
     row = run.planned.tightest
     below_in = [] if row is None else [CLOSE_UP_IN]
-    map_in, keys = _map_height_in(scene), _keys(scene, [run])
+    map_in, keys = map_height_in(scene), _keys(scene, [run])
     with styled(map_in + sum(below_in) + LEGEND_ROW_IN * math.ceil((4 + len(keys)) / 2)) as figure:
         rows = figure.add_gridspec(1 + len(below_in), 2, height_ratios=[map_in, *below_in])
         axes = figure.add_subplot(rows[0, :])
-        legend = _map(axes, scene)
+        legend = draw_map(axes, scene)
         legend.append(_flown(axes, scene, run, index))
         axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
         if row is not None:
@@ -154,21 +154,24 @@ def profiles(scene: Scene, runs: Numbered) -> Figure:
     return figure
 
 
-def _map_height_in(scene: Scene) -> float:
+def map_height_in(scene: Scene) -> float:
     """What a map as wide as a figure needs, title and axis labels included."""
     xmin, ymin, xmax, ymax = scene.bounds_m
     return 0.8 + min((WIDTH_IN - 0.6) * (ymax - ymin) / (xmax - xmin), TALLEST_MAP_IN)
 
 
-def _map(axes: Axes, scene: Scene) -> list[Any]:
-    """Obstacles, area, start, goal, straight line and optimum; returns what the legend begins with."""
+def draw_map(axes: Axes, scene: Scene, ends: bool = True) -> list[Any]:
+    """Obstacles and area, and start, goal, straight line and optimum where wanted; returns the legend's begin."""
     xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
     for obstacle in scene.obstacles:
         for grown, style in (
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.5, "ls": ":"}),
             (0.0, SOLID if obstacle.stands_for_ever else CHANGING),
         ):
-            axes.add_patch(_outline(obstacle, grown, **style))
+            axes.add_patch(outline(obstacle, grown, **style))
+    axes.set(xlim=(xmin, xmax), ylim=(ymin, ymax), aspect="equal", xlabel="east, km", ylabel="north, km")
+    if not ends:
+        return []
     (east, north), (goal_east, goal_north) = np.array(scene.start_m) / 1e3, np.array(scene.goal_m) / 1e3
     straight = axes.plot(
         [east, goal_east], [north, goal_north], color="0.3", lw=0.7, ls="--", label="straight line"
@@ -186,11 +189,10 @@ def _map(axes: Axes, scene: Scene) -> list[Any]:
             name, place, (0, 6 if low else -6), textcoords="offset points", ha="center",
             va="bottom" if low else "top", weight="bold", zorder=7,
         )  # fmt: skip
-    axes.set(xlim=(xmin, xmax), ylim=(ymin, ymax), aspect="equal", xlabel="east, km", ylabel="north, km")
     return legend
 
 
-def _outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
+def outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
     """An obstacle, moving ones where they appear, grown by a distance."""
     shape = obstacle.shape
     if isinstance(shape, Circle):
@@ -207,7 +209,7 @@ def _outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
 
 def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
     """Draws a track and the place of its tightest planned turn; the first planner's lies on top."""
-    points = _thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
+    points = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
     style: dict[str, Any] = {"color": colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
     if run.outcome != "reached":
@@ -234,7 +236,7 @@ def _keys(scene: Scene, runs: Sequence[DrawnRun]) -> list[Any]:
     return keys
 
 
-def _thinned(points: FloatArray, scene: Scene) -> FloatArray:
+def thinned(points: FloatArray, scene: Scene) -> FloatArray:
     """A track without the points that no one could see on the map."""
     import shapely
 
@@ -254,7 +256,7 @@ def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> 
             (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.6, "ls": ":"}),
             (0.0, SOLID),
         ):
-            axes.add_patch(_outline(obstacle, grown, **style))
+            axes.add_patch(outline(obstacle, grown, **style))
     planned = np.column_stack((run.planned.east_m, run.planned.north_m))
     flown = np.column_stack((run.track.east_m, run.track.north_m))
     for points, ink, width, dashes in (

@@ -76,7 +76,7 @@ def report_html(
 def run_html(
     chapter: Chapter,
     legs: Sequence[Mapping[str, Any]],
-    corners: Sequence[Mapping[str, Any]] | None,
+    checked: Mapping[str, Any] | None,
     *,
     aircraft: str,
     scenario_yaml: str,
@@ -90,7 +90,7 @@ def run_html(
     Args:
         chapter: with one row, and the figures of the path and of its profiles.
         legs: `trackability` of `metrics.json`.
-        corners: of a path that was given, `check.corners` in there; None where a planner made the path.
+        checked: `metrics.json` of a path that was given; None where a planner made the path.
         aircraft: its name.
         scenario_yaml: the scenario as flown.
         command: the command line that flew it.
@@ -104,7 +104,7 @@ def run_html(
         row=chapter.rows[0],
         legs=legs,
         lost=[leg for leg in legs if not leg["trackable"]],
-        corners=corners,
+        checked=checked,
         aircraft=aircraft,
         scenario_yaml=scenario_yaml,
         command=command,

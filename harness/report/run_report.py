@@ -34,7 +34,7 @@ def write_report(folder: Path) -> Path:
 
 
 def _written(run: Run, folder: Path) -> Path:
-    scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO))
+    scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO), ends_checked=False)
     optimum = optimum_of(scenario)
     flight = entry(scenario, run, optimum)
     page, manifest = folder / REPORT, run.manifest
@@ -47,7 +47,7 @@ def _written(run: Run, folder: Path) -> Path:
     text = run_html(
         run_chapter(scenario, flight, optimum),
         run.metrics["trackability"],
-        run.metrics["check"]["corners"] if "check" in run.metrics else None,
+        run.metrics if "check" in run.metrics else None,
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
         command=command,

@@ -8,6 +8,7 @@ an arc has the turn radius of the aircraft. What is left is the corner that had 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,11 @@ class CutCorner:
     cut_m: float
     arc_length_m: float
 
+    @property
+    def half_m(self) -> float:
+        """Half the length of its arc."""
+        return 0.5 * self.radius_m * abs(float(np.radians(self.turn_deg)))
+
 
 @dataclass(frozen=True, eq=False)
 class FlyBy:
@@ -67,11 +73,14 @@ class FlyBy:
         waypoints_m: (k, 2) those of the points given that are needed.
         segments: (n, 6) as in `planner.interface.Path`.
         corners: those that are cut by more than was left free, or have no arc, in order.
+        given_m: (m, 3) the polyline once more, with the points where arcs touch it: east, north, and the arc length of
+            `segments` that belongs there. Along a leg both grow alike; an arc is shared out over what it cuts off.
     """
 
     waypoints_m: FloatArray
     segments: FloatArray
     corners: tuple[CutCorner, ...]
+    given_m: FloatArray
 
 
 def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
@@ -133,7 +142,36 @@ def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
         )
         for i in np.flatnonzero(back | (cut > free_cut_m * (1.0 + 1e-9))).tolist()
     )
-    return FlyBy(points, np.array(rows), corners)
+    return FlyBy(
+        points, np.array(rows), corners, _as_given(points, ahead, trim, middles, turn * radius, station)
+    )
+
+
+def _as_given(
+    points_m: FloatArray,
+    ahead: NDArray[Any],
+    trim_m: FloatArray,
+    middles_m: list[float],
+    around_m: FloatArray,
+    length_m: float,
+) -> FloatArray:
+    """`FlyBy.given_m` of (k + 2, 2) points with arcs at the k between its ends.
+
+    Args:
+        points_m: the polyline.
+        ahead: (k + 1,) unit vectors along its legs.
+        trim_m: (k,) how far from its corner each arc begins and ends.
+        middles_m: of the arcs, along the rounded path.
+        around_m: (k,) lengths of the arcs, with a sign.
+        length_m: of the rounded path.
+    """
+    corners = points_m[1:-1, 0] + 1j * points_m[1:-1, 1]
+    middle, half = np.array(middles_m), 0.5 * np.abs(around_m)
+    places = np.stack((corners - trim_m * ahead[:-1], corners, corners + trim_m * ahead[1:]), axis=1).ravel()
+    along = np.stack((middle - half, middle, middle + half), axis=1).ravel()
+    inner = np.column_stack((places.real, places.imag, along))
+    ends = np.column_stack((points_m[[0, -1]], (0.0, length_m)))
+    return np.concatenate((ends[:1], inner, ends[1:]))
 
 
 def _needed(points_m: FloatArray) -> NDArray[np.int64]:

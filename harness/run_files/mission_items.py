@@ -10,7 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from harness.files.strict_yaml import InputError
+from harness.files.input_file import InputError
+from harness.run_files.fences import Fences
+from harness.run_files.path_as_read import PathAsRead
+
+NO_FENCES: Final = Fences()
 
 NAV_WAYPOINT: Final = 16
 
@@ -90,42 +94,32 @@ class Item:
     params: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class Waypoints:
-    """The waypoints of a mission.
-
-    Attributes:
-        local: positions are east and north in metres; else latitude and longitude in degrees.
-        positions: one a waypoint.
-        altitudes_m: above mean sea level.
-    """
-
-    local: bool
-    positions: tuple[tuple[float, float], ...]
-    altitudes_m: tuple[float, ...]
-
-
-def waypoints(items: Sequence[Item], home_altitude_m: float) -> Waypoints:
+def waypoints(
+    items: Sequence[Item], home_altitude_m: float, fences: Fences = NO_FENCES, notes: tuple[str, ...] = ()
+) -> PathAsRead:
     """The waypoints that a mission is made of.
 
     Args:
         items: all items of the mission, home not among them.
         home_altitude_m: what relative altitudes count from, above mean sea level.
+        fences: that come with the mission.
+        notes: on what else does.
 
     Raises:
         InputError: an item is not a waypoint, or not one that can be flown through at a fixed altitude.
     """
     local = any(item.frame in (LOCAL_ENU, LOCAL_NED) for item in items)
-    positions, altitudes = [], []
+    positions, altitudes, acceptance = [], [], []
     for item in items:
         _check(item, local)
         x, y, z = item.params[4:7]
         if item.frame == LOCAL_NED:
             x, y, z = y, x, -z
         positions.append((x, y))
+        acceptance.append(max(item.params[1], 0.0))
         above_home = local or GLOBAL_FRAMES[item.frame] == "home"
         altitudes.append(z + home_altitude_m if above_home else z)
-    return Waypoints(local, tuple(positions), tuple(altitudes))
+    return PathAsRead(local, tuple(positions), tuple(altitudes), False, tuple(acceptance), fences, notes)
 
 
 def _check(item: Item, local: bool) -> None:

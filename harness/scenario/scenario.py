@@ -94,7 +94,8 @@ class Scenario(Section):
             load_factor=_limit_load_factor(self.aircraft),
         )
         check_local_plane(self.area)
-        check_start_and_goal(self.area, self.obstacles, self.mission, self.planner.clearance_m)
+        if (info.context or {}).get("ends_checked", True):
+            check_start_and_goal(self.area, self.obstacles, self.mission, self.planner.clearance_m)
         object.__setattr__(self, "planner", planner_keys.resolved(self.planner, mission_of(self)))
         return self
 
@@ -121,16 +122,30 @@ def load_scenario(path: Path, overrides: Sequence[tuple[str, str]] = ()) -> Scen
         InputError: the file cannot be read or is not a scenario; a line of its text names file, line and key.
     """
     root = strict_yaml.read(path)
-    return _validated(overridden(root, overrides), str(path), path.parent)
+    return validated(overridden(root, overrides), str(path), path.parent)
 
 
-def parse_scenario(text: str, source: str = "scenario") -> Scenario:
-    """Reads a scenario from text; `source` is what faults name it.
+def parse_scenario(text: str, source: str = "scenario", ends_checked: bool = True) -> Scenario:
+    """Reads a scenario from text.
+
+    Args:
+        text: YAML.
+        source: what faults name it.
+        ends_checked: start and goal must keep the clearance; False for a scenario that a path was checked in.
 
     Raises:
         InputError: it is not a scenario.
     """
-    return _validated(strict_yaml.parse(text, source), source)
+    return validated(strict_yaml.parse(text, source), source, ends_checked=ends_checked)
+
+
+def node_of_keys(keys: Mapping[str, Any]) -> Node:
+    """Keys that a command has put together, as if they had been read; their faults name the command line.
+
+    Raises:
+        InputError: a value cannot be written in a scenario.
+    """
+    return strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
 
 
 def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
@@ -143,8 +158,7 @@ def scenario_of(keys: Mapping[str, Any], overrides: Sequence[tuple[str, str]] = 
     Raises:
         InputError: it is not a scenario; its faults name the command line.
     """
-    root = strict_yaml.parse(strict_yaml.dump(dict(keys)), "command line").moved(COMMAND_LINE)
-    return _validated(overridden(root, overrides), "command line")
+    return validated(overridden(node_of_keys(keys), overrides), "command line")
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -221,9 +235,21 @@ def scenario_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _validated(root: Node, source: str, folder: Path | None = None) -> Scenario:
+def validated(root: Node, source: str, folder: Path | None = None, ends_checked: bool = True) -> Scenario:
+    """A scenario from what was read, every default filled in.
+
+    Args:
+        root: its keys.
+        source: what faults name it.
+        folder: where the folder of an aircraft is sought first.
+        ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
+
+    Raises:
+        InputError: it is not a scenario.
+    """
     try:
-        return Scenario.model_validate(root.plain(), context={"folder": folder})
+        context = {"folder": folder, "ends_checked": ends_checked}
+        return Scenario.model_validate(root.plain(), context=context)
     except ValidationError as error:
         raise input_error(error, Scenario, root, source) from error
 

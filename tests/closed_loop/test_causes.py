@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -16,8 +15,9 @@ import pytest
 from harness.analysis.metrics import metrics
 from harness.flight.closed_loop import fly
 from harness.flight.record import FloatArray
-from harness.run.path_flight import check_path, scenario_for
+from harness.run.path_check import asked, fly_check
 from harness.run.scenario_flight import flight_limits, make_loop
+from harness.run_files.path_files import given_points
 from harness.scenario.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
@@ -49,13 +49,15 @@ def weave(radius_m: float, lobe_rad: float, lobes: int) -> FloatArray:
 
 
 @pytest.fixture
-def check(tmp_path: FilePath) -> Check:
+def check() -> Check:
     """Flies a path with an Aerosonde at 25 m/s in calm air, unless keys say otherwise; returns its metrics."""
 
-    def fly_it(points: FloatArray, model: str = "aerosonde", **keys: float) -> dict[str, Any]:
+    def fly_it(
+        points: FloatArray, model: str = "aerosonde", corner_m: float | None = None, **keys: float
+    ) -> dict[str, Any]:
         overrides = [(name.replace("__", "."), str(value)) for name, value in keys.items()]
-        scenario = scenario_for("path", points, {"aircraft": {"model": model}}, overrides)
-        return check_path(scenario, points, tmp_path / "run", recording=False)
+        check = asked(given_points(points), {"aircraft": {"model": model}}, overrides, corner_m=corner_m)
+        return fly_check(check).metrics
 
     return fly_it
 
@@ -77,22 +79,32 @@ def test_turn_radius_too_tight_for_a_corner_without_room(check: Check) -> None:
     strip = [(0.0, 0.0), (0.0, 2000.0), (60.0, 2000.0), (60.0, 0.0)]
     assert causes(check(np.array(strip))) == {"turn radius too tight"}
     wide = [(0.0, 0.0), (0.0, 2000.0), (300.0, 2000.0), (300.0, 0.0)]
-    assert causes(check(np.array(wide))) == set()
+    assert causes(check(np.array(wide), corner_m=120.0)) == set()
 
 
-def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_there_is_room(check: Check) -> None:
+def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_it_may_be(check: Check) -> None:
     """The arc of 110 m passes a corner of 170 degrees at 1.2 km, one of 90 degrees at 46 m."""
-    sharp = check(np.array([(0.0, 0.0), (0.0, 3000.0), (525.0, 0.0)]))
+    sharp = check(np.array([(0.0, 0.0), (0.0, 3000.0), (525.0, 0.0)]), corner_m=120.0)
     assert causes(sharp) == {"turn radius too tight"}
     (corner,) = sharp["check"]["corners"]
-    assert (corner["waypoint"], corner["allowed_cut_m"]) == (1, 120.0)
+    assert (corner["waypoint"], corner["allowed_cut_m"], corner["kept"]) == (1, 120.0, False)
     assert corner["flown_cut_m"] == pytest.approx(corner["cut_m"], abs=1.0)
     assert 1000.0 < corner["cut_m"] < 1400.0
     square = np.array([(0.0, 0.0), (0.0, 3000.0), (3000.0, 3000.0)])
-    assert causes(check(square)) == set()
-    assert causes(check(square, planner__clearance_m=20, trackability__cross_track_m=5)) == {
-        "turn radius too tight"
-    }
+    assert causes(check(square, corner_m=46.0)) == set()
+    assert causes(check(square, corner_m=45.0)) == {"turn radius too tight"}
+
+
+def test_a_drawn_line_is_to_be_flown_as_drawn(check: Check) -> None:
+    """A corner of 90 degrees is cut by 46 m, whatever the path is rounded to; a curve of points is given back."""
+    corner = check(np.array([(0.0, 0.0), (0.0, 3000.0), (3000.0, 3000.0)]))
+    assert causes(corner) == {"turn radius too tight"}
+    assert corner["cross_track_m"]["max"] < 1.0
+    assert corner["deviation_from_given_m"]["max"] == pytest.approx(45.6, abs=0.5)
+    assert [leg["trackable"] for leg in corner["trackability"]] == [False, True]
+    curve = check(turn(150.0))
+    assert causes(curve) == set()
+    assert curve["deviation_from_given_m"]["max"] < 1.0
 
 
 def test_a_path_that_leads_back_and_by_where_it_began(check: Check) -> None:

@@ -23,7 +23,7 @@ from harness.cli.falsify import range_of
 from harness.falsify.keys import vary_of
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.run.path_flight import scenario_for
+from harness.run.path_scenario import scenario_for
 from harness.run_files.given_path import fly_by
 from harness.run_files.path_files import read_path
 from harness.scenario.scenario import Scenario, dump_scenario, load_scenario, parse_scenario

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.analysis.trackability import FlightLimits, legs
+from harness.analysis.trackability import AsGiven, FlightLimits, legs
 from harness.flight.record import AcceptedPlan, Track
 
 LIMITS = FlightLimits(
@@ -141,17 +141,21 @@ def test_thresholds_can_be_given() -> None:
 class Passed:
     arc_length_m: float
     cut_m: float
+    half_m: float = 30.0
 
 
-def test_corners_end_legs_and_may_be_cut_by_the_clearance(
+def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
     make_track: Callable[..., Track], straight_plan: AcceptedPlan
 ) -> None:
     corners = [Passed(500.0, 49.0), Passed(1000.0, 51.0)]
-    judged = legs(make_track(601), [straight_plan], LIMITS, corners=corners)
-    assert [(leg.end_s, leg.corner_cut_m, leg.cause) for leg in judged] == [
-        (20.0, 49.0, None),
-        (40.0, 51.0, "turn radius too tight"),
-        (60.0, 0.0, None),
+    track = make_track(601)
+    off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 3.0)
+    given = AsGiven(corners, off, np.full(601, 50.0))
+    judged = legs(track, [straight_plan], LIMITS, given=given)
+    assert [(leg.end_s, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged] == [
+        (20.0, 49.0, 3.0, None),
+        (40.0, 51.0, 51.0, "turn radius too tight"),
+        (60.0, 0.0, 3.0, None),
     ]
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from harness.cli.app import main
+from harness.files.input_file import InputError
+from harness.run.path_check import check
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import parse_scenario
 
@@ -32,6 +36,7 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
     said = capsys.readouterr()
     assert said.err == ""
     *table, folder = said.out.splitlines()
+    assert table[2].startswith(" flown as given        no: ")
     assert max(map(len, table)) <= 80
     assert folder == f"run folder: {out}"
     assert "no: turn radius too tight" in said.out
@@ -41,15 +46,16 @@ def test_a_corner_too_tight_is_found_named_and_shown_in_80_columns(
     assert run.metrics["trackable"] is False
     assert len(run.plans) == 1
     assert run.plans[0].waypoints_m.tolist() == [[0.0, 0.0], [0.0, 2000.0], [60.0, 2000.0], [60.0, 0.0]]
-    check = run.metrics["check"]
-    assert check["given"]["heading_change_deg"] == pytest.approx(180.0)
-    assert check["given"]["angle_over_length_radpm"] == pytest.approx(math.pi / 4060.0)
-    assert [corner["waypoint"] for corner in check["corners"]] == [1, 2]
+    told = run.metrics["check"]
+    assert told["given"]["heading_change_deg"] == pytest.approx(180.0)
+    assert told["given"]["angle_over_length_radpm"] == pytest.approx(math.pi / 4060.0)
+    assert [corner["waypoint"] for corner in told["corners"]] == [1, 2]
     assert main(["report", str(out)]) == 0
     page = (out / "report.html").read_text()
     assert "strip-1: path as given, aerosonde" in page
-    for corner in check["corners"]:
+    for corner in told["corners"]:
         assert f"<td>{corner['flown_cut_m']:.0f}</td><td>{corner['allowed_cut_m']:.0f}</td>" in page
+    assert page.index(told["verdict"]) < page.index("at the end of the path")
     assert "for a planner to fly" in page
     scenario = parse_scenario(run.scenario_yaml)
     assert scenario.name == "strip-1"
@@ -61,7 +67,15 @@ def test_a_circuit_is_flown_to_its_end_and_is_trackable(
 ) -> None:
     path = tmp_path / "circuit.csv"
     path.write_text(CIRCUIT)
-    options = ["--aircraft", "aerosonde", "--no-recording", "--out", str(tmp_path / "run")]
+    options = [
+        "--aircraft",
+        "aerosonde",
+        "--no-recording",
+        "--out",
+        str(tmp_path / "run"),
+        "--corner-m",
+        "120",
+    ]
     assert main(["check", str(path), *options, "--wind", "6,200", "--turbulence", "light", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said == json.loads((tmp_path / "run" / "metrics.json").read_text())
@@ -128,3 +142,178 @@ def test_bad_input_is_refused_before_anything_is_flown(
     assert len(said.err.splitlines()) <= 2
     assert sentence in said.err
     assert not (tmp_path / "run").exists()
+
+
+def flown(path: Path, out: Path, *options: str, capsys: pytest.CaptureFixture[str]) -> tuple[int, Any]:
+    """Exit status and metrics of a check."""
+    given = ["--aircraft", "aerosonde", "--no-recording", "--json", "--out", str(out), *options]
+    status = main(["check", str(path), *given])
+    return status, json.loads(capsys.readouterr().out)
+
+
+@pytest.fixture
+def straight(tmp_path: Path) -> Path:
+    path = tmp_path / "straight.csv"
+    path.write_text("x_m,y_m\n0,0\n0,1500\n")
+    return path
+
+
+CIRCLE = "obstacles=[{circle: {center_m: [100, 800], radius_m: 150}}]"
+
+
+def test_an_aircraft_that_flies_through_a_circle_is_told_so_everywhere(
+    straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--aircraft", "aerosonde", "--no-recording", "--out", str(tmp_path / "run"), "--set", CIRCLE]
+    assert main(["check", str(straight), *options]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no: touches obstacles[0] at 28 s, by 50 m" in said
+    assert "least clearance -50 m" in said
+    run = load_run(tmp_path / "run")
+    assert (run.metrics["contact"], run.metrics["trackable"], run.metrics["outcome"]) == (
+        True,
+        False,
+        "collision",
+    )
+    assert run.metrics["min_clearance_m"] == pytest.approx(-50.0, abs=0.5)
+    assert main(["report", str(tmp_path / "run")]) == 0
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "no: touches obstacles[0] at 28 s, by 50 m" in page
+    assert "obstacles[0] (obstacle)" in page
+
+
+def test_what_keeps_off_obstacles_and_bounds_is_flown_as_given(
+    straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    beside = CIRCLE.replace("[100, 800]", "[200, 800]")
+    bounds = "area.bounds_m=[-400, -100, 400, 1600]"
+    status, metrics = flown(straight, tmp_path / "run", "--set", beside, "--set", bounds, capsys=capsys)
+    assert (status, metrics["contact"], metrics["breaches"]) == (0, False, [])
+    assert metrics["min_clearance_m"] == pytest.approx(50.0, abs=0.5)
+    assert metrics["deviation_from_given_m"]["max"] < 1.0
+    status, metrics = flown(
+        straight, tmp_path / "run", "--set", bounds.replace("1600", "1200"), capsys=capsys
+    )
+    (left,) = metrics["breaches"]
+    assert (status, left["name"]) == (1, "area.bounds_m")
+
+
+def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
+    straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    world = tmp_path / "world.yaml"
+    world.write_text(
+        "schema: wayproof/scenario/1\nname: w\narea: {bounds_m: [-2000, -2000, 2000, 3000]}\n"
+        f"{CIRCLE.replace('=', ': ')}\nmission: {{start_m: [-900, 0], goal_m: [-900, 1500], altitude_m: 700}}\n"
+        "environment: {wind: {speed_mps: 4, from_deg: 90}}\n"
+    )
+    status, metrics = flown(straight, tmp_path / "run", "--scenario", str(world), capsys=capsys)
+    assert (status, [each["name"] for each in metrics["contacts"]]) == (1, ["obstacles[0]"])
+    scenario = parse_scenario(load_run(tmp_path / "run").scenario_yaml)
+    assert (scenario.mission.altitude_m, scenario.mission.start_m) == (700.0, (0.0, 0.0))
+    assert scenario.environment.wind is not None
+    inside = "obstacles[0].circle.center_m=[0, 100]"
+    status, metrics = flown(
+        straight, tmp_path / "run", "--scenario", str(world), "--set", inside, capsys=capsys
+    )
+    assert (status, metrics["contacts"][0]["start_s"]) == (1, 0.0)
+
+
+def mission(*fences: dict[str, Any], acceptance_m: float = 0.0, firmware: int = 12) -> str:
+    places = [(47.0, 8.0), (47.012, 8.0), (47.012, 8.016)]
+    items = [
+        {
+            "type": "SimpleItem",
+            "command": 16,
+            "frame": 0,
+            "doJumpId": number,
+            "params": [0, acceptance_m, 0, None, latitude, longitude, 500],
+        }
+        for number, (latitude, longitude) in enumerate(places, start=1)
+    ]
+    fence = {
+        "circles": [each for each in fences if "circle" in each],
+        "polygons": [each for each in fences if "polygon" in each],
+    }
+    home = {"plannedHomePosition": [47.0, 8.0, 400], "firmwareType": firmware}
+    return json.dumps({"fileType": "Plan", "mission": {"items": items, **home}, "geoFence": fence})
+
+
+ACROSS: dict[str, Any] = {
+    "inclusion": False,
+    "polygon": [[47.005, 7.99], [47.007, 7.99], [47.007, 8.01], [47.005, 8.01]],
+}
+AROUND: dict[str, Any] = {"inclusion": True, "circle": {"center": [47.006, 8.008], "radius": 3000}}
+
+
+@pytest.mark.parametrize(
+    ("fences", "told"),
+    [
+        ([AROUND], []),
+        ([ACROSS], ["geoFence.polygons[0]"]),
+        ([{**AROUND, "circle": {"center": [47.0, 8.0], "radius": 1000}}], ["geoFence.circles[0]"]),
+    ],
+)
+def test_the_fences_of_a_mission_are_kept(
+    fences: list[dict[str, Any]], told: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "mission.plan"
+    path.write_text(mission(*fences))
+    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    assert (status, [each["name"] for each in metrics["breaches"]]) == (1 if told else 0, told)
+    assert metrics["check"]["ok"] is not bool(told)
+    assert metrics["min_clearance_m"] is not None
+
+
+@pytest.mark.parametrize(
+    ("acceptance_m", "options", "status", "allowed_m"),
+    [
+        (0.0, (), 0, 120.0),
+        (50.0, ("--corner-m", "5"), 0, 50.0),
+        (30.0, (), 1, 30.0),
+        (0.0, ("--corner-m", "5"), 1, 5.0),
+    ],
+)
+def test_a_mission_may_cut_corners_by_its_acceptance_radius(
+    acceptance_m: float,
+    options: tuple[str, ...],
+    status: int,
+    allowed_m: float,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "mission.plan"
+    path.write_text(mission(acceptance_m=acceptance_m))
+    ended, metrics = flown(path, tmp_path / "run", *options, capsys=capsys)
+    (corner,) = metrics["check"]["corners"]
+    assert (ended, corner["allowed_cut_m"], corner["kept"]) == (status, allowed_m, status == 0)
+
+
+def test_a_polygon_across_a_line_is_a_fence_unless_it_is_told_otherwise(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "line.geojson"
+    ring = [[longitude, latitude] for latitude, longitude in ACROSS["polygon"]]
+    shapes = [
+        {"type": "LineString", "coordinates": [[8.0, 47.0], [8.0, 47.012]]},
+        {"type": "Polygon", "coordinates": [[*ring, ring[0]]]},
+        {"type": "Point", "coordinates": [8.0, 47.0]},
+    ]
+    features = [{"type": "Feature", "properties": {}, "geometry": shape} for shape in shapes]
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    assert (status, metrics["breaches"][0]["name"]) == (1, "features[1]")
+    assert metrics["check"]["notes"] == ["1 Point beside the path passed over"]
+    status, metrics = flown(path, tmp_path / "run", "--polygons", "none", capsys=capsys)
+    assert (status, metrics["breaches"]) == (0, [])
+    assert metrics["check"]["notes"][-1] == "1 Polygon beside the path passed over"
+
+
+def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
+    checked = check([(0.0, 0.0), (0.0, 1500.0)])
+    assert checked.ok
+    assert repr(checked) == "CheckedPath('yes: flown as drawn, within 12 m')"
+    assert checked.metrics["digest"] == check(straight).metrics["digest"]
+    assert not check(np.array([(0.0, 0.0), (0.0, 1000.0), (60.0, 1000.0), (60.0, 0.0)])).ok
+    with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):
+        check([1.0, 2.0])  # type: ignore[list-item]

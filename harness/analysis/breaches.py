@@ -1,0 +1,207 @@
+"""Where a flown track touched an obstacle, crossed a fence or left the area: when, where and how deep.
+
+A track is known ten times a second; between two rows it is taken to be straight. What it crosses there counts as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from harness.flight.record import FloatArray, Track
+from harness.run_files.fences import Fence, Fences
+from harness.world.world import World
+
+if TYPE_CHECKING:
+    from shapely import Geometry
+
+CONTACT: Final = "obstacle"
+"""The kind of a breach that is a contact; the others are crossings of lines in the air."""
+
+
+@dataclass(frozen=True)
+class Breach:
+    """One stretch of flight where the aircraft was where it must not be.
+
+    Attributes:
+        kind: `obstacle`, `exclusion`, `inclusion` or `area`.
+        name: of what it touched or crossed.
+        start_s: when it began.
+        end_s: when it was over, or the flight was.
+        time_s: when it was deepest.
+        east_m: where it was deepest.
+        north_m: where it was deepest.
+        depth_m: how far inside, or outside of what it had to stay in, it was there.
+    """
+
+    kind: str
+    name: str
+    start_s: float
+    end_s: float
+    time_s: float
+    east_m: float
+    north_m: float
+    depth_m: float
+
+    def plain(self) -> dict[str, Any]:
+        """Its content for `metrics.json`."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What a track kept from obstacles and fences.
+
+    Attributes:
+        breaches: in order of time.
+        margin_m: least distance from every edge of obstacles and fences, negative where one was crossed; +inf without
+            any.
+    """
+
+    breaches: tuple[Breach, ...]
+    margin_m: float
+
+    @property
+    def contacts(self) -> tuple[Breach, ...]:
+        """Those with obstacles."""
+        return tuple(each for each in self.breaches if each.kind == CONTACT)
+
+    @property
+    def crossings(self) -> tuple[Breach, ...]:
+        """Those of fences and of the area's bounds."""
+        return tuple(each for each in self.breaches if each.kind != CONTACT)
+
+
+def kept(track: Track, world: World, fences: Fences, bounded: bool) -> Kept:
+    """Compares a track with obstacles, fences and the bounds of the area.
+
+    Args:
+        track: what was flown; `clearance_m` is the distance to the obstacles of `world`.
+        world: the truth.
+        fences: those of the path.
+        bounded: the bounds of the area must not be crossed.
+    """
+    import shapely
+
+    found = _contacts(track, world)
+    margins = [float(np.min(track.clearance_m, initial=np.inf))]
+    for fence in fences.exclusions:
+        margin = -_inside_m(track, fence.area)
+        margins.append(float(margin.min()))
+        found += _crossings(track, margin, fence.kind, fence.name, outside_of=fence.area)
+    allowed = fences.allowed
+    if allowed is not None:
+        margin = _inside_m(track, allowed)
+        margins.append(float(margin.min()))
+        found += _crossings(track, margin, "inclusion", _names(fences.inclusions), inside_of=allowed)
+    margins += [-each.depth_m for each in found]
+    if bounded:
+        area = shapely.box(*world.bounds_m)
+        found += _crossings(track, _inside_m(track, area), "area", "area.bounds_m", inside_of=area)
+    return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins))
+
+
+def _names(fences: Sequence[Fence]) -> str:
+    return fences[0].name if len(fences) == 1 else f"all of {', '.join(fence.name for fence in fences)}"
+
+
+def _contacts(track: Track, world: World) -> list[Breach]:
+    """Contacts with obstacles, one by one."""
+    steps_m = np.append(np.hypot(np.diff(track.east_m), np.diff(track.north_m)), 0.0)
+    steps_m += world.max_obstacle_speed_mps * np.append(np.diff(track.time_s), 0.0)
+    close = np.flatnonzero(track.clearance_m <= steps_m)
+    touched = {
+        index
+        for row in close.tolist()
+        for index in world.near(
+            track.east_m[row], track.north_m[row], float(steps_m[row]), float(track.time_s[row])
+        )
+    }
+    found = []
+    for index in sorted(touched):
+        one = World([world.obstacles[index]], world.bounds_m)
+        margin = one.clearance(np.column_stack((track.east_m, track.north_m)), track.time_s)
+        between = np.full(len(track), np.inf)
+        near = np.flatnonzero((margin[:-1] >= 0.0) & (margin[1:] >= 0.0) & (margin[:-1] <= steps_m[:-1]))
+        for row in near.tolist():
+            begin, end = _fix(track, row), _fix(track, row + 1)
+            between[row] = one.contact_between(begin, float(margin[row]), end, float(margin[row + 1]))
+        found += _stretches(track, np.minimum(margin, between), CONTACT, f"obstacles[{index}]")
+    return found
+
+
+def _fix(track: Track, row: int) -> tuple[float, float, float]:
+    return float(track.east_m[row]), float(track.north_m[row]), float(track.time_s[row])
+
+
+def _inside_m(track: Track, area: Geometry) -> FloatArray:
+    """(n,) how far inside of an area the rows of a track are; negative outside."""
+    import shapely
+
+    shapely.prepare(area)
+    edge = area.boundary
+    shapely.prepare(edge)
+    away = shapely.distance(edge, shapely.points(track.east_m, track.north_m))
+    inside: FloatArray = np.where(shapely.intersects_xy(area, track.east_m, track.north_m), away, -away)
+    return inside
+
+
+def _crossings(
+    track: Track,
+    margin_m: FloatArray,
+    kind: str,
+    name: str,
+    *,
+    inside_of: Geometry | None = None,
+    outside_of: Geometry | None = None,
+) -> list[Breach]:
+    """Stretches of a track on the wrong side of a line, those between two rows among them.
+
+    Args:
+        track: the track.
+        margin_m: (n,) distance of its rows from the line, negative on the wrong side.
+        kind: of the breaches.
+        name: of the fence.
+        inside_of: what the track has to stay in; or
+        outside_of: what it has to stay out of.
+    """
+    import shapely
+
+    margin = margin_m.copy()
+    steps_m = np.hypot(np.diff(track.east_m), np.diff(track.north_m))
+    near = np.flatnonzero(
+        (margin_m[:-1] >= 0.0) & (margin_m[1:] >= 0.0) & (margin_m[:-1] + margin_m[1:] <= steps_m)
+    )
+    for row in near.tolist():
+        way = shapely.LineString(np.column_stack((track.east_m[row : row + 2], track.north_m[row : row + 2])))
+        wrong = way.difference(inside_of) if inside_of is not None else way.intersection(outside_of)
+        if wrong.length > 0.0:
+            area = inside_of if inside_of is not None else outside_of
+            middle = wrong.interpolate(0.5, normalized=True) if wrong.geom_type == "LineString" else wrong
+            margin[row] = min(-shapely.distance(area.boundary, middle), -1e-9)  # type: ignore[union-attr]
+    return _stretches(track, margin, kind, name)
+
+
+def _stretches(track: Track, margin_m: FloatArray, kind: str, name: str) -> list[Breach]:
+    """One breach for every run of rows with a negative margin."""
+    wrong = np.concatenate(([False], margin_m < 0.0, [False]))
+    edges = np.flatnonzero(wrong[1:] != wrong[:-1])
+    found = []
+    for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        row = first + int(margin_m[first:stop].argmin())
+        found.append(
+            Breach(
+                kind=kind,
+                name=name,
+                start_s=float(track.time_s[first]),
+                end_s=float(track.time_s[min(stop, len(track) - 1)]),
+                time_s=float(track.time_s[row]),
+                east_m=float(track.east_m[row]),
+                north_m=float(track.north_m[row]),
+                depth_m=float(-margin_m[row]),
+            )
+        )
+    return found

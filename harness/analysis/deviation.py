@@ -1,0 +1,172 @@
+"""How far a flown track and the path that was given are from one another, both ways.
+
+A track is close to a path only if it keeps close to it all the way and leaves no part of it out. So every row of the
+track is measured against the path, and every point of the path against the track. Both know how far along they are:
+a point is compared with that part of the other line which is about as far along. A track that takes another leg of a
+path that comes by again is not taken to have flown this one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from harness.flight.record import FloatArray, Track
+
+BLOCK = 256
+"""Points that are measured together: numpy is then quick, and what is near them is a short part of the other line."""
+
+MOST_SAMPLES = 400_000
+"""A path has no more points measured than this, however long it is."""
+
+LEAST_M = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Deviation:
+    """Distances between a track and the path as given.
+
+    Attributes:
+        rows_m: (n,) of each row of the track from the path.
+        points_m: (k,) of points along the path from the track, as far along it as the flight came.
+        point_rows: (k,) the row of the track that is as far along as each of these.
+    """
+
+    rows_m: FloatArray
+    points_m: FloatArray
+    point_rows: np.ndarray[tuple[int], np.dtype[np.intp]]
+
+    @property
+    def by_row_m(self) -> FloatArray:
+        """(n,) for each row the larger of its own distance and those of the points of the path that belong to it."""
+        largest = self.rows_m.copy()
+        np.maximum.at(largest, self.point_rows, self.points_m)
+        return largest
+
+    def figures(self) -> dict[str, float | None]:
+        """95th percentile and maximum of all of them; None where nothing was flown."""
+        every = np.concatenate((self.rows_m, self.points_m))
+        every = every[np.isfinite(every)]
+        if not len(every):
+            return {"p95": None, "max": None}
+        return {"p95": float(np.percentile(every, 95)), "max": float(every.max())}
+
+
+class AllowedCut(Protocol):
+    """A corner, and how far off it may be passed."""
+
+    @property
+    def arc_length_m(self) -> float:
+        """Where on the flown path it is."""
+        ...
+
+    @property
+    def half_m(self) -> float:
+        """So far before and after that the flown path is off the corner's legs."""
+        ...
+
+    @property
+    def allowed_cut_m(self) -> float:
+        """How far off it may be passed."""
+        ...
+
+
+def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: float) -> Deviation:
+    """Measures a track against a path that was given.
+
+    Args:
+        track: rows that follow a plan have the arc length along the flown path.
+        given_m: (m, 3) the path as given: east, north, and the arc length of the flown path that belongs there.
+        spacing_m: points along the path are measured at least this close together, m.
+        window_m: what is further apart than this along the flown path is not compared.
+    """
+    # What is flown beyond the end is no part of the path.
+    flown = np.flatnonzero(track.arc_length_m <= given_m[-1, 2])
+    rows = np.full(len(track), math.nan)
+    if not len(flown):
+        return Deviation(rows, np.zeros(0), np.zeros(0, dtype=np.intp))
+    line = np.column_stack((track.east_m[flown], track.north_m[flown], track.arc_length_m[flown]))
+    line[:, 2] = np.maximum.accumulate(line[:, 2])
+    rows[flown] = distances_m(line, given_m, window_m)
+    points = _along(given_m, spacing_m)
+    points = points[points[:, 2] <= line[-1, 2]]
+    return Deviation(rows, distances_m(points, line, window_m), flown[_row(line[:, 2], points[:, 2])])
+
+
+def allowed_m(track: Track, tolerance_m: float, corners: Iterable[AllowedCut]) -> FloatArray:
+    """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be cut by.
+
+    Args:
+        track: as in `deviation`.
+        tolerance_m: away from corners.
+        corners: those that may be cut by more than that, or less.
+    """
+    allowed = np.full(len(track), tolerance_m)
+    corners = list(corners)
+    for corner in corners:
+        about = np.abs(track.arc_length_m - corner.arc_length_m) <= corner.half_m + tolerance_m
+        allowed[about] = np.maximum(allowed[about], corner.allowed_cut_m)
+    flown = np.flatnonzero(np.isfinite(track.arc_length_m))
+    if len(flown):
+        along = np.maximum.accumulate(track.arc_length_m[flown])
+        for corner in corners:
+            allowed[flown[_row(along, corner.arc_length_m)]] = corner.allowed_cut_m
+    return allowed
+
+
+def distances_m(points: FloatArray, line: FloatArray, window_m: float) -> FloatArray:
+    """(n,) distances of points from those parts of a line that are about as far along.
+
+    Args:
+        points: (n, 3) east, north, and how far along; the last need not rise.
+        line: (m, 3) the same of the line's vertices, m > 0; the last never falls.
+        window_m: how far apart along still counts.
+    """
+    line = np.concatenate((line, line[-1:])) if len(line) == 1 else line
+    along = line[:, 2]
+    found = np.empty(len(points))
+    for first in range(0, len(points), BLOCK):
+        block = points[first : first + BLOCK]
+        low, high = block[:, 2].min() - window_m, block[:, 2].max() + window_m
+        begin = int(np.clip(np.searchsorted(along, low, side="right") - 1, 0, len(line) - 2))
+        end = int(np.clip(np.searchsorted(along, high, side="left"), begin + 1, len(line) - 1))
+        found[first : first + BLOCK] = _block_distances(block, line[begin : end + 1], window_m)
+    return found
+
+
+def _row(along_m: FloatArray, at_m: FloatArray | float) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    """The first rows that are as far along as this, or the last of all."""
+    return np.minimum(np.searchsorted(along_m, at_m), len(along_m) - 1)
+
+
+def _block_distances(points: FloatArray, line: FloatArray, window_m: float) -> FloatArray:
+    """`distances_m` of a few points from a short line. The part of an edge outside of the window is left out."""
+    (east, north, along), (step_east, step_north, step) = line[:-1].T, np.diff(line, axis=0).T
+    off_east, off_north = points[:, :1] - east, points[:, 1:2] - north
+    square = np.maximum(step_east**2 + step_north**2, LEAST_M * LEAST_M)
+    share = (off_east * step_east + off_north * step_north) / square
+    ahead = points[:, 2:] - along
+    length = np.maximum(step, LEAST_M)
+    lowest, highest = (ahead - window_m) / length, (ahead + window_m) / length
+    inside = (lowest <= 1.0) & (highest >= 0.0)
+    # The nearest edge counts where none is in the window: before the line's begin and beyond its end.
+    inside |= ~inside.any(axis=1, keepdims=True)
+    share = np.clip(share, np.clip(lowest, 0.0, 1.0), np.clip(highest, 0.0, 1.0))
+    away = np.hypot(off_east - share * step_east, off_north - share * step_north)
+    least: FloatArray = np.where(inside, away, np.inf).min(axis=1)
+    return least
+
+
+def _along(line: FloatArray, spacing_m: float) -> FloatArray:
+    """(k, 3) points along a line at least so close together, its vertices among them."""
+    length = np.hypot(*np.diff(line[:, :2], axis=0).T)
+    spacing = max(spacing_m, float(length.sum()) / MOST_SAMPLES)
+    pieces = np.maximum(np.ceil(length / spacing), 1.0).astype(np.intp)
+    edge = np.repeat(np.arange(len(length)), pieces)
+    share = (np.arange(len(edge)) - np.repeat(np.cumsum(pieces) - pieces, pieces)) / pieces[edge]
+    inner = line[edge] + share[:, None] * (line[edge + 1] - line[edge])
+    return np.concatenate((inner, line[-1:]))

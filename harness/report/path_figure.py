@@ -1,0 +1,116 @@
+"""The figure of a checked path: the line as given, the flown one over it, corners, fences, and what was touched."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import patches
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from harness.report.figure_style import colour, styled
+from harness.report.figures import LEGEND_ROW_IN, DrawnRun, Scene, draw_map, map_height_in, thinned
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from harness.flight.record import FloatArray
+
+GIVEN: dict[str, Any] = {"color": "0.7", "lw": 5.0, "solid_joinstyle": "miter", "zorder": 3.5}
+KEPT: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": "#009E73", "mew": 1.4, "ms": 6.5, "zorder": 8}
+CUT: dict[str, Any] = {"marker": "X", "color": "#A8201A", "mec": "white", "mew": 0.6, "ms": 9, "zorder": 8}
+TOUCHED: dict[str, Any] = {
+    "marker": "*",
+    "color": "#A8201A",
+    "mec": "white",
+    "mew": 0.6,
+    "ms": 13,
+    "zorder": 9,
+}
+CROSSED: dict[str, Any] = {
+    "marker": "^",
+    "color": "#A8201A",
+    "mec": "white",
+    "mew": 0.6,
+    "ms": 9,
+    "zorder": 9,
+}
+FENCES: Mapping[str, dict[str, Any]] = {
+    "exclusion": {"ec": "#A8201A", "fc": "#A8201A22", "lw": 1.0, "ls": "--"},
+    "inclusion": {"ec": "#009E73", "fc": "none", "lw": 1.2, "ls": "--"},
+}
+POINT: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder": 6}
+MOST_POINTS = 300
+"""Of more than these, as those of a sampled curve, none is drawn."""
+
+ABOUT = 0.15
+"""The figure reaches this share of the path's span beyond it."""
+
+
+def path_figure(scene: Scene, run: DrawnRun, given_m: FloatArray, metrics: Mapping[str, Any]) -> Figure:
+    """Draws a checked path.
+
+    Args:
+        scene: its scenario.
+        run: the flight.
+        given_m: (k, 2) the line as given.
+        metrics: content of `metrics.json`.
+    """
+    check = metrics["check"]
+    flown = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
+    points = given_m.tolist() if len(given_m) <= MOST_POINTS else []
+    every = {
+        "point given": (POINT, points),
+        "corner cut as allowed": (KEPT, _corners(check["corners"], kept=True)),
+        "corner cut too far": (CUT, _corners(check["corners"], kept=False)),
+        "contact": (TOUCHED, [(each["east_m"], each["north_m"]) for each in metrics["contacts"]]),
+        "fence or bound crossed": (
+            CROSSED,
+            [(each["east_m"], each["north_m"]) for each in metrics["breaches"]],
+        ),
+    }
+    marks = {name: entry for name, entry in every.items() if entry[1]}
+    kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
+    lines = math.ceil((2 + len(marks) + len(kinds)) / 2)
+    scene = _about(scene, np.concatenate((given_m, flown)))
+    with styled(map_height_in(scene) + LEGEND_ROW_IN * (lines + 1)) as figure:
+        axes = figure.add_subplot()
+        draw_map(axes, scene, ends=False)
+        legend: list[Any] = [*axes.plot(*given_m.T / 1e3, label="as given", **GIVEN)]
+        legend += axes.plot(*flown.T / 1e3, color=colour(0), lw=1.5, zorder=5, label="flown")
+        for fence in check["fences"]:
+            _draw_fence(axes, fence)
+        legend += [patches.Patch(**FENCES[kind], label=f"{kind} fence") for kind in kinds]
+        for name, (style, places) in marks.items():
+            axes.plot(*np.array(places).T / 1e3, ls="", **style)
+            legend.append(Line2D([], [], ls="", label=name, **{**style, "zorder": 1}))
+        axes.set_title(f"{scene.name}: {'as given' if check['ok'] else 'not as given'}")
+        figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
+    return figure
+
+
+def _corners(corners: Sequence[Mapping[str, Any]], *, kept: bool) -> list[tuple[float, float]]:
+    return [(corner["east_m"], corner["north_m"]) for corner in corners if corner["kept"] is kept]
+
+
+def _about(scene: Scene, points_m: FloatArray) -> Scene:
+    """The scene, its frame drawn close about a path."""
+    from dataclasses import replace
+
+    lowest, highest = points_m.min(axis=0), points_m.max(axis=0)
+    middle = (lowest + highest) / 2
+    span = highest - lowest
+    half = (0.5 + ABOUT) * np.maximum(span, 0.35 * span.max())
+    return replace(scene, bounds_m=(*(middle - half).tolist(), *(middle + half).tolist()))
+
+
+def _draw_fence(axes: Axes, fence: Mapping[str, Any]) -> None:
+    style = FENCES[fence["kind"]]
+    if "center_m" in fence:
+        east, north = fence["center_m"]
+        axes.add_patch(patches.Circle((east / 1e3, north / 1e3), fence["radius_m"] / 1e3, zorder=3, **style))
+    for ring in fence.get("rings_m", []):
+        axes.add_patch(patches.Polygon(np.array(ring) / 1e3, zorder=3, **style))

@@ -1,0 +1,105 @@
+"""What a track touched or crossed, thin things between two rows among it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from harness.analysis.breaches import kept
+from harness.flight.record import Track
+from harness.run_files.fences import Fence, Fences
+from harness.world.obstacle import Circle, Obstacle, Polygon
+from harness.world.world import World
+
+MakeTrack = Callable[..., Track]
+BOUNDS = (-1e4, -1e4, 1e4, 1e4)
+
+
+def box(name: str, inclusion: bool, west: float, south: float, east: float, north: float) -> Fence:
+    return Fence(name, inclusion, (((west, south), (east, south), (east, north), (west, north)),))
+
+
+@pytest.fixture
+def northward(make_track: MakeTrack) -> Callable[[World], Track]:
+    """1 km to the north, a row every 2.5 m."""
+
+    def flown(world: World) -> Track:
+        track = make_track(401)
+        clearance = world.clearance(np.column_stack((track.east_m, track.north_m)), track.time_s)
+        return make_track(401, clearance_m=clearance)
+
+    return flown
+
+
+def test_a_contact_is_told_with_time_place_and_depth(northward: Callable[[World], Track]) -> None:
+    world = World([Obstacle(Circle((2000.0, 0.0), 9.0)), Obstacle(Circle((60.0, 500.0), 100.0))], BOUNDS)
+    found = kept(northward(world), world, Fences(), bounded=False)
+    (contact,) = found.breaches
+    assert (contact.kind, contact.name) == ("obstacle", "obstacles[1]")
+    assert (contact.time_s, contact.east_m, contact.north_m, contact.depth_m) == (20.0, 0.0, 500.0, 40.0)
+    assert (contact.start_s, contact.end_s) == (16.9, 23.2)
+    assert found.margin_m == -40.0
+
+
+def test_a_wire_between_two_rows_is_touched(northward: Callable[[World], Track]) -> None:
+    wire = Polygon(((-50.0, 501.0), (50.0, 501.0), (50.0, 501.1), (-50.0, 501.1)))
+    world = World([Obstacle(wire)], BOUNDS)
+    (contact,) = kept(northward(world), world, Fences(), bounded=False).contacts
+    assert contact.north_m == 500.0
+    assert 0.0 < contact.depth_m <= 0.05
+
+
+def test_a_moving_obstacle_is_met_where_it_is_then(northward: Callable[[World], Track]) -> None:
+    crossing = Obstacle(Circle((-200.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))
+    late = Obstacle(Circle((-400.0, 500.0), 30.0), velocity_mps=(10.0, 0.0))
+    world = World([crossing, late], BOUNDS)
+    (contact,) = kept(northward(world), world, Fences(), bounded=False).contacts
+    assert contact.name == "obstacles[0]"
+
+
+def test_fences_are_entered_left_and_clipped_between_rows(northward: Callable[[World], Track]) -> None:
+    world = World([], BOUNDS)
+    fences = Fences(
+        (
+            box("a", False, -5.0, 600.0, 300.0, 700.0),
+            box("b", True, -500.0, -500.0, 500.0, 300.0),
+            box("c", True, -500.0, 301.0, 500.0, 900.0),
+            Fence("d", False, center=(100.0, 0.0), radius_m=50.0),
+        )
+    )
+    found = kept(northward(world), world, fences, bounded=False)
+    told = [(each.kind, each.name, each.start_s, round(each.depth_m, 3)) for each in found.crossings]
+    assert told == [
+        ("inclusion", "all of b, c", 12.0, 0.5),
+        ("exclusion", "a", 24.1, 5.0),
+        ("inclusion", "all of b, c", 36.1, 100.0),
+    ]
+    assert found.margin_m == -100.0
+    assert found.contacts == ()
+
+
+def test_all_inclusions_count_where_the_autopilot_has_it_so(northward: Callable[[World], Track]) -> None:
+    fences = Fences(
+        (box("a", True, -9.0, -9.0, 9.0, 600.0), box("b", True, -9.0, -9.0, 9.0, 2000.0)), inside_all=True
+    )
+    world = World([], BOUNDS)
+    (left,) = kept(northward(world), world, fences, bounded=False).breaches
+    assert left.start_s == pytest.approx(24.1)
+
+
+def test_the_area_is_left_only_where_its_bounds_count(northward: Callable[[World], Track]) -> None:
+    world = World([], (-100.0, -100.0, 100.0, 900.0))
+    (left,) = kept(northward(world), world, Fences(), bounded=True).breaches
+    assert (left.kind, left.name, left.depth_m) == ("area", "area.bounds_m", 100.0)
+    assert kept(northward(world), world, Fences(), bounded=False).breaches == ()
+
+
+def test_a_fence_with_a_hole_is_open_there(northward: Callable[[World], Track]) -> None:
+    outer = ((-300.0, 300.0), (300.0, 300.0), (300.0, 1200.0), (-300.0, 1200.0))
+    hole = ((-50.0, 301.0), (50.0, 301.0), (50.0, 1100.0), (-50.0, 1100.0))
+    world = World([], BOUNDS)
+    (thin,) = kept(northward(world), world, Fences((Fence("ring", False, (outer, hole)),)), False).breaches
+    assert thin.start_s == 12.0
+    assert 0.0 < thin.depth_m <= 0.5

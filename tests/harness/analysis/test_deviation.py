@@ -1,0 +1,74 @@
+"""A track against the path as given: both ways, and only where both are about as far along."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import shapely
+
+from harness.analysis.deviation import allowed_m, deviation, distances_m
+from harness.flight.record import FloatArray, Track
+
+MakeTrack = Callable[..., Track]
+
+
+def line(*points: tuple[float, float]) -> FloatArray:
+    """A polyline with its own arc length."""
+    places = np.array(points, dtype=np.float64)
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(places, axis=0).T)))
+    return np.column_stack((places, along))
+
+
+def test_without_a_window_it_is_the_distance_that_geos_finds() -> None:
+    rng = np.random.default_rng(3)
+    way = line(*rng.uniform(-1e3, 1e3, (40, 2)).tolist())
+    points = np.column_stack((rng.uniform(-1.5e3, 1.5e3, (700, 2)), rng.uniform(0.0, way[-1, 2], 700)))
+    found = distances_m(points, way, math.inf)
+    wanted = shapely.distance(shapely.points(points[:, :2]), shapely.LineString(way[:, :2]))
+    assert found == pytest.approx(wanted, abs=1e-6)
+
+
+def test_another_leg_of_the_path_does_not_count() -> None:
+    """There and back 40 m beside; a point on the way back that flies over the way there is 40 m off."""
+    way = line((0.0, 0.0), (0.0, 2000.0), (40.0, 2000.0), (40.0, 0.0))
+    back = np.array([(0.0, 1000.0, 3040.0), (40.0, 1000.0, 3040.0)])
+    assert distances_m(back, way, 300.0).tolist() == [40.0, 0.0]
+    assert distances_m(back, way, 3000.0).tolist() == [0.0, 0.0]
+
+
+def test_a_track_is_measured_both_ways(make_track: MakeTrack) -> None:
+    """The path has a spike of 500 m that the track leaves out: all rows are on the path, the spike is 500 m away."""
+    given = np.array([(0.0, 0.0, 0.0), (0.0, 1000.0, 1000.0), (500.0, 1000.0, 1000.0), (0.0, 1000.0, 1000.0)])
+    given = np.concatenate((given, [(0.0, 2000.0, 2000.0)]))
+    found = deviation(make_track(801), given, 10.0, 400.0)
+    assert found.rows_m.max() < 1e-9
+    assert found.points_m.max() == pytest.approx(500.0, abs=3.0)
+    assert found.figures()["max"] == pytest.approx(500.0, abs=3.0)
+    assert found.by_row_m[400] == pytest.approx(500.0, abs=3.0)
+    assert found.by_row_m[100] < 1e-9
+
+
+def test_what_was_not_flown_yet_is_not_compared(make_track: MakeTrack) -> None:
+    found = deviation(make_track(401), line((0.0, 0.0), (0.0, 1000.0), (5000.0, 1000.0)), 10.0, 400.0)
+    assert found.figures() == pytest.approx({"p95": 0.0, "max": 0.0}, abs=1e-9)
+    before = make_track(3, arc_length_m=math.nan, plan_index=-1)
+    assert deviation(before, line((0.0, 0.0), (0.0, 1.0)), 1.0, 1.0).figures() == {"p95": None, "max": None}
+
+
+@dataclass(frozen=True)
+class Corner:
+    arc_length_m: float
+    half_m: float
+    allowed_cut_m: float
+
+
+def test_a_corner_may_be_cut_by_its_own_figure(make_track: MakeTrack) -> None:
+    track = make_track(401)
+    allowed = allowed_m(track, 10.0, [Corner(250.0, 80.0, 60.0), Corner(750.0, 80.0, 4.0)])
+    assert sorted(set(allowed.tolist())) == [4.0, 10.0, 60.0]
+    assert track.north_m[allowed == 60.0] == pytest.approx(np.arange(160.0, 342.0, 2.5))
+    assert track.north_m[allowed == 4.0] == pytest.approx([750.0])
