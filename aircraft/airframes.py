@@ -1,127 +1,20 @@
-"""The known airframes: what airframes.yaml says of them, and what their models show when they are flown."""
+"""Airframes by name: what airframes.yaml says of them, and what their models show when they are flown."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import fields
 from functools import cache, lru_cache, partial
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
+from aircraft.airframe import FIGURES, Airframe, Entry
 from aircraft.autopilot import Gains
 from aircraft.card_cache import cached, figure
-from aircraft.guidance import GuidanceLimits
 from aircraft.model_files import AircraftError as AircraftError
 from aircraft.model_files import ModelFiles, model_files
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One entry of airframes.yaml: what is known of an airframe before it flies.
-
-    Attributes:
-        name: as in `aircraft.model` of a scenario.
-        summary: one line for lists.
-        cruise_mps: default true airspeed; None: from the speeds at which the model can be trimmed.
-        verified: flown against the tracking figures of the tests.
-        figures: attributes of `Airframe` that replace what the survey makes of the model.
-        gains: gains of the autopilot that replace derived ones, by field of `Gains`.
-    """
-
-    name: str
-    summary: str
-    cruise_mps: float | None = None
-    verified: bool = False
-    figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
-    gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
-
-
-FIGURES = (
-    "bank_limit_deg",
-    "roll_rate_dps",
-    "stall_angle_deg",
-    "roll_lag_s",
-    "roll_delay_s",
-    "guidance_bandwidth_radps",
-)
-"""Attributes of `Airframe` that an entry may replace."""
-
-
-@dataclass(frozen=True)
-class Airframe:
-    """One airframe, as flown.
-
-    Attributes:
-        name: as in `aircraft.model` of a scenario; of a folder, that of its model.
-        summary: one line for lists.
-        files: the JSBSim model.
-        mass_kg: as flown.
-        airspeed_range_mps: lowest and highest true airspeed of level flight, near sea level.
-        cruise_mps: default true airspeed.
-        bank_limit_deg: largest bank the guidance may command.
-        roll_rate_dps: fastest change of the roll command.
-        roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less,
-            the command a step, at cruise.
-        stall_angle_deg: angle of attack beyond which control counts as lost.
-        roll_lag_s: time constant of roll behind its command.
-        roll_delay_s: further delay of roll behind its command.
-        guidance_bandwidth_radps: natural frequency of the cross-track correction.
-        level_banks: (true airspeed m/s, bank deg) pairs, airspeed rising: the steepest bank up to the limit at
-            which speed and altitude are kept.
-        weave_error_m: largest cross-track error on a weave of lines and arcs as planned, at cruise in calm air.
-        gains: of the autopilot.
-        verified: flown against the tracking figures of the tests.
-    """
-
-    name: str
-    summary: str
-    files: ModelFiles
-    mass_kg: float
-    airspeed_range_mps: tuple[float, float]
-    cruise_mps: float
-    bank_limit_deg: float
-    roll_rate_dps: float
-    roll_in_s: float
-    stall_angle_deg: float
-    roll_lag_s: float
-    roll_delay_s: float
-    guidance_bandwidth_radps: float
-    level_banks: tuple[tuple[float, float], ...]
-    weave_error_m: float
-    gains: Gains
-    verified: bool
-
-    @property
-    def guidance_limits(self) -> GuidanceLimits:
-        """Limits for `PathFollower`."""
-        return GuidanceLimits(
-            bank_limit_rad=math.radians(self.bank_limit_deg),
-            roll_rate_radps=math.radians(self.roll_rate_dps),
-            roll_lag_s=self.roll_lag_s,
-            roll_delay_s=self.roll_delay_s,
-            bandwidth_radps=self.guidance_bandwidth_radps,
-        )
-
-    def level_bank_deg(self, airspeed_mps: float) -> float:
-        """Steepest bank at which an airspeed and the altitude are kept, between the speeds flown linear."""
-        (before, bank), *rest = self.level_banks
-        for speed, after in rest:
-            if airspeed_mps <= speed:
-                share = max(0.0, (airspeed_mps - before) / (speed - before))
-                return bank + share * (after - bank)
-            before, bank = speed, after
-        return bank
-
-    def check_airspeed(self, airspeed_mps: float) -> None:
-        """Raises `AircraftError` if level flight at a true airspeed is not possible."""
-        low, high = self.airspeed_range_mps
-        if not low <= airspeed_mps <= high:
-            raise AircraftError(
-                f"{self.name} cannot hold {airspeed_mps:g} m/s; "
-                f"its level-flight range is {low:g} to {high:g} m/s"
-            )
 
 
 def aircraft_names() -> tuple[str, ...]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from aircraft.airframes import AircraftError, Airframe
-from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import Performance
+from aircraft.airframe import Airframe
+from aircraft.interface import GRAVITY_MPS2, Performance
+from aircraft.model_files import AircraftError
 
 BANK_RESERVE_DEG = {None: 15.0, "light": 17.0, "moderate": 20.0, "severe": 25.0}
 """Bank kept back from the limit for corrections: 9 degrees is the least that does not saturate in calm air or

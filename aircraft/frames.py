@@ -47,7 +47,7 @@ class LocalPlane:
         self._polar_m = self._prime_vertical_m * (1.0 - ECCENTRICITY_SQUARED) * self._sin
 
     def project(self, latitude_rad: float, longitude_rad: float) -> tuple[float, float, float]:
-        """Plane coordinates of a geodetic point, and how the meridian leans there.
+        """Plane coordinates of a geodetic point, and the meridian convergence there.
 
         The point goes to the tangent plane through its ECEF coordinates. The distance is the arc over the
         chord, with the radius of the normal section after Euler: 1/R = cos^2/M + sin^2/N.
@@ -89,7 +89,7 @@ class LocalPlane:
         """The plane about a geodetic point, for whoever asks for many points near one another.
 
         `project` to the second order, to a tenth of a millimetre: a polynomial through nine points of it, as
-        `aircraft.guidance_law` works it out.
+        `aircraft.kernels.place_in_patch` works it out.
 
         Args:
             latitude_rad: geodetic latitude.
@@ -97,19 +97,20 @@ class LocalPlane:
 
         Returns:
             19 numbers: latitude and longitude (rad) of its middle; how far from there it holds, to the north and the
-            south, to the east and the west (rad; `PATCH_M` on the ground); east and north (m) of the middle, and of
-            the derivatives per radian by latitude and by longitude, and of half those by latitude twice, by both, by
-            longitude twice; meridian convergence (rad) of the middle, its derivatives by latitude and longitude.
+            south, to the east and the west (rad; `PATCH_M` on the ground); for east and then for north, the value in
+            the middle (m), its derivatives per radian by latitude and by longitude, and half of those by latitude
+            twice, by both, by longitude twice; meridian convergence (rad) in the middle, its derivatives by latitude
+            and longitude.
         """
         up = PATCH_M / self._meridian_m
         right = up / math.cos(latitude_rad)
 
         def at(rows: int, columns: int) -> tuple[complex, float]:
-            east, north, leans = self.project(latitude_rad + rows * up, longitude_rad + columns * right)
-            return complex(east, north), leans
+            east, north, convergence = self.project(latitude_rad + rows * up, longitude_rad + columns * right)
+            return complex(east, north), convergence
 
-        (here, leans), (above, leans_above), (below, leans_below) = at(0, 0), at(1, 0), at(-1, 0)
-        (beyond, leans_beyond), (before, leans_before) = at(0, 1), at(0, -1)
+        (here, turned), (above, turned_above), (below, turned_below) = at(0, 0), at(1, 0), at(-1, 0)
+        (beyond, turned_beyond), (before, turned_before) = at(0, 1), at(0, -1)
         twist = at(1, 1)[0] - at(1, -1)[0] - at(-1, 1)[0] + at(-1, -1)[0]
         places = (
             here,
@@ -121,8 +122,10 @@ class LocalPlane:
         )
         return (
             *(latitude_rad, longitude_rad, up, right),
-            *(part for place in places for part in (place.real, place.imag)),
-            *(leans, (leans_above - leans_below) / (2.0 * up), (leans_beyond - leans_before) / (2.0 * right)),
+            *(place.real for place in places),
+            *(place.imag for place in places),
+            *(turned, (turned_above - turned_below) / (2.0 * up)),
+            (turned_beyond - turned_before) / (2.0 * right),
         )
 
     def plane(self, latitude_deg: float, longitude_deg: float) -> tuple[float, float]:

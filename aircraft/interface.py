@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from aircraft.guidance import PathFollower
-
 FloatArray = NDArray[np.float64]
+
+GRAVITY_MPS2 = 9.80665
+"""Standard acceleration of free fall (ISO 80000-3)."""
 
 STEP_RATE_HZ = 120
 """Steps of a flight model a second."""
@@ -120,35 +120,6 @@ class FlightModel(Protocol):
 
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
-        ...
-
-    def fly_on(
-        self,
-        follower: PathFollower,
-        track: FloatArray,
-        row: int,
-        plan_index: int,
-        updates: int,
-        steps: int,
-        until_s: float,
-    ) -> int:
-        """Flies updates of guidance in a row, as far as the model can by itself.
-
-        One update is: the state is read, the follower asked, a row of the track filled, the roll commanded and the
-        time to the next update flown. Altitude and airspeed stay as commanded.
-
-        Args:
-            follower: guidance, on its route.
-            track: (k, 17) rows to fill: the state, roll command, cross-track error, station, plan index.
-            row: the first of them.
-            plan_index: for the last column.
-            updates: the most, for which there are rows.
-            steps: from one to the next, each of 1 / step_rate_hz.
-            until_s: at that time, or later, none begins any more.
-
-        Returns:
-            How many: fewer where control is lost, or for reasons of the model's own; 0 from one that cannot do this.
-        """
         ...
 
     def fault(self) -> str | None:

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
-import numpy as np
-
-from aircraft import guidance_law as law
-from aircraft.airframes import AircraftError, Airframe, airframe
+from aircraft.airframe import Airframe
 from aircraft.frames import LocalPlane
-from aircraft.guidance import PathFollower
-from aircraft.interface import STEP_RATE_HZ, AircraftState, FloatArray
+from aircraft.interface import STEP_RATE_HZ, AircraftState
 from aircraft.jsbsim_loading import load, node, trim
+from aircraft.model_files import AircraftError
+from aircraft.plane_patch import PatchedPlane
 from aircraft.properties import (
     COMMAND_PROPERTIES,
     CONTROLS,
+    FAULT_PROPERTIES,
     FOOT_M,
     STATE_PROPERTIES,
     TURBULENCE_SEVERITY,
@@ -36,10 +34,6 @@ SETTLING_STEP_S = 1e-9
 INTEGRATOR_MEMORY = 6
 """Steps that replace every derivative an integrator of JSBSim remembers."""
 
-Update = Callable[[FloatArray, FloatArray, FloatArray, int, int, float], float]
-NO_ROUTE, NO_MEMORY = np.zeros((0, 9)), np.zeros(law.MEMORY)
-NO_ROUTE.setflags(write=False)
-
 
 class JsbsimModel:
     """Flight model for one flight of one airframe. Implements `FlightModel`.
@@ -49,7 +43,7 @@ class JsbsimModel:
 
     def __init__(
         self,
-        aircraft: str | Airframe,
+        frame: Airframe,
         start: StartConditions,
         plane: LocalPlane,
         atmosphere: Atmosphere | None = None,
@@ -58,22 +52,20 @@ class JsbsimModel:
         """Loads, trims and starts the aircraft.
 
         Args:
-            aircraft: a name or folder that `airframe` knows, or an airframe.
+            frame: the airframe, see `aircraft.airframes.airframe`.
             start: where and how fast it starts.
             plane: the local plane that all positions refer to.
             atmosphere: steady wind, gust and turbulence; default: calm.
             step_rate_hz: integration steps per second.
 
         Raises:
-            AircraftError: if the name is unknown, the airspeed out of range or too low for the wind, or the
-                model cannot be loaded, trimmed or held.
+            AircraftError: if the airspeed is out of range or too low for the wind, or the model cannot be loaded,
+                trimmed or held.
         """
-        self.airframe = airframe(aircraft) if isinstance(aircraft, str) else aircraft
+        self.airframe = frame
         self.airframe.check_airspeed(start.airspeed_mps)
-        self._plane = plane
         self._step_rate_hz = step_rate_hz
         self._step = 0
-        self._sound_at = -1  # the last step at which the aircraft was seen to be under control
         atmosphere = atmosphere or Atmosphere()
         try:
             heading_rad = start.heading_rad(atmosphere)
@@ -81,28 +73,20 @@ class JsbsimModel:
             raise AircraftError(f"{self.airframe.name}: {error}") from None
         self._stall_rad = math.radians(self.airframe.stall_angle_deg)
         self._stall_fps = STALL_SPEED_SHARE * self.airframe.airspeed_range_mps[0] / FOOT_M
-        self._sheet, self._here = np.zeros(law.SHEET), np.zeros((1, len(AircraftState._fields)))
-        self._sheet[law.PATCH : law.LIMITS] = plane.patch(
-            *map(math.radians, plane.geodetic(start.east_m, start.north_m))
-        )
-        self._sheet[law.LIMITS : law.LEANS] = self._stall_rad, self._stall_fps, GROUND_FT, MAX_ROLL_RAD
-        self._sheet[law.LEANS] = convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
+        self._plane = PatchedPlane(plane, *map(math.radians, plane.geodetic(start.east_m, start.north_m)))
+        self._convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
+        """Meridian convergence where the state was last read."""
         self._gust: Gust | None = None
         self._windy = atmosphere.wind_mps > 0.0
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
 
         fdm = self._fdm = load(self.airframe.files, step_rate_hz)
-        trim(fdm, self.airframe.name, plane, start, heading_rad + convergence_rad)
-        self._readings = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
+        trim(fdm, self.airframe.name, plane, start, heading_rad + self._convergence_rad)
+        self._read = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
-        self._alpha = node(fdm, "aero/alpha-rad").get_double_value
-        self._take = _taker(self._sheet, self._readings, self._alpha)
         self._enable = node(fdm, "wayproof/enable").set_double_value
-        self._roll, self._airspeed, self._altitude = (
-            node(fdm, path).get_double_value
-            for path in ("attitude/phi-rad", "velocities/vtrue-fps", "position/h-sl-ft")
-        )
+        self._read_for_fault = tuple(node(fdm, path).get_double_value for path in FAULT_PROPERTIES)
         self._set_up_autopilot()
         self.command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
         if self._windy:
@@ -120,18 +104,38 @@ class JsbsimModel:
 
     def state(self) -> AircraftState:
         """The state now, in the local plane."""
-        values = self._read_here()
-        if values[1] != values[1]:  # on to the next patch
-            latitude_rad, longitude_rad, *_ = self._readings
-            self._sheet[law.PATCH : law.LIMITS] = self._plane.patch(latitude_rad(), longitude_rad())
-            values = self._read_here()
-        # At once: the constructor of a NamedTuple takes twice as long.
-        return tuple.__new__(AircraftState, values)
-
-    def _read_here(self) -> list[float]:
-        command = self._take(NO_MEMORY, NO_ROUTE, self._here, 0, -1, self._step / self._step_rate_hz)
-        self._sound_at = self._step if command == 0.0 else -1
-        return self._here.tolist()[0]
+        (
+            latitude_rad,
+            longitude_rad,
+            up_ft,
+            north_fps,
+            east_fps,
+            climb_fps,
+            true_heading_rad,
+            roll_rad,
+            pitch_rad,
+            airspeed_fps,
+            load_factor,
+            throttle,
+        ) = [read() for read in self._read]
+        east_m, north_m, convergence_rad = self._plane.project(latitude_rad, longitude_rad)
+        self._convergence_rad = convergence_rad
+        cosine_m, sine_m = FOOT_M * math.cos(convergence_rad), FOOT_M * math.sin(convergence_rad)
+        return AircraftState(
+            time_s=self._step / self._step_rate_hz,
+            east_m=east_m,
+            north_m=north_m,
+            up_m=up_ft * FOOT_M,
+            velocity_east_mps=east_fps * cosine_m - north_fps * sine_m,
+            velocity_north_mps=east_fps * sine_m + north_fps * cosine_m,
+            velocity_up_mps=climb_fps * FOOT_M,
+            heading_rad=(true_heading_rad - convergence_rad) % math.tau,
+            roll_rad=roll_rad,
+            pitch_rad=pitch_rad,
+            airspeed_mps=airspeed_fps * FOOT_M,
+            load_factor=load_factor,
+            throttle=throttle,
+        )
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
         """Sets what the inner loops hold.
@@ -158,47 +162,15 @@ class JsbsimModel:
             run()
         self._step += steps
 
-    def fly_on(
-        self,
-        follower: PathFollower,
-        track: FloatArray,
-        row: int,
-        plan_index: int,
-        updates: int,
-        steps: int,
-        until_s: float,
-    ) -> int:
-        """Flies updates of guidance in a row, as if they were asked for one by one, to the last bit, but sooner.
-
-        It flies none in a gust front, or with guidance that is not just `PathFollower`; and stops where a new patch of
-        the plane begins, which is for `state` to make.
-        """
-        if self._gust is not None or type(follower) is not PathFollower or follower.route is None:
-            return 0
-        memory, route = follower.memory, follower.route
-        take, run, rate, windy = self._take, self._fdm.run, self._step_rate_hz, self._windy
-        roll_command, _, _ = self._write
-        for flown in range(updates):
-            time_s = self._step / rate
-            if time_s >= until_s:
-                return flown
-            command = take(memory, route, track, row + flown, plan_index, time_s)
-            if command != command:  # out of control, or off the patch
-                return flown
-            roll_command(command)
-            if windy:
-                self._blow()
-            for _ in range(steps):
-                run()
-            self._step += steps
-        return updates
-
     def fault(self) -> str | None:
         """A sentence if control is lost: not finite, at the ground, stalled or rolled over; else None."""
-        if self._sound_at == self._step:
-            return None
-        roll, airspeed, altitude, alpha = self._roll(), self._airspeed(), self._altitude(), self._alpha()
-        if law.in_control(self._sheet, alpha, airspeed, altitude, roll):
+        roll, airspeed, altitude, alpha = [read() for read in self._read_for_fault]
+        if (
+            abs(alpha) <= self._stall_rad
+            and self._stall_fps <= airspeed < math.inf
+            and GROUND_FT < altitude < math.inf
+            and abs(roll) <= MAX_ROLL_RAD
+        ):
             return None
         if not math.isfinite(roll + airspeed + altitude + alpha):
             return "the state is not finite"
@@ -263,8 +235,7 @@ class JsbsimModel:
         if self._gust is not None:
             share = self._gust.share(self._step / self._step_rate_hz) / FOOT_M
             east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
-        leans = self._sheet.item(law.LEANS)
-        sine, cosine = math.sin(leans), math.cos(leans)
+        sine, cosine = math.sin(self._convergence_rad), math.cos(self._convergence_rad)
         return east * cosine + north * sine, north * cosine - east * sine
 
     def _blow(self) -> None:
@@ -281,41 +252,3 @@ class JsbsimModel:
         }
         for path, value in values.items():
             node(self._fdm, path).set_double_value(value)
-
-
-def _taker(
-    sheet: FloatArray, readings: tuple[Callable[[], float], ...], alpha: Callable[[], float]
-) -> Update:
-    """`law.update` with all that JSBSim tells: compiled, if it is by now."""
-    update = law.update
-    latitude, longitude, up, north, east, climb, heading, roll, pitch, airspeed, load_factor, throttle = (
-        readings
-    )
-
-    def take(
-        memory: FloatArray, route: FloatArray, track: FloatArray, row: int, plan_index: int, time_s: float
-    ) -> float:
-        return update(
-            sheet,
-            memory,
-            route,
-            track,
-            row,
-            plan_index,
-            time_s,
-            latitude(),
-            longitude(),
-            up(),
-            north(),
-            east(),
-            climb(),
-            heading(),
-            roll(),
-            pitch(),
-            airspeed(),
-            load_factor(),
-            throttle(),
-            alpha(),
-        )
-
-    return take

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from aircraft.guidance import GuidanceOutput
+from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import STEP_RATE_HZ, AircraftState, FloatArray, Route
 from aircraft.route import route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
@@ -20,7 +20,7 @@ JOINING_STEPS = 8
 class KinematicPoint:
     """Flight model and guidance in one: moves along its route at the commanded airspeed, whatever its bends.
 
-    Implements `FlightModel`, and `follow` and `update` as `PathFollower` has them. The air does not touch it:
+    Implements `FlightModel` and `GuidanceLaw`. The air does not touch it:
     speed over the ground is the airspeed, wind and turbulence are ignored. Before its first route it flies
     straight on. A route that begins elsewhere is joined in a straight line, where it comes near; the
     cross-track error is then the distance to that place, else 0. Beyond the end it goes straight on, or round
@@ -76,10 +76,6 @@ class KinematicPoint:
         """Moves on by `steps` steps of 1 / step_rate_hz."""
         self._step += steps
         self._along_m += self._airspeed * steps / STEP_RATE_HZ
-
-    def fly_on(self, *_: object) -> int:
-        """It flies no updates by itself."""
-        return 0
 
     def fault(self) -> str | None:
         """None: a point is always under control."""

@@ -151,5 +151,7 @@ def _content(folder: Path) -> Iterator[Path]:
     return (
         path
         for path in folder.rglob("*")
-        if path.is_file() and not any(part.startswith((".", "__")) for part in path.relative_to(folder).parts)
+        if path.is_file()
+        and path.suffix != ".md"
+        and not any(part.startswith((".", "__")) for part in path.relative_to(folder).parts)
     )

@@ -20,7 +20,10 @@ STATE_PROPERTIES = (
     "accelerations/Nz",  # 1 in level flight
     "fcs/throttle-cmd-norm",
 )
-"""Read for `AircraftState`, in the order in which `aircraft.guidance_law.update` takes them."""
+"""Read for `AircraftState`, in this order."""
+
+FAULT_PROPERTIES = ("attitude/phi-rad", "velocities/vtrue-fps", "position/h-sl-ft", "aero/alpha-rad")
+"""Read to tell whether control is lost, in this order."""
 
 COMMAND_PROPERTIES = ("wayproof/roll-cmd-rad", "wayproof/altitude-cmd-ft", "wayproof/airspeed-cmd-fps")
 """Written for a command, in this order."""

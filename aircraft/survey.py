@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from aircraft.airframes import FIGURES, AircraftError, Airframe, Entry
+from aircraft.airframe import FIGURES, Airframe, Entry
 from aircraft.autopilot import Derivatives, Gains, gains
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
-from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import STEP_RATE_HZ, AircraftState, Route
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,
     angle_of_attack_rad,
@@ -27,7 +27,7 @@ from aircraft.jsbsim_loading import (
     trimmed,
 )
 from aircraft.jsbsim_model import JsbsimModel
-from aircraft.model_files import ModelFiles, TrimError
+from aircraft.model_files import AircraftError, ModelFiles, TrimError
 from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
 
@@ -245,11 +245,12 @@ def weaving_error_m(frame: Airframe, speed: float) -> float:
             bend = math.copysign(curvature, turn_deg)
             rows.append((*point, bend, abs(length)))
             point = arc_point(rows[-1], abs(length))
-    follower = PathFollower(frame.guidance_limits)
-    follower.follow(Route(np.array(rows)))
+    limits = frame.guidance_limits(speed)
+    law = PreviewLaw(PreviewConfig().resolved(limits), limits)
+    law.follow(Route(np.array(rows)))
     model, worst = in_flight(frame, speed), 0.0
     while True:
-        output = follower.update(model.state())
+        output = law.update(model.state())
         if model.fault() or output.past_end:
             return math.inf if model.fault() else worst
         worst = max(worst, abs(output.cross_track_m))

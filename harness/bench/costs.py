@@ -43,9 +43,9 @@ T = TypeVar("T")
 def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any]:
     """Measures one scenario, in this process.
 
-    First the loop is flown once alone, with a stopwatch on its blocks and every update of guidance by itself: that
-    gives their shares, and loads what is loaded at its first use. Then come rounds of two flights, until both ratios
-    are steady, but no more than `MOST_ROUNDS`:
+    First the loop is flown once alone, with a stopwatch on its blocks: that gives their shares, and loads what is
+    loaded at its first use. Then come rounds of two flights, until both ratios are steady, but no more than
+    `MOST_ROUNDS`:
 
     - closed loop: the whole flight from the scenario to a complete run folder without the recording:
       loading, trimming, flying, metrics, writing and closing every file;
@@ -119,7 +119,7 @@ def watched(loop: Loop, watch: Stopwatch) -> Loop:
         seen=watch.over(loop.seen, "map", "update"),
         planner=watch.over(loop.planner, "planner", "plan"),
         model=watch.over(loop.model, "dynamics", "state", "fault", "command", "advance"),
-        follower=watch.over(loop.follower, "guidance", "follow", "update"),
+        guidance=watch.over(loop.guidance, "guidance", "follow", "update"),
     )
 
 

@@ -11,11 +11,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
-from aircraft.airframes import AircraftError, Airframe, airframe
+from aircraft.airframe import Airframe
+from aircraft.airframes import AircraftError, airframe
 from aircraft.card_cache import cached, figure
 from aircraft.envelope import performance
-from aircraft.guidance import UPDATE_RATE_HZ
-from aircraft.guidance_law import GRAVITY_MPS2
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.interface import GRAVITY_MPS2
 from aircraft.start import Atmosphere
 from harness.bench.tracking import ALTITUDE_M, course, fly_course
 

@@ -13,14 +13,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from aircraft.airframes import Airframe, airframe
+from aircraft.airframe import Airframe
+from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import UPDATE_RATE_HZ
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.guidance.registry import DEFAULT_KIND, guidance_kinds
 from aircraft.interface import Route
 from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
-from harness.run.compiled_guidance import path_follower
 
 ALTITUDE_M: Final = 300.0
 COURSE_RAD: Final = 0.3
@@ -125,15 +126,15 @@ def fly_course(frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Rou
         LocalPlane(47.0, 8.0),
         air,
     )
-    follower = path_follower(frame.guidance_limits)
-    follower.follow(route)
+    law = guidance_kinds()[DEFAULT_KIND].law(frame.guidance_limits(airspeed_mps))
+    law.follow(route)
     steps = model.step_rate_hz // UPDATE_RATE_HZ
     cross, altitude, saturated = [], [], 0
     while True:
         state = model.state()
         if fault := model.fault():
             raise ArithmeticError(f"{frame.name}: control is lost after {state.time_s:.0f} s: {fault}")
-        output = follower.update(state)
+        output = law.update(state)
         if output.past_end:
             break
         cross.append(abs(output.cross_track_m))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
-from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
 from aircraft.interface import AircraftState, FlightModel, Route
 from aircraft.route import route_length
 from harness.files.crash import in_a_line, sentence, trace
@@ -59,7 +59,7 @@ class Loop:
         seen: obstacle map, all that the planner sees.
         planner: planner under test.
         model: aircraft with its inner loops.
-        follower: guidance.
+        guidance: law that steers the aircraft along the route.
         mission: goal and limits.
         altitude_m: altitude held, above mean sea level.
         time_limit_s: simulated.
@@ -71,7 +71,7 @@ class Loop:
     seen: SensedMap
     planner: Planner
     model: FlightModel
-    follower: PathFollower
+    guidance: GuidanceLaw
     mission: Mission
     altitude_m: float
     time_limit_s: float
@@ -83,9 +83,8 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
 
     Everything happens at whole steps of the flight model: guidance and log at one rate, a scan at the
     sensor's. The planner is asked after a scan, and twice a step of guidance while it goes on. A scan or a plan
-    that is late takes effect at the first of these steps after its delay. Steps at which nothing but guidance is
-    due are left to the model, if it can fly them by itself. Time is a count of steps. Ctrl-C is taken between
-    two of these.
+    that is late takes effect at the first of these steps after its delay. Time is a count of steps. Ctrl-C is
+    taken between two of these.
 
     Args:
         loop: all parts of the flight; used up by it.
@@ -103,7 +102,7 @@ def _flown(
     loop: Loop, observers: Sequence[Observer], progress: Progress | None, interrupt: Callable[[], None]
 ) -> Flight:
     begun = time.perf_counter()
-    model, follower, seen, mission = loop.model, loop.follower, loop.seen, loop.mission
+    model, guidance, seen, mission = loop.model, loop.guidance, loop.seen, loop.mission
     strides, at = _strides(model.step_rate_hz, loop.scan_rate_hz), 0
     log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
     plans = _Plans(loop, observers)
@@ -113,7 +112,7 @@ def _flown(
     model.command(0.0, loop.altitude_m, mission.speed_mps)  # the last two for all of the flight
     while True:
         interrupt()
-        scan_due, tick, steps, updates = strides[at % len(strides)]
+        scan_due, tick, steps = strides[at % len(strides)]
         state = model.state()
         verdict = judge.verdict(state)
         if verdict is not None:
@@ -133,19 +132,10 @@ def _flown(
         if tick:
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
-            if updates and plans.index >= 0 and not plans.go_on:
-                until_s = min(judge.next_look_s, plans.due_s, next_report)
-                if late:
-                    until_s = min(until_s, late[0].available_s - 1e-6)
-                updates = min(updates, len(log.table) - log.row)
-                flown = model.fly_on(follower, log.table, log.row, plans.index, updates, steps, until_s)
-                if flown:
-                    station = log.filled(flown)
-                    at += flown
-                    continue
-            roll_command, cross_track, station = (
-                follower.update(state)[:3] if plans.index >= 0 else log.commanded
-            )
+            if plans.index >= 0:
+                output = guidance.update(state)
+                log.commanded = output.roll_command_rad, output.cross_track_m, output.arc_length_m
+            roll_command, cross_track, station = log.commanded
             model.command(roll_command, loop.altitude_m, mission.speed_mps)
             log.add(state, roll_command, cross_track, station, plans.index)
             if progress is not None and state.time_s >= next_report:
@@ -180,23 +170,15 @@ def _flown(
     )
 
 
-def _strides(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[bool, bool, int, int]]:
+def _strides(step_rate_hz: int, scan_rate_hz: float) -> list[tuple[bool, bool, int]]:
     """What happens at a step (scan, tick of guidance and log), and how many steps of the model come after it.
 
-    One tuple for every step at which something happens, until all of it begins again; the last number is how many
-    whole ticks begin there, one after the other, before the next scan.
+    One tuple for every step at which something happens, until all of it begins again.
     """
     scan = _whole(step_rate_hz, scan_rate_hz, "scan")
     tick = _whole(step_rate_hz, UPDATE_RATE_HZ, "guidance")
     happens = sorted({step for stride in (scan, tick) for step in range(0, math.lcm(scan, tick) + 1, stride)})
-    strides: list[tuple[bool, bool, int, int]] = []
-    updates = 0
-    for step, after in reversed(list(itertools.pairwise(happens))):
-        updates = updates + 1 if step % tick == 0 and after - step == tick else 0
-        strides.insert(0, (step % scan == 0, step % tick == 0, after - step, updates))
-        if step % scan == 0:
-            updates = 0
-    return strides
+    return [(step % scan == 0, step % tick == 0, after - step) for step, after in pairwise(happens)]
 
 
 def _whole(step_rate_hz: int, rate_hz: float, name: str) -> int:
@@ -310,7 +292,7 @@ class _Plans:
         compute_ms, plan, route = self._coming
         late = state.time_s - (self.due_s - self._loop.mission.compute_latency_s)
         self._coming, self.due_s = None, math.inf
-        self._loop.follower.follow(route, arc_length_m=late * state.groundspeed_mps)
+        self._loop.guidance.follow(route, arc_length_m=late * state.groundspeed_mps)
         accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
         self.accepted.append(accepted)
         self.index = accepted.plan_index

@@ -47,9 +47,7 @@ BLOCK_ROWS = 6000
 """Rows that are handed on together: ten minutes of flight, which is less than a second of the loop."""
 
 ROW = len(AircraftState._fields) + 4
-"""Numbers in a row: a state, roll command, cross-track error and station, plan index."""
-COMMANDED, STATION = slice(ROW - 4, ROW - 1), ROW - 2
-"""Of these, roll command, cross-track error and station."""
+"""Numbers in a row: a state, roll command, cross-track error and arc length, plan index."""
 THROTTLE = AircraftState._fields.index("throttle")
 """What comes before it in a row is finite while the aircraft is under control."""
 
@@ -166,11 +164,10 @@ class TrackLog:
     ) -> None:
         self._clearance = clearance
         self._sinks = tuple(sinks)
-        self.table: FloatArray = np.zeros((block_rows, ROW))  # no more objects while flying than now
-        """(k, 17) rows of this block: what `add` takes, in its order."""
-        self.row = 0
-        """The first row of `table` that is free; there always is one, and the one before is the last of all."""
-        self.table[-1, COMMANDED] = 0.0, math.nan, math.nan
+        self._table = np.zeros((block_rows, ROW))  # no more objects while flying than now
+        self._row = 0
+        self.commanded = 0.0, math.nan, math.nan
+        """Roll command, cross-track error and arc length of the last update; 0 and NaN before the first."""
         self._blocks: list[Track] = []
 
     def add(
@@ -185,33 +182,21 @@ class TrackLog:
 
         A state that is not finite, with which control is lost, is no row of the track.
         """
-        self.table[self.row] = (*state, roll_command_rad, cross_track_m, arc_length_m, plan_index)
-        self.filled(1)
-
-    def filled(self, rows: int) -> float:
-        """So many of `table` from `row` on have been filled: the station of the last."""
-        self.row += rows
-        station = float(self.table[self.row - 1, STATION])
-        if self.row == len(self.table):
+        self._table[self._row] = (*state, roll_command_rad, cross_track_m, arc_length_m, plan_index)
+        self._row += 1
+        if self._row == len(self._table):
             self._cut()
-        return station
-
-    @property
-    def commanded(self) -> tuple[float, float, float]:
-        """Roll command, cross-track error and station of the last row; 0 and NaN before the first."""
-        roll_command, cross_track, station = self.table[self.row - 1, COMMANDED].tolist()
-        return roll_command, cross_track, station
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
-        if self.row:
+        if self._row:
             self._cut()
         return Track.joined(self._blocks)
 
     def _cut(self) -> None:
-        rows = np.ascontiguousarray(self.table[: self.row].T)
+        rows = np.ascontiguousarray(self._table[: self._row].T)
         rows = rows[:, np.isfinite(rows[:THROTTLE]).all(axis=0)]
-        self.row = 0
+        self._row = 0
         if not rows.size:
             return
         time, east, north, up, east_mps, north_mps, _, heading, roll, pitch = rows[:10]

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-from aircraft.guidance import UPDATE_RATE_HZ
+from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import Route
 from harness.flight.closed_loop import Loop, Observer, Progress
 from harness.flight.record import AcceptedPlan, Flight, Outcome, TrackLog
@@ -40,13 +40,13 @@ def _flown(
     interrupt: Callable[[], None],
 ) -> Flight:
     begun = time.perf_counter()
-    model, follower = loop.model, loop.follower
+    model, guidance = loop.model, loop.guidance
     path = Path(way.segments)
     plan = Plan(PlanStatus.FOUND, "the path as given", way.waypoints_m, path)
     accepted = AcceptedPlan(0, 0.0, 0.0, plan)
     log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
     limit_s = 2.0 * path.length_m / max(_slowest_mps(loop), 1.0) + 60.0
-    follower.follow(Route(path.segments))
+    guidance.follow(Route(path.segments))
     for observer in observers:
         observer.on_plan(accepted, model.state())
     steps = model.step_rate_hz // UPDATE_RATE_HZ
@@ -54,7 +54,7 @@ def _flown(
     while True:
         interrupt()
         state = model.state()
-        guided = follower.update(state)
+        guided = guidance.update(state)
         model.command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps)
         off_m = abs(guided.cross_track_m) if guided.past_end else None
         outcome = _outcome(model.fault(), off_m, loop.mission.goal_radius_m, state.time_s, limit_s)

@@ -15,9 +15,9 @@ import numpy as np
 
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
-from aircraft.guidance import PathFollower
-from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import FlightModel
+from aircraft.guidance.interface import GuidanceLaw
+from aircraft.guidance.registry import DEFAULT_KIND, guidance_kinds
+from aircraft.interface import GRAVITY_MPS2, FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.analysis.metrics import metrics
@@ -26,7 +26,6 @@ from harness.files.errors import WriteError
 from harness.flight.closed_loop import Loop, Observer, Progress, fly
 from harness.flight.record import Flight
 from harness.mapping.sensed_map import SensedMap
-from harness.run.compiled_guidance import path_follower
 from harness.run_files.run_folder import RunFolder
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario, mission_of, performance_of
@@ -53,8 +52,6 @@ def make_loop(
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
     """
-    # From here on all is compiled.
-    follower = path_follower(airframe(scenario.aircraft.model).guidance_limits)
     mission = mission_of(scenario)
     world = World.from_scenario(scenario)
     start, air = start_conditions(scenario), atmosphere(scenario)
@@ -70,7 +67,7 @@ def make_loop(
         ),
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
-        follower=follower,
+        guidance=guidance_law(scenario),
         mission=mission,
         altitude_m=scenario.mission.altitude_m,
         time_limit_s=_given(scenario.mission.time_limit_s),
@@ -81,7 +78,13 @@ def make_loop(
 def kinematic_loop(scenario: Scenario) -> Loop:
     """The same loop with a point that flies every path exactly in place of aircraft and guidance."""
     loop = make_loop(scenario, KinematicPoint)
-    return replace(loop, follower=cast(PathFollower, loop.model))
+    return replace(loop, guidance=cast(GuidanceLaw, loop.model))
+
+
+def guidance_law(scenario: Scenario) -> GuidanceLaw:
+    """The guidance of a scenario's flight."""
+    limits = airframe(scenario.aircraft.model).guidance_limits(scenario.aircraft.airspeed_mps)
+    return guidance_kinds()[DEFAULT_KIND].law(limits)
 
 
 def start_conditions(scenario: Scenario) -> StartConditions:
@@ -127,14 +130,14 @@ def jsbsim_aircraft(scenario: Scenario, start: StartConditions, air: Atmosphere)
 
     origin = scenario.area.origin
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
-    return JsbsimModel(scenario.aircraft.model, start, plane, air)
+    return JsbsimModel(airframe(scenario.aircraft.model), start, plane, air)
 
 
 def flight_limits(scenario: Scenario) -> FlightLimits:
     """What a scenario's flight is measured against."""
     performance, limits = performance_of(scenario), scenario.trackability
     calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
-    guidance = airframe(scenario.aircraft.model).guidance_limits
+    guidance = airframe(scenario.aircraft.model).guidance_limits()
     speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
     wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
     sensor = scenario.sensor

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
-from aircraft.guidance_laws.l1 import (
+from aircraft.guidance.l1 import (
     L1Circle,
     L1Leg,
     L1Memory,
@@ -24,7 +24,7 @@ from aircraft.guidance_laws.l1 import (
     follow_circle,
     follow_leg,
 )
-from aircraft.guidance_laws.npfg import NpfgInput, NpfgParameters, npfg
+from aircraft.guidance.npfg import NpfgInput, NpfgParameters, npfg
 from tests.aircraft.guidance_replay import Row, replayed
 
 TOLERANCE, SINGLE_TOLERANCE, CENTIDEGREES = 1e-6, 2e-4, 1.0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from aircraft.guidance_laws.l1 import (
+from aircraft.guidance.l1 import (
     L1Circle,
     L1Config,
     L1Leg,
@@ -16,7 +16,7 @@ from aircraft.guidance_laws.l1 import (
     follow_circle,
     follow_leg,
 )
-from aircraft.guidance_laws.npfg import NpfgConfig, NpfgInput, npfg
+from aircraft.guidance.npfg import NpfgConfig, NpfgInput, npfg
 
 Row = dict[str, Any]
 """Column names and values: numbers, but for the kind of a run."""

@@ -30,7 +30,7 @@ def test_the_fleet_has_those_that_are_asked_for_most() -> None:
 
 
 def test_guidance_limits_are_in_radians() -> None:
-    limits = airframe("aerosonde").guidance_limits
+    limits = airframe("aerosonde").guidance_limits()
     assert limits.bank_limit_rad == pytest.approx(math.pi / 4)
     assert limits.roll_rate_radps == pytest.approx(math.pi / 3)
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from aircraft.airframes import FIGURES, airframe
+from aircraft.airframe import FIGURES
+from aircraft.airframes import airframe
 from aircraft.autopilot import Gains
 from aircraft.card_cache import cache_folder, figure
 from aircraft.card_cache import cached as read_or_measured

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.frames import PATCH_M, LocalPlane
-from aircraft.guidance_law import in_patch
+from aircraft.kernels import place_in_patch
 
 GEOD = pyproj.Geod(ellps="WGS84")
 FURTHEST_M = 142_000.0
@@ -85,7 +85,7 @@ def test_a_patch_agrees_with_the_plane_to_a_tenth_of_a_millimetre(
     patch = plane.patch(*map(math.radians, middle))
     latitude, longitude, reach_up, reach_right = patch[:4]
     point = (latitude + up * reach_up, longitude + right * reach_right)
-    near = in_patch(np.array(patch), *point)
+    near = place_in_patch(np.array(patch), *point)
     if math.isnan(near[0]):  # on the rim, by rounding
         assert max(abs(up), abs(right)) > 1.0 - 1e-6
         return
@@ -100,9 +100,9 @@ def test_a_patch_ends_where_its_terms_no_longer_hold() -> None:
     patch = np.array(plane.patch(latitude, longitude))
     reach_up, reach_right = patch[2:4]
     for up, right in ((1.01, 0.0), (-1.01, 0.0), (0.0, 1.01), (0.0, -1.01), (math.nan, 0.0)):
-        place = in_patch(patch, latitude + up * reach_up, longitude + right * reach_right)
+        place = place_in_patch(patch, latitude + up * reach_up, longitude + right * reach_right)
         assert np.isnan(place).all()
-    middle, rim = (in_patch(patch, latitude + up * reach_up, longitude) for up in (0.0, 0.99))
+    middle, rim = (place_in_patch(patch, latitude + up * reach_up, longitude) for up in (0.0, 0.99))
     assert middle == plane.project(latitude, longitude)
     assert math.dist(rim[:2], middle[:2]) == pytest.approx(0.99 * PATCH_M, rel=0.01)
 

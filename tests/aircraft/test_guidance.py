@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,22 +12,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.airframes import airframe
-from aircraft.guidance import (
-    UPDATE_RATE_HZ,
-    GuidanceLimits,
-    GuidanceOutput,
-    PathFollower,
-)
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceLimits, GuidanceOutput
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.guidance.progress import route_rows
 from aircraft.interface import STEP_RATE_HZ, AircraftState, Route
-from aircraft.point_mass import PointMass
 from aircraft.route import arc_point, route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
+from tests.point_mass import PointMass
 
 AIRSPEED = 25.0
 ALTITUDE = 300.0
 STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ
-LIMITS = airframe("aerosonde").guidance_limits
+LIMITS = airframe("aerosonde").guidance_limits()
 Piece = tuple[float, float]
+
+
+def preview(limits: GuidanceLimits = LIMITS, **keys: float) -> GuidanceLaw:
+    return PreviewLaw(PreviewConfig(**keys).resolved(limits), limits)
 
 
 def joined(pieces: list[Piece], *, loiter: bool = False, east: float = 0.0, north: float = 0.0) -> Route:
@@ -46,12 +48,12 @@ def fly(
 ) -> list[tuple[AircraftState, GuidanceOutput]]:
     """State and decision of every guidance update."""
     model = PointMass(start, Atmosphere(*wind))
-    follower = PathFollower(LIMITS)
-    follower.follow(route)
+    law = preview()
+    law.follow(route)
     flown = []
     for _ in range(round(UPDATE_RATE_HZ * seconds)):
         state = model.state()
-        output = follower.update(state)
+        output = law.update(state)
         flown.append((state, output))
         model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)
         model.advance(STEPS)
@@ -87,16 +89,14 @@ def test_beyond_the_end_a_route_goes_straight_on_and_a_loiter_round() -> None:
 @pytest.mark.parametrize("loiter", [False, True])
 def test_a_route_is_kept_row_by_row_however_it_was_given(loiter: bool) -> None:
     rows = joined([(0.0, 500.0), (1 / 150.0, 300.0), (0.0, 400.0)]).segments
-    follower = PathFollower(LIMITS)
-    follower.follow(Route(np.asfortranarray(rows), loiter))
-    assert follower.route is not None
-    assert follower.route.flags.c_contiguous  # compiled guidance reads it as it lies in memory
-    np.testing.assert_array_equal(follower.route[:3, :6], rows)
+    kept = route_rows(Route(np.asfortranarray(rows), loiter))
+    assert kept.flags.c_contiguous  # compiled guidance reads it as it lies in memory
+    np.testing.assert_array_equal(kept[:3, :6], rows)
 
 
 def test_update_needs_a_route() -> None:
     with pytest.raises(RuntimeError, match=r"follow\(\) a route"):
-        PathFollower(LIMITS).update(PointMass(northwards()).state())
+        preview().update(PointMass(northwards()).state())
 
 
 @given(st.floats(-200.0, 200.0), st.sampled_from([0.0, 1 / 400.0, -1 / 400.0]), st.floats(0.1, 0.9))
@@ -107,9 +107,9 @@ def test_cross_track_is_signed_to_the_right(offset: float, curvature: float, sha
     state = PointMass(
         northwards(east + offset * tangent_north, north - offset * tangent_east, course)
     ).state()
-    follower = PathFollower(LIMITS)
-    follower.follow(route)
-    output = follower.update(state)
+    law = preview()
+    law.follow(route)
+    output = law.update(state)
     assert output.cross_track_m == pytest.approx(offset, abs=1e-6)
     assert output.arc_length_m == pytest.approx(share * 600.0, abs=1e-6)
 
@@ -130,17 +130,17 @@ def test_curvature_preview_is_what_keeps_a_joint_smooth() -> None:
     route = joined([(0.0, 200.0), (1 / 120.0, 300.0), (0.0, 500.0)])
 
     def worst(limits: GuidanceLimits) -> float:
-        model, follower = PointMass(northwards()), PathFollower(limits)
-        follower.follow(route)
+        model, law = PointMass(northwards()), preview(limits)
+        law.follow(route)
         errors = []
         for _ in range(UPDATE_RATE_HZ * 30):
-            output = follower.update(model.state())
+            output = law.update(model.state())
             errors.append(abs(output.cross_track_m))
             model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)
             model.advance(STEPS)
         return max(errors)
 
-    blind = GuidanceLimits(LIMITS.bank_limit_rad, LIMITS.roll_rate_radps, 0.0, 0.0, LIMITS.bandwidth_radps)
+    blind = replace(LIMITS, roll_lag_s=0.0, roll_delay_s=0.0)
     assert worst(LIMITS) < 0.2
     assert worst(blind) > 3 * worst(LIMITS)
 
@@ -204,8 +204,8 @@ def test_progress_stays_on_its_own_branch_of_a_crossing_route() -> None:
 def test_hand_over_in_a_turn_makes_no_bump() -> None:
     """Same path, new route that begins anywhere behind the aircraft: as if nothing had happened."""
     whole = joined([(0.0, 100.0), (1 / 120.0, 600.0), (0.0, 2000.0)])
-    model, follower = PointMass(northwards()), PathFollower(LIMITS)
-    follower.follow(whole)
+    model, law = PointMass(northwards()), preview()
+    law.follow(whole)
     rolls, errors = [], []
     new_at = 8 * UPDATE_RATE_HZ
     for tick in range(UPDATE_RATE_HZ * 20):
@@ -213,8 +213,8 @@ def test_hand_over_in_a_turn_makes_no_bump() -> None:
             row = whole.segments[1].copy()
             row[:4] = arc_point(tuple(whole.segments[1]), 60.0)
             row[5] = 540.0
-            follower.follow(Route(np.vstack((row, whole.segments[2]))), arc_length_m=30.0)
-        output = follower.update(model.state())
+            law.follow(Route(np.vstack((row, whole.segments[2]))), arc_length_m=30.0)
+        output = law.update(model.state())
         rolls.append(output.roll_command_rad)
         errors.append(abs(output.cross_track_m))
         model.command(output.roll_command_rad, ALTITUDE, AIRSPEED)

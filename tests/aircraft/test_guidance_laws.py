@@ -4,13 +4,13 @@ import math
 
 import pytest
 
-from aircraft.guidance_laws.npfg import NpfgConfig, NpfgInput, npfg
-from aircraft.guidance_laws.pure_pursuit import (
+from aircraft.guidance.npfg import NpfgConfig, NpfgInput, npfg
+from aircraft.guidance.pure_pursuit import (
     PurePursuitConfig,
     look_ahead_distance,
     pure_pursuit,
 )
-from aircraft.guidance_laws.vector_field import (
+from aircraft.guidance.vector_field import (
     Motion,
     VectorFieldConfig,
     follow_line,

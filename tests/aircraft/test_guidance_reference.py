@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from aircraft.guidance_laws.l1 import follow_circle
+from aircraft.guidance.l1 import follow_circle
 from tests.aircraft import guidance_reference
 from tests.aircraft.guidance_reference import compared, main
 

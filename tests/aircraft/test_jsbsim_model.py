@@ -20,6 +20,7 @@ from aircraft.airframes import AircraftError, airframe
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState, FlightModel
 from aircraft.jsbsim_model import JsbsimModel
+from aircraft.properties import FAULT_PROPERTIES
 from aircraft.start import Atmosphere, StartConditions
 
 PLANE = LocalPlane(47.0, 8.0)
@@ -33,14 +34,15 @@ def model_of(
     atmosphere: Atmosphere | None = None,
     at: tuple[float, float] = (60e3, 70e3),
 ) -> JsbsimModel:
-    return JsbsimModel(
-        name, StartConditions(*at, 300.0, course, airframe(name).cruise_mps), PLANE, atmosphere
-    )
+    frame = airframe(name)
+    return JsbsimModel(frame, StartConditions(*at, 300.0, course, frame.cruise_mps), PLANE, atmosphere)
 
 
 def test_state_has_the_throttle_that_holds_the_airspeed() -> None:
     slow, fast = (
-        JsbsimModel("aerosonde", StartConditions(0.0, 0.0, 300.0, 0.0, speed), LocalPlane(47.0, 8.0))
+        JsbsimModel(
+            airframe("aerosonde"), StartConditions(0.0, 0.0, 300.0, 0.0, speed), LocalPlane(47.0, 8.0)
+        )
         for speed in (20.0, 30.0)
     )
     assert 0.0 < slow.state().throttle < fast.state().throttle < 1.0
@@ -173,7 +175,7 @@ def test_starts_trimmed_without_transient(name: str, wind: tuple[float, float]) 
 def test_wind_keeps_its_direction_in_the_plane() -> None:
     """At 70 degrees true north leans by half a degree over the 20 km of this flight; the wind must not."""
     start = StartConditions(50e3, 0.0, 300.0, math.pi / 2, 25.0)
-    model = JsbsimModel("aerosonde", start, LocalPlane(70.0, 8.0), Atmosphere(wind_east_mps=10.0))
+    model = JsbsimModel(airframe("aerosonde"), start, LocalPlane(70.0, 8.0), Atmosphere(wind_east_mps=10.0))
     for _ in range(600):
         state = model.state()
         model.command(0.0, 300.0, 25.0)
@@ -278,21 +280,30 @@ def test_faults_name_the_cause() -> None:
 @pytest.mark.parametrize(
     ("reading", "good", "bad", "fault"),
     [
-        ("_alpha", 0.2, 0.6, "stalled: angle of attack 34.4 deg, limit "),
-        ("_alpha", -0.2, -0.6, "stalled: angle of attack -34.4 deg, limit "),
-        ("_airspeed", 70.0, 10.0, "stalled: airspeed 3.0 m/s, below "),
-        ("_altitude", 7.0, 6.0, "the aircraft is at the ground (1.8 m above sea level)"),
-        ("_roll", -1.3, -1.4, "rolled over: roll -80 deg, limit 75 deg"),
-        ("_altitude", 1e9, math.inf, "the state is not finite"),
-        ("_airspeed", 1e9, math.inf, "the state is not finite"),
-        ("_roll", 0.0, math.nan, "the state is not finite"),
+        ("aero/alpha-rad", 0.2, 0.6, "stalled: angle of attack 34.4 deg, limit "),
+        ("aero/alpha-rad", -0.2, -0.6, "stalled: angle of attack -34.4 deg, limit "),
+        ("velocities/vtrue-fps", 70.0, 10.0, "stalled: airspeed 3.0 m/s, below "),
+        ("position/h-sl-ft", 7.0, 6.0, "the aircraft is at the ground (1.8 m above sea level)"),
+        ("attitude/phi-rad", -1.3, -1.4, "rolled over: roll -80 deg, limit 75 deg"),
+        ("position/h-sl-ft", 1e9, math.inf, "the state is not finite"),
+        ("velocities/vtrue-fps", 1e9, math.inf, "the state is not finite"),
+        ("attitude/phi-rad", 0.0, math.nan, "the state is not finite"),
     ],
 )
 def test_each_limit_is_a_fault_of_its_own(reading: str, good: float, bad: float, fault: str) -> None:
     model = model_of("aerosonde")
-    setattr(model, reading, lambda: good)
+
+    def reads(value: float) -> None:
+        place = FAULT_PROPERTIES.index(reading)
+        model._read_for_fault = (
+            *model._read_for_fault[:place],
+            lambda: value,
+            *model._read_for_fault[place + 1 :],
+        )
+
+    reads(good)
     assert model.fault() is None
-    setattr(model, reading, lambda: bad)
+    reads(bad)
     assert (model.fault() or "").startswith(fault)
 
 
@@ -321,15 +332,16 @@ def test_what_cannot_fly_is_refused(
     name: str, start: StartConditions, atmosphere: Atmosphere | None, message: str
 ) -> None:
     with pytest.raises(AircraftError, match=message):
-        JsbsimModel(name, start, PLANE, atmosphere)
+        JsbsimModel(airframe(name), start, PLANE, atmosphere)
 
 
 FLIGHT = """
+from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import Atmosphere, StartConditions
 air = Atmosphere(5.0, -2.0, "tustin", "moderate", 3)
-model = JsbsimModel({name!r}, StartConditions(1e3, 2e3, 300.0, 0.3, {airspeed}), LocalPlane(47.0, 8.0), air)
+model = JsbsimModel(airframe({name!r}), StartConditions(1e3, 2e3, 300.0, 0.3, {airspeed}), LocalPlane(47.0, 8.0), air)
 for tick in range(600):
     model.command(0.4 if tick % 200 < 100 else -0.4, 300.0, {airspeed})
     model.advance(6)

@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
-from aircraft.guidance import UPDATE_RATE_HZ, PathFollower
-from aircraft.guidance_law import air_direction
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.interface import AircraftState, FlightModel, Route
 from aircraft.jsbsim_model import JsbsimModel
-from aircraft.point_mass import PointMass
+from aircraft.kernels import air_direction
 from aircraft.start import Atmosphere, Gust, StartConditions
+from tests.point_mass import PointMass
 
 EASTWARDS = StartConditions(0.0, 0.0, 300.0, math.pi / 2, 25.0)
 EAST_LINE = Route(np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 20_000.0]]))
@@ -32,12 +33,13 @@ class Row(NamedTuple):
 
 
 def flown(model: FlightModel, seconds: float, route: Route = EAST_LINE) -> list[Row]:
-    follower = PathFollower(airframe("aerosonde").guidance_limits)
-    follower.follow(route)
+    limits = airframe("aerosonde").guidance_limits()
+    law = PreviewLaw(PreviewConfig().resolved(limits), limits)
+    law.follow(route)
     rows = []
     for _ in range(round(UPDATE_RATE_HZ * seconds)):
         state = model.state()
-        output = follower.update(state)
+        output = law.update(state)
         rows.append(Row(state, output.cross_track_m, output.roll_command_rad))
         model.command(output.roll_command_rad, 300.0, 25.0)
         model.advance(model.step_rate_hz // UPDATE_RATE_HZ)
@@ -85,8 +87,10 @@ def test_the_aircraft_flies_in_the_gust(gust: Gust) -> None:
         return state.velocity_north_mps - state.airspeed_mps * math.cos(state.heading_rad)
 
     plane, begun = LocalPlane(47.0, 8.0), 5 * UPDATE_RATE_HZ
-    calm = flown(JsbsimModel("aerosonde", EASTWARDS, plane, Atmosphere(wind_east_mps=3.0)), 12.0)
-    gusty = flown(JsbsimModel("aerosonde", EASTWARDS, plane, Atmosphere(wind_east_mps=3.0, gust=gust)), 12.0)
+    calm = flown(JsbsimModel(airframe("aerosonde"), EASTWARDS, plane, Atmosphere(wind_east_mps=3.0)), 12.0)
+    gusty = flown(
+        JsbsimModel(airframe("aerosonde"), EASTWARDS, plane, Atmosphere(wind_east_mps=3.0, gust=gust)), 12.0
+    )
     assert gusty[:begun] == calm[:begun]
     assert gusty[begun + 1 :] != calm[begun + 1 :]
     assert max(abs(row.state.load_factor - 1.0) for row in gusty[:begun]) < 0.01
@@ -101,7 +105,9 @@ def test_the_aircraft_flies_in_the_gust(gust: Gust) -> None:
 
 def test_a_gust_front_is_flown_through() -> None:
     gust = Gust("step", 0.0, 7.5, 20.0)
-    rows = flown(JsbsimModel("aerosonde", EASTWARDS, LocalPlane(47.0, 8.0), Atmosphere(gust=gust)), 60.0)
+    rows = flown(
+        JsbsimModel(airframe("aerosonde"), EASTWARDS, LocalPlane(47.0, 8.0), Atmosphere(gust=gust)), 60.0
+    )
     assert max(abs(row.cross_track_m) for row in rows) < 8.0
     assert max(abs(row.cross_track_m) for row in rows[50 * UPDATE_RATE_HZ :]) < 0.2
 
@@ -141,7 +147,7 @@ def test_the_heading_makes_the_bearing_good_where_that_can_be(
 def test_in_too_much_wind_it_drifts_without_circling(wind: tuple[float, float], heading: float) -> None:
     """Towards the east at 25 m/s: against the wind, across it, with it."""
     air = Atmosphere(gust=Gust("one_minus_cosine", *wind, 0.0, 240.0))
-    rows = flown(JsbsimModel("aerosonde", EASTWARDS, LocalPlane(47.0, 8.0), air), 120.0)
+    rows = flown(JsbsimModel(airframe("aerosonde"), EASTWARDS, LocalPlane(47.0, 8.0), air), 120.0)
     last = rows[-1].state
     headings = [math.degrees(row.state.heading_rad) for row in rows]
     turned = sum(abs(math.remainder(b - a, 360.0)) for a, b in pairwise(headings))
@@ -155,6 +161,6 @@ def test_in_too_much_wind_it_drifts_without_circling(wind: tuple[float, float], 
 
 def test_when_the_wind_drops_the_path_is_flown_again() -> None:
     air = Atmosphere(gust=Gust("one_minus_cosine", -20.0, -20.0, 0.0, 120.0))
-    rows = flown(JsbsimModel("aerosonde", EASTWARDS, LocalPlane(47.0, 8.0), air), 180.0)
+    rows = flown(JsbsimModel(airframe("aerosonde"), EASTWARDS, LocalPlane(47.0, 8.0), air), 180.0)
     assert max(abs(row.cross_track_m) for row in rows) > 20.0
     assert max(abs(row.cross_track_m) for row in rows[170 * UPDATE_RATE_HZ :]) < 0.2

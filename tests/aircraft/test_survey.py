@@ -12,7 +12,8 @@ import pytest
 
 import aircraft
 import aircraft.survey
-from aircraft.airframes import AircraftError, Entry, aircraft_names, airframe
+from aircraft.airframe import Entry
+from aircraft.airframes import AircraftError, aircraft_names, airframe
 from aircraft.autopilot import gains
 from aircraft.interface import AircraftState
 from aircraft.jsbsim_loading import linearised, mass_kg, trimmed

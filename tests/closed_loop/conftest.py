@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from aircraft.point_mass import PointMass
 from harness.files.strict_yaml import dump
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight
@@ -15,6 +14,7 @@ from planner import registry
 from planner.interface import Mission, Plan, PlanRequest
 from planner.registry import PlannerKind
 from planner.rolling_window.config import RollingWindowConfig
+from tests.point_mass import PointMass
 
 SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]

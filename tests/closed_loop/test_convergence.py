@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 import shapely
 
-from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions
 from harness.files.strict_yaml import dump
 from harness.flight.closed_loop import fly
 from harness.flight.record import FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
 from harness.scenario.scenario import Scenario, dump_scenario, mission_of, parse_scenario
+from tests.point_mass import PointMass
 
 SIDE_M, CLEARANCE_M, THICK_M = 5000.0, 40.0, 30.0
 GOAL_RADIUS_M, APART_M = 60.0, 2000.0

@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from aircraft.point_mass import PointMass
 from harness.analysis.smoothness import flown_lengths
 from harness.flight.closed_loop import fly
 from harness.flight.record import Outcome
@@ -16,6 +15,7 @@ from harness.run.scenario_flight import make_loop
 from harness.scenario.scenario import Scenario
 from planner.geometry.clearance import inside_bounds
 from planner.geometry.curves import end_of
+from tests.point_mass import PointMass
 
 SmallWorld = Callable[..., Scenario]
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from aircraft.interface import AircraftState
-from aircraft.point_mass import PointMass
 from harness.flight.closed_loop import fly
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import make_loop
 from harness.scenario.scenario import Scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from tests.point_mass import PointMass
 
 SmallWorld = Callable[..., Scenario]
 Install = Callable[[Callable[[Mission, PlanRequest], Plan]], None]

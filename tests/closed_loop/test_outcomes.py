@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aircraft.guidance import UPDATE_RATE_HZ
+from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState
-from aircraft.point_mass import PointMass
 from aircraft.start import Atmosphere, StartConditions
 from harness.cli.app import main
 from harness.flight.record import Flight
 from harness.run import scenario_flight as run
 from harness.scenario.scenario import Scenario, dump_scenario
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+from tests.point_mass import PointMass
 
 SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]

@@ -20,7 +20,6 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from aircraft.interface import AircraftState
-from aircraft.point_mass import PointMass
 from harness.cli.app import main
 from harness.flight.closed_loop import fly
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
@@ -32,6 +31,7 @@ from harness.world.world import World
 from planner.geometry.clearance import distances
 from planner.geometry.curves import on_loiter, pose_at, sample
 from planner.interface import Path
+from tests.point_mass import PointMass
 
 SmallWorld = Callable[..., Scenario]
 Obstacles = list[dict[str, Any]]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import STEP_RATE_HZ, AircraftState
+from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState
 from aircraft.start import Atmosphere, StartConditions
 
 LONGEST_STEP_S = 0.1
@@ -99,10 +98,6 @@ class PointMass:
             self._heading += turn
             self._roll = end
         self._step += steps
-
-    def fly_on(self, *_: object) -> int:
-        """It flies no updates by itself."""
-        return 0
 
     def fault(self) -> str | None:
         """A sentence if the state is not finite or the ground is reached, else None."""

@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.guidance_law import GRAVITY_MPS2
-from aircraft.interface import FlightModel
-from aircraft.point_mass import PointMass
+from aircraft.interface import GRAVITY_MPS2, FlightModel
 from aircraft.start import Atmosphere, StartConditions
+from tests.point_mass import PointMass
 
 START = StartConditions(1000.0, 2000.0, 300.0, 0.5, 25.0)
 

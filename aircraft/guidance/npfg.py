@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from aircraft.guidance_laws.key import key
+from aircraft.guidance.key import key
 
 GRAVITY_MPS2 = 9.80665
 FEASIBILITY_BUFFER_MPS = 1.5

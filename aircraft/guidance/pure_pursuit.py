@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from aircraft.guidance_laws.key import key
+from aircraft.guidance.key import key
 
 GRAVITY_MPS2 = 9.80665
 LEAST_CRAB_COSINE = 0.2

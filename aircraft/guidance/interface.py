@@ -1,0 +1,80 @@
+"""What a guidance law is: a route in, then state in and roll command out, update by update."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+from aircraft.interface import AircraftState, Route
+
+UPDATE_RATE_HZ = 10
+"""Roll commands a second. Flown on the 14-turn courses of `harness.bench.tracking`, 20 a second track no better: the
+command is held for half an update more, which the preview makes up for."""
+
+
+@dataclass(frozen=True)
+class GuidanceLimits:
+    """What guidance may ask of an aircraft.
+
+    Attributes:
+        airspeed_mps: true airspeed that the autopilot holds.
+        max_airspeed_mps: fastest level flight.
+        bank_limit_rad: largest roll command.
+        roll_rate_radps: fastest change of the roll command.
+        roll_lag_s: time constant of roll behind its command; the command leads by it.
+        roll_delay_s: what further delay there is (actuators, the roll mode).
+        bandwidth_radps: natural frequency omega of the cross-track correction, about a third of 1 / roll_lag_s.
+    """
+
+    airspeed_mps: float
+    max_airspeed_mps: float
+    bank_limit_rad: float
+    roll_rate_radps: float
+    roll_lag_s: float
+    roll_delay_s: float
+    bandwidth_radps: float
+
+
+class GuidanceOutput(NamedTuple):
+    """One decision of a guidance law."""
+
+    roll_command_rad: float
+    """Held until the next update, positive right wing down."""
+    cross_track_m: float
+    """Distance from the route, positive to its right."""
+    arc_length_m: float
+    """Distance along the route of the nearest point; grows on in a loiter."""
+    bank_saturated: bool
+    """The bank limit cut the command."""
+    past_end: bool
+    """The route is flown out; straight on along its last tangent."""
+
+
+class GuidanceLaw(Protocol):
+    """Follows a route, asked `UPDATE_RATE_HZ` times a second. One object serves one flight.
+
+    The state it is given is what the aircraft believes of itself, not necessarily what is true.
+    """
+
+    def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
+        """Takes a new route; the roll command goes on from where it is.
+
+        Args:
+            route: what to fly.
+            arc_length_m: where on it to begin looking for the nearest point, m from its start.
+        """
+        ...
+
+    def update(self, state: AircraftState) -> GuidanceOutput:
+        """Decides the roll command for the next update interval.
+
+        Args:
+            state: the aircraft now.
+
+        Returns:
+            Roll command, and where the aircraft is relative to the route.
+
+        Raises:
+            RuntimeError: there is no route yet.
+        """
+        ...

@@ -1,0 +1,93 @@
+"""Where an aircraft is on its route: nearest point, cross-track error, curvature there. For any law."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from aircraft.interface import FloatArray, Route
+from aircraft.route import arc_point
+
+
+class PathPoint(NamedTuple):
+    """The point of a route that is nearest to the aircraft."""
+
+    east_m: float
+    north_m: float
+    tangent_east: float
+    """Unit tangent in the direction of flight."""
+    tangent_north: float
+    curvature_1pm: float
+    """Positive for a left turn."""
+    cross_track_m: float
+    """Distance of the aircraft from the route, positive to its right."""
+    arc_length_m: float
+    """Distance along the route; grows on in a loiter."""
+    past_end: bool
+    """The route is flown out: the point lies on its last tangent, beyond the end."""
+
+
+class RouteProgress:
+    """Keeps the place on one route. It only moves on, so a route may cross itself.
+
+    Args:
+        route: what is flown.
+        arc_length_m: where on it to begin looking for the nearest point, m from its start.
+    """
+
+    def __init__(self, route: Route, arc_length_m: float = 0.0) -> None:
+        from aircraft import kernels  # half a second
+
+        self._nearest = kernels.nearest_on_route
+        self.rows = route_rows(route)
+        self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
+
+    def nearest(self, east_m: float, north_m: float) -> PathPoint:
+        """The nearest point from the last one onwards.
+
+        Args:
+            east_m: position of the aircraft.
+            north_m: likewise.
+        """
+        row, along_m, cross_m, tangent_east, tangent_north = self._nearest(
+            self.rows, self._row, self._along_m, east_m, north_m
+        )
+        self._row, self._along_m = row, along_m
+        _, _, _, _, curvature_1pm, length_m, start_m, _, _ = self.rows[row].tolist()
+        return PathPoint(
+            east_m=east_m - cross_m * tangent_north,
+            north_m=north_m + cross_m * tangent_east,
+            tangent_east=tangent_east,
+            tangent_north=tangent_north,
+            curvature_1pm=curvature_1pm,
+            cross_track_m=cross_m,
+            arc_length_m=start_m + along_m,
+            past_end=length_m == math.inf and along_m > 0.0,
+        )
+
+
+def route_rows(route: Route) -> FloatArray:
+    """(n, 9) the segments of a route as kernels take them; one without a loiter goes on straight for ever.
+
+    Columns are those of `Route.segments`, then the arc lengths at which the segment begins and ends (m; the last is
+    infinite) and by how much the route has turned before it (rad, positive to the left).
+    """
+    segments = route.segments
+    if not route.loiter:
+        end = arc_point(tuple(segments[-1].tolist()), float(segments[-1, 5]))
+        segments = np.vstack((segments, (*end, 0.0, math.inf)))
+    arc_lengths = np.append(0.0, np.cumsum(segments[:, 5]))
+    arc_lengths[-1] = math.inf
+    turned = np.append(0.0, np.cumsum(segments[:-1, 4] * segments[:-1, 5]))
+    rows = np.column_stack((segments, arc_lengths[:-1], arc_lengths[1:], turned))
+    rows.setflags(write=False)
+    return rows
+
+
+def place_on_rows(rows: FloatArray, arc_length_m: float) -> tuple[int, float]:
+    """Row of a route, and distance along it (m), at an arc length."""
+    starts = rows[:, 6]
+    row = max(int(np.searchsorted(starts, arc_length_m, side="right")) - 1, 0)
+    return row, arc_length_m - float(starts[row])

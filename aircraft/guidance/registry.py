@@ -1,0 +1,92 @@
+"""Guidance laws by name: the built-in ones and those of other distributions.
+
+Another distribution adds a law by an entry point in the group `wayproof.guidance` that names a `GuidanceKind`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from typing import Any
+
+from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+
+GROUP = "wayproof.guidance"
+DEFAULT_KIND = "preview"
+
+
+@dataclass(frozen=True)
+class GuidanceKind:
+    """A guidance law that scenarios may name.
+
+    Attributes:
+        kind: the name, as in `guidance.kind` of a scenario.
+        summary: one line for `wayproof list guidance`.
+        config: frozen dataclass of the law's own keys. Each field has a default and the metadata `doc` (a sentence),
+            `unit`, and `minimum` / `maximum` or `above` where there is such a bound. A default of None is derived:
+            `config.resolved(limits)` returns the config with no None left and raises ValueError, with a sentence,
+            where keys contradict each other.
+        make: the law for one flight, from a resolved config and what may be asked of the aircraft.
+    """
+
+    kind: str
+    summary: str
+    config: type[Any]
+    make: Callable[[Any, GuidanceLimits], GuidanceLaw]
+
+    def law(self, limits: GuidanceLimits, **keys: Any) -> GuidanceLaw:
+        """The law for one flight, its own keys given or at their defaults.
+
+        Args:
+            limits: what may be asked of the aircraft.
+            **keys: own keys of the law.
+
+        Raises:
+            ValueError: keys contradict each other.
+        """
+        return self.make(self.config(**keys).resolved(limits), limits)
+
+
+BUILT_IN = (
+    GuidanceKind(
+        kind="preview",
+        summary="path curvature ahead of the roll lag, and a second-order correction of the cross-track error",
+        config=PreviewConfig,
+        make=PreviewLaw,
+    ),
+)
+
+
+def guidance_kinds() -> dict[str, GuidanceKind]:
+    """All guidance laws by name, built-in ones first.
+
+    Raises:
+        TypeError: an entry point names something else.
+    """
+    kinds = {kind.kind: kind for kind in BUILT_IN}
+    for point in _outside(entry_points, tuple(sys.path)):
+        outside = point.load()
+        if not isinstance(outside, GuidanceKind):
+            raise TypeError(f"entry point {point.name!r} ({point.value}) is not a GuidanceKind")
+        kinds.setdefault(outside.kind, outside)
+    return kinds
+
+
+def distribution_of(kind: str) -> str | None:
+    """Name and version of the other distribution that a law comes from; None for a built-in one."""
+    if kind in (built_in.kind for built_in in BUILT_IN):
+        return None
+    for point in _outside(entry_points, tuple(sys.path)):
+        if point.load().kind == kind and point.dist is not None:
+            return f"{point.dist.name} {point.dist.version}"
+    return None
+
+
+@cache
+def _outside(find: Callable[..., EntryPoints], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+    """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""
+    return tuple(find(group=GROUP))

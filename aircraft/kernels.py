@@ -1,0 +1,292 @@
+"""Machine code: the arithmetic of what happens at every update, as plain functions of numbers and arrays.
+
+numba compiles a function at its first call and keeps the result on disk. Importing this module takes half a second, so
+it is imported inside the functions that need it. Fast mathematics is off: the same numbers give the same results.
+
+A route is given as rows, see `aircraft.guidance.progress.route_rows`. A record is an array of one element with named
+fields, so that a function can change it. The frame is the local ENU plane; headings are clockwise from north.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, ParamSpec, TypeVar
+
+import numba
+import numpy as np
+
+from aircraft.interface import GRAVITY_MPS2, FloatArray
+
+INTERCEPT_SINE = 0.7
+"""Sine of the steepest angle to the path at which the law `preview` approaches it from far off."""
+
+SPLIT = 2.0**27 + 1.0
+"""Times this, a number is parted into two of half its digits."""
+
+CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8
+"""Columns of a route's rows."""
+
+PREVIEW_GAINS = np.dtype(
+    [
+        ("bandwidth_radps", np.float64),
+        ("damping", np.float64),
+        ("bank_limit_rad", np.float64),
+        ("roll_step_rad", np.float64),  # largest change of the roll reference from one update to the next
+        ("roll_lag_updates", np.float64),  # time constant of roll, in update intervals
+        ("delay_s", np.float64),  # from a command to when roll begins to follow it
+        ("blend_s", np.float64),  # a step of curvature is averaged over this time
+    ]
+)
+PREVIEW_MEMORY = np.dtype([("row", np.intp), ("along_m", np.float64), ("roll_reference_rad", np.float64)])
+"""Place of the nearest point (row of the route, distance along it) and the roll that the law has asked for."""
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Has numba compile a function at its first call, for the types it is called with; division by zero gives inf."""
+    machine_code: Callable[P, R] = numba.njit(cache=True, error_model="numpy")(function)
+    return machine_code
+
+
+@compiled
+def place_in_patch(
+    patch: FloatArray, latitude_rad: float, longitude_rad: float
+) -> tuple[float, float, float]:
+    """East and north (m) and meridian convergence (rad) of a point; NaN where the patch does not reach.
+
+    Args:
+        patch: (19,) see `aircraft.frames.LocalPlane.patch`.
+        latitude_rad: geodetic latitude.
+        longitude_rad: longitude.
+    """
+    up, right = latitude_rad - patch[0], longitude_rad - patch[1]
+    if not (abs(up) <= patch[2] and abs(right) <= patch[3]):
+        return math.nan, math.nan, math.nan
+    convergence = patch[16] + up * patch[17] + right * patch[18]
+    return _second_order(patch[4:10], up, right), _second_order(patch[10:16], up, right), convergence
+
+
+@compiled
+def _second_order(terms: FloatArray, up: float, right: float) -> float:
+    """A polynomial from its middle value, two slopes and half of three second derivatives."""
+    return float(
+        terms[0] + up * (terms[1] + up * terms[3] + right * terms[4]) + right * (terms[2] + right * terms[5])
+    )
+
+
+@compiled
+def preview_update(
+    rows: FloatArray,
+    gains: Any,
+    memory: Any,
+    east_m: float,
+    north_m: float,
+    velocity_east_mps: float,
+    velocity_north_mps: float,
+    heading_rad: float,
+    airspeed_mps: float,
+) -> tuple[float, float, float, bool, bool]:
+    """The law of `aircraft.guidance.preview`, from one update to the next.
+
+    Args:
+        rows: (n, 9) the route.
+        gains: record of `PREVIEW_GAINS`.
+        memory: record of `PREVIEW_MEMORY`; goes on.
+        east_m: position of the aircraft.
+        north_m: likewise.
+        velocity_east_mps: ground velocity.
+        velocity_north_mps: likewise.
+        heading_rad: of the nose.
+        airspeed_mps: true airspeed.
+
+    Returns:
+        What `GuidanceOutput` consists of.
+    """
+    has, kept = gains[0], memory[0]
+    row, along_m, cross, tangent_east, tangent_north = nearest_on_route(
+        rows, kept.row, kept.along_m, east_m, north_m
+    )
+    arc_length = rows[row, START] + along_m
+    speed = max(
+        math.sqrt(velocity_east_mps * velocity_east_mps + velocity_north_mps * velocity_north_mps), 1.0
+    )
+    along_mps = velocity_east_mps * tangent_east + velocity_north_mps * tangent_north
+    cross_mps = velocity_east_mps * tangent_north - velocity_north_mps * tangent_east
+    heading_east, heading_north = math.sin(heading_rad), math.cos(heading_rad)
+    ahead_mps = velocity_east_mps * heading_east + velocity_north_mps * heading_north
+    pull_per_s = has.bandwidth_radps / (2.0 * has.damping)
+    # The wind, the ground velocity less the air velocity, is not weaker than the airspeed.
+    if speed * speed >= 2.0 * airspeed_mps * ahead_mps:
+        # Left of the path by this sine, as far as it can be made good.
+        left = INTERCEPT_SINE * _within(1.0, cross * pull_per_s / airspeed_mps)
+        ahead = math.sqrt(1.0 - left * left)
+        to_east, to_north = air_direction(
+            velocity_east_mps - airspeed_mps * heading_east,
+            velocity_north_mps - airspeed_mps * heading_north,
+            airspeed_mps,
+            ahead * tangent_east - left * tangent_north,
+            ahead * tangent_north + left * tangent_east,
+        )
+        turn = math.atan2(
+            to_east * heading_north - to_north * heading_east,
+            to_east * heading_east + to_north * heading_north,
+        )
+        wanted = math.atan(airspeed_mps * has.bandwidth_radps * turn / GRAVITY_MPS2)
+    elif along_mps <= 0.0:
+        wanted = -has.bank_limit_rad if cross_mps > 0.0 else has.bank_limit_rad
+    else:
+        pull = _within(INTERCEPT_SINE * speed, cross * pull_per_s)
+        # Lift acts across the course, the correction across the path.
+        damped = -2.0 * has.damping * has.bandwidth_radps * (cross_mps + pull)
+        across = damped * speed / max(along_mps, 0.3 * speed)
+        curvature = _mean_curvature(rows, row, arc_length + speed * has.delay_s, speed * has.blend_s)
+        acceleration = across - curvature * (speed * speed)
+        wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
+    allowed = _within(has.bank_limit_rad, wanted)
+    step = _within(has.roll_step_rad, allowed - kept.roll_reference_rad)
+    roll = kept.roll_reference_rad + step
+    # Ahead by what roll lags behind its command: roll then moves at the reference's rate.
+    command = _within(has.bank_limit_rad, roll + has.roll_lag_updates * step)
+    past_end = rows[row, LENGTH] == math.inf and along_m > 0.0
+    kept.row, kept.along_m, kept.roll_reference_rad = row, along_m, roll
+    return command, cross, arc_length, allowed != wanted, past_end
+
+
+@compiled
+def _mean_curvature(rows: FloatArray, row: int, arc_length_m: float, blend_m: float) -> float:
+    """Curvature averaged over a length of the route about an arc length near a row, 1/m, positive to the left."""
+    low = arc_length_m - 0.5 * blend_m
+    if rows[row, START] <= low and low + blend_m <= rows[row, STOP]:
+        return float(rows[row, CURVATURE])
+    return (_turned(rows, row, low + blend_m) - _turned(rows, row, low)) / blend_m
+
+
+@compiled
+def nearest_on_route(
+    rows: FloatArray, row: int, along_m: float, east_m: float, north_m: float
+) -> tuple[int, float, float, float, float]:
+    """The nearest point of a route from the last one onwards.
+
+    Args:
+        rows: (n, 9) the route.
+        row: of the last nearest point.
+        along_m: distance of that point from the row's start.
+        east_m: position of the aircraft.
+        north_m: likewise.
+
+    Returns:
+        Row and distance along it, cross-track error (m, positive to the right), unit tangent east and north.
+    """
+    while True:
+        east = east_m - rows[row, 0]
+        north = north_m - rows[row, 1]
+        tangent_east, tangent_north, curvature = rows[row, 2], rows[row, 3], rows[row, CURVATURE]
+        if curvature == 0.0:
+            along = east * tangent_east + north * tangent_north
+            cross = east * tangent_north - north * tangent_east
+        else:
+            # The centre lies 1/curvature to the left of the start; angles are counted along the flight.
+            radius = 1.0 / curvature
+            east, north = east + radius * tangent_north, north - radius * tangent_east
+            outward_east, outward_north = tangent_north * radius, -tangent_east * radius
+            angle = math.atan2(
+                outward_east * north - outward_north * east, outward_east * east + outward_north * north
+            )
+            # Within half a turn of the last one.
+            expected = along_m * curvature
+            since = np.fmod(angle - expected, math.tau)
+            if abs(since) > math.pi:
+                since -= math.copysign(math.tau, since)
+            angle = expected + since
+            away = _length(east, north)
+            cross = away - radius if radius > 0.0 else -radius - away
+            along = angle * radius
+            sine, cosine = math.sin(angle), math.cos(angle)
+            tangent_east, tangent_north = (
+                tangent_east * cosine - tangent_north * sine,
+                tangent_east * sine + tangent_north * cosine,
+            )
+        if along <= rows[row, LENGTH] or row == len(rows) - 1:
+            return row, max(along, 0.0), cross, tangent_east, tangent_north
+        row, along_m = row + 1, 0.0
+
+
+@compiled
+def _length(x: float, y: float) -> float:
+    """sqrt(x^2 + y^2) to half a unit in the last place, as CPython's `math.hypot` has it and that of C has not.
+
+    Squares are taken in two parts, and one step of Newton's makes up for the error of the root (T. J. Dekker, A
+    floating-point technique for extending the available precision, Numerische Mathematik 18, 1971).
+    """
+    large, small = max(abs(x), abs(y)), min(abs(x), abs(y))
+    if large == 0.0:
+        return 0.0
+    square = large * large + small * small
+    root = math.sqrt(square)
+    lost = large * large - square + small * small
+    lost += _rounded_off(large) + _rounded_off(small) - _rounded_off(root)
+    return root + (square - root * root + lost) / (2.0 * root)
+
+
+@compiled
+def _rounded_off(x: float) -> float:
+    """What x * x lacks of the exact square."""
+    high = x * SPLIT - (x * SPLIT - x)
+    low = x - high
+    return (high * high - x * x) + 2.0 * high * low + low * low
+
+
+@compiled
+def _turned(rows: FloatArray, row: int, arc_length_m: float) -> float:
+    """Direction change of the route from its start to an arc length near a row, rad, positive to the left."""
+    while row > 0 and arc_length_m < rows[row, START]:
+        row -= 1
+    while arc_length_m >= rows[row, STOP]:
+        row += 1
+    turned: float = rows[row, TURNED] + rows[row, CURVATURE] * (arc_length_m - rows[row, START])
+    return turned
+
+
+@compiled
+def _within(limit: float, value: float) -> float:
+    """The value between minus and plus a limit that is nearest to it."""
+    return value if -limit <= value <= limit else math.copysign(limit, value)
+
+
+@compiled
+def air_direction(
+    wind_east_mps: float,
+    wind_north_mps: float,
+    airspeed_mps: float,
+    bearing_east: float,
+    bearing_north: float,
+) -> tuple[float, float]:
+    """Where to head in a wind that is not weaker than the airspeed.
+
+    If the bearing can be made good, the wind triangle. If not, along sqrt(W^2 - V^2) b - w, as PX4's npfg has it
+    (`CourseToAirspeedRefMapper::infeasibleAirVelRef`): this is the wind triangle where feasibility ends, and
+    straight into the wind where the bearing is against it.
+
+    Args:
+        wind_east_mps: the wind, the direction it blows towards.
+        wind_north_mps: its other component.
+        airspeed_mps: true airspeed, not above the wind's.
+        bearing_east: wanted direction over the ground, a unit vector.
+        bearing_north: its other component.
+
+    Returns:
+        East and north of the heading, a unit vector.
+    """
+    along = wind_east_mps * bearing_east + wind_north_mps * bearing_north
+    excess = wind_east_mps**2 + wind_north_mps**2 - airspeed_mps**2
+    reach = (
+        along * along - excess
+    )  # of the ground velocity's quadratic: negative where no course is the bearing
+    ground = along + math.sqrt(reach) if along > 0.0 and reach > 0.0 else math.sqrt(max(excess, 0.0))
+    east = ground * bearing_east - wind_east_mps
+    north = ground * bearing_north - wind_north_mps
+    length = max(_length(east, north), 1e-9)
+    return east / length, north / length

@@ -1,0 +1,77 @@
+"""Guidance laws by name, ours and those of other distributions."""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import fields
+from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.airframes import airframe
+from aircraft.guidance import registry
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.guidance.registry import BUILT_IN, GROUP, GuidanceKind, guidance_kinds
+from aircraft.interface import Route
+from aircraft.start import StartConditions
+from tests.point_mass import PointMass
+
+LIMITS = airframe("aerosonde").guidance_limits()
+OUTSIDE = GuidanceKind("mine", "a law of another distribution", PreviewConfig, PreviewLaw)
+
+
+def found_outside(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    point = EntryPoint("mine", value, GROUP)
+    monkeypatch.setattr(
+        registry, "entry_points", lambda group: EntryPoints([point] if group == GROUP else [])
+    )
+
+
+@pytest.mark.parametrize("kind", BUILT_IN, ids=lambda kind: kind.kind)
+def test_every_key_of_a_law_is_described_and_has_a_default(kind: GuidanceKind) -> None:
+    config = kind.config().resolved(LIMITS)
+    for each in fields(kind.config):
+        assert each.metadata["doc"]
+        assert getattr(config, each.name) is not None
+
+
+def test_keys_reach_the_law() -> None:
+    law: Any = guidance_kinds()["preview"].law(LIMITS, bandwidth_radps=0.5, damping=0.7)
+    assert law._gains["bandwidth_radps"] == 0.5
+    assert law._gains["damping"] == 0.7
+    law = guidance_kinds()["preview"].law(LIMITS)
+    assert law._gains["bandwidth_radps"] == LIMITS.bandwidth_radps
+
+
+def test_a_law_of_another_distribution_is_found_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    found_outside(monkeypatch, f"{__name__}:OUTSIDE")
+    assert guidance_kinds()["mine"] is OUTSIDE
+    assert list(guidance_kinds())[: len(BUILT_IN)] == [kind.kind for kind in BUILT_IN]
+
+
+def test_an_entry_point_that_is_no_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    found_outside(monkeypatch, "math:tau")
+    with pytest.raises(TypeError, match=r"'mine' \(math:tau\) is not a GuidanceKind"):
+        guidance_kinds()
+
+
+def test_the_law_of_the_readme_flies_to_its_route(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (Path(__file__).parents[2] / "aircraft" / "README.md").read_text("utf-8")
+    (block,) = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    names: dict[str, Any] = {"__name__": "readme_law"}
+    monkeypatch.setitem(sys.modules, "readme_law", ModuleType("readme_law"))  # where its dataclass looks
+    exec(block, names)
+    law = names["LAW"].law(LIMITS)
+    law.follow(Route(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 20_000.0]])))
+    model = PointMass(StartConditions(100.0, 0.0, 300.0, 0.0, 25.0))
+    for _ in range(120 * UPDATE_RATE_HZ):
+        output = law.update(model.state())
+        model.command(output.roll_command_rad, 300.0, 25.0)
+        model.advance(model.step_rate_hz // UPDATE_RATE_HZ)
+    assert abs(output.cross_track_m) < 1.0

@@ -1,0 +1,111 @@
+"""Machine code of guidance against its source, and the nearest point of a route against a search of all of it."""
+
+from __future__ import annotations
+
+import math
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft import kernels
+from aircraft.airframes import airframe
+from aircraft.guidance.interface import GuidanceOutput
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.guidance.progress import RouteProgress
+from aircraft.interface import AircraftState, Route
+from aircraft.route import arc_point, route_length, route_point
+
+LIMITS = airframe("aerosonde").guidance_limits()
+CIRCLE = (1.0 / 120.0, math.tau * 120.0)
+
+
+def source(name: str) -> Any:
+    """A function of `kernels` as it is written; the functions that it calls are too."""
+    names = dict(vars(kernels))
+    for each, function in vars(kernels).items():
+        if hasattr(function, "py_func"):
+            names[each] = FunctionType(function.py_func.__code__, names)
+    return names[name]
+
+
+def drawn(rng: np.random.Generator) -> Route:
+    """Lines and arcs, joined; some end in a loiter."""
+    loiter = bool(rng.random() < 0.5)
+    pieces = [
+        (float(rng.choice((0.0, *rng.uniform(-1e-2, 1e-2, 2)))), float(rng.uniform(1.0, 2000.0)))
+        for _ in range(rng.integers(1, 6))
+    ]
+    rows, place = [], (0.0, 0.0, 0.0, 1.0)
+    for curvature, length in [*pieces, CIRCLE] if loiter else pieces:
+        rows.append((*place, curvature, length))
+        place = arc_point(rows[-1], length)
+    return Route(np.array(rows), loiter)
+
+
+def near(route: Route, arc_length_m: float, rng: np.random.Generator) -> AircraftState:
+    """Somewhere about an arc length, on any course, in any wind, a hurricane included."""
+    east, north, tangent_east, tangent_north = route_point(route, arc_length_m)
+    off = rng.normal(0.0, float(rng.choice((0.0, 1.0, 100.0))), 2)
+    heading = math.atan2(tangent_east, tangent_north) + float(rng.normal(0.0, rng.choice((0.1, 3.0))))
+    wind = rng.normal(0.0, float(rng.choice((0.0, 5.0, 40.0))), 2)
+    velocity = 25.0 * np.array((math.sin(heading), math.cos(heading))) + wind
+    values = (east + off[0], north + off[1], 300.0, *velocity, 0.0, heading % math.tau, 0.0, 0.0, 25.0, 1.0)
+    return AircraftState(0.0, *map(float, values))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_law_decides_as_its_source(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(seed)
+    route = drawn(rng)
+    states = [near(route, float(share) * route_length(route), rng) for share in np.linspace(0.0, 1.5, 60)]
+
+    def decided() -> list[GuidanceOutput]:
+        law = PreviewLaw(PreviewConfig().resolved(LIMITS), LIMITS)
+        law.follow(route, 5.0)
+        return [law.update(state) for state in states]
+
+    compiled = decided()
+    update = source("preview_update")
+
+    def by_source(rows: Any, gains: Any, memory: Any, *numbers: float) -> Any:
+        return update(rows, gains.view(np.recarray), memory.view(np.recarray), *numbers)
+
+    monkeypatch.setattr(kernels, "preview_update", by_source)
+    np.testing.assert_allclose(np.array(decided(), float), np.array(compiled, float), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_point_beside_a_route_is_told_with_its_distance_and_curvature(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    route = drawn(rng)
+    progress = RouteProgress(route)
+    ends = np.cumsum(route.segments[:, 5])
+    for arc_length in np.linspace(0.0, 0.999 * route_length(route), 200):
+        off = float(rng.uniform(-20.0, 20.0))
+        east, north, tangent_east, tangent_north = route_point(route, float(arc_length))
+        point = progress.nearest(east + off * tangent_north, north - off * tangent_east)
+        assert point.cross_track_m == pytest.approx(off, abs=1e-6)
+        assert point.arc_length_m == pytest.approx(arc_length, abs=1e-6)
+        assert (point.east_m, point.north_m) == pytest.approx((east, north), abs=1e-6)
+        assert (point.tangent_east, point.tangent_north) == pytest.approx(
+            (tangent_east, tangent_north), abs=1e-9
+        )
+        assert point.curvature_1pm in route.segments[[int(np.searchsorted(ends, arc_length))], 4]
+        assert not point.past_end
+
+
+def test_beyond_the_end_of_a_route_its_last_tangent_is_nearest() -> None:
+    progress = RouteProgress(Route(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 100.0]])), arc_length_m=90.0)
+    point = progress.nearest(3.0, 130.0)
+    assert point.past_end
+    assert (point.arc_length_m, point.cross_track_m, point.curvature_1pm) == (130.0, 3.0, 0.0)
+
+
+def test_a_length_is_rounded_once() -> None:
+    """As CPython's own, which C's is not."""
+    rng = np.random.default_rng(1)
+    for x, y in rng.uniform(-1.0, 1.0, (2000, 2)) * 10.0 ** rng.uniform(-3.0, 5.0, (2000, 2)):
+        assert kernels._length(x, y) == math.hypot(x, y)
+    assert kernels._length(0.0, 0.0) == 0.0
