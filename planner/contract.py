@@ -33,6 +33,7 @@ from planner.interface import (
     PlanRequest,
     PlanStatus,
 )
+from planner.plan_checks import checked_plan
 from planner.registry import PlannerKind
 
 Circle = tuple[float, float, float]
@@ -267,6 +268,11 @@ class PlannerContract:
             if not self.kind.point:
                 np.testing.assert_allclose(plan.path.segments[0, 2:4], request.direction, atol=1e-5)
         assert found, "no plan was found among a few circles"
+
+    def test_its_answers_are_taken_by_the_closed_loop(self) -> None:
+        """Each passes what the loop asks of an answer (`planner.plan_checks`), or the flight would end there."""
+        for request, plan in _among_circles(self.kind, self.mission).answers:
+            checked_plan(plan, request.position_m, self.mission)
 
     def test_paths_are_joined_no_tighter_than_the_turn_radius_and_inside(self) -> None:
         """Segments meet; those of an aircraft without a jump of direction, and none bends too tightly."""

@@ -272,9 +272,15 @@ class Plan:
 class Planner(Protocol):
     """A local planner for one flight. It is asked after every scan, in order of time.
 
-    Between scans it is asked at every step of guidance for as long as its last answer says that it goes on.
+    Between scans it is asked at every step of guidance for as long as its last answer has `wants_more_time`.
+    What it is handed is read-only; what it prints goes to standard error.
     """
 
     def plan(self, request: PlanRequest) -> Plan:
-        """Answers one request. Must not use clocks or randomness of its own: same requests, same plans."""
+        """Answers one request. Must not use clocks or randomness of its own: same requests, same plans.
+
+        A path that is FOUND begins at `request.position_m`, and each segment where the one before ends. What is
+        asked of an answer, with every figure, is in `planner.plan_checks`: one that does not pass, or whatever is
+        raised here, ends the flight as `planner_failed` with a sentence that says why.
+        """
         ...

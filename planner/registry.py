@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
@@ -93,7 +94,8 @@ def planner_kinds() -> dict[str, PlannerKind]:
     """All planner kinds by name, built-in ones first."""
     kinds = {kind.kind: kind for kind in BUILT_IN}
     for point in _outside(entry_points, tuple(sys.path)):
-        outside = point.load()
+        with redirect_stdout(sys.stderr):
+            outside = point.load()
         if not isinstance(outside, PlannerKind):
             raise TypeError(f"entry point {point.name!r} ({point.value}) is not a PlannerKind")
         kinds.setdefault(outside.kind, outside)

@@ -115,7 +115,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("rolling_window",),
         ("memory", "world_stability"),
         ("geometry",),
-        ("compiled",),
+        ("compiled", "plan_checks"),
         ("interface",),
     ),
 }

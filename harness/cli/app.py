@@ -7,6 +7,7 @@ not reached safely, 2 bad input or usage, 3 the goal is proved unreachable, 130 
 from __future__ import annotations
 
 import errno
+import os
 import sys
 import traceback
 from collections.abc import Sequence
@@ -22,11 +23,13 @@ from harness.cli.flights import bench, compare, fly
 from harness.cli.formats import list_names, schema, validate
 from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
 from harness.cli.review import report, view
-from harness.cli.standard_output import kept_up, to_nowhere
+from harness.cli.standard_output import kept_up, results_alone, results_over, to_nowhere
 from harness.cli.sweep import sweep
 from harness.flight.signals import taken_as_interrupt
 
 INTERRUPTED: Final = 130
+COMPLETION: Final = "_WAYPROOF_COMPLETE"
+"""The variable by which a shell asks for completions, which typer ends with sys.exit."""
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
 for command in (fly, check, compare, sweep, falsify, validate, schema, view, report, export, bench, envelope):
@@ -68,8 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
     words = [word for word in given if word != "--debug"]
+    if arguments is None:
+        results_alone()
     with taken_as_interrupt() as came:
         status = _run(words, debug)
+    if arguments is None:
+        results_over()
     return 128 + came[0] if came and status == INTERRUPTED else status
 
 
@@ -81,6 +88,13 @@ def _run(words: Sequence[str], debug: bool) -> int:
         return status
     except KeyboardInterrupt:
         return INTERRUPTED
+    except SystemExit:
+        if COMPLETION in os.environ:
+            raise
+        typer.echo(
+            "wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done", err=True
+        )
+        return FAILED
     except Exception as error:
         if debug:
             traceback.print_exc()

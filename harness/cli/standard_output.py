@@ -9,6 +9,39 @@ from contextlib import contextmanager
 from typing import Any, TextIO
 
 
+def results_alone() -> None:
+    """From now on only what this program prints as its result reaches the standard output of the process.
+
+    What code of others writes past Python, from C or a process of its own, goes to standard error, so that it cannot
+    get into `--json`. So does what is printed when the interpreter ends, once `results_over` was called.
+    """
+    if sys.stdout is None or sys.stderr is None:
+        return
+    try:
+        results, aside = os.dup(sys.stdout.fileno()), sys.stderr.fileno()
+    except (OSError, ValueError):
+        return  # no file of the process, or a closed one
+    sys.stdout.flush()
+    os.dup2(aside, sys.stdout.fileno())
+    sys.stdout = open(  # noqa: SIM115  it stays open to the end
+        results,
+        "w",
+        encoding=sys.stdout.encoding,
+        errors=sys.stdout.errors,
+        buffering=1 if os.isatty(results) else -1,
+    )
+
+
+def results_over() -> None:
+    """The result is printed."""
+    if sys.stdout is not None:
+        try:
+            sys.stdout.flush()
+        except (OSError, ValueError):
+            to_nowhere(sys.stdout)
+    sys.stdout = sys.stderr
+
+
 @contextmanager
 def kept_up() -> Iterator[None]:
     """A reader that goes away meanwhile (`wayproof fly ... | head -1`) changes neither what is done nor its status."""

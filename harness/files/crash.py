@@ -5,6 +5,12 @@ from __future__ import annotations
 import re
 import traceback
 
+MOST_LETTERS = 2000
+"""So many characters of what others say are told in a sentence."""
+
+MOST_TRACE_LETTERS = 40_000
+"""So many characters are kept of a traceback, of its beginning and its end."""
+
 
 class PlannerError(RuntimeError):
     """A planner cannot be made; the message is one sentence that says why."""
@@ -13,18 +19,24 @@ class PlannerError(RuntimeError):
 def sentence(error: BaseException) -> str:
     """Its type and what it says, in one line; of a PlannerError what it says alone."""
     try:
-        said = str(error)
-    except Exception:
+        said = str(error)[:MOST_LETTERS]
+    except KeyboardInterrupt:
+        raise
+    except BaseException:  # it may call sys.exit, too
         said = "it cannot be told what"
     if isinstance(error, PlannerError):
         return in_a_line(said)
-    name = type(error).__name__
+    name = type(error).__name__[:MOST_LETTERS]
     return in_a_line(f"{name}: {said}" if said else name)
 
 
 def trace(error: BaseException) -> str:
-    """Its traceback."""
-    return _same("".join(traceback.format_exception(error)))
+    """Its traceback; the middle of a very long one is left out."""
+    told = "".join(traceback.format_exception(error))
+    if len(told) > MOST_TRACE_LETTERS:
+        half = MOST_TRACE_LETTERS // 2
+        told = f"{told[:half]}\n... {len(told) - 2 * half:,} characters left out ...\n{told[-half:]}"
+    return _same(told)
 
 
 def in_a_line(text: str) -> str:

@@ -13,7 +13,8 @@ from typing import Protocol
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
 from aircraft.interface import AircraftState, FlightModel, Route
 from aircraft.route import route_length
-from harness.files.crash import in_a_line, sentence, trace
+from harness.files.crash import in_a_line
+from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
 from harness.flight.signals import held_back
 from harness.flight.termination import Termination
@@ -195,7 +196,7 @@ class _Plans:
 
     def __init__(self, loop: Loop, observers: Sequence[Observer]) -> None:
         self._loop, self._observers = loop, observers
-        self._plan, self._seen = loop.planner.plan, loop.seen
+        self._planner, self._seen = AskedPlanner(loop.planner, loop.mission, loop.seen), loop.seen
         self._coming: tuple[float, Plan, Route] | None = None
         self.due_s = math.inf
         """When the plan on its way takes effect."""
@@ -251,15 +252,12 @@ class _Plans:
             ),
         )
         self._scanned = False
-        begun = time.perf_counter()
         try:
-            plan = self._plan(request)
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:  # whatever it is, it is no more than a plan that failed
-            self.error = trace(error)
-            return Outcome.PLANNER_FAILED, f"the planner raised {sentence(error)}"
-        compute_ms = 1e3 * (time.perf_counter() - begun)
+            plan = self._planner.plan(request)
+        except PlannerFailedError as error:
+            self.error = error.trace
+            return Outcome.PLANNER_FAILED, str(error)
+        compute_ms = self._planner.compute_ms
         self._told = plan.reason
         self.go_on = plan.wants_more_time
         if plan.status is PlanStatus.KEPT:
@@ -275,13 +273,8 @@ class _Plans:
                     observer.on_event(state.time_s, plan.reason)
         if plan.status is PlanStatus.FOUND:
             self._stuck, self._in_vain = "", set()
-            try:
-                if plan.path is None:
-                    raise ValueError("it is none")
-                route = Route(plan.path.segments, plan.path.loiter)
-            except ValueError as error:
-                self.error = trace(error)
-                return Outcome.PLANNER_FAILED, f"the planner gave a path that cannot be flown: {error}"
+            assert plan.path is not None
+            route = Route(plan.path.segments, plan.path.loiter)
             self._coming = (compute_ms, plan, route)
             self.due_s = state.time_s + self._loop.mission.compute_latency_s - 1e-9
         return None

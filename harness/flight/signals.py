@@ -5,6 +5,7 @@ In flight they are held back to where no machine code is at work.
 
 from __future__ import annotations
 
+import _thread
 import math
 import signal
 import threading
@@ -54,20 +55,30 @@ def held_back() -> Iterator[Callable[[], None]]:
     """Holds back signals that Python handles until the block calls for them, or ends.
 
     A handler runs, and raises, wherever the process is; numba, in its first calls, makes another error or a crash of
-    what is raised there. One that comes again after `AGAIN_S` is not held back: the block may never call. Outside the
-    main thread, where Python takes no signals, nothing is held.
+    what is raised there. A block that has not called `AGAIN_S` after the signal may never call, as one with a planner
+    that hangs: then the signal is let through wherever the block is. Machine code that hangs is not interrupted: Python
+    takes signals between two of its own instructions. Outside the main thread, where Python takes no signals, nothing
+    is held.
     """
     held: list[int] = []
+    timers: list[threading.Timer] = []
     first_s = math.inf
 
     def hold(number: int, frame: FrameType | None) -> None:
         nonlocal first_s
-        held.append(number)
         first_s = min(first_s, time.monotonic())
-        if time.monotonic() - first_s > AGAIN_S:
+        held.append(number)
+        if time.monotonic() - first_s >= AGAIN_S:
             let_through()
+        elif not timers:
+            timers.append(threading.Timer(AGAIN_S, _thread.interrupt_main, (number,)))
+            timers[0].daemon = True
+            timers[0].start()
 
     def let_through() -> None:
+        for timer in timers:
+            timer.cancel()
+        timers.clear()
         if held:
             number = held[0]
             held.clear()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from pydantic import ValidationError, create_model
 
 from harness.files.crash import PlannerError, sentence
+from harness.files.printing import PrintingAside
 from harness.scenario.sections import PlannerSpec, Section, key
 from harness.scenario.validation import KeyFault, first_fault, unknown_key
 from planner.compiled import compile_all
@@ -24,6 +25,11 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
     Raises:
         KeyFault: there is no such planner or key, or the keys contradict each other or the mission.
     """
+    with PrintingAside():
+        return _resolved(spec, mission)
+
+
+def _resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
     kinds = planner_kinds()
     if spec.kind not in kinds:
         raise KeyFault(("planner", "kind"), f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}")
@@ -42,6 +48,10 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
     except ValueError as error:
         blamed = [name for name in known if name in str(error)][:1]
         raise KeyFault(("planner", *blamed), str(error)) from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise KeyFault(("planner", "kind"), f"cannot be configured: {sentence(error)}") from error
     return spec.model_copy(update={name: getattr(config, name) for name in known})
 
 
@@ -54,7 +64,8 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
     compile_all()
     kind = planner_kinds()[spec.kind]
     try:
-        return kind.make(kind.config(**spec.own), mission)
+        with PrintingAside():
+            return kind.make(kind.config(**spec.own), mission)
     except KeyboardInterrupt:
         raise
     except BaseException as error:

@@ -222,9 +222,9 @@ def test_planner_that_raises(fly: Fly, answering: Install, small_world: SmallWor
 @pytest.mark.parametrize(
     ("curvature_1pm", "length_m", "fault"),
     [
-        (0.0, -500.0, "route segments must be finite and longer than zero"),
-        (1e308, 500.0, "route segments must be of finite length together, and turn by a finite angle each"),
-        (0.0, 1e308, "route segments must be of finite length together, and turn by a finite angle each"),
+        (0.0, -500.0, "segment 0 is -500 m long; it must be longer than 0 m"),
+        (1e308, 500.0, "it turns by inf rad up to the end of segment 0; it must turn by at most 100000 rad"),
+        (0.0, 1e308, "it is 1e+308 m long up to the end of segment 0; it must be at most 1e+07 m long"),
     ],
 )
 def test_planner_whose_path_cannot_be_flown(

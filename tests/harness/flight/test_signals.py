@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import time
 
 import pytest
 
@@ -71,3 +72,29 @@ def test_a_signal_that_is_ignored_stays_so() -> None:
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_a_block_that_hangs_is_ended_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(signals, "AGAIN_S", 0.05)
+    until = time.monotonic() + 30.0
+
+    def hangs() -> None:
+        with held_back():
+            signal.raise_signal(signal.SIGINT)
+            while time.monotonic() < until:
+                pass
+
+    with pytest.raises(KeyboardInterrupt):
+        hangs()
+    assert time.monotonic() < until
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_one_that_was_taken_in_time_comes_but_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(signals, "AGAIN_S", 0.05)
+    with held_back() as interrupt:
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            interrupt()
+        time.sleep(0.2)
+        interrupt()

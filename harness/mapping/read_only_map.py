@@ -1,0 +1,67 @@
+"""The map as a planner is handed it: to be read, not to be changed."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+from planner.interface import BoolArray, FloatArray, MapView, MovingEdges
+
+
+class ReadOnlyMap:
+    """A map through which nothing can be changed (`planner.interface.MapView`).
+
+    It guards against mistakes. Code in the same process that means to reach what is behind it can always do so.
+
+    Args:
+        seen: the map itself.
+    """
+
+    __slots__ = ("_seen",)
+
+    _seen: MapView
+
+    def __init__(self, seen: MapView) -> None:
+        object.__setattr__(self, "_seen", seen)
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise AttributeError(f"{name[:100]} of the map cannot be set: a planner may only read what was seen")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise AttributeError(
+            f"{name[:100]} of the map cannot be deleted: a planner may only read what was seen"
+        )
+
+    @property
+    def spacing_m(self) -> float:
+        """Edge points of one wall are about this far apart."""
+        return self._seen.spacing_m
+
+    @property
+    def revision(self) -> int:
+        """Grows by one with every change of the set of edge points."""
+        return self._seen.revision
+
+    @property
+    def last_removal_revision(self) -> int:
+        """The last revision at which edge points were taken away again; 0 where none ever was."""
+        return self._seen.last_removal_revision
+
+    @property
+    def moving(self) -> tuple[MovingEdges, ...]:
+        """What is known to move; its edges are not among the others."""
+        return self._seen.moving
+
+    @property
+    def last_contradiction_s(self) -> float:
+        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
+        return self._seen.last_contradiction_s
+
+    def edges_since(self, revision: int) -> FloatArray:
+        """(k, 2) read-only edge points that came in after `revision`, oldest first; all of them after -1."""
+        points = self._seen.edges_since(revision).view()
+        points.flags.writeable = False
+        return points
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        """(k,) whether each of (k, 2) points lies in space seen to be free."""
+        return self._seen.seen_free(points_m)

@@ -1,0 +1,280 @@
+"""What a planner's answer must be before anything is flown by it.
+
+An answer comes from code of others. It is read once, attribute by attribute; what is flown, judged and recorded is a
+copy of what was read, so that nothing the planner does later can change it.
+
+Frame: local ENU plane, x = east, y = north, metres. A path is refused, with the number of the segment and the figure,
+if it does not begin at the aircraft, does not join, or is larger than any path can be that is meant to be flown. A
+kink between two segments is allowed: the path of a point that turns on the spot has them, and the trackability
+verdict counts each as a corner.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planner.interface import NOT_UNIT, FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
+
+MOST_LETTERS = 2000
+"""A reason is one sentence, no longer than this."""
+
+MOST_SEGMENTS = 100_000
+"""A path has no more segments, and a plan no more waypoints. A sampled curve of 100 km at 1 m has as many."""
+
+LONGEST_M = 1e7
+"""Greatest length of a path: five times across the largest area."""
+
+MOST_TURNING_RAD = 1e5
+"""Greatest sum of the angles that the segments of a path turn by: 16,000 full turns."""
+
+FURTHEST_M = 1e8
+"""No waypoint lies further east, west, north or south of the origin."""
+
+START_S = 1.0
+"""A path may begin so much flying time ahead of the aircraft or behind it; see `start_tolerance_m`."""
+
+JOIN_M = 0.1
+"""A segment begins no further than this from where the one before ends; a loiter ends so near to its beginning."""
+
+FULL_TURN_RAD = 1e-3
+"""A loiter turns by a full turn, give or take this."""
+
+MOST_PICTURE_POINTS = 1_000_000
+"""A picture of a plan has no more points."""
+
+
+class WrongAnswerError(ValueError):
+    """An answer that is no plan, or a plan that cannot be flown; the message is a sentence that says why."""
+
+
+def start_tolerance_m(mission: Mission) -> float:
+    """How far from the aircraft a path may begin.
+
+    A plan begins on the path in effect as long as the aircraft is within `mission.off_path_m` of that, and either where
+    the aircraft is when the planner is asked or where it will be after the compute latency.
+    """
+    return mission.off_path_m + mission.ground_speed_mps * (mission.compute_latency_s + START_S)
+
+
+def checked_plan(answer: object, position_m: tuple[float, float], mission: Mission) -> Plan:
+    """A planner's answer as a plan that nobody can change any more.
+
+    Args:
+        answer: what `Planner.plan` returned, whatever that is.
+        position_m: (east, north) of the aircraft when the planner was asked.
+        mission: speed, tracking error and latency, which say how far off a path may begin.
+
+    Returns:
+        The answer itself where it is no new path; else a copy of it with its picture made.
+
+    Raises:
+        WrongAnswerError: it is no plan, or its path cannot be flown.
+        BaseException: whatever an attribute of the answer, or the making of its picture, raises.
+    """
+    if not issubclass(type(answer), Plan):
+        raise WrongAnswerError(f"the planner answered with {_type(answer)}; an answer must be a Plan")
+    assert isinstance(answer, Plan)
+    status, reason, wants_more_time = answer.status, answer.reason, answer.wants_more_time
+    if type(status) is not PlanStatus:
+        raise WrongAnswerError(
+            f"the planner's plan has {_type(status)} as its status; it must be a PlanStatus"
+        )
+    if not issubclass(type(reason), str):
+        raise WrongAnswerError(f"the planner's plan has {_type(reason)} as its reason; it must be a str")
+    letters = str.__len__(reason)
+    if letters > MOST_LETTERS:
+        raise WrongAnswerError(
+            f"the planner's plan has a reason of {letters:,} characters; it must have at most {MOST_LETTERS:,}"
+        )
+    if not isinstance(wants_more_time, bool | np.bool_):
+        raise WrongAnswerError(
+            f"the planner's plan has {_type(wants_more_time)} as wants_more_time; it must be True or False"
+        )
+    if status is not PlanStatus.FOUND:
+        if type(answer) is Plan:
+            return answer
+        return Plan(status, str.__str__(reason), wants_more_time=bool(wants_more_time))
+    waypoints_m = _waypoints(answer.waypoints_m)
+    path = _path(answer.path, position_m, start_tolerance_m(mission))
+    return Plan(
+        status,
+        str.__str__(reason),
+        waypoints_m,
+        path,
+        _picture(answer.picture),
+        wants_more_time=bool(wants_more_time),
+    )
+
+
+def _type(value: object) -> str:
+    """What a value is, told without asking the value."""
+    return "None" if value is None else f"an object of type {type(value).__name__[:100]}"
+
+
+def _refused(what: str) -> WrongAnswerError:
+    return WrongAnswerError(f"the planner gave a path that cannot be flown: {what}")
+
+
+def _waypoints(waypoints_m: Any) -> FloatArray:
+    """The waypoints, if they are (n, 2) finite numbers."""
+    if not issubclass(type(waypoints_m), np.ndarray) or waypoints_m.ndim != 2 or waypoints_m.shape[1] != 2:
+        shape = f"shape {waypoints_m.shape}" if isinstance(waypoints_m, np.ndarray) else _type(waypoints_m)
+        raise WrongAnswerError(
+            f"the planner gave waypoints with {shape}; they must be an array of shape (n, 2)"
+        )
+    if len(waypoints_m) > MOST_SEGMENTS:
+        raise WrongAnswerError(
+            f"the planner gave {len(waypoints_m):,} waypoints; a plan must have at most {MOST_SEGMENTS:,}"
+        )
+    far = np.flatnonzero(~(np.abs(waypoints_m) <= FURTHEST_M).all(axis=1))
+    if len(far):
+        east, north = waypoints_m[far[0]].tolist()
+        raise WrongAnswerError(
+            f"the planner gave a waypoint {far[0]} at ({east:g}, {north:g}) m; "
+            f"its coordinates must be finite and within {FURTHEST_M:g} m of the origin"
+        )
+    return np.asarray(waypoints_m, dtype=np.float64)
+
+
+def _path(path: Any, position_m: tuple[float, float], start_m: float) -> Path:
+    """A copy of a path, if it can be flown from where the aircraft is.
+
+    Args:
+        path: of the answer.
+        position_m: (east, north) of the aircraft.
+        start_m: the path begins no further from there.
+    """
+    if path is None:
+        raise _refused("it is none")
+    if not issubclass(type(path), Path):
+        raise _refused(f"it is {_type(path)}; it must be a Path")
+    rows, loiter = path.segments, path.loiter
+    if not issubclass(type(rows), np.ndarray) or rows.ndim != 2 or rows.shape[1] != 6 or not len(rows):
+        shape = rows.shape if isinstance(rows, np.ndarray) else _type(rows)
+        raise _refused(f"its segments must have shape (n, 6), n > 0; got {shape}")
+    if not isinstance(loiter, bool | np.bool_):
+        raise _refused(f"it has {_type(loiter)} as its loiter; it must be True or False")
+    if len(rows) > MOST_SEGMENTS:
+        raise _refused(f"it has {len(rows):,} segments; it must have at most {MOST_SEGMENTS:,}")
+    rows = np.asarray(rows, dtype=np.float64)
+    _check_each(rows)
+    _check_size(rows)
+    _check_joints(rows, position_m, start_m)
+    if loiter:
+        _check_loiter(rows)
+    return Path(rows, bool(loiter))
+
+
+def _check_each(rows: FloatArray) -> None:
+    """Every segment is finite, longer than zero, and begins with a unit tangent."""
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(bad):
+        raise _refused(
+            f"segment {bad[0]} is not finite: {', '.join(f'{x:g}' for x in rows[bad[0]].tolist())}"
+        )
+    bad = np.flatnonzero(rows[:, 5] <= 0.0)
+    if len(bad):
+        raise _refused(f"segment {bad[0]} is {rows[bad[0], 5]:g} m long; it must be longer than 0 m")
+    tangent = np.hypot(rows[:, 2], rows[:, 3])
+    bad = np.flatnonzero(~(np.abs(tangent - 1.0) < NOT_UNIT))
+    if len(bad):
+        raise _refused(
+            f"segment {bad[0]} begins with a tangent of length {tangent[bad[0]]:.9g}; it must be a unit vector"
+        )
+
+
+def _check_size(rows: FloatArray) -> None:
+    """The path is no longer and turns no more than a path that is meant to be flown."""
+    with np.errstate(over="ignore"):
+        length, turning = np.cumsum(rows[:, 5]), np.cumsum(np.abs(rows[:, 4] * rows[:, 5]))
+    if not length[-1] <= LONGEST_M:
+        segment = int(np.argmax(~(length <= LONGEST_M)))
+        raise _refused(
+            f"it is {length[segment]:.6g} m long up to the end of segment {segment}; "
+            f"it must be at most {LONGEST_M:g} m long"
+        )
+    if not turning[-1] <= MOST_TURNING_RAD:
+        segment = int(np.argmax(~(turning <= MOST_TURNING_RAD)))
+        raise _refused(
+            f"it turns by {turning[segment]:.6g} rad up to the end of segment {segment}; "
+            f"it must turn by at most {MOST_TURNING_RAD:g} rad"
+        )
+
+
+def _check_joints(rows: FloatArray, position_m: tuple[float, float], start_m: float) -> None:
+    """The path begins at the aircraft, and each segment where the one before ends."""
+    off_m = math.dist(rows[0, :2].tolist(), position_m)
+    if not off_m <= start_m:
+        raise _refused(
+            f"segment 0 begins {off_m:.6g} m from the aircraft; it must begin at most {start_m:.3g} m from it"
+        )
+    ends = _ends(rows)
+    gaps = np.hypot(*(rows[1:, :2] - ends[:-1]).T)
+    bad = np.flatnonzero(~(gaps <= JOIN_M))
+    if len(bad):
+        first = int(bad[0])
+        raise _refused(
+            f"segment {first + 1} begins {gaps[first]:.6g} m from where segment {first} ends; "
+            f"they must meet within {JOIN_M:g} m"
+        )
+
+
+def _check_loiter(rows: FloatArray) -> None:
+    """The last segment is a full circle."""
+    last = len(rows) - 1
+    turn = abs(float(rows[-1, 4] * rows[-1, 5]))
+    gap = math.dist(_ends(rows[-1:])[0].tolist(), rows[-1, :2].tolist())
+    if not (abs(turn - math.tau) <= FULL_TURN_RAD and gap <= JOIN_M):
+        raise _refused(
+            f"segment {last}, its loiter, turns by {math.degrees(turn):.6g} deg and ends {gap:.3g} m from where it "
+            "begins; it must be a full circle"
+        )
+
+
+def _ends(rows: FloatArray) -> FloatArray:
+    """(n, 2) where segments of constant curvature end: the chord of an arc that turns by `a` is sinc(a / 2) as long."""
+    half = 0.5 * rows[:, 4] * rows[:, 5]
+    chord = rows[:, 5] * np.sinc(half / np.pi)
+    ahead, left = chord * np.cos(half), chord * np.sin(half)
+    return np.column_stack(
+        (
+            rows[:, 0] + ahead * rows[:, 2] - left * rows[:, 3],
+            rows[:, 1] + ahead * rows[:, 3] + left * rows[:, 2],
+        )
+    )
+
+
+def _picture(make: Callable[[], PlanPicture] | None) -> Callable[[], PlanPicture] | None:
+    """The picture of a plan, made now, so that a flight ends alike whether or not it is recorded."""
+    if make is None:
+        return None
+    made = make()
+    if not issubclass(type(made), PlanPicture):
+        raise WrongAnswerError(
+            f"the planner's picture of its plan is {_type(made)}; it must be a PlanPicture"
+        )
+    fields = {"guide_m": (2, made.guide_m), "sectors": (4, made.sectors), "met_m": (2, made.met_m)}
+    candidates = tuple(made.candidates)
+    fields |= {f"candidates[{number}]": (2, each) for number, each in enumerate(candidates)}
+    for name, (width, points) in fields.items():
+        fits = issubclass(type(points), np.ndarray) and points.ndim == 2 and points.shape[1] == width
+        if not fits or (name == "guide_m" and len(points) != 2) or len(points) > MOST_PICTURE_POINTS:
+            shape = points.shape if isinstance(points, np.ndarray) else _type(points)
+            rows = "2" if name == "guide_m" else "n"
+            raise WrongAnswerError(
+                f"the planner's picture of its plan has {shape} as {name}; it must be an array of shape "
+                f"({rows}, {width}), n at most {MOST_PICTURE_POINTS:,}"
+            )
+        if not np.isfinite(points).all():
+            raise WrongAnswerError(
+                f"the planner's picture of its plan has a number in {name} that is not finite"
+            )
+    window_m = float(made.window_m)
+    if not 0.0 <= window_m <= FURTHEST_M:
+        raise WrongAnswerError(f"the planner's picture of its plan has a window of {window_m:g} m")
+    kept = PlanPicture(made.guide_m, window_m, made.sectors, candidates, made.met_m)
+    return lambda: kept

@@ -1,0 +1,215 @@
+"""A planner of another distribution, in a process of its own, that prints, exits or hangs."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from harness.files.errors import RunFolderError
+from harness.run_files.run_folder import load_run
+from tests.faults.command import ROOT, TIMEOUT_S, wait_until
+
+PLUGIN = '''
+import atexit
+import ctypes
+import os
+import sys
+from pathlib import Path
+
+from planner.interface import Plan, PlanStatus
+from planner.registry import PlannerKind
+from planner.rolling_window.config import RollingWindowConfig
+from planner.rolling_window.planner import RollingWindow
+
+print("on being imported")
+libc = ctypes.CDLL(None)
+
+
+class Talks(RollingWindow):
+    """Prints in every way that there is."""
+
+    def __init__(self, config, mission):
+        print("on being made")
+        atexit.register(print, "on leaving")
+        super().__init__(config, mission)
+
+    def plan(self, request):
+        if request.flown is None:
+            print("from Python")
+            os.write(1, b"past Python\\n")
+            libc.puts(b"from C")
+            os.system("echo from a process of its own")
+        return super().plan(request)
+
+
+class Hangs(RollingWindow):
+    def plan(self, request):
+        Path("hanging").touch()
+        while True:
+            pass
+
+
+class Unspeakable(Exception):
+    def __str__(self):
+        sys.exit(0)
+
+
+class Exits(RollingWindow):
+    def plan(self, request):
+        raise Unspeakable
+
+
+class Gone(RollingWindow):
+    def plan(self, request):
+        os._exit(0)
+
+
+class ExitsOnResolving(RollingWindowConfig):
+    def resolved(self, mission):
+        sys.exit(0)
+
+
+TALKS, HANGS, EXITS, GONE = (
+    PlannerKind(kind.__name__.lower(), "for a test", RollingWindowConfig, kind) for kind in (Talks, Hangs, Exits, Gone)
+)
+UNRESOLVED = PlannerKind("unresolved", "for a test", ExitsOnResolving, RollingWindow)
+'''
+KINDS = ("talks", "hangs", "exits", "gone", "unresolved")
+SCENARIO = """\
+schema: wayproof/scenario/1
+name: short
+area: {bounds_m: [0, 0, 2000, 2000]}
+mission: {start_m: [500, 500], goal_m: [1500, 1500], goal_radius_m: 60}
+sensor: {range_m: 900, rays: 360}
+planner: {clearance_m: 40}
+"""
+CAMPAIGN = """\
+schema: wayproof/campaign/1
+name: short
+seed: 5
+scenarios: [short.yaml]
+planners: [gone, rolling_window]
+"""
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """A folder with a scenario, a campaign and a distribution with planners."""
+    info = tmp_path / "site" / "own_plugin-1.0.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: own_plugin\nVersion: 1.0\n")
+    points = (f"{kind} = own_plugin:{kind.upper()}\n" for kind in KINDS)
+    (info / "entry_points.txt").write_text("[wayproof.planners]\n" + "".join(points))
+    (tmp_path / "site" / "own_plugin.py").write_text(PLUGIN)
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    (tmp_path / "campaign.yaml").write_text(CAMPAIGN)
+    return tmp_path
+
+
+def begun(place: Path, *arguments: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "harness", *arguments],
+        cwd=place,
+        env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{place / 'site'}"},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def ran(place: Path, *arguments: str) -> tuple[int, str, str]:
+    process = begun(place, *arguments)
+    try:
+        out, err = process.communicate(timeout=TIMEOUT_S)
+    finally:
+        process.kill()
+    return process.returncode, out, err
+
+
+def flown(place: Path, kind: str, *arguments: str) -> tuple[int, str, str]:
+    return ran(place, "fly", "short.yaml", "--planner", kind, "--out", "run", "--no-recording", *arguments)
+
+
+def test_nothing_that_a_planner_prints_gets_into_the_result(place: Path) -> None:
+    status, out, err = flown(place, "talks", "--json")
+    assert (status, json.loads(out)["outcome"]) == (0, "reached"), err
+    ways = (
+        "on being imported",
+        "on being made",
+        "from Python",
+        "past Python",
+        "from C",
+        "from a process of its own",
+    )
+    for way in (*ways, "on leaving"):
+        assert f"{way}\n" in err, way
+
+
+def test_an_error_that_exits_when_it_is_told_is_a_planner_that_failed(place: Path) -> None:
+    status, _, _ = flown(place, "exits", "--quiet")
+    assert status == 1
+    run = load_run(place / "run")
+    assert run.metrics["outcome"] == "planner_failed"
+    assert run.metrics["reason"] == "the planner raised Unspeakable: it cannot be told what"
+
+
+def test_a_config_that_exits_is_bad_input(place: Path) -> None:
+    status, out, err = flown(place, "unresolved", "--quiet")
+    assert (status, out) == (2, "")
+    assert "planner.kind: cannot be configured: SystemExit: 0" in err
+    assert not (place / "run").exists()
+
+
+def test_a_module_that_exits_when_it_is_loaded_is_no_success(place: Path) -> None:
+    (place / "site" / "own_plugin.py").write_text("import sys\nsys.exit(0)\n")
+    status, out, err = flown(place, "talks", "--quiet")
+    assert (status, out) == (1, "")
+    assert err == "wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done\n"
+
+
+def test_a_planner_that_ends_the_process_leaves_a_folder_that_is_marked(place: Path) -> None:
+    flown(place, "gone", "--quiet")
+    with pytest.raises(RunFolderError, match="incomplete"):
+        load_run(place / "run")
+
+
+@pytest.mark.slow
+def test_a_sweep_survives_a_planner_that_ends_its_process(place: Path) -> None:
+    status, out, err = ran(place, "sweep", "campaign.yaml", "--workers", "1", "--out", "out", "--json")
+    assert status == 1, err
+    assert json.loads(out)["outcomes"] == {"error": 1, "reached": 1}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ("fly", "short.yaml", "--planner", "hangs", "--no-recording"),
+            "the run in out is marked incomplete",
+        ),
+        (
+            ("compare", "short.yaml", "--planners", "hangs", "--no-recording"),
+            "the comparison in out is marked",
+        ),
+        (("sweep", "hangs.yaml", "--workers", "1"), "what is done is in out, --resume goes on"),
+    ],
+    ids=["fly", "compare", "sweep"],
+)
+def test_one_interrupt_ends_a_planner_that_hangs(arguments: tuple[str, ...], told: str, place: Path) -> None:
+    (place / "hangs.yaml").write_text(CAMPAIGN.replace("[gone, rolling_window]", "[hangs]"))
+    process = begun(place, *arguments, "--out", "out")
+    wait_until((place / "hanging").exists, process)
+    process.send_signal(signal.SIGINT)
+    try:
+        _, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 130
+    assert f"wayproof: interrupted; {told}" in err
