@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import html
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
+
+from harness.files.wording import printable
 
 CRASHED = "crashed"
 """Outcome of a flight that did not come to an end; the other outcomes are those of `metrics.json`."""
@@ -205,7 +208,7 @@ def to_markdown(rows: Sequence[Row]) -> str:
     parts = []
     for name in dict.fromkeys(row.scenario for row in rows):
         own = [row for row in rows if row.scenario == name]
-        lines = [f"## {name}", "", _line(["", *(row.planner for row in own)])]
+        lines = [f"## {escaped(name)}", "", _line(["", *(row.planner for row in own)])]
         lines.append(_line(["---", *("---:" for _ in own)]))
         lines += [_line([figure.label, *(figure.text(row) or DASH for row in own)]) for figure in FIGURES]
         lines += ["", *(f"- {escaped(row.planner)}: {escaped(row.reason)}" for row in own), ""]
@@ -218,7 +221,8 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def escaped(text: str) -> str:
-    """Text that Markdown takes for nothing else."""
-    for mark in "\\|<>`*":
+    """Text in one line that Markdown takes for nothing else, nor whoever shows its HTML."""
+    text = html.escape(printable(" ".join(text.splitlines())), quote=False)
+    for mark in "\\|`*[]":
         text = text.replace(mark, f"\\{mark}")
     return text

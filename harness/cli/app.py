@@ -23,7 +23,7 @@ from harness.cli.flights import bench, compare, fly
 from harness.cli.formats import list_names, schema, validate
 from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
 from harness.cli.review import report, view
-from harness.cli.standard_output import kept_up, results_alone, results_over, to_nowhere
+from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
 from harness.cli.sweep import sweep
 from harness.flight.signals import taken_as_interrupt
 
@@ -42,9 +42,9 @@ def _print_version(wanted: bool) -> None:
         from importlib.metadata import PackageNotFoundError, version
 
         try:
-            typer.echo(f"wayproof {version('wayproof')}")
+            say(f"wayproof {version('wayproof')}")
         except PackageNotFoundError:
-            typer.echo("wayproof, run from its sources without being installed")
+            say("wayproof, run from its sources without being installed")
         raise typer.Exit
 
 
@@ -91,13 +91,11 @@ def _run(words: Sequence[str], debug: bool) -> int:
     except SystemExit:
         if COMPLETION in os.environ:
             raise
-        typer.echo(
-            "wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done", err=True
-        )
+        say("wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done", err=True)
         return FAILED
     except Exception as error:
         if debug:
-            traceback.print_exc()
+            say(traceback.format_exc().rstrip(), err=True)
         return _report(error)
 
 
@@ -119,20 +117,20 @@ def _report(error: Exception) -> int:
     from harness.files.input_file import InputError
 
     if isinstance(error, PlannerError):
-        typer.echo(f"wayproof: {error}", err=True)
+        say(f"wayproof: {error}", err=True)
         return BAD_INPUT
     if isinstance(error, InputError):
-        typer.echo(str(error), err=True)
+        say(str(error), err=True)
         return BAD_INPUT
     if isinstance(error, typer.TyperException):
         text = " ".join(error.format_message().split())
-        typer.echo(f"wayproof: {text} (see wayproof --help)", err=True)
+        say(f"wayproof: {text} (see wayproof --help)", err=True)
         return BAD_INPUT
     if isinstance(error, WriteError):
-        typer.echo(f"wayproof: {error}", err=True)
+        say(f"wayproof: {error}", err=True)
         return FAILED
     if isinstance(error, OSError):
-        typer.echo(f"wayproof: {error}", err=True)
+        say(f"wayproof: {error}", err=True)
         return FAILED if error.errno in (errno.ENOSPC, errno.EDQUOT) else BAD_INPUT
-    typer.echo(f"wayproof: internal error, {sentence(error)}; --debug shows where", err=True)
+    say(f"wayproof: internal error, {sentence(error)}; --debug shows where", err=True)
     return FAILED

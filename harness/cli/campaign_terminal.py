@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from rich import box
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table as Grid
 
 from harness.analysis.rows import number
 from harness.campaign.questions import QUESTIONS, difference, ratio
 from harness.campaign.summary import Cell, Summary, Table
+from harness.cli.terminal import plain
 from harness.files.wording import counted
 
 WIDTH = 80
@@ -29,13 +29,13 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     """
     console = Console()
     width = min(WIDTH, console.width)
-    ended = ", ".join(f"{outcome} {count}" for outcome, count in summary.outcomes.items())
+    ended = ", ".join(f"{plain(outcome)} {count}" for outcome, count in summary.outcomes.items())
     runs = (
         f"{summary.total.runs} of {counted(summary.planned or 0, 'run')}"
         if summary.missing
         else counted(summary.total.runs, "run")
     )
-    console.print(f"{escape(summary.name)}: {runs}" + (f": {ended}" if ended else ""))
+    console.print(f"{plain(summary.name)}: {runs}" + (f": {ended}" if ended else ""))
     if summary.missing:
         are, them = ("is missing", "it") if summary.missing == 1 else ("are missing", "them")
         console.print(f"[bold yellow]not complete[/]: {summary.missing} {are}, --resume flies {them}")
@@ -51,9 +51,9 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     console.print(f" {LEGEND}", style="dim", highlight=False, width=width)
     for duel in summary.duels:
         console.print(
-            f"{escape(duel.first)} against {escape(duel.second)}, {duel.pairs} pairs: reached "
-            f"{difference(duel.success)} points, only {escape(duel.first)} {duel.only_first}, only "
-            f"{escape(duel.second)} {duel.only_second}; length x {ratio(duel.length)} on {duel.both_reached}",
+            f"{plain(duel.first)} against {plain(duel.second)}, {duel.pairs} pairs: reached "
+            f"{difference(duel.success)} points, only {plain(duel.first)} {duel.only_first}, only "
+            f"{plain(duel.second)} {duel.only_second}; length x {ratio(duel.length)} on {duel.both_reached}",
             highlight=False,
             width=width,
         )
@@ -61,19 +61,19 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     for run in failed[:SHOWN_WORST]:
         near = "" if run.min_clearance_m is None else f", least clearance {number(run.min_clearance_m)} m"
         console.print(
-            f"[bold red]{escape(run.outcome)}[/] run {run.run} ({escape(run.name)}){near}",
+            f"[bold red]{plain(run.outcome)}[/] run {run.run} ({plain(run.name)}){near}",
             highlight=False,
             width=width,
         )
     if failed:
-        console.print(escape(f"again: {failed[0].command}"), highlight=False, soft_wrap=True)
+        console.print(plain(f"again: {failed[0].command}"), highlight=False, soft_wrap=True)
     kept = next((run for run in summary.worst if run.view), None)
     if kept is not None:
-        console.print(escape(f"view: {kept.view}"), highlight=False, soft_wrap=True)
+        console.print(plain(f"view: {kept.view}"), highlight=False, soft_wrap=True)
 
 
 def _columns(title: str) -> Grid:
-    grid = Grid(title=escape(title), box=box.SIMPLE, title_justify="left", padding=0, pad_edge=False)
+    grid = Grid(title=plain(title), box=box.SIMPLE, title_justify="left", padding=0, pad_edge=False)
     grid.add_column("", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
     for name in ("runs", *(question.short for question in QUESTIONS)):
         grid.add_column(name, justify="right", no_wrap=True)
@@ -90,11 +90,11 @@ def _grid(table: Table, total: Cell) -> Grid:
     grid = _columns(" x ".join(keys))
     for label, cells in zip(table.rows.labels, table.cells, strict=True):
         if table.columns is None:
-            grid.add_row(escape(label), *_cells(cells[0]))
+            grid.add_row(plain(label), *_cells(cells[0]))
             continue
-        grid.add_row(f"[bold]{escape(label)}[/]")
+        grid.add_row(f"[bold]{plain(label)}[/]")
         for name, cell in zip(table.columns.labels, cells, strict=True):
-            grid.add_row(f" {escape(name)}", *_cells(cell))
+            grid.add_row(f" {plain(name)}", *_cells(cell))
     grid.add_section()
     grid.add_row("all runs", *_cells(total))
     return grid

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from harness.cli.options import FAILED, bad_input, flag, print_json, setting
+from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
     from harness.run.path_check import CheckedPath, PathCheck
@@ -120,7 +121,7 @@ def check(
 
         speed_mps = check.scenario.aircraft.airspeed_mps
         print_table(f"{path.name}: {aircraft}, {speed_mps:g} m/s", verdict_rows(flown.metrics))
-        typer.echo(f"run folder: {folder}")
+        say(f"run folder: {folder}")
     return 0 if flown.ok else FAILED
 
 
@@ -175,5 +176,5 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> Ch
     except (AircraftError, RunFolderError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
-        typer.echo(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
+        say(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
         raise

@@ -8,11 +8,11 @@ from contextlib import contextmanager
 
 from rich import box
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from harness.analysis.rows import CRASHED, DASH, FIGURES, ON_TERMINAL, Row
+from harness.cli.terminal import plain
 from harness.compare.flights import Progress as Report
 from harness.scenario.scenario import Scenario
 
@@ -46,7 +46,7 @@ def comparison_bar(scenarios: Sequence[Scenario]) -> Iterator[Report | None]:
             over = state not in ("waiting", "following", "holding")
             flown[index] = 1.0 if over else min(max(1.0 - to_go_m / straight_m[index], 0.0), 0.99)
             text = f"{each.name}, {each.planner.kind}: {time_s:.0f} s, {state}"
-            bar.update(task, completed=sum(flown.values()), description=escape(text))
+            bar.update(task, completed=sum(flown.values()), description=plain(text))
 
         yield report
 
@@ -57,7 +57,7 @@ def print_comparison(rows: Sequence[Row]) -> None:
     shown = [next(figure for figure in FIGURES if figure.short == short) for short in ON_TERMINAL]
     for name in dict.fromkeys(row.scenario for row in rows):
         table = Table(
-            title=escape(name), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False
+            title=plain(name), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False
         )
         table.add_column("planner", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
         for figure in shown:
@@ -67,12 +67,12 @@ def print_comparison(rows: Sequence[Row]) -> None:
         own = [row for row in rows if row.scenario == name]
         for row in own:
             style = _STYLE.get(row.outcome, "bold red")
-            cells = [escape(figure.text(row)) or DASH for figure in shown]
+            cells = [plain(figure.text(row)) or DASH for figure in shown]
             cells[0] = f"[{style}]{cells[0]}[/]"
-            table.add_row(escape(row.planner), *cells)
+            table.add_row(plain(row.planner), *cells)
         console.print(table, width=min(WIDTH, console.width))
         for row in own:
             if row.outcome == CRASHED:
                 console.print(
-                    f"{escape(row.planner)} crashed: {escape(row.reason)}", highlight=False, soft_wrap=True
+                    f"{plain(row.planner)} crashed: {plain(row.reason)}", highlight=False, soft_wrap=True
                 )

@@ -22,6 +22,7 @@ from harness.cli.options import (
     print_json,
     setting,
 )
+from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
     from harness.falsify.breaking_point import Until
@@ -131,15 +132,15 @@ def _search(
         raise bad_input(error) from error
     except KeyboardInterrupt:
         told = f"the flights so far are in {folder / TRIALS}" if flights else "no flight had ended yet"
-        typer.echo(f"wayproof: interrupted; {told}", err=True)
+        say(f"wayproof: interrupted; {told}", err=True)
         raise
     if as_json:
         print_json(found.plain())
         return 0
     print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
     if found.found is not None:
-        typer.echo(f"again: wayproof fly {folder / FALSIFIED}")
-    typer.echo(last_line(found))
+        say(f"again: wayproof fly {folder / FALSIFIED}")
+    say(last_line(found))
     return 0
 
 

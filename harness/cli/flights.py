@@ -25,6 +25,7 @@ from harness.cli.options import (
     straight_m,
 )
 from harness.cli.review import open_viewer
+from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
@@ -74,7 +75,7 @@ def fly(
     metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
     otherwise = bool(digest) and not given and metrics["digest"] != digest
     if otherwise:
-        typer.echo(
+        say(
             f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
             "aircraft is made of, have changed since",
             err=True,
@@ -86,8 +87,8 @@ def fly(
 
         print_table(f"{loaded.name}: {loaded.planner.kind}, {loaded.aircraft.model}", flight_rows(metrics))
         if digest and not given and not otherwise:
-            typer.echo("digest: as the campaign flew it")
-        typer.echo(f"run folder: {folder}")
+            say("digest: as the campaign flew it")
+        say(f"run folder: {folder}")
     if view:
         open_viewer([folder])
     return FAILED if otherwise else FLY_STATUS.get(metrics["outcome"], FAILED)
@@ -160,13 +161,13 @@ def compare(
     except OSError as error:
         raise WriteError.of("the comparison", out, error) from error
     except KeyboardInterrupt:
-        typer.echo(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
+        say(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
         raise
     if as_json:
         print_json(comparison.plain())
     else:
         print_comparison(comparison.rows)
-        typer.echo(f"report: {out / 'report.html'}")
+        say(f"report: {out / 'report.html'}")
     return 0 if comparison.all_reached else FAILED
 
 
@@ -278,5 +279,5 @@ def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> 
     except (AircraftError, RunFolderError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
-        typer.echo(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
+        say(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
         raise

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from harness.cli.options import BAD_INPUT, load, print_json
+from harness.cli.standard_output import say
 
 
 def validate(
@@ -27,10 +28,10 @@ def validate(
         try:
             found = _found(file)
         except InputError as error:
-            typer.echo(str(error), err=True)
+            say(str(error), err=True)
             status = BAD_INPUT
         else:
-            typer.echo(f"{file}: {found}: valid")
+            say(f"{file}: {found}: valid")
     return status
 
 
@@ -92,18 +93,18 @@ def _print_aircraft() -> None:
     from aircraft.airframes import AircraftError, aircraft_names, airframe
     from aircraft.envelope import performance
 
-    typer.echo(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "verified", "what"))
+    say(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "verified", "what"))
     for name in aircraft_names():
         try:
             frame = airframe(name)
             radius_m = performance(frame, frame.cruise_mps).turn_radius_m
         except AircraftError as error:
-            typer.echo(f"{name:10} cannot be flown: {error}")
+            say(f"{name:10} cannot be flown: {error}")
             continue
         low, high = frame.airspeed_range_mps
         verified = "yes" if frame.verified else "no"
         cells = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
-        typer.echo(_AIRCRAFT_ROW.format(name, *cells, verified, frame.summary))
+        say(_AIRCRAFT_ROW.format(name, *cells, verified, frame.summary))
 
 
 _AIRCRAFT_ROW = "{:10} {:>7} {:>11} {:>6} {:>6}  {:8}  {}"

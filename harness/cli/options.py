@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from harness.cli.standard_output import say
+from harness.files.wording import printable
+
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
 
@@ -129,4 +132,8 @@ def print_json(content: Any) -> None:
     """Prints a result for scripts."""
     import json
 
-    typer.echo(json.dumps(content, indent=2, ensure_ascii=False))
+    text = json.dumps(content, indent=2, ensure_ascii=False)
+    if printable(text) != text:
+        # JSON has spelt out what ASCII has of them; what say() would make of the others is no JSON.
+        text = "".join(c if c == printable(c) else f"\\u{ord(c):04x}" for c in text)
+    say(text)

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from harness.cli.options import FAILED, bad_input, flag
+from harness.cli.standard_output import say
 
 
 def view(
@@ -61,7 +62,7 @@ def report(
             f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
         )
     try:
-        typer.echo(f"report: {write_report(run)}")
+        say(f"report: {write_report(run)}")
     except RunFolderError as error:
         raise bad_input(error) from error
     return 0
@@ -77,7 +78,7 @@ def _summary(folder: Path, by: Sequence[str] | None) -> int:
     summary = summarise(folder, by=chosen)
     page = write_summary(summary, folder)
     print_summary(summary, all_tables=by is not None)
-    typer.echo(f"summary: {page}")
+    say(f"summary: {page}")
     return 0
 
 
@@ -97,10 +98,10 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
     from harness.recording.viewer import ViewerError, open_viewer
 
     try:
-        open_viewer(runs, web, lambda address: typer.echo(f"{address} (Ctrl-C ends it)", err=True))
+        open_viewer(runs, web, lambda address: say(f"{address} (Ctrl-C ends it)", err=True))
     except RunFolderError as error:
         raise bad_input(error) from error
     except ViewerError as error:
-        typer.echo(f"wayproof: {error}", err=True)
+        say(f"wayproof: {error}", err=True)
         return False
     return True

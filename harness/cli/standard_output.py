@@ -1,4 +1,7 @@
-"""Standard output that outlives its reader: what nobody takes any more is lost, and nothing else."""
+"""What is said on a terminal: no control character of others reaches it.
+
+Standard output outlives its reader: what nobody takes any more is lost, and nothing else.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,15 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
+
+import typer
+
+from harness.files.wording import printable
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """A line of text, control characters in it spelt out, on standard output or standard error."""
+    typer.echo(printable(text), err=err)
 
 
 def results_alone() -> None:

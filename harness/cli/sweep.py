@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from harness.cli.options import FAILED, bad_input, flag, print_json
+from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
     from harness.campaign.runs import CampaignRuns
@@ -76,8 +77,8 @@ def sweep(
         print_json({"results": str(folder / "results.parquet"), "runs": len(runs), "outcomes": told})
     elif not quiet:
         print_summary(summary)
-        typer.echo(f"results: {folder / 'results.parquet'}")
-        typer.echo(f"summary: {page}")
+        say(f"results: {folder / 'results.parquet'}")
+        say(f"summary: {page}")
     return FAILED if "error" in told else 0
 
 
@@ -116,10 +117,10 @@ def _fly(
     except RunFolderError as error:
         raise bad_input(error) from error
     except OSError as error:
-        typer.echo(f"wayproof: {error}; what is done is in {path}, --resume goes on", err=True)
+        say(f"wayproof: {error}; what is done is in {path}, --resume goes on", err=True)
         raise typer.Exit(FAILED) from error
     except KeyboardInterrupt:
-        typer.echo(f"wayproof: interrupted; what is done is in {path}, --resume goes on", err=True)
+        say(f"wayproof: interrupted; what is done is in {path}, --resume goes on", err=True)
         raise
 
 

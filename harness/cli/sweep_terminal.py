@@ -10,7 +10,6 @@ from typing import Final
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console, JustifyMethod
-from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -25,8 +24,9 @@ from rich.text import Text
 
 from harness.campaign.flight import Answer
 from harness.campaign.runs import CampaignRuns
+from harness.cli.terminal import plain
 from harness.files.strict_yaml import Scalar
-from harness.files.wording import counted
+from harness.files.wording import counted, printable
 
 FIRST, LAST = 15, 5
 """Of more runs than both, so many are shown."""
@@ -111,7 +111,7 @@ def print_runs(runs: CampaignRuns) -> None:
     if not console.is_terminal:
         console.width = WIDTH
     console.print(
-        f"{campaign.name}: {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}, "
+        f"{printable(campaign.name)}: {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}, "
         f"root seed {campaign.seed}, recordings: {campaign.recordings}",
         highlight=False,
         markup=False,
@@ -124,9 +124,9 @@ def print_runs(runs: CampaignRuns) -> None:
         table = Table(box=box.SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
         for head, _ in (number, *columns[:fit]):
             justify: JustifyMethod = "left" if head in NAMES else "right"
-            table.add_column(escape(head), justify=justify, no_wrap=True)
+            table.add_column(plain(head), justify=justify, no_wrap=True)
         for row in zip(number[1], *(cells for _, cells in columns[:fit]), strict=True):
-            table.add_row(*map(escape, row))
+            table.add_row(*map(plain, row))
         console.print(table)
         columns = columns[fit:]
 

@@ -8,10 +8,11 @@ from typing import Any, TypeAlias
 
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
-from harness.files.wording import tallied
+from harness.files.wording import printable, tallied
 
 Report: TypeAlias = Callable[[float, float, str], None]
 """Takes simulated time (s), distance to go (m) and what is being done."""
@@ -43,7 +44,7 @@ def progress_bar(straight_m: float) -> Iterator[Report | None]:
             bar.update(
                 task,
                 completed=max(0.0, straight_m - to_go_m),
-                description=state,
+                description=plain(state),
                 time_s=time_s,
                 to_go_m=to_go_m,
                 speed_up=time_s / elapsed_s if elapsed_s > 0 else 0.0,
@@ -65,7 +66,7 @@ def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
         task = bar.add_task("")
 
         def report(done: int, of: int, what: str) -> None:
-            bar.update(task, completed=done, total=of, description=what)
+            bar.update(task, completed=done, total=of, description=plain(what))
 
         yield report
 
@@ -73,22 +74,22 @@ def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
 def print_grid(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """A table with a heading over each column, on standard output; figures are right-aligned."""
     console = Console()
-    table = Table(title=title, box=box.SIMPLE, title_justify="left", pad_edge=False)
+    table = Table(title=plain(title), box=box.SIMPLE, title_justify="left", pad_edge=False)
     for index, column in enumerate(columns):
-        table.add_column(column, justify="right" if index else "left", overflow="fold")
+        table.add_column(printable(column), justify="right" if index else "left", overflow="fold")
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(printable, row))
     console.print(table, width=min(80, console.width))
 
 
 def print_table(title: str, rows: Mapping[str, str]) -> None:
     """Two columns, name and value, on standard output and never wider than 80."""
     console = Console()
-    table = Table(title=title, box=box.SIMPLE, show_header=False, title_justify="left", pad_edge=False)
+    table = Table(title=plain(title), box=box.SIMPLE, show_header=False, title_justify="left", pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     for name, value in rows.items():
-        table.add_row(name, value)
+        table.add_row(printable(name), printable(value))
     console.print(table, width=min(80, console.width))
 
 
@@ -97,7 +98,7 @@ def print_columns(rows: Mapping[str, str]) -> None:
     console = Console()
     width = max((len(name) for name in rows), default=0)
     for name, text in rows.items():
-        console.print(f"{name:{width}}  {text}", highlight=False, markup=False, soft_wrap=True)
+        console.print(printable(f"{name:{width}}  {text}"), highlight=False, markup=False, soft_wrap=True)
 
 
 def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
@@ -214,8 +215,8 @@ def world_rows(result: Sequence[Mapping[str, Any]]) -> tuple[Sequence[str], list
 
 
 def plain(text: str) -> str:
-    """`text` with nothing in it that rich would take for markup."""
-    return text.replace("[", "\\[")
+    """Text of others with nothing in it that rich takes for markup, or a terminal for a command."""
+    return escape(printable(text))
 
 
 def _number(value: float | None) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from harness.analysis.rows import to_csv, to_markdown
+from harness.analysis.rows import escaped, to_csv, to_markdown
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
+from harness.files.wording import printable
 from harness.report.chapters import entry, optimum_of, run_chapter
 from harness.report.page import run_html
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
@@ -56,7 +57,9 @@ def _written(run: Run, folder: Path) -> Path:
         written=manifest["started_utc"],
     )
     page.with_suffix(".csv").write_text(to_csv([flight.row]), encoding="utf-8")
-    repeat = f"## How to repeat it\n\n    {command}\n\nDigest of the track: `{flight.row.digest}`\n"
+    # A line of code shows HTML and does not follow it; a program that makes HTML of all of it must not either.
+    shown = printable(" ".join(command.splitlines())).replace("<", "&lt;")
+    repeat = f"## How to repeat it\n\n    {shown}\n\nDigest of the track: `{escaped(flight.row.digest)}`\n"
     page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
     replace_text(page, text)
     return page

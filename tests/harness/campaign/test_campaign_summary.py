@@ -26,6 +26,7 @@ from harness.campaign.summary import CURVE_POINTS, Cell, Summary, summarise, wil
 from harness.cli.app import main
 from harness.cli.campaign_terminal import print_summary
 from harness.files.strict_yaml import InputError
+from harness.files.wording import printable
 from tests.page import shown
 
 SCHEMA = pa.schema(
@@ -304,6 +305,20 @@ def test_what_is_missing_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "6 of 8 runs" in page
     assert "2 runs are missing" in page
     assert json.loads((folder / PLAIN).read_text())["planned"] == 8
+
+
+def test_what_a_table_of_others_holds_reaches_no_terminal_raw(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    evil = "\x1b[2J[red]\x9b"
+    folder = campaign(
+        tmp_path / "c",
+        [row(run, evil, planner=f"{evil}{run}", scenario=evil, world=evil) for run in range(3)],
+    )
+    print_summary(summarise(folder, by=[("planner", "scenario")]), all_tables=True)
+    said = capsys.readouterr().out
+    assert printable(said) == said
+    assert r"\x1b[2J[red]\x9b" in said
 
 
 def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:

@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import json
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from harness.cli.terminal import bench_rows, flight_rows, print_table, progress_bar
+from harness.cli.app import main
+from harness.cli.options import print_json
+from harness.cli.standard_output import say
+from harness.cli.terminal import (
+    bench_rows,
+    flight_rows,
+    print_columns,
+    print_grid,
+    print_table,
+    progress_bar,
+)
+from harness.files.wording import printable
 
 METRICS: dict[str, Any] = {
     "outcome": "collision",
@@ -45,6 +59,58 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
     assert "rms 0.04 / p95 0.09 / max 0.18 m" in shown
     assert "rms - / p95 - / max - m" in shown
     assert "\x1b" not in shown
+
+
+EVIL = "\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp\r\x7f\ud800"
+SPELT = r"\x1b]0;owned\x07\x1b[2J\x9b31m\u202egnp\r\x7f\ud800"
+
+
+def test_control_characters_of_others_never_reach_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    assert printable(EVIL) == SPELT
+    assert printable("na\u00efve \u2013 10 \u00b0\n\tb") == "na\u00efve \u2013 10 \u00b0\n\tb"
+    print_table(EVIL, flight_rows({**METRICS, "reason": EVIL}))
+    print_grid(EVIL, ("", EVIL), [(EVIL, EVIL)])
+    print_columns({EVIL: EVIL})
+    say(EVIL)
+    say(EVIL, err=True)
+    print_json({"reason": EVIL})
+    said = capsys.readouterr()
+    shown = said.out + said.err
+    assert shown.count("owned") >= 9
+    assert printable(shown) == shown
+    assert json.loads(said.out[said.out.index("{") :]) == {"reason": EVIL}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["fly", EVIL[:-1]],
+        ["fly", "paper_circles", "--set", f"{EVIL[:-1]}=1"],
+        ["fly", "paper_circles", "--planner", EVIL[:-1]],
+        ["fly", "paper_circles", "--aircraft", EVIL[:-1]],
+        ["check", f"{EVIL[:-1]}.csv", "--aircraft", "aerosonde"],
+        ["report", EVIL[:-1]],
+        ["validate", EVIL[:-1]],
+        [EVIL[:-1]],
+    ],
+)
+def test_what_was_typed_in_is_said_without_control_characters(
+    arguments: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    said = capsys.readouterr()
+    assert printable(said.out + said.err) == said.out + said.err
+    assert said.err
+
+
+def test_the_commands_speak_through_what_spells_control_characters_out() -> None:
+    """`say` and `plain` know how; `export` writes a file's content, whose names are a scenario's."""
+    for path in sorted((Path(__file__).parents[3] / "harness" / "cli").glob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        assert ("typer.echo(" in text) == (path.name in ("standard_output.py", "export.py")), path.name
+        assert ("rich.markup" in text) == (path.name == "terminal.py"), path.name
+        assert not re.search(r"(?<![\w.])print\(", text), path.name
 
 
 def test_a_flight_without_a_plan_was_not_tracked() -> None:

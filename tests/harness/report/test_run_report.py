@@ -53,9 +53,15 @@ def test_report_escapes_what_it_is_told(run: Path, tmp_path: Path) -> None:
     shutil.copytree(run, copy)
     text = (copy / "metrics.json").read_text()
     reason = load_run(run).metrics["reason"]
-    (copy / "metrics.json").write_text(text.replace(reason, "<script>alert(1)</script>"))
+    (copy / "metrics.json").write_text(
+        text.replace(reason, "<script>alert(1)</script>\\n<img src=x> \\u001b[31m")
+    )
     assert main(["report", str(copy)]) == 0
     page = (copy / "report.html").read_text()
+    markdown = (copy / "report.md").read_text()
+    assert "<" not in markdown
+    assert "\x1b" not in markdown
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &lt;img src=x&gt;" in markdown
     assert "<script" not in page
     assert "&lt;script&gt;alert(1)" in page
 
