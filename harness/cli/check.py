@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.cli.options import FAILED, bad_input, flag, print_json, setting
+from harness.cli.options import FAILED, bad_input, flag, print_json, setting, tell_interrupted
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -168,6 +168,7 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> Ch
     from harness.cli.terminal import progress_bar
     from harness.files.errors import RunFolderError
     from harness.run.path_check import fly_check
+    from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     length_m = float(np.hypot(*np.diff(check.given.points_m, axis=0).T).sum())
     try:
@@ -176,5 +177,5 @@ def _fly(check: PathCheck, folder: Path, *, recording: bool, silent: bool) -> Ch
     except (AircraftError, RunFolderError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
-        say(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
+        tell_interrupted("run", folder, MANIFEST, SCHEMA)
         raise

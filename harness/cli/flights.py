@@ -23,6 +23,7 @@ from harness.cli.options import (
     print_json,
     setting,
     straight_m,
+    tell_interrupted,
 )
 from harness.cli.review import open_viewer
 from harness.cli.standard_output import say
@@ -143,6 +144,7 @@ def compare(
 
     from aircraft.airframes import AircraftError
     from harness.cli.compare_terminal import comparison_bar, print_comparison
+    from harness.compare.comparison import INDEX, SCHEMA
     from harness.compare.comparison import compare as fly_and_compare
     from harness.files.errors import RunFolderError, WriteError
 
@@ -161,7 +163,7 @@ def compare(
     except OSError as error:
         raise WriteError.of("the comparison", out, error) from error
     except KeyboardInterrupt:
-        say(f"wayproof: interrupted; the comparison in {out} is marked incomplete", err=True)
+        tell_interrupted("comparison", out, INDEX, SCHEMA)
         raise
     if as_json:
         print_json(comparison.plain())
@@ -272,6 +274,7 @@ def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> 
     from harness.cli.terminal import progress_bar
     from harness.files.errors import RunFolderError
     from harness.run.scenario_flight import fly_to_folder
+    from harness.run_files.run_folder import MANIFEST, SCHEMA
 
     try:
         with nullcontext() if silent else progress_bar(straight_m(scenario)) as report:
@@ -279,5 +282,5 @@ def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> 
     except (AircraftError, RunFolderError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:
-        say(f"wayproof: interrupted; the run in {folder} is marked incomplete", err=True)
+        tell_interrupted("run", folder, MANIFEST, SCHEMA)
         raise

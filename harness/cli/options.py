@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
@@ -126,6 +127,26 @@ def bad_input(error: ValueError) -> Exception:
     from harness.files.strict_yaml import InputError
 
     return InputError(f"wayproof: {error}")
+
+
+def tell_interrupted(what: str, folder: Path, index: str, schema: str) -> None:
+    """Says after Ctrl-C what became of a folder.
+
+    Args:
+        what: that was to be written: "run".
+        folder: where.
+        index: file of the folder that says whether it is complete.
+        schema: of that file.
+    """
+    from harness.files.input_file import read_index
+
+    begun = read_index(folder / index, schema)
+    left = (
+        f"the {what} in {folder} is marked incomplete"
+        if begun is not None and begun.get("complete") is False
+        else "nothing was written"
+    )
+    say(f"wayproof: interrupted; {left}", err=True)
 
 
 def print_json(content: Any) -> None:

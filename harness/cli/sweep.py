@@ -100,7 +100,7 @@ def _fly(
     """Flies what is missing; returns how many runs ended how."""
     from contextlib import nullcontext
 
-    from harness.campaign.folder import CampaignFolder
+    from harness.campaign.folder import INDEX, CampaignFolder
     from harness.campaign.sweep import sweep as fly_missing
     from harness.campaign.workers import dask_workers, local_workers
     from harness.cli.sweep_terminal import sweep_bar
@@ -120,7 +120,9 @@ def _fly(
         say(f"wayproof: {error}; what is done is in {path}, --resume goes on", err=True)
         raise typer.Exit(FAILED) from error
     except KeyboardInterrupt:
-        say(f"wayproof: interrupted; what is done is in {path}, --resume goes on", err=True)
+        begun = (path / INDEX).exists()
+        left = f"what is done is in {path}, --resume goes on" if begun else "nothing was written"
+        say(f"wayproof: interrupted; {left}", err=True)
         raise
 
 

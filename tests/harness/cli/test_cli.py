@@ -454,7 +454,41 @@ def test_an_interrupted_flight_exits_130_and_says_so(
     assert main(["fly", "paper_circles", "--out", "here"]) == 130
     said = capsys.readouterr()
     assert said.out == ""
-    assert said.err == "wayproof: interrupted; the run in here is marked incomplete\n"
+    assert said.err == "wayproof: interrupted; nothing was written\n", "the folder does not exist yet"
+    assert not Path("here").exists()
+
+
+@pytest.mark.parametrize("complete", [True, False])
+def test_an_interrupt_before_the_flight_tells_of_the_folder_as_it_is(
+    complete: bool,
+    pilot: Pilot,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("here").mkdir()
+    manifest = {"schema": "wayproof/run/1", "complete": complete}
+    Path("here/manifest.json").write_text(json.dumps(manifest))
+    pilot.outcome = KeyboardInterrupt()
+    assert main(["fly", "paper_circles", "--out", "here"]) == 130
+    left = "nothing was written" if complete else "the run in here is marked incomplete"
+    assert capsys.readouterr().err == f"wayproof: interrupted; {left}\n"
+
+
+def test_an_interrupt_before_a_comparison_or_a_campaign_has_begun_promises_nothing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("harness.compare.comparison.compare", interrupted)
+    monkeypatch.setattr("harness.campaign.workers.local_workers", interrupted)
+    for arguments in (["compare", "paper_circles", "--planners", "bug2"], ["sweep", "forest_planners"]):
+        assert main([*arguments, "--out", "here"]) == 130
+        assert capsys.readouterr().err == "wayproof: interrupted; nothing was written\n"
+    assert not Path("here").exists()
 
 
 def test_a_refused_run_folder_is_bad_input(pilot: Pilot, capsys: pytest.CaptureFixture[str]) -> None:
