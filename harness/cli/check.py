@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.cli.options import FAILED, bad_input, flag, print_json, setting, tell_interrupted
+from harness.cli.options import FAILED, bad_input, flag, print_json, setting, tell_interrupted, told_apart
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -67,7 +67,8 @@ def check(
         typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; can be repeated."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Default: runs/check/NAME-AIRCRAFT.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Default: runs/check/NAME-AIRCRAFT, and digits for options."),
     ] = None,
     no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
@@ -111,7 +112,17 @@ def check(
         corner_m=corner_m,
         name=_name(path),
     )
-    folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}"
+    numbers = {
+        "airspeed_mps": airspeed_mps,
+        "altitude_m": altitude_m,
+        "clearance_m": clearance_m,
+        "seed": seed,
+    }
+    numbers |= {"tolerance_m": tolerance_m, "corner_m": corner_m}
+    words = {"scenario": scenario, "wind": wind, "turbulence": turbulence, "polygons": polygons}
+    differs = [(name, str(value)) for name, value in {**numbers, **words}.items() if value is not None]
+    apart = told_apart([*differs, *map(setting, settings or ())], named=())
+    folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}{apart}"
     flown = _fly(check, folder, recording=not no_recording, silent=quiet)
     if as_json:
         print_json(flown.metrics)

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from harness.cli.options import bad_input
-from harness.cli.standard_output import to_nowhere
+from harness.cli.standard_output import say, to_nowhere
 
 
 def export(
@@ -57,7 +57,7 @@ def export(
     else:
         out.write_bytes(file.content)
     if file.left_out is not None:
-        typer.echo(file.left_out, err=True)
+        say(file.left_out, err=True)
     return 0
 
 

@@ -21,6 +21,7 @@ from harness.cli.options import (
     load,
     print_json,
     setting,
+    told_apart,
 )
 from harness.cli.standard_output import say
 
@@ -55,7 +56,8 @@ def falsify(
         float, typer.Option(metavar="SHARE", help="Narrow down to this share of each range.")
     ] = 0.01,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/falsify-KEYS.")
+        Path | None,
+        typer.Option(metavar="DIR", help="Default: runs/SCENARIO/falsify-KEYS, and digits for --set."),
     ] = None,
     as_json: JsonOption = False,
 ) -> int:
@@ -106,7 +108,7 @@ def _search(
         return load(scenario, [*fixed, *replaced])
 
     varied = vary_of(loaded, ranges, [name for name, _ in fixed], tolerance)
-    folder = out or Path("runs") / loaded(()).name / _folder_name(varied)
+    folder = out or Path("runs") / loaded(()).name / f"{_folder_name(varied)}{told_apart(fixed, named=())}"
     flights = 0
 
     def ended(*step: Any) -> None:

@@ -93,7 +93,7 @@ def last_line(breaking: Breaking) -> str:
         f"{each.key}={number_text(value)}"
         for each, value in zip(breaking.vary, breaking.found.values, strict=True)
     )
-    return f"falsified: {keys}, the mildest failure found in {counted(breaking.conditions, 'condition')}"
+    return f"falsified: {keys}, the mildest found in {counted(breaking.conditions, 'condition')}"
 
 
 def _values(values: Sequence[float]) -> str:

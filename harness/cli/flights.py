@@ -24,6 +24,7 @@ from harness.cli.options import (
     setting,
     straight_m,
     tell_interrupted,
+    told_apart,
 )
 from harness.cli.review import open_viewer
 from harness.cli.standard_output import say
@@ -70,9 +71,12 @@ def fly(
     """
     if view and no_recording:
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
-    given = [*chosen(planner, aircraft, seed), *map(setting, settings or ())]
+    replaced = list(map(setting, settings or ()))
+    given = [*chosen(planner, aircraft, seed), *replaced]
     loaded, digest = _asked(scenario, results, run, given)
-    folder = out or _default_folder(loaded)
+    if results is not None:
+        replaced += [("from", str(results.resolve())), ("run", str(run))]
+    folder = out or _default_folder(loaded, told_apart(replaced))
     metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
     otherwise = bool(digest) and not given and metrics["digest"] != digest
     if otherwise:
@@ -261,9 +265,9 @@ def bench_worlds(most: int | None, as_json: bool) -> int:
     return 0
 
 
-def _default_folder(scenario: Scenario) -> Path:
+def _default_folder(scenario: Scenario, apart: str = "") -> Path:
     model = Path(scenario.aircraft.model).name
-    return Path("runs") / scenario.name / f"{scenario.planner.kind}-{model}-{scenario.seed}"
+    return Path("runs") / scenario.name / f"{scenario.planner.kind}-{model}-{scenario.seed}{apart}"
 
 
 def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:

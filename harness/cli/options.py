@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 FAILED: Final = 1
 BAD_INPUT: Final = 2
+IN_THE_NAME: Final = ("name", "seed", "planner.kind", "aircraft.model")
+"""Keys that the default folder of a run is called after; of a model that is a folder, by the folder's last name."""
 
 
 class Command(TyperCommand):
@@ -127,6 +129,26 @@ def bad_input(error: ValueError) -> Exception:
     from harness.files.strict_yaml import InputError
 
     return InputError(f"wayproof: {error}")
+
+
+def told_apart(settings: Sequence[tuple[str, str]], named: Sequence[str] = IN_THE_NAME) -> str:
+    """What a default folder's name has at its end, so that runs which differ in settings do not replace one another.
+
+    Args:
+        settings: keys and values as given.
+        named: keys that the folder is called after anyway.
+
+    Returns:
+        Eight digits after a dash, the same for the same settings; nothing without any.
+    """
+    import json
+    from hashlib import sha256
+
+    from harness.files.strict_yaml import as_spelt
+
+    spelt = [(as_spelt(key), value.strip()) for key, value in settings]
+    others = [(key, value) for key, value in spelt if key not in named or "/" in value]
+    return f"-{sha256(json.dumps(others).encode()).hexdigest()[:8]}" if others else ""
 
 
 def tell_interrupted(what: str, folder: Path, index: str, schema: str) -> None:

@@ -429,6 +429,26 @@ def test_exit_status_of_fly_follows_the_outcome(
     assert said.err == ""
 
 
+def test_runs_that_differ_in_settings_have_folders_of_their_own(pilot: Pilot, tmp_path: Path) -> None:
+    def folder(*options: str) -> str:
+        assert main(["fly", "paper_circles", "--quiet", *options]) == 0
+        return str(pilot.asked[-1][1])
+
+    plain = "runs/paper_circles/rolling_window-aerosonde-1"
+    assert folder() == folder() == plain
+    calm = folder("--set", "environment.wind.speed_mps=0")
+    windy = folder("--set", "environment.wind.speed_mps=8")
+    assert re.fullmatch(re.escape(plain) + "-[0-9a-f]{8}", windy)
+    assert len({plain, calm, windy}) == 3
+    assert folder("--set", "environment.wind.speed_mps= 8") == windy, "a re-run replaces its own"
+    assert folder("--set", "obstacles.0.circle.radius_m=500") == folder(
+        "--set", "obstacles[0].circle.radius_m=500"
+    )
+    assert folder("--seed", "9") == folder("--set", "seed=9") == plain[:-1] + "9"
+    assert folder("--set", "planner.kind=bug2") == "runs/paper_circles/bug2-aerosonde-1"
+    assert folder("--set", "sensor.rays=90", "--out", str(tmp_path)) == str(tmp_path)
+
+
 def test_fly_passes_its_options_on(pilot: Pilot) -> None:
     options = ["--seed", "9", "--set", "sensor.rays=90", "--set", "mission.goal_m=[81e3, 7e4]"]
     assert main(["fly", "paper_circles", *options, "--out", "here", "--no-recording", "--quiet"]) == 0

@@ -105,10 +105,10 @@ def test_what_was_typed_in_is_said_without_control_characters(
 
 
 def test_the_commands_speak_through_what_spells_control_characters_out() -> None:
-    """`say` and `plain` know how; `export` writes a file's content, whose names are a scenario's."""
+    """`say` and `plain` know how."""
     for path in sorted((Path(__file__).parents[3] / "harness" / "cli").glob("*.py")):
         text = path.read_text(encoding="utf-8")
-        assert ("typer.echo(" in text) == (path.name in ("standard_output.py", "export.py")), path.name
+        assert ("typer.echo(" in text) == (path.name == "standard_output.py"), path.name
         assert ("rich.markup" in text) == (path.name == "terminal.py"), path.name
         assert not re.search(r"(?<![\w.])print\(", text), path.name
 
