@@ -189,17 +189,20 @@ def local_workers(number: int) -> Iterator[Workers]:
 
 
 @contextmanager
-def dask_workers(address: str) -> Iterator[Workers]:
+def dask_workers(address: str, unencrypted: bool = False) -> Iterator[Workers]:
     """The workers of a Dask cluster, as many as there are at any time.
 
     A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given
-    up.
+    up. Scheduler and workers are trusted: Dask sends pickles, which run code, in both directions.
 
     Args:
-        address: of the scheduler, as tcp://127.0.0.1:8786.
+        address: of the scheduler, as tcp://127.0.0.1:8786 or tls://host:8786.
+        unencrypted: whether an address beyond this machine may lead there without TLS, where whoever can change
+            what is sent can run code on both ends.
 
     Raises:
-        InputError: Dask is not installed, no scheduler answers, or a worker has other versions than we.
+        InputError: the address leads beyond this machine without TLS and may not, Dask is not installed, no
+            scheduler answers, or a worker has other versions than we.
     """
     try:
         from distributed import Client
@@ -207,6 +210,11 @@ def dask_workers(address: str) -> Iterator[Workers]:
         raise InputError("wayproof: --scheduler needs Dask; pip install 'wayproof[cluster]'") from error
     for logger in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(logger).setLevel(logging.CRITICAL)
+    if not unencrypted and _is_open(address):
+        raise InputError(
+            f"wayproof: {address} leads beyond this machine without encryption: whoever can change what is sent can "
+            "run code here; give tls://HOST:PORT, or --unencrypted in a network that is trusted"
+        )
     try:
         _knock(address)
         client: Any = Client(address, timeout=CONNECT_S, set_as_default=False)
@@ -234,6 +242,31 @@ def _knock(address: str) -> None:
     scheme, place = parse_address(address)
     if scheme in ("tcp", "tls"):
         socket.create_connection(parse_host_port(place, SCHEDULER_PORT), CONNECT_S).close()
+
+
+def _is_open(address: str) -> bool:
+    """Whether an address leads beyond this machine, as far as it is one, without TLS."""
+    from distributed.comm.addressing import parse_address, parse_host_port
+
+    try:
+        scheme, place = parse_address(address)
+        if scheme in ("tls", "wss", "inproc"):
+            return False
+        host, _ = parse_host_port(place, SCHEDULER_PORT)
+        found = socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)
+    except (OSError, ValueError):  # nobody is there: who knocks finds out
+        return False
+    return not all(_is_ours(family, place) for family, *_, place in found)
+
+
+def _is_ours(family: int, place: tuple[Any, ...]) -> bool:
+    """Whether an IP address is one of this machine: only those can be bound."""
+    try:
+        with socket.socket(family, socket.SOCK_STREAM) as own:
+            own.bind((place[0], 0, *place[2:]))
+    except OSError:
+        return False
+    return True
 
 
 class DaskWorkers:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,6 +14,7 @@ from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
     from harness.campaign.runs import CampaignRuns
+    from harness.campaign.workers import Workers
 
 
 def _campaigns(incomplete: str) -> list[str]:
@@ -34,8 +36,15 @@ def sweep(
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Of a Dask cluster that flies instead, as tcp://HOST:8786."),
+        typer.Option(
+            metavar="ADDRESS",
+            help="Of a Dask cluster that flies instead, as tls://HOST:8786; trusted with running code here.",
+        ),
     ] = None,
+    unencrypted: Annotated[
+        bool,
+        flag("--unencrypted", "Let --scheduler lead beyond this machine without TLS, in a trusted network."),
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="The campaign's folder. Default: runs/NAME.")
     ] = None,
@@ -60,8 +69,11 @@ def sweep(
     """
     if scheduler and workers:
         raise typer.BadParameter("--workers goes with this machine, --scheduler with a cluster; give one")
+    if unencrypted and not scheduler:
+        raise typer.BadParameter("--unencrypted goes with --scheduler")
     from harness.campaign.report import write_summary
     from harness.campaign.summary import summarise
+    from harness.campaign.workers import dask_workers, local_workers
     from harness.cli.campaign_terminal import print_summary
     from harness.scenario.shipped import campaign_path
 
@@ -70,7 +82,10 @@ def sweep(
         _print_runs(runs, as_json)
         return 0
     folder = out or Path("runs") / runs.campaign.name
-    told = _fly(runs, folder, workers or os.cpu_count() or 1, scheduler, resume=resume, silent=quiet)
+    flyers = (
+        dask_workers(scheduler, unencrypted) if scheduler else local_workers(workers or os.cpu_count() or 1)
+    )
+    told = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)
     page = write_summary(summary, folder)
     if as_json:
@@ -95,20 +110,19 @@ def checked(path: Path) -> CampaignRuns:
 
 
 def _fly(
-    runs: CampaignRuns, path: Path, workers: int, scheduler: str | None, *, resume: bool, silent: bool
+    runs: CampaignRuns, path: Path, workers: AbstractContextManager[Workers], *, resume: bool, silent: bool
 ) -> dict[str, int]:
     """Flies what is missing; returns how many runs ended how."""
     from contextlib import nullcontext
 
     from harness.campaign.folder import INDEX, CampaignFolder
     from harness.campaign.sweep import sweep as fly_missing
-    from harness.campaign.workers import dask_workers, local_workers
     from harness.cli.sweep_terminal import sweep_bar
     from harness.files.errors import RunFolderError
 
     try:
         with (
-            dask_workers(scheduler) if scheduler else local_workers(workers) as flyers,
+            workers as flyers,
             CampaignFolder(path, runs, resume=resume) as folder,
             nullcontext() if silent else sweep_bar(len(runs), len(folder.done)) as report,
         ):

@@ -134,6 +134,37 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
     assert results(out) == whole
 
 
+def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """192.0.2.1 is an address for documentation (RFC 5737): nobody's, so not of this machine."""
+    out = place / "out"
+
+    def knocked(address: str) -> None:
+        raise OSError
+
+    monkeypatch.setattr("harness.campaign.workers._knock", knocked)
+
+    def said(*arguments: str) -> str:
+        assert main(["sweep", str(place / "campaign.yaml"), "--out", str(out), *arguments]) == 2
+        assert not out.exists()
+        return capsys.readouterr().err
+
+    for address in ("tcp://192.0.2.1:8786", "192.0.2.1", "ws://192.0.2.1:8786", "tcp://[2001:db8::1]:8786"):
+        assert said("--scheduler", address).startswith(
+            f"wayproof: {address} leads beyond this machine without encryption"
+        )
+        assert "no Dask scheduler answers" in said("--scheduler", address, "--unencrypted")
+    for address in (
+        "tls://192.0.2.1:8786",
+        "tcp://localhost:1",
+        "127.0.0.1:1",
+        f"tcp://{socket.gethostname()}:1",
+    ):
+        assert "no Dask scheduler answers" in said("--scheduler", address)
+    assert "--unencrypted goes with --scheduler" in said("--unencrypted")
+
+
 def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     begun = time.monotonic()
     address = f"tcp://{LOCAL}:{free_port()}"
