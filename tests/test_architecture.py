@@ -38,6 +38,10 @@ ALLOWED = {
         "foxglove_schemas_protobuf",
         "mcap_protobuf",
         "distributed",
+        "PIL",
+        "rasterio",
+        "osmium",
+        "pyogrio",
         "planner",
         "aircraft",
     },
@@ -55,7 +59,17 @@ ONLY_IN = {
         "harness/campaign/paired.py",
         "harness/campaign/summary.py",
         "harness/falsify/search.py",
+        "harness/world_files/free_room.py",
     ),
+    "pyproj": (
+        "harness/scenario/checks.py",
+        "harness/world_files/plane.py",
+        "harness/world_files/readers/rings.py",
+    ),
+    "PIL": ("harness/world_files/readers/*.py",),
+    "rasterio": ("harness/world_files/readers/geotiff.py",),
+    "osmium": ("harness/world_files/readers/osm.py",),
+    "pyogrio": ("harness/world_files/readers/vector.py",),
     "distributed": ("harness/campaign/workers.py",),
     "mcap_protobuf": ("harness/run_files/exports/recordings.py",),
     "foxglove_schemas_protobuf": ("harness/run_files/exports/recordings.py",),
@@ -81,6 +95,10 @@ LATE = {
     "fastkml": (),
     "mcap_protobuf": (),
     "foxglove_schemas_protobuf": (),
+    "PIL": (),
+    "rasterio": (),
+    "osmium": (),
+    "pyogrio": (),
 }
 
 LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
@@ -106,6 +124,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("world",),
         ("mapping",),
         ("scenario",),
+        ("world_files",),
         ("files",),
     ),
     "planner": (

@@ -25,6 +25,7 @@ from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
 from harness.cli.review import report, view
 from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
 from harness.cli.sweep import sweep
+from harness.cli.world import world
 from harness.flight.signals import taken_as_interrupt
 
 INTERRUPTED: Final = 130
@@ -32,7 +33,21 @@ COMPLETION: Final = "_WAYPROOF_COMPLETE"
 """The variable by which a shell asks for completions, which typer ends with sys.exit."""
 
 app = typer.Typer(cls=Group, pretty_exceptions_enable=False)
-for command in (fly, check, compare, sweep, falsify, validate, schema, view, report, export, bench, envelope):
+for command in (
+    fly,
+    check,
+    world,
+    compare,
+    sweep,
+    falsify,
+    validate,
+    schema,
+    view,
+    report,
+    export,
+    bench,
+    envelope,
+):
     app.command(cls=Command)(command)
 app.command("list", cls=Command)(list_names)
 

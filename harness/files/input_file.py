@@ -6,7 +6,7 @@ import json
 import os
 import stat
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 
 MAX_JSON_BYTES: Final = 16_000_000
 
@@ -35,12 +35,8 @@ def read_text(path: Path, max_bytes: int, what: str) -> str:
         InputError: it cannot be opened, is not a regular file, is too large or is not UTF-8 text.
     """
     try:
-        with open(path, "rb", opener=_at_once) as file:
-            kind = stat.S_IFMT(os.fstat(file.fileno()).st_mode)
-            if kind != stat.S_IFREG:
-                shown = _KINDS.get(kind, "something else")
-                raise InputError(f"{path}: is {shown}, not a file; give the path of a file")
-            data = file.read(max_bytes + 1)
+        with open_regular(path) as file:
+            data: bytes = file.read(max_bytes + 1)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -57,6 +53,22 @@ def read_text(path: Path, max_bytes: int, what: str) -> str:
         raise InputError(
             f"{path}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
         ) from error
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Opens a regular file for reading, without ever waiting for who writes a pipe.
+
+    Raises:
+        InputError: it is not a regular file.
+        OSError: it cannot be opened.
+    """
+    file: BinaryIO = open(path, "rb", opener=_at_once)  # noqa: SIM115 - handed on
+    kind = stat.S_IFMT(os.fstat(file.fileno()).st_mode)
+    if kind != stat.S_IFREG:
+        file.close()
+        shown = _KINDS.get(kind, "something else")
+        raise InputError(f"{path}: is {shown}, not a file; give the path of a file")
+    return file
 
 
 def read_index(path: Path, schema: str, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any] | None:

@@ -79,7 +79,11 @@ def _outline(area: Area) -> Iterator[Point]:
 
 
 def check_start_and_goal(
-    area: Area, obstacles: Sequence[Obstacle], mission: MissionSpec, clearance_m: float
+    area: Area,
+    obstacles: Sequence[Obstacle],
+    mission: MissionSpec,
+    clearance_m: float,
+    names: Sequence[str],
 ) -> None:
     """Start and goal lie in the area and, as far as it can be told, clear of obstacles.
 
@@ -91,6 +95,7 @@ def check_start_and_goal(
         obstacles: all of them.
         mission: start and goal.
         clearance_m: wanted distance from obstacle edges.
+        names: what messages call each obstacle.
 
     Raises:
         KeyFault: one of them does not.
@@ -117,7 +122,7 @@ def check_start_and_goal(
                 where = f"{distance_m:.6g} m from" if distance_m > 0 else "inside"
                 raise KeyFault(
                     ("mission", name),
-                    f"lies {where} obstacles[{index}]; must be {clearance_m:g} m (planner.clearance_m) away",
+                    f"lies {where} {names[index]}; must be {clearance_m:g} m (planner.clearance_m) away",
                 )
 
 
@@ -128,5 +133,6 @@ def distance_to(obstacle: Obstacle, point: Point) -> float:
     assert obstacle.polygon
     import shapely
 
-    polygon, place = shapely.Polygon(obstacle.polygon.vertices_m), shapely.Point(point)
-    return float(shapely.distance(polygon, place) or -shapely.distance(polygon.exterior, place))
+    polygon = shapely.Polygon(obstacle.polygon.vertices_m, obstacle.polygon.holes_m)
+    place = shapely.Point(point)
+    return float(shapely.distance(polygon, place) or -shapely.distance(polygon.boundary, place))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Literal
 
-from pydantic import ConfigDict, FailFast, Strict, field_validator, model_validator
+from pydantic import ConfigDict, FailFast, Field, Strict, field_validator, model_validator
 
 from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity, key
+
+Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
 class Circle(Section):
@@ -15,6 +17,10 @@ class Circle(Section):
 
     center_m: Point = key("Centre: east, north.", unit="m")
     radius_m: float = key("Radius.", unit="m", gt=0, le=MAX_COORDINATE_M)
+
+
+Ring = Annotated[tuple[Point, ...], Strict(False)]
+Rings = Annotated[tuple[Ring, ...], Strict(False)]
 
 
 class Polygon(Section):
@@ -26,42 +32,137 @@ class Polygon(Section):
         unit="m",
         min_length=3,
     )
+    holes_m: Rings | None = key(
+        "Rings inside the shape, in either direction, within which it is free. Default: none.",
+        unit="m",
+        default=None,
+    )
 
     @field_validator("vertices_m")
     @classmethod
     def _enclose_an_area(cls, vertices_m: tuple[Point, ...]) -> tuple[Point, ...]:
+        return _ring(vertices_m)
+
+    @field_validator("holes_m")
+    @classmethod
+    def _are_rings(
+        cls, holes_m: tuple[tuple[Point, ...], ...] | None
+    ) -> tuple[tuple[Point, ...], ...] | None:
+        rings = []
+        for number, hole in enumerate(holes_m or ()):
+            try:
+                rings.append(_ring(hole))
+            except ValueError as error:
+                raise ValueError(f"hole {number} {error}") from error
+        return tuple(rings) or None
+
+    @model_validator(mode="after")
+    def _has_its_holes_inside(self) -> Polygon:
         import shapely
 
-        ring = tuple(vertex for vertex, _ in itertools.groupby(vertices_m))
-        if len(ring) > 1 and ring[0] == ring[-1]:
-            ring = ring[:-1]
-        if len(ring) < 3:
-            raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
-        shape = shapely.Polygon(ring)
-        if shape.convex_hull.area == 0:
-            raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
-        if not shape.is_valid:
-            where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
-            raise ValueError(
-                f"crosses or touches itself at ({where}); give the vertices in order round the shape"
-            )
-        return ring
+        if self.holes_m:
+            shape = shapely.Polygon(self.vertices_m, self.holes_m)
+            if not shape.is_valid:
+                what, _, where = shapely.is_valid_reason(shape).partition("[")
+                raise ValueError(
+                    f"has holes_m that lie outside of it, cross or touch ({what.lower()} at "
+                    f"({where.rstrip(']').replace(' ', ', ')})); each hole must lie inside, apart from the others"
+                )
+        return self
+
+
+def _ring(points: Sequence[Point]) -> tuple[Point, ...]:
+    """A ring without repeated vertices, its first one not given again at the end."""
+    import shapely
+
+    ring = tuple(point for index, point in enumerate(points) if not index or point != points[index - 1])
+    ring = ring[:-1] if len(ring) > 1 and ring[0] == ring[-1] else ring
+    if len(ring) < 3:
+        raise ValueError(f"has {len(ring)} distinct vertices; must be at least 3")
+    shape = shapely.Polygon(ring)
+    if shape.convex_hull.area == 0:
+        raise ValueError("encloses no area: its vertices lie on one line; must be a polygon")
+    if not shape.is_valid:
+        where = shapely.is_valid_reason(shape).partition("[")[2].rstrip("]").replace(" ", ", ")
+        raise ValueError(
+            f"crosses or touches itself at ({where}); give the vertices in order round the shape"
+        )
+    return ring
+
+
+KindName = Literal[
+    "geotiff", "ascii_grid", "srtm", "numpy_dem", "osm", "osm_pbf", "cityjson", "geojson", "kml", "openair", "ed269",
+    "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai", "gazebo_world", "vector"
+]  # fmt: skip
+
+
+class WorldFile(Section):
+    """What of a file of terrain, buildings, airspace, fences or occupancy is solid at the mission's altitude."""
+
+    path: str = key("The file, from the scenario's folder or from here.", min_length=1, max_length=1000)
+    kind: KindName | None = key("Its kind. Default: told from the file.", default=None)
+    vertical_clearance_m: float = key(
+        "A part is an obstacle where it reaches into the band of so much below and above mission.altitude_m.",
+        unit="m",
+        default=10.0,
+        ge=0,
+        le=10_000,
+    )
+    metres_per_cell: float | None = key(
+        "Side of a cell of an occupancy map, or of a grid that names no place on earth. Default: as the file says, "
+        "else 1 m.",
+        unit="m",
+        default=None,
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
+    shift_m: Annotated[tuple[Shift, Shift], Strict(False)] = key(
+        "East and north, added to the metres of a file that names no place on earth.",
+        unit="m",
+        default=(0.0, 0.0),
+    )
+    crs: str | None = key(
+        "Coordinate reference system of a file that names none, as EPSG:28992. Default: as the file says.",
+        default=None,
+        min_length=1,
+        max_length=200,
+    )
+    tolerance_m: float | None = key(
+        "Notches of outlines up to so deep are filled. Default: a cell of a raster, else 0.1 m.",
+        unit="m",
+        default=None,
+        ge=0,
+        le=10_000,
+    )
+    holes: Literal["keep", "fill", "flyable"] = key(
+        "Holes of solid parts: kept, filled, or kept where a circle of the turn radius and planner.clearance_m fits.",
+        default="keep",
+    )
+    nodata: Literal["solid", "free"] = key("What cells of terrain without a height are.", default="solid")
+    unknown: Literal["occupied", "free"] = key("What unknown cells of an occupancy map are.", default="free")
+    default_height_m: float = key(
+        "Height of a building that gives neither height nor levels.", unit="m", default=6.0, ge=0, le=1000
+    )
+    ground_m: float | None = key(
+        "Height above mean sea level of flat ground, for heights above ground where no terrain is known. Default: "
+        "0 below buildings; zones with limits above ground are refused.",
+        unit="m",
+        default=None,
+        ge=-1000,
+        le=9000,
+    )
 
 
 class Obstacle(Section):
-    """One obstacle, unknown to the planner until sensed: a circle or a polygon."""
+    """One obstacle, unknown to the planner until sensed: a circle, a polygon, or what a file holds."""
 
     model_config = ConfigDict(
-        json_schema_extra={
-            "oneOf": [
-                {"required": ["circle"], "not": {"required": ["polygon"]}},
-                {"required": ["polygon"], "not": {"required": ["circle"]}},
-            ]
-        }
+        json_schema_extra={"oneOf": [{"required": [shape]} for shape in ("circle", "polygon", "file")]}
     )
 
     circle: Circle | None = key("Its shape, if it is round.", default=None)
     polygon: Polygon | None = key("Its shape, if it has corners.", default=None)
+    file: WorldFile | None = key("A file: what of it is solid at the mission's altitude.", default=None)
     velocity_mps: Velocity | None = key(
         "Moves in a straight line: east, north; as its shape says at active_s[0]. Default: it stands still.",
         unit="m/s",
@@ -75,9 +176,12 @@ class Obstacle(Section):
 
     @model_validator(mode="after")
     def _has_one_shape(self) -> Obstacle:
-        if (self.circle is None) == (self.polygon is None):
-            have = "neither" if self.circle is None else "both"
-            raise ValueError(f"has {have} of circle and polygon; must have exactly one")
+        have = [name for name in ("circle", "polygon", "file") if getattr(self, name) is not None]
+        if len(have) != 1:
+            which = f"both of {' and '.join(have)}" if have else "neither of circle, polygon and file"
+            raise ValueError(f"has {which}; must have exactly one")
+        if self.file and self.velocity_mps:
+            raise ValueError("is a file with velocity_mps; what a file holds stands still")
         return self
 
     @field_validator("active_s")

@@ -19,6 +19,8 @@ from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node
 from harness.files.yaml_pieces import dump_in_pieces
 from harness.scenario import planner_keys
 from harness.scenario.checks import check_local_plane, check_start_and_goal
+from harness.scenario.files_resolved import plane_point, resolved
+from harness.scenario.ground import GroundSpec, SourceSpec
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.sections import (
     AircraftSpec,
@@ -58,6 +60,12 @@ class Scenario(Section):
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(
         "Unknown to the planner until sensed.", default=()
     )
+    ground: GroundSpec | None = key(
+        "The true ground. Default: that of terrain files among the obstacles.", default=None
+    )
+    sources: Annotated[tuple[SourceSpec, ...], Strict(False)] | None = key(
+        "Files that obstacles and ground were made of. Default: none.", default=None
+    )
     mission: MissionSpec = key("From where to where.")
     aircraft: AircraftSpec = key("What flies.", default_factory=AircraftSpec)
     sensor: Sensor = key("What it senses with.", default_factory=Sensor)
@@ -70,7 +78,9 @@ class Scenario(Section):
     @model_validator(mode="after")
     def _complete(self, info: ValidationInfo) -> Scenario:
         """Fills in derived defaults, each after those it depends on, and checks across sections."""
-        found = model_or_folder(self.aircraft.model, (info.context or {}).get("folder"))
+        folder = (info.context or {}).get("folder")
+        self._place_ends()
+        found = model_or_folder(self.aircraft.model, folder)
         object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))
         self._set("aircraft", airspeed_mps=_cruise_mps(self.aircraft))
         performance = performance_of(self)
@@ -94,10 +104,29 @@ class Scenario(Section):
             load_factor=_limit_load_factor(self.aircraft),
         )
         check_local_plane(self.area)
+        names = self._expand_files(radius_m, folder)
         if (info.context or {}).get("ends_checked", True):
-            check_start_and_goal(self.area, self.obstacles, self.mission, self.planner.clearance_m)
+            check_start_and_goal(self.area, self.obstacles, self.mission, self.planner.clearance_m, names)
         object.__setattr__(self, "planner", planner_keys.resolved(self.planner, mission_of(self)))
         return self
+
+    def _place_ends(self) -> None:
+        """Puts start and goal that are given in degrees into the plane."""
+        ends = {name: getattr(self.mission, name) for name in ("start", "goal")}
+        given = {f"{name}_m": plane_point(place, self.area) for name, place in ends.items() if place}
+        if given:
+            update = {"start": None, "goal": None, **given}
+            object.__setattr__(self, "mission", self.mission.model_copy(update=update))
+
+    def _expand_files(self, turn_radius_m: float, folder: Path | None) -> tuple[str, ...]:
+        """Makes obstacles and ground of files; returns what messages call each obstacle."""
+        room_m = turn_radius_m + self.planner.clearance_m
+        found = resolved(self.obstacles, self.area, self.ground, self.mission.altitude_m, room_m, folder)
+        if found.sources:
+            object.__setattr__(self, "obstacles", found.obstacles)
+            object.__setattr__(self, "ground", found.ground)
+            object.__setattr__(self, "sources", (*(self.sources or ()), *found.sources))
+        return found.names
 
     def _cross_track_m(self, tracking_error_m: float) -> float:
         return max(0.1 * self.planner.clearance_m, 2.0 * tracking_error_m)
@@ -125,18 +154,21 @@ def load_scenario(path: Path, overrides: Sequence[tuple[str, str]] = ()) -> Scen
     return validated(overridden(root, overrides), str(path), path.parent)
 
 
-def parse_scenario(text: str, source: str = "scenario", ends_checked: bool = True) -> Scenario:
+def parse_scenario(
+    text: str, source: str = "scenario", ends_checked: bool = True, folder: Path | None = None
+) -> Scenario:
     """Reads a scenario from text.
 
     Args:
         text: YAML.
         source: what faults name it.
         ends_checked: start and goal must keep the clearance; False for a scenario that a path was checked in.
+        folder: files that it names are looked for there first.
 
     Raises:
         InputError: it is not a scenario.
     """
-    return validated(strict_yaml.parse(text, source), source, ends_checked=ends_checked)
+    return validated(strict_yaml.parse(text, source), source, folder, ends_checked=ends_checked)
 
 
 def node_of_keys(keys: Mapping[str, Any]) -> Node:
@@ -241,7 +273,7 @@ def validated(root: Node, source: str, folder: Path | None = None, ends_checked:
     Args:
         root: its keys.
         source: what faults name it.
-        folder: where the folder of an aircraft is sought first.
+        folder: where the folder of an aircraft, and files of obstacles, are sought first.
         ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
 
     Raises:

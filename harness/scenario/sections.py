@@ -10,10 +10,12 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, field_validator, model_validator
 
+from harness.scenario.validation import KeyFault
+
 SIMULATION_RATE_HZ: Final = 120
 """Integration steps per simulated second; every other rate must divide it."""
 MAX_COORDINATE_M: Final = 1e6
-ALTITUDES_M: Final = (50, 20_000)
+ALTITUDES_M: Final = (5, 20_000)
 
 
 def key(
@@ -84,14 +86,31 @@ class Area(Section):
         return bounds_m
 
 
+class Geodetic(Section):
+    """A place on the WGS84 ellipsoid."""
+
+    latitude_deg: float = key("Geodetic latitude.", unit="deg", ge=-85, le=85)
+    longitude_deg: float = key("Longitude.", unit="deg", ge=-180, le=180)
+
+
 class MissionSpec(Section):
     """From where to where."""
 
-    start_m: Point = key("Start: east, north.", unit="m")
+    model_config = ConfigDict(
+        json_schema_extra={
+            "allOf": [
+                {"oneOf": [{"required": [end]}, {"required": [f"{end}_m"]}]} for end in ("start", "goal")
+            ]
+        }
+    )
+
+    start: Geodetic | None = key("Start by latitude and longitude, in place of start_m.", default=None)
+    start_m: Point = key("Start: east, north.", unit="m", derived="where start lies")
     course_deg: float = key(
         "Course over the ground at the start.", unit="deg", derived="towards the goal", ge=0, le=360
     )
-    goal_m: Point = key("Goal: east, north.", unit="m")
+    goal: Geodetic | None = key("Goal by latitude and longitude, in place of goal_m.", default=None)
+    goal_m: Point = key("Goal: east, north.", unit="m", derived="where goal lies")
     goal_radius_m: float = key(
         "Reached = the aircraft is inside this circle.",
         unit="m",
@@ -113,6 +132,16 @@ class MissionSpec(Section):
         gt=0,
         le=1e7,
     )
+
+    @model_validator(mode="after")
+    def _has_each_end_once(self) -> MissionSpec:
+        for name in ("start", "goal"):
+            given, metres = getattr(self, name), getattr(self, f"{name}_m")
+            if given is not None and metres is not None:
+                raise KeyFault((name,), f"is given beside {name}_m; must be one of them")
+            if given is None and metres is None:
+                raise KeyFault((f"{name}_m",), f"is missing; it is required, or {name} in degrees")
+        return self
 
 
 class AircraftSpec(Section):

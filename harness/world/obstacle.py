@@ -58,20 +58,28 @@ class Circle:
 
 @dataclass(frozen=True)
 class Polygon:
-    """A simple polygon, convex or not, of either orientation. The last vertex joins the first.
+    """A simple polygon, convex or not, of either orientation. The last vertex of a ring joins the first.
 
     Attributes:
         vertices_m: (east, north) of each vertex.
+        holes_m: rings inside of it within which it is free, each as `vertices_m`.
 
     Raises:
         ValueError: fewer than three vertices, or a number is not finite.
     """
 
     vertices_m: tuple[tuple[float, float], ...]
+    holes_m: tuple[tuple[tuple[float, float], ...], ...] = ()
 
     def __post_init__(self) -> None:
-        if len(self.vertices_m) < 3 or not np.isfinite(self.vertices_m).all():
-            raise ValueError(f"a polygon needs at least three finite vertices; got {self}")
+        for ring in self.rings_m:
+            if len(ring) < 3 or not np.isfinite(ring).all():
+                raise ValueError(f"a polygon needs at least three finite vertices a ring; got {self}")
+
+    @property
+    def rings_m(self) -> tuple[tuple[tuple[float, float], ...], ...]:
+        """Its outline and then its holes."""
+        return self.vertices_m, *self.holes_m
 
     @property
     def rounded_box(self) -> tuple[float, float, float, float, float]:
@@ -82,9 +90,9 @@ class Polygon:
 
     @cached_property
     def edges_m(self) -> FloatArray:
-        """(4, e) edges: start east, start north, end east, end north. Each ends where the next one starts."""
-        vertices = np.array(self.vertices_m, dtype=np.float64)
-        edges = np.hstack((vertices, np.roll(vertices, -1, axis=0)))
+        """(4, e) edges: start east, start north, end east, end north. Each ends where the next of its ring starts."""
+        rings = [np.array(ring, dtype=np.float64) for ring in self.rings_m]
+        edges = np.vstack([np.hstack((ring, np.roll(ring, -1, axis=0))) for ring in rings])
         edges_m: FloatArray = edges[(edges[:, :2] != edges[:, 2:]).any(axis=1)].T.copy()
         edges_m.setflags(write=False)
         return edges_m
@@ -92,7 +100,7 @@ class Polygon:
     def distance(self, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
         """(k,) distances from points to the nearest edge, negative inside.
 
-        Inside is told by counting the edges that a ray crosses (Haines, Graphics Gems IV, 1994, I.4).
+        Inside is told by counting the edges that a ray crosses, holes included (Haines, Graphics Gems IV, 1994, I.4).
         """
         rows = max(1, _PAIRS_AT_ONCE // self.edges_m.shape[1])
         if len(east_m) > rows:

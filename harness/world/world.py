@@ -50,7 +50,7 @@ class Faces:
     Attributes:
         circles_m: (3, c): centre east, centre north, radius.
         edges_m: (4, e) polygon edges: start east, start north, end east, end north. The end of an edge is,
-            bit for bit, the start of the next one of its polygon.
+            bit for bit, the start of the next one of its ring.
     """
 
     circles_m: FloatArray
@@ -124,7 +124,7 @@ class World:
             if each.circle is not None:
                 shape = Circle(each.circle.center_m, each.circle.radius_m)
             elif each.polygon is not None:
-                shape = Polygon(each.polygon.vertices_m)
+                shape = Polygon(each.polygon.vertices_m, each.polygon.holes_m or ())
             else:
                 raise ValueError(f"an obstacle needs a circle or a polygon; got {each}")
             obstacles.append(Obstacle(shape, each.velocity_mps or (0.0, 0.0), each.active_s))

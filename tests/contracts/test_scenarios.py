@@ -108,6 +108,10 @@ def schema_keys(part: dict[str, Any], defs: dict[str, Any], prefix: str = "") ->
 def test_one_of_everything_has_every_key() -> None:
     schema = scenario_schema()
     written = keys_of(yaml.safe_load(SHIPPED["one_of_everything"].read_text()))
-    assert written == schema_keys(schema, schema["$defs"])
+    instead = {
+        f".mission.{end}{key}" for end in ("start", "goal") for key in ("", ".latitude_deg", ".longitude_deg")
+    }
+    wayproofs_own = {key for key in schema_keys(schema, schema["$defs"]) if key.startswith(".sources")}
+    assert written == schema_keys(schema, schema["$defs"]) - instead - wayproofs_own
     assert ".obstacles.circle.radius_m" in written
     assert ".planner.steps" in written

@@ -384,13 +384,14 @@ def bounded(key: dict[str, Any]) -> bool:
 
 
 def bounded_items(key: dict[str, Any]) -> bool:
-    return "prefixItems" in key and bounded(key)
+    return ("prefixItems" in key or "items" in key) and bounded(key)
 
 
 def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
     schema = scenario_schema()
     keys = described_keys(schema, schema["$defs"])
     holders = {"area", "origin", "obstacles", "circle", "polygon", "mission", "aircraft", "sensor", "planner"}
+    holders |= {"file", "ground", "sources", "start", "goal"}
     values = [
         (name, key)
         for name, key in keys
@@ -407,8 +408,24 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         "goal_m",
         "kind",
         "speed_mps",
+        *("path", "corner_m", "spacing_m", "rows", "columns", "lowest_m", "heights", "sha256", "polygons"),
+        *("latitude_deg", "longitude_deg"),
     }
-    words = {"schema", "name", "kind", "model", "turn", "intensity", "shape"}
+    words = {
+        "schema",
+        "name",
+        "kind",
+        "model",
+        "turn",
+        "intensity",
+        "shape",
+        "path",
+        "crs",
+        "holes",
+        "nodata",
+        "unknown",
+    }
+    words |= {"heights", "sha256", "notes"}
     assert len(values) > 40
     for name, key in values:
         assert bounded(key), name

@@ -139,7 +139,7 @@ BROKEN = {
         "13: mission.course_deg",
         "is empty; must be a number",
     ),
-    "below ground": ("altitude_m: 300", "altitude_m: 0", "16: mission.altitude_m", "at least 50"),
+    "below ground": ("altitude_m: 300", "altitude_m: 0", "16: mission.altitude_m", "at least 5"),
     "misspelt key": (
         "altitude_m: 300",
         "altitud_m: 300",

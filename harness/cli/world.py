@@ -1,0 +1,240 @@
+"""The command `world`: a scenario from files that people own."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from harness.cli.options import aircraft as aircraft_names
+
+if TYPE_CHECKING:
+    from harness.world_files.siting import Craft, Site
+
+Pair = tuple[float, float]
+
+
+def world(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE...", help="Terrain, buildings, airspace, fences or an occupancy map."),
+    ],
+    altitude_m: Annotated[
+        float, typer.Option("--altitude-m", metavar="H", help="Flight altitude above mean sea level.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="SCENARIO.yaml", help="The scenario that is written.")],
+    aircraft: Annotated[
+        str, typer.Option(metavar="NAME", help="What flies.", autocompletion=aircraft_names)
+    ] = "aerosonde",
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="A,B", help="Latitude,longitude; x,y in metres of a file without a place on earth."
+        ),
+    ] = None,
+    goal: Annotated[str | None, typer.Option(metavar="A,B", help="The same.")] = None,
+    clearance_m: Annotated[
+        float | None, typer.Option("--clearance-m", metavar="C", help="planner.clearance_m.")
+    ] = None,
+    vertical_clearance_m: Annotated[
+        float,
+        typer.Option(
+            "--vertical-clearance-m", metavar="V", help="What reaches so near to the altitude is an obstacle."
+        ),
+    ] = 10.0,
+    metres_per_cell: Annotated[
+        float | None,
+        typer.Option("--metres-per-cell", metavar="M", help="Side of a cell of an occupancy map."),
+    ] = None,
+    ground_m: Annotated[
+        float | None,
+        typer.Option(
+            "--ground-m", metavar="G", help="Flat ground, for heights above ground without terrain."
+        ),
+    ] = None,
+    crs: Annotated[
+        str | None, typer.Option(metavar="EPSG:N", help="Of files that name none, as EPSG:28992.")
+    ] = None,
+) -> int:
+    """Makes a scenario that can be flown from files of terrain, buildings, airspace, fences or occupancy.
+
+    Without --start and --goal they lie far apart in free space with room to turn.
+
+    For example: wayproof world davos.tif --altitude-m 2000 --out davos.yaml
+    """
+    from harness.files.input_file import InputError
+    from harness.world_files.expansion import FileFault, FileSpec
+    from harness.world_files.parts import WorldFileError
+    from harness.world_files.siting import site
+
+    given = _ends(start, goal)
+    craft = _craft(aircraft, clearance_m)
+    specs = [
+        FileSpec(
+            path,
+            vertical_clearance_m=vertical_clearance_m,
+            metres_per_cell=metres_per_cell,
+            ground_m=ground_m,
+            crs=crs,
+        )
+        for path in files
+    ]
+    try:
+        found = site(specs, altitude_m, craft, given, _tell)
+    except FileFault as fault:
+        raise InputError(f"{files[fault.index]}: {fault}") from fault
+    except WorldFileError as error:
+        raise InputError(f"{' '.join(map(str, files))}: {error}") from error
+    keys = _scenario(found, out, aircraft, altitude_m, clearance_m)
+    text = _written(keys, found, [str(each) for each in files], altitude_m)
+    _checked(text, out)
+    _write(out, text)
+    _print(found, out)
+    return 0
+
+
+def _tell(what: str) -> None:
+    typer.echo(f"wayproof: {what}", err=True)
+
+
+def _ends(start: str | None, goal: str | None) -> tuple[Pair, Pair] | None:
+    if (start is None) != (goal is None):
+        raise typer.BadParameter("--start and --goal belong together; give both or none of them")
+    return None if start is None or goal is None else (_pair(start, "--start"), _pair(goal, "--goal"))
+
+
+def _pair(text: str, option: str) -> Pair:
+    match = re.fullmatch(r"\s*([-+\d.eE]+)\s*,\s*([-+\d.eE]+)\s*", text)
+    try:
+        if match:
+            first, second = float(match[1]), float(match[2])
+            if abs(first) < 1e9 and abs(second) < 1e9:
+                return first, second
+    except ValueError:
+        pass
+    raise typer.BadParameter(f"{text[:40]!r} is not A,B; write two numbers, as 46.81,9.85", param_hint=option)
+
+
+def _craft(name: str, clearance_m: float | None) -> Craft:
+    """What the aircraft asks of the area, by the scenario's own defaults."""
+    from harness.scenario.scenario import performance_of, scenario_of
+    from harness.world_files.siting import Craft
+
+    keys: dict[str, Any] = {
+        "schema": "wayproof/scenario/1",
+        "name": "room",
+        "area": {"bounds_m": [0.0, 0.0, 1e6, 1e6]},
+        "mission": {"start_m": [3e5, 3e5], "goal_m": [7e5, 7e5]},
+        "aircraft": {"model": name},
+    }
+    if clearance_m is not None:
+        keys["planner"] = {"clearance_m": clearance_m}
+    empty = scenario_of(keys)
+    return Craft(name, performance_of(empty).turn_radius_m, empty.planner.clearance_m)
+
+
+def _scenario(
+    found: Site, out: Path, aircraft: str, altitude_m: float, clearance_m: float | None
+) -> dict[str, Any]:
+    """The keys of the scenario file."""
+    name = re.sub(r"[^a-z0-9._-]+", "_", out.stem.lower())[:100].strip(".") or "world"
+    area: dict[str, Any] = {"bounds_m": list(found.bounds_m)}
+    if found.place is not None:
+        area["origin"] = {
+            "latitude_deg": found.place.latitude_deg,
+            "longitude_deg": found.place.longitude_deg,
+        }
+    keys: dict[str, Any] = {
+        "schema": "wayproof/scenario/1",
+        "name": name,
+        "area": area,
+        "obstacles": [{"file": _file_keys(spec, out)} for spec in found.specs],
+        "mission": {
+            "start_m": list(found.start_m),
+            "goal_m": list(found.goal_m),
+            "altitude_m": float(altitude_m),
+        },
+        "aircraft": {"model": aircraft},
+    }
+    if clearance_m is not None:
+        keys["planner"] = {"clearance_m": float(clearance_m)}
+    return keys
+
+
+def _file_keys(spec: Any, out: Path) -> dict[str, Any]:
+    """The key `file`, with what differs from its defaults."""
+    from dataclasses import fields
+
+    keys: dict[str, Any] = {"path": os.path.relpath(spec.path.absolute(), out.absolute().parent)}
+    for field in fields(spec):
+        value = getattr(spec, field.name)
+        if field.name == "path" or (value == field.default and field.name != "vertical_clearance_m"):
+            continue
+        keys[field.name] = [round(each, 3) for each in value] if isinstance(value, tuple) else value
+    return keys
+
+
+def _written(keys: dict[str, Any], found: Site, files: Sequence[str], altitude_m: float) -> str:
+    from harness.files.strict_yaml import dump
+
+    names = ", ".join(Path(each).name for each in files)
+    lines = [f"What {names} has at {altitude_m:g} m: made by `wayproof world`."]
+    lines += _notes(found)
+    return "".join(f"# {line}\n" for line in lines) + dump(keys)
+
+
+def _notes(found: Site) -> list[str]:
+    notes = [*found.notes, *found.expanded.notes]
+    for source in found.expanded.sources:
+        notes += [f"{source.spec.path.name}: {note}" for note in source.notes]
+    return [note[:200] for note in notes]
+
+
+def _checked(text: str, out: Path) -> None:
+    """Raises InputError if the scenario could not be flown: start and goal that were given, perhaps."""
+    from harness.files.input_file import InputError
+    from harness.scenario.scenario import parse_scenario
+
+    try:
+        parse_scenario(text, str(out), folder=out.absolute().parent)
+    except InputError as error:
+        first = str(error).splitlines()[0]
+        raise InputError(
+            re.sub(rf"^{re.escape(str(out))}:\d+: ", "wayproof: the scenario would not fly: ", first)
+        ) from error
+
+
+def _write(out: Path, text: str) -> None:
+    from harness.files.input_file import InputError
+    from harness.files.whole_file import replace_text
+
+    try:
+        replace_text(out, text)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror}); give the path of a file") from error
+
+
+def _print(found: Site, out: Path) -> None:
+    import math
+
+    from harness.cli.terminal import print_table
+
+    xmin, ymin, xmax, ymax = found.bounds_m
+    solid = [each for source in found.expanded.sources for each in source.polygons]
+    inside = sum(each.area for each in solid) / ((xmax - xmin) * (ymax - ymin))
+    rows = {
+        "area": f"{(xmax - xmin) / 1e3:.4g} x {(ymax - ymin) / 1e3:.4g} km",
+        "origin": "none: the files name no place on earth"
+        if found.place is None
+        else f"{found.place.latitude_deg:.5f}, {found.place.longitude_deg:.5f}",
+        "obstacles": f"{len(solid):,} polygons, {min(inside, 1.0):.0%} of the area",
+        "start to goal": f"{math.dist(found.start_m, found.goal_m) / 1e3:.4g} km",
+        "ground": "from terrain" if found.expanded.ground is not None else "not known",
+    }
+    for number, note in enumerate(_notes(found), 1):
+        rows[f"note {number}"] = note.replace("[", "\\[")
+    print_table(f"{out}: fly it with `wayproof fly {out}`", rows)

@@ -1,0 +1,145 @@
+"""Opens world files without trust: bounded in size, depth and what they unpack to."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+import zlib
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+from harness.files.input_file import InputError, open_regular
+from harness.world_files.parts import WorldFileError
+
+MAX_BYTES: Final = 400_000_000
+"""Of a file that is read in pieces, or whose numbers take little more room than its bytes."""
+MAX_TREE_BYTES: Final = 64_000_000
+"""Of JSON and XML that is read whole: it takes about ten times the room."""
+
+
+def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
+    """The bytes of a regular file.
+
+    Raises:
+        WorldFileError: it cannot be read or is too large.
+    """
+    try:
+        with open_regular(path) as file:
+            data: bytes = file.read(most + 1)
+    except InputError as error:
+        raise WorldFileError(str(error).removeprefix(f"{path}: ")) from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
+    if len(data) > most:
+        raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it first")
+    return data
+
+
+def head(path: Path, size: int = 65_536) -> bytes:
+    """The first bytes of a regular file."""
+    try:
+        with open_regular(path) as file:
+            first: bytes = file.read(size)
+            return first
+    except InputError as error:
+        raise WorldFileError(str(error).removeprefix(f"{path}: ")) from error
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
+
+
+def text_of(data: bytes) -> str:
+    """Bytes as text: UTF-8, or Latin-1 as older airspace files are."""
+    if b"\0" in data:
+        raise WorldFileError("is not a text file; give a file of one of the kinds that are known")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+def json_of(path: Path) -> Any:
+    """The content of a JSON file; numbers that are not finite are refused.
+
+    Raises:
+        WorldFileError: it is too large or is not JSON.
+    """
+    data = read_bytes(path, MAX_TREE_BYTES)
+
+    def refuse(word: str) -> float:
+        raise WorldFileError(f"has the number {word}; must have finite numbers only")
+
+    try:
+        return json.loads(text_of(data), parse_constant=refuse)
+    except (RecursionError, MemoryError) as error:
+        raise WorldFileError("is nested too deeply; must be a map") from error
+    except ValueError as error:
+        if isinstance(error, WorldFileError):
+            raise
+        line = getattr(error, "lineno", 1)
+        raise WorldFileError(f"is not whole JSON (line {line}); it may be torn: get it again") from error
+
+
+def xml_events(data: bytes, ends_only: bool = True) -> Iterator[tuple[str, ElementTree.Element]]:
+    """Elements of an XML text as they end; whoever reads them clears them.
+
+    Declarations of entities are refused: a few lines of them unpack to gigabytes.
+
+    Raises:
+        WorldFileError: it is not whole XML.
+    """
+    _refuse_entities(data)
+    try:
+        if ends_only:
+            yield from ElementTree.iterparse(BytesIO(data), events=("end",))
+        else:
+            yield from ElementTree.iterparse(BytesIO(data), events=("start", "end"))
+    except ElementTree.ParseError as error:
+        raise WorldFileError(
+            f"is not whole XML (line {error.position[0]}); it may be torn: get it again"
+        ) from error
+
+
+def _refuse_entities(data: bytes) -> None:
+    # Entities can only be declared before the first element.
+    if b"<!DOCTYPE" not in data[:100_000] and b"<!ENTITY" not in data[:100_000]:
+        return
+    parser = expat.ParserCreate()
+
+    def refuse(*_: object) -> None:
+        raise WorldFileError("declares XML entities; must be plain XML")
+
+    parser.EntityDeclHandler = refuse
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise WorldFileError(
+            f"is not whole XML (line {error.lineno}); it may be torn: get it again"
+        ) from error
+
+
+def unzipped(data: bytes, suffixes: tuple[str, ...], most: int) -> tuple[str, bytes]:
+    """Name and bytes of the first file with one of these suffixes in a ZIP archive.
+
+    Raises:
+        WorldFileError: there is none, it is damaged, or it unpacks to more than `most` bytes.
+    """
+    try:
+        with zipfile.ZipFile(BytesIO(data)) as archive:
+            for info in archive.infolist():
+                if info.filename.lower().endswith(suffixes):
+                    with archive.open(info) as member:
+                        inner = member.read(most + 1)
+                    if len(inner) > most:
+                        raise WorldFileError(
+                            f"unpacks to more than {most // 10**6} MB; must be one {' or '.join(suffixes)} file"
+                        )
+                    return Path(info.filename).name, inner
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
+        raise WorldFileError("is a damaged ZIP archive; get it again") from error
+    raise WorldFileError(f"is a ZIP archive without a {' or '.join(suffixes)} file")

@@ -1,0 +1,212 @@
+"""The kinds of world files: told from what stands in a file, each with its reader."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from harness.world_files import bounded
+from harness.world_files.parts import Contents, Reading, WorldFileError
+from harness.world_files.readers import (
+    city_json,
+    ed269,
+    fences,
+    geo_json,
+    geotiff,
+    grids,
+    kml,
+    occupancy,
+    open_air,
+    osm,
+    vector,
+)
+
+Reader = Callable[[Path, Reading], Contents]
+
+KINDS: Final[dict[str, Reader]] = {
+    "geotiff": geotiff.read,
+    "ascii_grid": grids.read_ascii,
+    "srtm": grids.read_srtm,
+    "numpy_dem": grids.read_numpy,
+    "osm": osm.read_xml,
+    "osm_pbf": osm.read_pbf,
+    "cityjson": city_json.read,
+    "geojson": geo_json.read,
+    "kml": kml.read,
+    "openair": open_air.read,
+    "ed269": ed269.read,
+    "ed318": geo_json.read_ed318,
+    "plan_fence": fences.read_plan,
+    "ardupilot_fence": fences.read_ardupilot,
+    "ros_map": occupancy.read_ros,
+    "moving_ai": occupancy.read_moving_ai,
+    "gazebo_world": occupancy.read_gazebo,
+    "vector": vector.read,
+}
+"""Readers by the name of their kind."""
+
+VECTOR_ENDINGS: Final = (".gpkg", ".shp", ".dxf", ".fgb", ".gml", ".tab", ".gdb")
+PACKED: Final = {".hgt": "srtm", ".kml": "kml", "elevation.npy": "numpy_dem"}
+"""What a ZIP archive is by what lies in it."""
+ROOTS: Final = {"osm": "osm", "kml": "kml", "sdf": "gazebo_world", "gazebo": "gazebo_world"}
+"""What an XML file is by its first element."""
+MEANT: Final = {
+    ".pgm": "an image; give the YAML file of its ROS map",
+    ".png": "an image; give the YAML file of its ROS map",
+    ".jpg": "an image; there is nothing in it that could be an obstacle",
+    ".scen": "a list of MovingAI problems; give the .map file that it names",
+    ".npy": "a plain array; save it as ESRI ASCII grid or GeoTIFF",
+    ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
+    ".laz": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
+    ".igc": "a flight, not a world; `wayproof check` takes flown paths",
+    ".gpx": "a track, not a world; `wayproof check` takes paths",
+    ".shx": "part of a Shapefile; give the .shp file",
+    ".dbf": "part of a Shapefile; give the .shp file",
+    ".dt2": "DTED; convert it with gdal_translate to GeoTIFF",
+    ".obj": "a mesh; give CityJSON or GeoJSON of the footprints",
+    ".stl": "a mesh; give CityJSON or GeoJSON of the footprints",
+}
+"""What some files are that are no world file."""
+FAMILIES: Final = (
+    "terrain (GeoTIFF, ESRI ASCII, SRTM .hgt), buildings (OSM XML or PBF, CityJSON, GeoJSON), airspace (GeoJSON, KML, "
+    "OpenAir, ED-269, ED-318), fences (.plan, ArduPilot), occupancy (ROS map_server, MovingAI, Gazebo .world)"
+)
+
+_XML_ROOT: Final = re.compile(rb"<([A-Za-z_][\w.-]*:)?([A-Za-z_][\w.-]*)[\s>/]")
+_PLACES: Final = re.compile(r"\s*[-+]?\d+\.\d+[\s,]+[-+]?\d+\.\d+\s*$")
+
+
+def read(path: Path, kind: str | None, reading: Reading) -> Contents:
+    """Reads a world file.
+
+    Args:
+        path: the file.
+        kind: a name of `KINDS`; None: told from the file.
+        reading: what the file leaves open.
+
+    Raises:
+        WorldFileError: it is of none of the kinds, or cannot be used.
+    """
+    found = kind or kind_of(path)
+    contents = KINDS[found](path, reading)
+    return replace(contents, kind=found, notes=_together(contents.notes))
+
+
+def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
+    """Notes with those that say the same of several parts made one."""
+    same: dict[str, list[str]] = {}
+    for note in notes:
+        name, found, sentence = note.partition(": its ")
+        same.setdefault(f"its {sentence}" if found else note, []).append(name if found else "")
+    return tuple(
+        sentence if not names[0] else f"{names[0]}: {sentence}" if len(names) == 1 else
+        f"{len(names)} parts, {names[0]} the first: {sentence}"
+        for sentence, names in same.items()
+    )  # fmt: skip
+
+
+def kind_of(path: Path) -> str:
+    """The kind of a file, told from what stands in it.
+
+    Raises:
+        WorldFileError: it is of none of them; the message says what would do.
+    """
+    first, ending = bounded.head(path), path.suffix.lower()
+    if not first:
+        raise WorldFileError("is empty; get it again")
+    found = _binary(path, first, ending) or _text(path, first, ending)
+    if found is not None:
+        return found
+    meant = MEANT.get(ending)
+    if meant:
+        raise WorldFileError(f"is {meant}")
+    raise WorldFileError(f"is of no kind that is known; give {FAMILIES}")
+
+
+def _binary(path: Path, first: bytes, ending: str) -> str | None:
+    if first[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
+        return "geotiff"
+    if first[:2] == b"PK":
+        names = _names(path)
+        return next((kind for end, kind in PACKED.items() if any(name.endswith(end) for name in names)), None)
+    if ending == ".hgt" or path.name.lower().endswith(".hgt.gz"):
+        return "srtm"
+    if b"OSMHeader" in first[:64]:
+        return "osm_pbf"
+    return "vector" if ending in VECTOR_ENDINGS else None
+
+
+def _names(path: Path) -> list[str]:
+    import zipfile
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return [name.lower() for name in archive.namelist()[:1000]]
+    except (zipfile.BadZipFile, OSError, ValueError) as error:
+        raise WorldFileError("is a damaged ZIP archive; get it again") from error
+
+
+def _text(path: Path, first: bytes, ending: str) -> str | None:
+    if b"\0" in first:
+        return None
+    start = first.lstrip(b"\xef\xbb\xbf \t\r\n")
+    if start[:1] == b"<":
+        roots = _XML_ROOT.search(start)
+        return ROOTS.get(roots[2].decode("ascii").lower()) if roots else None
+    if start[:1] in b"{[":
+        return _json(path)
+    text = bounded.text_of(first)
+    lines = text.splitlines()[:-1] if len(first) == 65_536 else text.splitlines()
+    lines = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith(("*", "#"))]
+    if not lines:
+        return None
+    words = lines[0].lower().split()
+    if words[0] in ("ncols", "nrows"):
+        return "ascii_grid"
+    if words[0] == "type" and any(line == "map" for line in lines[:6]):
+        return "moving_ai"
+    if lines[0].startswith("QGC WPL"):
+        return "ardupilot_fence"
+    if any(line.startswith("image:") for line in lines) and any(
+        line.startswith("resolution:") for line in lines
+    ):
+        return "ros_map"
+    if any(line.upper().startswith("AC ") for line in lines):
+        return "openair"
+    if len(lines) >= 2 and all(_PLACES.match(line) for line in lines[:20]):
+        return "ardupilot_fence"
+    return None
+
+
+def _json(path: Path) -> str | None:
+    content = bounded.json_of(path)
+    if not isinstance(content, dict):
+        return None
+    if "CityObjects" in content:
+        return "cityjson"
+    if content.get("fileType") == "Plan" or "geoFence" in content:
+        return "plan_fence"
+    if "UASZoneList" in content:
+        return "ed269"
+    features = content.get("features")
+    if isinstance(features, list) and features and isinstance(features[0], dict):
+        geometry = features[0].get("geometry")
+        if isinstance(geometry, list):
+            return "ed269"
+        geometries = [each.get("geometry") for each in features[:50] if isinstance(each, dict)]
+        return "ed318" if any(_layered(each, 0) for each in geometries) else "geojson"
+    geometric = ("FeatureCollection", "Feature", "Polygon", "MultiPolygon", "GeometryCollection")
+    return "geojson" if content.get("type") in geometric else None
+
+
+def _layered(geometry: object, depth: int) -> bool:
+    """Whether a geometry has the layer or extent of ED-318."""
+    if not isinstance(geometry, dict) or depth > 3:
+        return False
+    if isinstance(geometry.get("layer"), dict) or isinstance(geometry.get("extent"), dict):
+        return True
+    inner = geometry.get("geometries")
+    return isinstance(inner, list) and any(_layered(each, depth + 1) for each in inner[:10])

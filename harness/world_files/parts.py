@@ -1,0 +1,142 @@
+"""What a world file holds, whatever its format: solid parts with a height band, terrain, occupied cells.
+
+Heights are metres. Horizontal coordinates are those of the file: x, y in its coordinate reference system (longitude
+before latitude), or metres in a plane of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+WGS84: Final = "EPSG:4326"
+FOOT_M: Final = 0.3048
+LEVEL_M: Final = 3.0
+"""Height of a storey where a file gives storeys only."""
+
+
+class WorldFileError(ValueError):
+    """A world file that cannot be used. The message is one sentence, without the file's name."""
+
+
+class Datum(Enum):
+    """What a height is counted from."""
+
+    SEA = "above mean sea level"
+    GROUND = "above ground"
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """The bottom or the top of a part.
+
+    Attributes:
+        height_m: above the datum; infinite where there is no limit.
+        datum: what it is counted from.
+    """
+
+    height_m: float
+    datum: Datum = Datum.SEA
+
+
+NO_BOTTOM: Final = Limit(-math.inf)
+"""It begins at the ground, or below."""
+NO_TOP: Final = Limit(math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A solid: a footprint between two heights.
+
+    Attributes:
+        footprint: shapely Polygon or MultiPolygon, in the coordinates of the file.
+        bottom: where it begins.
+        top: where it ends.
+        name: for messages.
+        keep_in: the footprint is what is free: all outside is solid (an inclusion fence).
+        rigid: stands level on the ground below it, as a building does; limits above ground of others, those of an
+            airspace, follow the ground.
+    """
+
+    footprint: Any
+    bottom: Limit = NO_BOTTOM
+    top: Limit = NO_TOP
+    name: str = ""
+    keep_in: bool = False
+    rigid: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Raster:
+    """Numbers in rows and columns, the first row on top.
+
+    Attributes:
+        values: (rows, columns) heights above mean sea level (m), NaN where there is none; or, of an occupancy map,
+            1 where a cell is occupied, 0 where it is free, NaN where it is not known.
+        affine: a, b, c, d, e, f: the corner of column i and row j is at x = a i + b j + c, y = d i + e j + f; the
+            value belongs to the middle of a cell.
+    """
+
+    values: FloatArray
+    affine: tuple[float, float, float, float, float, float]
+
+    def places(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """X and y of places given in columns and rows from the upper left corner."""
+        a, b, c, d, e, f = self.affine
+        return a * column + b * row + c, d * column + e * row + f
+
+    def cells(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Columns and rows from the upper left corner of places given as x and y."""
+        a, b, c, d, e, f = self.affine
+        determinant = a * e - b * d
+        return (e * (x - c) - b * (y - f)) / determinant, (a * (y - f) - d * (x - c)) / determinant
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """All that was read from a file.
+
+    Attributes:
+        kind: its format, as `kinds` names it.
+        crs: its coordinate reference system, as pyproj takes it; None: metres in a plane of its own.
+        parts: solids.
+        terrain: heights of the ground.
+        occupied: an occupancy map.
+        notes: what was passed over or assumed, one sentence each.
+    """
+
+    kind: str
+    crs: str | None
+    parts: tuple[Part, ...] = ()
+    terrain: Raster | None = None
+    occupied: Raster | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a file is to be read, where it leaves that open.
+
+    Attributes:
+        metres_per_cell: side of a cell of an occupancy map, or of terrain without a place on earth; None: as the
+            file says.
+        crs: coordinate reference system; None: as the file says.
+        default_height_m: of a building that gives neither height nor levels.
+    """
+
+    metres_per_cell: float | None = None
+    crs: str | None = None
+    default_height_m: float = 2 * LEVEL_M
+
+
+def counted(number: int, what: str) -> str:
+    """`1 part`, `2 parts`."""
+    return f"{number:,} {what}{'' if number == 1 else 's'}"

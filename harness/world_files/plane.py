@@ -1,0 +1,101 @@
+"""From the coordinates of a file to the local ENU plane of a scenario, and back.
+
+pyproj does the work: axis order is always x, y (longitude, latitude), and grid north of a national grid is turned to
+true north at the origin. The plane is the azimuthal equidistant one of `aircraft.frames`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import numpy as np
+
+from harness.world_files.parts import WGS84, FloatArray, WorldFileError
+
+MOST_LATITUDE_DEG: Final = 85.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the local plane of a scenario touches the earth.
+
+    Attributes:
+        latitude_deg: of ENU (0, 0), WGS84.
+        longitude_deg: of ENU (0, 0).
+    """
+
+    latitude_deg: float
+    longitude_deg: float
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """Coordinates of one file in the plane of a scenario.
+
+    Attributes:
+        crs: of the file; None: metres in a plane of its own.
+        place: where the scenario lies.
+        shift_m: east and north that are added to the metres of a file without a CRS.
+    """
+
+    crs: str | None
+    place: Place
+    shift_m: tuple[float, float] = (0.0, 0.0)
+
+    def to_plane(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """East and north of places in the file; not finite where there is none."""
+        if self.crs is None:
+            return x + self.shift_m[0], y + self.shift_m[1]
+        east, north = self._transformer.transform(x, y)
+        return np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)
+
+    def from_plane(self, east: FloatArray, north: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """X and y in the file of places of the plane."""
+        if self.crs is None:
+            return east - self.shift_m[0], north - self.shift_m[1]
+        x, y = self._transformer.transform(east, north, direction="INVERSE")
+        return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+
+    def geometries(self, shapes: Any) -> Any:
+        """Shapely geometries of the file in the plane."""
+        import shapely
+
+        return shapely.transform(
+            shapes, lambda points: np.column_stack(self.to_plane(points[:, 0], points[:, 1]))
+        )
+
+    @cached_property
+    def _transformer(self) -> Any:
+        from pyproj import Transformer
+
+        plane = (
+            f"+proj=aeqd +lat_0={self.place.latitude_deg!r} +lon_0={self.place.longitude_deg!r} +ellps=WGS84"
+        )
+        return Transformer.from_crs(flat_crs(self.crs or WGS84), plane, always_xy=True)
+
+
+def flat_crs(name: str) -> Any:
+    """A coordinate reference system without its vertical part.
+
+    Raises:
+        WorldFileError: there is none of that name.
+    """
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    try:
+        return CRS.from_user_input(name).to_2d()
+    except CRSError as error:
+        raise WorldFileError(
+            f"has the crs {name[:60]!r}, which is not known; give one as EPSG:32632"
+        ) from error
+
+
+def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Latitude and longitude (WGS84, degrees) of places in a file."""
+    from pyproj import Transformer
+
+    longitude, latitude = Transformer.from_crs(flat_crs(crs), WGS84, always_xy=True).transform(x, y)
+    return np.asarray(latitude, dtype=np.float64), np.asarray(longitude, dtype=np.float64)

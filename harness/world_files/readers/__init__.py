@@ -1,0 +1,1 @@
+"""Readers of world files, one module a format."""

@@ -1,0 +1,113 @@
+"""Fences of autopilots: the geoFence of a QGroundControl plan, ArduPilot's fence files old and new.
+
+What is not inside an inclusion fence is solid. PX4 asks to be inside one of several, ArduPilot inside all of them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from harness.world_files.bounded import json_of, read_bytes, text_of
+from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
+from harness.world_files.readers import rings
+
+PX4: Final = 12
+"""`firmwareType` of PX4 in a plan."""
+FENCE_COMMANDS: Final = {5001: True, 5002: False, 5003: True, 5004: False}
+"""MAV_CMD_NAV_FENCE_*: vertex of an inclusion and exclusion polygon, inclusion and exclusion circle."""
+CIRCLES: Final = (5003, 5004)
+
+
+def read_plan(path: Path, reading: Reading) -> Contents:
+    """Reads the geoFence of a QGroundControl plan.
+
+    Raises:
+        WorldFileError: it has none, or it cannot be read.
+    """
+    content = json_of(path)
+    fence = content.get("geoFence") if isinstance(content, dict) else None
+    if not isinstance(fence, dict):
+        raise WorldFileError("has no geoFence; must be a QGroundControl plan with one")
+    found: list[tuple[Any, bool]] = []
+    try:
+        found += [
+            (rings.ring([_turned(each) for each in polygon["polygon"]]), bool(polygon.get("inclusion")))
+            for polygon in fence.get("polygons") or ()
+        ]
+        for one in fence.get("circles") or ():
+            shape = rings.circle(_turned(one["circle"]["center"]), float(one["circle"]["radius"]))
+            found.append((shape, bool(one.get("inclusion"))))
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        if isinstance(error, WorldFileError):
+            raise
+        raise WorldFileError("has a geoFence whose polygons or circles are not whole") from error
+    mission = content.get("mission")
+    any_of = isinstance(mission, dict) and mission.get("firmwareType") == PX4
+    return _contents("plan_fence", found, any_of)
+
+
+def _turned(place: Any) -> rings.Place:
+    return rings.on_earth(float(place[1]), float(place[0]))
+
+
+def read_ardupilot(path: Path, reading: Reading) -> Contents:
+    """Reads an ArduPilot fence: lines of latitude and longitude, the return point first; or a waypoint file.
+
+    Raises:
+        WorldFileError: it cannot be read, or has no fence.
+    """
+    lines = [line.partition("#")[0].split() for line in text_of(read_bytes(path, 10_000_000)).splitlines()]
+    rows = [line for line in lines if line]
+    if rows and rows[0][0] == "QGC":
+        return _contents("ardupilot_fence", _items(rows[1:]), any_of=False)
+    try:
+        places = [rings.on_earth(float(row[1]), float(row[0])) for row in rows if len(row) == 2]
+    except ValueError as error:
+        raise WorldFileError(
+            "has a line that is not latitude and longitude; must be an ArduPilot fence"
+        ) from error
+    if len(places) != len(rows):
+        raise WorldFileError("has a line that is not two numbers; must be an ArduPilot fence")
+    if len(places) < 4:
+        raise WorldFileError(f"has {len(places)} lines; must be a return point and at least three corners")
+    return _contents("ardupilot_fence", [(rings.ring(places[1:]), True)], any_of=False)
+
+
+def _items(rows: list[list[str]]) -> list[tuple[Any, bool]]:
+    """Fences among the items of a waypoint file: four numbers, the fourth the command, four parameters, the place."""
+    found: list[tuple[Any, bool]] = []
+    pending: list[rings.Place] = []
+    for row in rows:
+        try:
+            command, first = int(row[3]), float(row[4])
+            place = rings.on_earth(float(row[9]), float(row[8]))
+        except (ValueError, IndexError) as error:
+            raise WorldFileError("has a line that is no item of a waypoint file") from error
+        if command not in FENCE_COMMANDS:
+            continue
+        if command in CIRCLES:
+            found.append((rings.circle(place, first), FENCE_COMMANDS[command]))
+            continue
+        pending.append(place)
+        if len(pending) >= first:
+            found.append((rings.ring(pending), FENCE_COMMANDS[command]))
+            pending = []
+    return found
+
+
+def _contents(kind: str, fences: list[tuple[Any, bool]], any_of: bool) -> Contents:
+    import shapely
+
+    if any(shape is None for shape, _ in fences):
+        raise WorldFileError("has a fence with fewer than three corners, or without an area")
+    if not fences:
+        raise WorldFileError("has an empty fence; must have at least one polygon or circle")
+    inside = [shape for shape, inclusion in fences if inclusion]
+    if any_of and len(inside) > 1:
+        inside = [shapely.union_all(inside)]
+    parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
+    parts += [Part(shape, name="exclusion fence") for shape, inclusion in fences if not inclusion]
+    return Contents(
+        kind, WGS84, tuple(parts), notes=("a fence has no heights: taken as solid at every altitude",)
+    )

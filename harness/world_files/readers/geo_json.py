@@ -1,0 +1,207 @@
+"""GeoJSON: buildings by their heights, airspace by its limits; ED-318 geozones, which are GeoJSON with layers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from harness.world_files.bounded import json_of
+from harness.world_files.parts import (
+    FOOT_M,
+    NO_BOTTOM,
+    NO_TOP,
+    WGS84,
+    Contents,
+    Datum,
+    Limit,
+    Part,
+    Reading,
+    WorldFileError,
+    counted,
+)
+from harness.world_files.readers import limits, rings
+
+DEEPEST: Final = 8
+FREE: Final = ("NO_RESTRICTION",)
+"""Restrictions of a geozone that forbid nothing."""
+
+
+def read(path: Path, reading: Reading) -> Contents:
+    """Reads the polygons of a GeoJSON file; points and lines are passed over and counted.
+
+    Raises:
+        WorldFileError: it is not GeoJSON, or has no polygon.
+    """
+    content = json_of(path)
+    notes: list[str] = []
+    parts: list[Part] = []
+    passed = guessed = bare = 0
+    for tags, geometry, name in _features(content):
+        for one in _simple(geometry, 0):
+            footprint = footprint_of(one)
+            if footprint is None:
+                passed += 1
+            elif limits.is_building(tags):
+                part, guess = limits.building(tags, footprint, reading, name)
+                guessed += guess
+                parts.append(part)
+            else:
+                bare += not limits.has_limits(tags)
+                bottom, top = limits.limits(tags, notes, name)
+                parts.append(Part(footprint, bottom, top, name=name))
+    if not parts:
+        raise WorldFileError("has no polygon; must be GeoJSON with some")
+    if guessed:
+        notes.append(
+            f"{counted(guessed, 'building')} without height and levels taken as {reading.default_height_m:g} m high"
+            " (default_height_m)"
+        )
+    if bare:
+        notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
+    if passed:
+        notes.append(f"{counted(passed, 'point, line or polygon')} without an area passed over")
+    return Contents("geojson", reading.crs or _crs(content), tuple(parts), notes=tuple(notes))
+
+
+def read_ed318(path: Path, reading: Reading) -> Contents:
+    """Reads ED-318 geozones: a layer, and for a circle an extent, in each geometry.
+
+    Raises:
+        WorldFileError: it is not ED-318, or has no zone.
+    """
+    notes: list[str] = []
+    parts: list[Part] = []
+    passed = free = 0
+    for tags, geometry, name in _features(json_of(path)):
+        if str(tags.get("type", "")).upper() in FREE:
+            free += 1
+            continue
+        for one in _simple(geometry, 0):
+            layer, extent = one.get("layer"), one.get("extent")
+            if isinstance(extent, dict) and one.get("type") == "Point":
+                place = places_of([one.get("coordinates")])[0]
+                footprint = rings.circle(place, radius_of(extent.get("radius")))
+            else:
+                footprint = footprint_of(one)
+            if footprint is None:
+                passed += 1
+                continue
+            bottom, top = _layer(layer if isinstance(layer, dict) else {}, notes, name)
+            parts.append(Part(footprint, bottom, top, name=name))
+    if not parts:
+        raise WorldFileError("has no zone with an area; must be ED-318 with some")
+    if passed:
+        notes.append(f"{counted(passed, 'geometry')} without an area passed over")
+    if free:
+        notes.append(f"{counted(free, 'zone')} without restriction passed over")
+    return Contents("ed318", WGS84, tuple(parts), notes=tuple(notes))
+
+
+def _layer(layer: dict[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
+    feet = str(layer.get("uom", "m")).lower().startswith("f")
+    found: list[Limit | None] = []
+    for word, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
+        value = layer.get(word)
+        found.append(none if value is None else zone_limit(value, str(layer.get(f"{word}Reference")), feet))
+    return limits.band_of(found[0], found[1], notes, name)
+
+
+def zone_limit(value: Any, reference: str, feet: bool) -> Limit | None:
+    """A limit of a geozone: a number, in its own unit, above ground (AGL) or above mean sea level (AMSL, WGS84)."""
+    number = limits.metres_of(value)
+    if number is None:
+        return None
+    datum = Datum.GROUND if reference.upper() in ("AGL", "SFC", "GND") else Datum.SEA
+    if datum is Datum.GROUND and number == 0.0:
+        return NO_BOTTOM
+    return Limit(number * (FOOT_M if feet else 1.0), datum)
+
+
+def radius_of(value: Any) -> float:
+    """A radius in metres.
+
+    Raises:
+        WorldFileError: it is none.
+    """
+    radius = limits.metres_of(value)
+    if radius is None:
+        raise WorldFileError("has a circle without a radius")
+    return radius
+
+
+def _features(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:
+    """Attributes, geometry and name of each feature."""
+    kind = content.get("type") if isinstance(content, dict) else None
+    features = content.get("features") if kind == "FeatureCollection" else [content]
+    if not isinstance(features, list):
+        raise WorldFileError("has no list of features; must be GeoJSON")
+    for feature in features:
+        if not isinstance(feature, dict):
+            raise WorldFileError("has a feature that is no mapping; must be GeoJSON")
+        if feature.get("type") == "Feature":
+            tags = feature.get("properties")
+            tags = tags if isinstance(tags, dict) else {}
+            name = tags.get("name") or tags.get("identifier") or feature.get("id") or ""
+            yield (
+                tags,
+                feature.get("geometry"),
+                (name if isinstance(name, str) else str(tags.get("identifier", "")))[:40],
+            )
+        else:
+            yield {}, feature, ""
+
+
+def _simple(geometry: Any, depth: int) -> Iterator[dict[str, Any]]:
+    """The geometries of a collection, one after the other."""
+    if not isinstance(geometry, dict) or depth > DEEPEST:
+        return
+    if geometry.get("type") == "GeometryCollection":
+        for each in geometry.get("geometries") or ():
+            yield from _simple(each, depth + 1)
+    else:
+        yield geometry
+
+
+def footprint_of(geometry: dict[str, Any]) -> Any:
+    """The area of a Polygon or MultiPolygon; None of anything else, or without one."""
+    import shapely
+
+    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    if kind not in ("Polygon", "MultiPolygon") or not isinstance(coordinates, list):
+        return None
+    shapes = []
+    for polygon in [coordinates] if kind == "Polygon" else coordinates:
+        if not isinstance(polygon, list) or not all(isinstance(ring, list) for ring in polygon):
+            raise WorldFileError("has a polygon whose rings are not lists of positions")
+        closed = [ring for ring in map(places_of, polygon) if len(set(ring)) >= 3]
+        if closed:
+            shapes.append(shapely.Polygon(closed[0], closed[1:]))
+    shapes = [shapely.make_valid(each, method="structure", keep_collapsed=False) for each in shapes]
+    whole = shapes[0] if len(shapes) == 1 else shapely.union_all(shapes)
+    return None if whole.is_empty or whole.area == 0.0 else whole
+
+
+def places_of(positions: list[Any]) -> list[rings.Place]:
+    """First and second number of each position.
+
+    Raises:
+        WorldFileError: one is not two finite numbers.
+    """
+    try:
+        numbers = np.array([(each[0], each[1]) for each in positions], dtype=np.float64).reshape(-1, 2)
+    except (TypeError, ValueError, IndexError, KeyError) as error:
+        raise WorldFileError("has a position that is not two numbers") from error
+    if not np.isfinite(numbers).all():
+        raise WorldFileError("has a position that is not finite")
+    return [(east, north) for east, north in numbers.tolist()]
+
+
+def _crs(content: Any) -> str:
+    """WGS84, unless an older file names another system."""
+    named = content.get("crs") if isinstance(content, dict) else None
+    match = re.search(r"EPSG:+(?:[\d.]*:)?(\d+)", str(named)) if named else None
+    return f"EPSG:{match[1]}" if match else WGS84

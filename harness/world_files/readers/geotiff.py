@@ -1,0 +1,152 @@
+"""Terrain from GeoTIFF: Pillow reads the usual ones, rasterio (`wayproof[maps]`) any.
+
+Tags are those of OGC GeoTIFF 1.1 (OGC 19-008r4).
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from harness.world_files.bounded import read_bytes
+from harness.world_files.parts import Contents, Raster, Reading, WorldFileError
+
+MAX_CELLS: Final = 60_000_000
+"""Half a gigabyte of heights while they are read."""
+PIXEL_SCALE, TIE_POINTS, TRANSFORMATION, GEO_KEYS, NODATA = 33550, 33922, 34264, 34735, 42113
+GEOGRAPHIC_CRS, PROJECTED_CRS, RASTER_TYPE = 2048, 3072, 1025
+USER_DEFINED: Final = 32767
+POINT: Final = 2
+"""Of RASTER_TYPE: a tie point is the middle of a cell, not its corner."""
+MISSING: Final = "rasterio reads it: pip install 'wayproof[maps]'"
+
+
+def read(path: Path, reading: Reading) -> Contents:
+    """Reads a GeoTIFF of one band of heights.
+
+    Raises:
+        WorldFileError: it cannot be read, has no place on earth, or is too large.
+    """
+    try:
+        return _with_pillow(path, reading)
+    except WorldFileError as error:
+        found = _with_rasterio(path, reading)
+        if found is None:
+            raise
+        if isinstance(found, WorldFileError):
+            raise found from error
+        return found
+
+
+def _with_pillow(path: Path, reading: Reading) -> Contents:
+    from PIL import Image
+
+    data = read_bytes(path)
+    try:
+        with Image.open(BytesIO(data), formats=["TIFF"]) as image:
+            columns, rows = image.size
+            check_cells(rows, columns)
+            tags: dict[int, Any] = dict(image.tag_v2)  # type: ignore[attr-defined]
+            if len(image.getbands()) != 1:
+                raise WorldFileError(
+                    f"has {len(image.getbands())} bands; must have one, of heights; {MISSING}"
+                )
+            values = np.asarray(image).astype(np.float64)
+    except WorldFileError:
+        raise
+    except Exception as error:  # Pillow raises many kinds for damaged files
+        raise WorldFileError(
+            f"cannot be read as a TIFF ({str(error)[:80] or type(error).__name__}); {MISSING}"
+        ) from error
+    if values.shape != (rows, columns):
+        raise WorldFileError(f"is a TIFF of mode {image.mode}, not of heights; {MISSING}")
+    nodata = _number(tags.get(NODATA))
+    if nodata is not None:
+        values[values == nodata] = np.nan
+    keys = _geo_keys(tags.get(GEO_KEYS, ()))
+    crs = reading.crs or _crs(keys)
+    affine = _affine(tags, keys.get(RASTER_TYPE) == POINT)
+    return Contents("geotiff", crs, terrain=Raster(plausible(values), affine))
+
+
+def check_cells(rows: int, columns: int) -> None:
+    """Raises WorldFileError if a raster is too large to be read whole."""
+    if rows * columns > MAX_CELLS:
+        raise WorldFileError(
+            f"has {rows} x {columns} cells; must have at most {MAX_CELLS:,}: cut the area of interest out of it"
+        )
+
+
+def plausible(values: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Heights with those that are no height on earth made NaN."""
+    values[~((values > -12_000.0) & (values < 9_000.0))] = np.nan
+    if not np.isfinite(values).any():
+        raise WorldFileError("has no cell with a height between -12000 and 9000 m; must be terrain")
+    return values
+
+
+def _number(text: Any) -> float | None:
+    try:
+        return float(str(text).strip("\0 "))
+    except ValueError:
+        return None
+
+
+def _geo_keys(directory: Any) -> dict[int, int]:
+    """Key -> value of those whose value stands in the directory itself."""
+    entries = [int(each) for each in directory]
+    quads = [entries[i : i + 4] for i in range(4, len(entries) - 3, 4)]
+    return {key: value for key, where, _, value in quads if where == 0}
+
+
+def _crs(keys: dict[int, int]) -> str:
+    for key in (PROJECTED_CRS, GEOGRAPHIC_CRS):
+        code = keys.get(key, 0)
+        if 0 < code < USER_DEFINED:
+            return f"EPSG:{code}"
+    raise WorldFileError(
+        f"names no coordinate reference system by its EPSG number; give crs, as EPSG:32632, or {MISSING}"
+    )
+
+
+def _affine(tags: dict[int, Any], points: bool) -> tuple[float, float, float, float, float, float]:
+    if TRANSFORMATION in tags:
+        m = [float(each) for each in tags[TRANSFORMATION]]
+        affine = (m[0], m[1], m[3], m[4], m[5], m[7])
+    elif PIXEL_SCALE in tags and TIE_POINTS in tags:
+        column, row, _, x, y = (float(each) for each in tags[TIE_POINTS][:5])
+        right, down = (float(each) for each in tags[PIXEL_SCALE][:2])
+        affine = (right, 0.0, x - right * column, 0.0, -down, y + down * row)
+    else:
+        raise WorldFileError(f"says not where it lies (no tie point); {MISSING}")
+    if points:
+        a, b, c, d, e, f = affine
+        affine = (a, b, c - (a + b) / 2, d, e, f - (d + e) / 2)
+    if affine[0] * affine[4] == affine[1] * affine[3] or not np.isfinite(affine).all():
+        raise WorldFileError("has cells of no size; must be a GeoTIFF of terrain")
+    return affine
+
+
+def _with_rasterio(path: Path, reading: Reading) -> Contents | WorldFileError | None:
+    """The same with rasterio; what is wrong with it; or None where there is no rasterio."""
+    try:
+        import rasterio
+        from rasterio.errors import RasterioError
+    except ImportError:
+        return None
+    try:
+        with rasterio.open(path) as source:
+            check_cells(source.height, source.width)
+            band = source.read(1, masked=True)
+            values = np.ma.filled(band.astype(np.float64), np.nan)
+            crs = reading.crs or (source.crs.to_wkt() if source.crs else None)
+            if crs is None:
+                return WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
+            return Contents("geotiff", crs, terrain=Raster(plausible(values), tuple(source.transform)[:6]))
+    except WorldFileError as error:
+        return error
+    except (RasterioError, ValueError, OSError, MemoryError) as error:
+        return WorldFileError(f"cannot be read as a raster ({' '.join(str(error).split())[:120]})")

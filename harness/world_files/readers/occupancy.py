@@ -1,0 +1,223 @@
+"""Occupancy maps: ROS map_server, MovingAI benchmark maps, worlds of the BARN navigation challenge."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, Final
+from xml.etree import ElementTree
+
+import numpy as np
+
+from harness.files import strict_yaml
+from harness.files.input_file import InputError
+from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of, xml_events
+from harness.world_files.parts import Contents, Part, Raster, Reading, WorldFileError, counted
+from harness.world_files.readers.geotiff import check_cells
+
+FREE: Final = frozenset(b".GS")
+"""Ground, ground and shallow water of the MovingAI format (Sturtevant, Benchmarks for grid-based pathfinding, 2012)."""
+BLOCKED: Final = frozenset(b"@OTW")
+"""Out of bounds, trees and deep water."""
+BARN_CELL_M: Final = 0.15
+"""Side of a cell of the BARN worlds: the diameter of their cylinders (Perille et al. 2020)."""
+TALLEST: Final = 1000.0
+
+
+def read_moving_ai(path: Path, reading: Reading) -> Contents:
+    """Reads a MovingAI map; a cell is as large as `metres_per_cell` says, else one metre.
+
+    Raises:
+        WorldFileError: it is not whole.
+    """
+    lines = text_of(read_bytes(path)).splitlines()
+    head = dict(line.split(None, 1) for line in lines[:3] if len(line.split()) == 2)
+    try:
+        rows, columns = int(head["height"]), int(head["width"])
+        begin = next(i for i, line in enumerate(lines[:10]) if line.strip() == "map") + 1
+    except (KeyError, ValueError, StopIteration) as error:
+        raise WorldFileError("has no height, width and `map`; must be a MovingAI map") from error
+    body = [line.rstrip("\r\n").encode("latin-1", "replace") for line in lines[begin : begin + rows]]
+    if len(body) != rows or any(len(line) != columns for line in body) or rows * columns == 0:
+        raise WorldFileError(
+            f"has {len(body)} rows, not all of {columns} cells; must have {rows}: it may be torn"
+        )
+    check_cells(rows, columns)
+    cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
+    strange = set(np.unique(cells).tolist()) - FREE - BLOCKED
+    if strange:
+        raise WorldFileError(f"has the cell {chr(min(strange))!r}; must be one of . G S @ O T W")
+    occupied = np.isin(cells, list(BLOCKED)).astype(np.float64)
+    size = reading.metres_per_cell or 1.0
+    notes = () if reading.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
+    return Contents(
+        "moving_ai", None, occupied=Raster(occupied, _from_corner(0.0, 0.0, size, rows)), notes=notes
+    )
+
+
+def read_ros(path: Path, reading: Reading) -> Contents:
+    """Reads a map of ROS map_server: a YAML file and the image that it names.
+
+    Occupied and free are told as map_server does (mode trinary): p = (255 - grey) / 255, or grey / 255 if `negate`;
+    above `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown.
+
+    Raises:
+        WorldFileError: it is not such a map, or its image cannot be read.
+    """
+    from PIL import Image
+
+    keys = _yaml(path)
+    image_path = path.parent / str(keys.get("image", ""))
+    data = read_bytes(image_path)
+    try:
+        with Image.open(_stream(data), formats=["PPM", "PNG", "BMP", "JPEG"]) as image:
+            check_cells(image.height, image.width)
+            grey = np.asarray(image.convert("L"), dtype=np.float64)
+            alpha = np.asarray(image.getchannel("A")) if "A" in image.getbands() else None
+    except WorldFileError:
+        raise
+    except Exception as error:  # Pillow raises many kinds for damaged files
+        raise WorldFileError(
+            f"names the image {image_path.name}, which cannot be read ({str(error)[:80]})"
+        ) from error
+    size = _positive(keys, "resolution")
+    origin = keys.get("origin", (0.0, 0.0, 0.0))
+    if not (isinstance(origin, tuple) and len(origin) >= 2 and all(_is_number(each) for each in origin)):
+        raise WorldFileError("has an origin that is not [x, y, yaw]")
+    occupied_from, free_to = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
+    if not (_is_number(occupied_from) and _is_number(free_to)):
+        raise WorldFileError("has thresholds that are no numbers")
+    chance = grey / 255.0 if keys.get("negate", 0) else (255.0 - grey) / 255.0
+    occupied, free = chance > occupied_from, chance < free_to
+    if alpha is not None:
+        occupied, free = occupied & (alpha == 255), free & (alpha == 255)
+    solid = occupied.astype(np.float64)
+    solid[~occupied & ~free] = np.nan
+    scale = (reading.metres_per_cell or size) / size
+    rows = solid.shape[0]
+    affine = _from_corner(origin[0] * scale, origin[1] * scale, size * scale, rows)
+    yaw = float(origin[2]) if len(origin) > 2 else 0.0
+    if yaw:
+        affine = _turned(affine, origin[0] * scale, origin[1] * scale, yaw)
+    return Contents("ros_map", None, occupied=Raster(solid, affine))
+
+
+def _stream(data: bytes) -> Any:
+    from io import BytesIO
+
+    return BytesIO(data)
+
+
+def _yaml(path: Path) -> dict[str, Any]:
+    try:
+        keys = strict_yaml.parse(text_of(read_bytes(path, 100_000)), "map").plain()
+    except InputError as error:
+        raise WorldFileError(str(error).removeprefix("map:")) from error
+    if not isinstance(keys, dict) or not isinstance(keys.get("image"), str):
+        raise WorldFileError("names no image; must be a map of ROS map_server")
+    return keys
+
+
+def _positive(keys: dict[str, Any], name: str) -> float:
+    value = keys.get(name)
+    if not _is_number(value) or not 0 < float(value) < 1e6:  # type: ignore[arg-type]
+        raise WorldFileError(f"has no positive {name}; must be a map of ROS map_server")
+    return float(value)  # type: ignore[arg-type]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _from_corner(
+    west: float, south: float, size: float, rows: int
+) -> tuple[float, float, float, float, float, float]:
+    """Of a raster whose lower left corner is given."""
+    return size, 0.0, west, 0.0, -size, south + rows * size
+
+
+def _turned(
+    affine: tuple[float, float, float, float, float, float], x0: float, y0: float, yaw: float
+) -> tuple[float, float, float, float, float, float]:
+    """The same, turned counter-clockwise about (x0, y0)."""
+    a, b, c, d, e, f = affine
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    c, f = c - x0, f - y0
+    return (
+        cos * a - sin * d,
+        cos * b - sin * e,
+        x0 + cos * c - sin * f,
+        sin * a + cos * d,
+        sin * b + cos * e,
+        y0 + sin * c + cos * f,
+    )
+
+
+def read_gazebo(path: Path, reading: Reading) -> Contents:
+    """Reads the upright cylinders and boxes of a Gazebo world, as those of the BARN challenge are.
+
+    `metres_per_cell` scales it: a cell is the diameter of a BARN cylinder, 0.15 m.
+
+    Raises:
+        WorldFileError: it is not whole XML, or has nothing solid.
+    """
+    scale = (reading.metres_per_cell or BARN_CELL_M) / BARN_CELL_M
+    parts: list[Part] = []
+    passed = 0
+    for _, element in xml_events(read_bytes(path, MAX_TREE_BYTES)):
+        if element.tag == "state":
+            element.clear()  # the same models again, without their shapes
+        if element.tag != "model":
+            continue
+        pose = _pose(element)
+        for link in element.iter("link"):
+            for collision in link.iter("collision"):
+                solid = _solid(collision, [pose, _pose(link), _pose(collision)], scale)
+                passed += solid is None and collision.find("geometry/plane") is None
+                parts += [Part(solid, name=str(element.get("name", ""))[:40])] if solid is not None else []
+        element.clear()
+    if not parts:
+        raise WorldFileError("has no upright cylinder or box; must be a Gazebo world with some")
+    notes = [f"{counted(passed, 'shape')} other than cylinders and boxes passed over"] if passed else []
+    if not reading.metres_per_cell:
+        notes.append("a cell is taken as 0.15 m (metres_per_cell)")
+    return Contents("gazebo_world", None, tuple(parts), notes=tuple(notes))
+
+
+Pose = tuple[float, float, float]
+"""x, y and turn about the vertical."""
+
+
+def _pose(element: ElementTree.Element) -> Pose:
+    text = element.findtext("pose") or ""
+    try:
+        numbers = [float(each) for each in text.split()] or [0.0] * 6
+    except ValueError as error:
+        raise WorldFileError(f"has the pose {text[:40]!r}; must be six numbers") from error
+    if len(numbers) != 6 or not all(map(math.isfinite, numbers)):
+        raise WorldFileError(f"has the pose {text[:40]!r}; must be six finite numbers")
+    return numbers[0], numbers[1], numbers[5]
+
+
+def _solid(collision: ElementTree.Element, poses: list[Pose], scale: float) -> Any:
+    """Footprint of a cylinder or box; None of anything else."""
+    import shapely
+    from shapely import affinity
+
+    radius, box = collision.findtext("geometry/cylinder/radius"), collision.findtext("geometry/box/size")
+    try:
+        if radius is not None:
+            # Circumscribed: no point of the disc is left out.
+            shape = shapely.Point(0, 0).buffer(float(radius) / math.cos(math.pi / 32), quad_segs=8)
+        elif box is not None:
+            width, depth = (0.5 * float(each) for each in box.split()[:2])
+            shape = shapely.box(-width, -depth, width, depth)
+        else:
+            return None
+    except ValueError as error:
+        raise WorldFileError("has a cylinder or box whose size is no number") from error
+    for x, y, yaw in reversed(poses):
+        if yaw:
+            shape = affinity.rotate(shape, yaw, origin=(0, 0), use_radians=True)
+        shape = affinity.translate(shape, x, y)
+    return affinity.scale(shape, scale, scale, origin=(0, 0)) if scale != 1.0 else shape

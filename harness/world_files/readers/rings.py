@@ -1,0 +1,100 @@
+"""Footprints on the ellipsoid: rings of longitude and latitude, circles, arcs, corridors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+
+from harness.world_files.parts import FloatArray, WorldFileError
+
+NAUTICAL_MILE_M: Final = 1852.0
+CIRCLE_POINTS: Final = 96
+"""Corners of a circle; it lies inside of their polygon, whose area is 0.04 % larger."""
+ARC_STEP_DEG: Final = 1.0
+LARGEST_M: Final = 2_000_000.0
+
+Place = tuple[float, float]
+"""Longitude and latitude, degrees."""
+
+
+def circle(center: Place, radius_m: float) -> Any:
+    """A polygon round a circle on the ellipsoid."""
+    import shapely
+
+    if not 0.0 < radius_m <= LARGEST_M:
+        raise WorldFileError(
+            f"has a circle of radius {radius_m:g} m; must be positive and at most {LARGEST_M:g} m"
+        )
+    azimuths = np.arange(0.0, 360.0, 360.0 / CIRCLE_POINTS)
+    return shapely.Polygon(around(center, azimuths, radius_m / math.cos(math.pi / CIRCLE_POINTS)))
+
+
+def around(center: Place, azimuth_deg: FloatArray, distance_m: float | FloatArray) -> list[Place]:
+    """Places at azimuths and distances from another."""
+    east, north = np.full(len(azimuth_deg), center[0]), np.full(len(azimuth_deg), center[1])
+    longitude, latitude, _ = _geod().fwd(
+        east, north, azimuth_deg, np.broadcast_to(distance_m, azimuth_deg.shape)
+    )
+    return list(zip(longitude.tolist(), latitude.tolist(), strict=True))
+
+
+def arc(
+    center: Place, from_deg: float, to_deg: float, distance_m: tuple[float, float], clockwise: bool
+) -> list[Place]:
+    """Places along an arc between two azimuths; the distance goes evenly from the first to the second."""
+    sweep = (to_deg - from_deg) % 360.0 if clockwise else -((from_deg - to_deg) % 360.0)
+    count = max(int(abs(sweep) / ARC_STEP_DEG), 1) + 1
+    return around(center, from_deg + np.linspace(0.0, sweep, count), np.linspace(*distance_m, count))
+
+
+def polar(center: Place, place: Place) -> tuple[float, float]:
+    """Azimuth (deg) and distance (m) of a place from another."""
+    azimuth, _, distance = _geod().inv(center[0], center[1], place[0], place[1])
+    return float(azimuth), float(distance)
+
+
+def corridor(line: Sequence[Place], width_m: float) -> Any:
+    """All that lies within half a width of a line."""
+    import shapely
+
+    latitude = line[0][1]
+    stretch = math.cos(math.radians(latitude))
+    plane = shapely.LineString([((x - line[0][0]) * stretch, y - latitude) for x, y in line])
+    grown = plane.buffer(width_m / 2.0 / 111_200.0, quad_segs=16)
+    return shapely.transform(
+        grown, lambda p: np.column_stack((p[:, 0] / stretch + line[0][0], p[:, 1] + latitude))
+    )
+
+
+def ring(places: Sequence[Place]) -> Any:
+    """The area inside a ring, closed or not; None where it encloses none."""
+    import shapely
+
+    if len(set(places)) < 3:
+        return None
+    shape = shapely.make_valid(shapely.Polygon(places), method="structure", keep_collapsed=False)
+    return None if shape.is_empty or shape.area == 0.0 else shape
+
+
+def on_earth(longitude: float, latitude: float) -> Place:
+    """The place, if it is one.
+
+    Raises:
+        WorldFileError: it is not on earth.
+    """
+    if not (abs(longitude) <= 360.0 and abs(latitude) <= 90.0):
+        raise WorldFileError(
+            f"has a place at latitude {latitude:g}, longitude {longitude:g}; must be degrees, WGS84"
+        )
+    return longitude, latitude
+
+
+@cache
+def _geod() -> Any:
+    from pyproj import Geod
+
+    return Geod(ellps="WGS84")

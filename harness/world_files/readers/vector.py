@@ -1,0 +1,67 @@
+"""Any vector file that GDAL knows (GeoPackage, Shapefile, FlatGeobuf, DXF ...), with pyogrio (`wayproof[maps]`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from harness.world_files.parts import Contents, Part, Reading, WorldFileError, counted
+from harness.world_files.readers import limits
+
+MAX_FEATURES = 300_000
+
+
+def read(path: Path, reading: Reading) -> Contents:
+    """Reads the polygons of a file's layers; heights and limits are told from their attributes as in GeoJSON.
+
+    Raises:
+        WorldFileError: pyogrio is not there, or GDAL cannot read the file.
+    """
+    try:
+        import pyogrio
+        from pyogrio.errors import DataLayerError, DataSourceError
+    except ImportError as error:
+        raise WorldFileError("is a kind of file that pyogrio reads: pip install 'wayproof[maps]'") from error
+    import shapely
+
+    notes: list[str] = []
+    parts: list[Part] = []
+    crs: str | None = None
+    passed = 0
+    try:
+        for layer in np.atleast_2d(pyogrio.list_layers(path))[:, 0]:
+            if pyogrio.read_info(path, layer=layer)["features"] > MAX_FEATURES:
+                raise WorldFileError(
+                    f"has more than {MAX_FEATURES:,} features; cut the area of interest out of it"
+                )
+            meta, _, geometries, columns = pyogrio.raw.read(path, layer=layer, on_invalid="ignore")
+            crs = crs or meta["crs"]
+            shapes = shapely.make_valid(
+                shapely.force_2d(shapely.from_wkb(geometries, on_invalid="ignore")), method="structure",
+                keep_collapsed=False,
+            )  # fmt: skip
+            for row, shape in enumerate(shapes):
+                if shape is None or shape.area == 0.0:
+                    passed += 1
+                    continue
+                tags = {str(name): column[row] for name, column in zip(meta["fields"], columns, strict=True)}
+                tags = {name: value for name, value in tags.items() if value is not None and value == value}
+                parts.append(_part(tags, shape, reading, notes))
+    except (DataSourceError, DataLayerError, ValueError, RuntimeError, OSError, MemoryError) as error:
+        if isinstance(error, WorldFileError):
+            raise
+        raise WorldFileError(f"cannot be read by GDAL ({' '.join(str(error).split())[:100]})") from error
+    if not parts:
+        raise WorldFileError("has no polygon; must have some")
+    if passed:
+        notes.append(f"{counted(passed, 'shape')} without an area passed over")
+    return Contents("vector", reading.crs or crs, tuple(parts), notes=tuple(notes))
+
+
+def _part(tags: dict[str, object], shape: object, reading: Reading, notes: list[str]) -> Part:
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in tags.items()}
+    name = str(plain.get("name", ""))[:40]
+    if limits.is_building(plain):
+        return limits.building(plain, shape, reading, name)[0]
+    return Part(shape, *limits.limits(plain, notes, name), name=name)
