@@ -84,8 +84,10 @@ class Campaign(Section):
         default="independent",
     )
     draws: int = key("Draws of every combination.", unit="1", default=1, ge=1, le=MAX_RUNS)
-    recordings: Literal["all", "failures", "none"] = key(
-        "Of which runs a run folder is kept; failures are those that do not reach the goal.", default="none"
+    recordings: Literal["all", "thin", "failures", "none"] = key(
+        "Of which runs a run folder is kept; thin: of all, their recordings with no more than track, plans and "
+        "obstacles; failures are those that do not reach the goal.",
+        default="none",
     )
     optimum: bool = key("Whether to compute the shortest path of every run's world.", default=True)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -26,13 +28,15 @@ class Job:
         folder: the run folder, if it is kept.
         recordings: when it is kept.
         optimum: whether to compute the shortest path of the world.
+        varied: the keys that the campaign varies and their values in this run, for the recording's properties.
     """
 
     run: int
     packed: bytes
     folder: Path
-    recordings: Literal["all", "failures", "none"]
+    recordings: Literal["all", "thin", "failures", "none"]
     optimum: bool
+    varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -89,12 +93,15 @@ def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
     from harness.flight.closed_loop import fly
     from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 
-    if job.recordings == "all":
-        return fly_to_folder(scenario, job.folder, recording=True)
+    recorded = partial(
+        fly_to_folder, scenario, job.folder, recording=True, identity=f"run {job.run}", varied=job.varied
+    )
+    if job.recordings in ("all", "thin"):
+        return recorded(thin=job.recordings == "thin")
     found = metrics(fly(make_loop(scenario)), flight_limits(scenario))
     if job.recordings == "failures" and found["outcome"] != "reached":
         # Failures are few: to fly them again costs less than to record every flight.
-        fly_to_folder(scenario, job.folder, recording=True)
+        recorded()
     return found
 
 

@@ -25,6 +25,7 @@ from harness.files.input_file import read_index
 from harness.files.versions import versions
 from harness.files.whole_file import PARTIAL, replace_text
 from harness.files.wording import counted
+from harness.run_files.run_folder import RECORDING
 from planner.registry import distribution_of
 
 if TYPE_CHECKING:
@@ -192,3 +193,9 @@ def _changes(before: Any, now: Any, where: str = "") -> Iterator[str]:
 def _shown(value: Any) -> str:
     text = "not there" if value is ABSENT else json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def recordings_of(folder: Path) -> list[Path]:
+    """The recordings that a campaign's folder keeps, by the number of the run."""
+    kept = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
+    return sorted(kept, key=lambda path: int(path.parent.name))

@@ -78,6 +78,7 @@ def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:
                 (folder.path / RUNS / str(number)).resolve(),
                 campaign.recordings,
                 campaign.optimum,
+                {name: value for name, value in runs.run(number).varied.items() if value is not None},
             )
 
 

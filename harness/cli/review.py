@@ -14,7 +14,11 @@ from harness.cli.standard_output import say
 
 def view(
     runs: Annotated[
-        list[Path], typer.Argument(metavar="RUN_DIR...", help="Run folders; several are overlaid.")
+        list[Path],
+        typer.Argument(
+            metavar="RUN_DIR...",
+            help="Run folders, several are overlaid; or a campaign's folder, as a table of runs.",
+        ),
     ],
     web: Annotated[bool, flag("--web", "In a browser, served on 127.0.0.1, instead of a window.")] = False,
 ) -> int:
@@ -22,6 +26,10 @@ def view(
 
     For example: wayproof view runs/paper_circles/rolling_window-aerosonde-1
     """
+    from harness.campaign.folder import INDEX
+
+    if len(runs) == 1 and (runs[0] / INDEX).is_file():
+        return 0 if open_campaign(runs[0], web) else FAILED
     return 0 if open_viewer(runs, web) else FAILED
 
 
@@ -103,5 +111,29 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
         raise bad_input(error) from error
     except ViewerError as error:
         say(f"wayproof: {error}", err=True)
+        return False
+    return True
+
+
+def open_campaign(folder: Path, web: bool = False) -> bool:
+    """Shows the recordings of a campaign as a table until the viewer is closed; says why, if it cannot start."""
+    from harness.campaign.folder import recordings_of
+    from harness.files.errors import RunFolderError
+    from harness.recording.catalog import open_table
+    from harness.recording.viewer import ViewerError
+
+    try:
+        recordings = recordings_of(folder)
+        typer.echo(f"{len(recordings)} recordings", err=True)
+        open_table(
+            folder.resolve().name,
+            recordings,
+            web,
+            lambda address: typer.echo(f"{address} (Ctrl-C ends it)", err=True),
+        )
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    except ViewerError as error:
+        typer.echo(f"wayproof: {error}", err=True)
         return False
     return True

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import rerun as rr
@@ -238,6 +238,32 @@ def blueprint(frame: Frame, runs: Sequence[str] = ("",)) -> Layout:
     )
 
 
+THIN_SERIES: Final = ("cross_track", "clearance", "bank")
+"""Time series of a thin recording."""
+
+
+def thin_blueprint(frame: Frame) -> Layout:
+    """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series."""
+    events = rrb.TextLogView(origin=EVENTS, name="Events")
+    about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
+    return Layout(
+        rrb.Horizontal(
+            rrb.Vertical(
+                rrb.Horizontal(plan_view(frame, ("",)), flight_view(frame, ("",))),
+                rrb.Horizontal(events, about),
+                row_shares=[12, 5],
+            ),
+            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES)),
+            column_shares=[13, 6],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
 def plan_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial2DView:
     """The plan view, north up, framed on the area.
 
@@ -300,8 +326,16 @@ def attitude_view() -> rrb.Spatial3DView:
     )
 
 
-def series_views(frame: Frame, runs: Sequence[str]) -> list[rrb.TimeSeriesView]:
-    """The time series, one a question, each over the whole flight."""
+def series_views(
+    frame: Frame, runs: Sequence[str], only: Sequence[str] | None = None
+) -> list[rrb.TimeSeriesView]:
+    """The time series, one a question, each over the whole flight.
+
+    Args:
+        frame: what to frame the views on.
+        runs: as in `blueprint`.
+        only: names of the series shown; default: all.
+    """
     wanted = max(frame.clearance_m, 1.0)
     lines = Counter(line.split("/")[0] for line in SERIES_STYLE)
     bank = "Attitude and saturation: bank and pitch, deg (right +, up +)"
@@ -325,6 +359,7 @@ def series_views(frame: Frame, runs: Sequence[str]) -> list[rrb.TimeSeriesView]:
             plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=max(lines[entity], 1) * len(runs) > 1),
         )
         for entity, title, limits in rows
+        if only is None or entity in only
     ]
 
 

@@ -22,6 +22,7 @@ from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.moving import Tracked, log_tracked_style
 from harness.recording.plans import log_plan_style, send_plans
+from harness.recording.properties import RUN, VARIED, Value, send_properties
 from harness.recording.scene import lines_2d, log_moving, log_obstacle, log_scene, log_summary, quaternions
 from harness.recording.sensed import News, Sensed, returns_m
 from harness.recording.states import (
@@ -152,8 +153,19 @@ class RerunLog:
         """Ends the file as it is, without summary; after `close` it does nothing."""
         self._file.end()
 
-    def close(self, metrics: Mapping[str, Any] | None = None) -> None:
-        """Draws the whole track, writes verdicts and summary where there are metrics, and ends the file."""
+    def close(
+        self,
+        metrics: Mapping[str, Any] | None = None,
+        run: Mapping[str, Value] | None = None,
+        varied: Mapping[str, Value] | None = None,
+    ) -> None:
+        """Draws the whole track, writes verdicts and summary where there are metrics, and ends the file.
+
+        Args:
+            metrics: content of `metrics.json`; None where the flight broke off.
+            run: typed figures of the run (`harness.recording.properties.run_properties`).
+            varied: the keys that a campaign varied, and their values.
+        """
         self._send_happened()
         if self._whole:
             whole = np.concatenate(self._whole)
@@ -170,6 +182,8 @@ class RerunLog:
             log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM})
             log_summary(self._rec, self._scene, metrics)
             self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
+        send_properties(self._rec, RUN, run or {})
+        send_properties(self._rec, VARIED, varied or {})
         self._file.flush()
         self._file.end()
 

@@ -25,9 +25,9 @@ STYLES = (
 )
 
 
-def log_plan_style(rec: rr.RecordingStream) -> None:
-    """Logs what all plans have in common."""
-    for entity, colour, width, order in STYLES:
+def log_plan_style(rec: rr.RecordingStream, thin: bool = False) -> None:
+    """Logs what all plans have in common; of a thin recording that of the plan itself."""
+    for entity, colour, width, order in STYLES[-1:] if thin else STYLES:
         style = rr.LineStrips2D.from_fields(
             colors=[colour], radii=rr.Radius.ui_points(0.5 * width), draw_order=order
         )
@@ -37,6 +37,8 @@ def log_plan_style(rec: rr.RecordingStream) -> None:
         rr.Points2D.from_fields(colors=[look.CHOSEN], radii=rr.Radius.ui_points(3.5), draw_order=41),
         static=True,
     )
+    if thin:
+        return
     rec.log(
         f"{look.PLAN}/{MET}",
         rr.Points2D.from_fields(colors=[look.MET], radii=rr.Radius.ui_points(1.0), draw_order=24),

@@ -38,8 +38,14 @@ SHAPE = np.array(
 """(5, 3, 3) triangles of the drawn aircraft, of half span 1: body, wings, tailplane, fin."""
 
 
-def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
-    """Logs all that never changes."""
+def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None:
+    """Logs all that never changes.
+
+    Args:
+        rec: where to.
+        scene: what it is.
+        thin: for a thin recording: circles with fewer corners, no attitude, and the summary when it is known.
+    """
     frame = scene.frame
     rec.send_property(
         look.FRAME,
@@ -50,18 +56,27 @@ def log_scene(rec: rr.RecordingStream, scene: Scene) -> None:
     _log_area(rec, scene)
     standing = [obstacle.shape for obstacle in scene.obstacles if obstacle.stands_for_ever]
     if standing:
-        points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
+        points = (
+            LEAST_CIRCLE_POINTS
+            if thin
+            else max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
+        )
         rings = [_outline(shape, points) for shape in standing]
         # Of many obstacles each of these is large: none is kept while the next is made.
         rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
-        rec.log(f"{look.WORLD}/outlines", _rims(rings, scene.obstacle_top_m, look.OUTLINE), static=True)
+        if not thin:
+            rec.log(f"{look.WORLD}/outlines", _rims(rings, scene.obstacle_top_m, look.OUTLINE), static=True)
         del rings
-        log_solids(rec, f"{look.WORLD}/{look.TRUE}", standing, scene.obstacle_top_m, look.OBSTACLE)
-    _log_aircraft(rec, scene)
+        solid = "obstacles" if thin else look.TRUE
+        log_solids(rec, f"{look.WORLD}/{solid}", standing, scene.obstacle_top_m, look.OBSTACLE)
+    _log_aircraft(rec, scene, thin)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
+        if thin and entity.partition("/")[0] not in look.THIN_SERIES:
+            continue
         style = rr.SeriesLines(names=[name], colors=[colour], widths=[width])
         rec.log(f"{look.SERIES}/{entity}", style, static=True)
-    log_summary(rec, scene, None)
+    if not thin:
+        log_summary(rec, scene, None)
 
 
 def log_obstacle(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
@@ -270,10 +285,15 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
     )
 
 
-def _log_aircraft(rec: rr.RecordingStream, scene: Scene) -> None:
+def _log_aircraft(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
     """The aircraft as a mesh (x forward, y left, z up), and as an arrowhead within the sensing range."""
     half = 0.5 * AIRCRAFT_SHARE * scene.frame.span_m
-    for entity, size in ((f"{look.WORLD}/aircraft", half), (f"{look.ATTITUDE}/aircraft", 1.0)):
+    sizes = (
+        {f"{look.WORLD}/aircraft": half}
+        if thin
+        else {f"{look.WORLD}/aircraft": half, f"{look.ATTITUDE}/aircraft": 1.0}
+    )
+    for entity, size in sizes.items():
         corners = size * SHAPE.reshape(-1, 3)
         rec.log(
             f"{entity}/shape",
@@ -285,6 +305,8 @@ def _log_aircraft(rec: rr.RecordingStream, scene: Scene) -> None:
             ),
             static=True,
         )
+        if thin:
+            continue
         rec.log(
             f"{entity}/axes",
             rr.Arrows3D(vectors=1.5 * size * np.eye(3), colors=look.AXES, radii=rr.Radius.ui_points(1.0)),
@@ -294,9 +316,12 @@ def _log_aircraft(rec: rr.RecordingStream, scene: Scene) -> None:
     horizon = rr.LineStrips3D(
         [level, [(-1.6, 0.0, 0.0), (1.6, 0.0, 0.0)]], colors=[look.BOUNDS], radii=rr.Radius.ui_points(0.75)
     )
-    rec.log(f"{look.ATTITUDE}/level", horizon, static=True)
+    if not thin:
+        rec.log(f"{look.ATTITUDE}/level", horizon, static=True)
     arrowhead = half * np.array([(1.0, 0.0), (-0.8, 0.65), (-0.4, 0.0), (-0.8, -0.65), (1.0, 0.0)])
     rec.log(f"{look.PLAN}/aircraft/shape", lines_2d([arrowhead], look.AIRCRAFT, 2.5, 60), static=True)
+    if thin:
+        return
     rec.log(
         f"{look.PLAN}/aircraft/sensing",
         lines_2d([circle((0.0, 0.0), scene.mission.sensor_range_m)], look.SENSING, 1.0, 20),

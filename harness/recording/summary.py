@@ -48,13 +48,9 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
         f"range {mission.sensor_range_m:g} m.",
         "",
         LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:g}"),
-        "### Scenario",
-        "",
-        "```yaml",
-        scene.scenario_yaml.rstrip(),
-        "```",
-        "",
     ]
+    if scene.scenario_yaml:
+        lines += ["### Scenario", "", "```yaml", scene.scenario_yaml.rstrip(), "```", ""]
     return "\n".join(lines)
 
 

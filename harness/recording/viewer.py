@@ -62,8 +62,8 @@ def open_viewer(
         ViewerError: there is no screen, or the viewer does not start.
     """
     recordings = [recording_of(folder) for folder in run_dirs]
-    if not web and sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
-        raise ViewerError(NO_SCREEN)
+    if not web:
+        need_screen()
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
         shown = recordings[0]
         if len(recordings) > 1:
@@ -78,10 +78,16 @@ def open_viewer(
                 webbrowser.open(address)
                 viewer.wait()
             return
-        command = [_executable(), str(shown), "--bind", LOCALHOST, "--port", str(_free_port())]
+        command = [_executable(), str(shown), "--bind", LOCALHOST, "--port", str(free_port())]
         with _viewer(command, Path(scratch)) as viewer:
             if viewer.wait() != 0:
                 raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_words(scratch)}")
+
+
+def need_screen() -> None:
+    """Raises ViewerError where there is no screen to open a window on."""
+    if sys.platform == "linux" and not (os.environ.keys() & {"DISPLAY", "WAYLAND_DISPLAY"}):
+        raise ViewerError(NO_SCREEN)
 
 
 @contextlib.contextmanager
@@ -96,17 +102,38 @@ def served(rrd: Path, runs: int, scratch: Path) -> Iterator[tuple[subprocess.Pop
     Raises:
         ViewerError: the server does not start.
     """
-    port, web_port = _free_port(), _free_port()
-    # A viewer that serves a file keeps a processor busy; one that is sent it does not.
+    with web_viewer(scratch) as (viewer, address, source):
+        # A viewer that serves a file keeps a processor busy; one that is sent it does not.
+        send_recording(rrd, runs, source)
+        yield viewer, address_of(address, source)
+
+
+@contextlib.contextmanager
+def web_viewer(scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str, str]]:
+    """Serves the viewer's page to browsers of this machine.
+
+    Args:
+        scratch: an empty folder for the viewer's settings.
+
+    Returns:
+        The server, the page's address, and the address that takes recordings.
+
+    Raises:
+        ViewerError: the server does not start.
+    """
+    port, web_port = free_port(), free_port()
     command = [_executable(), "--serve-web", "--bind", LOCALHOST]
     command += ["--port", str(port), "--web-viewer-port", str(web_port)]
-    source = f"rerun+http://{LOCALHOST}:{port}/proxy"
     with _viewer(command, scratch) as viewer:
         for each in (port, web_port):
             if not _answers(each, viewer):
                 raise ViewerError(f"the viewer does not start: {_last_words(str(scratch))}")
-        send_recording(rrd, runs, source)
-        yield viewer, f"http://{LOCALHOST}:{web_port}/?url={quote(source, safe='')}"
+        yield viewer, f"http://{LOCALHOST}:{web_port}/", f"rerun+http://{LOCALHOST}:{port}/proxy"
+
+
+def address_of(page: str, source: str) -> str:
+    """The address at which a browser opens the viewer's page on a source of data."""
+    return f"{page}?url={quote(source, safe='')}"
 
 
 def _last_words(scratch: str) -> str:
@@ -148,15 +175,12 @@ def screenshot(
         raise ViewerError(f"no recording {rrd}")
     from rerun.experimental import ViewerClient
 
-    port = _free_port()
-    command = [_executable(), "--headless", "--bind", LOCALHOST, "--port", str(port)]
-    command += ["--hide-welcome-screen", "--window-size", f"{size[0]}x{size[1]}"]
+    port = free_port()
+    arguments = ["--headless", "--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen"]
     with (
         tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch,
-        _viewer(command, Path(scratch)) as viewer,
+        viewer_process([*arguments, "--window-size", f"{size[0]}x{size[1]}"], Path(scratch), port),
     ):
-        if not _answers(port, viewer):
-            raise ViewerError(NO_DRIVER)
         try:
             client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
             client.open(str(rrd.resolve()))
@@ -215,6 +239,26 @@ def _viewer(command: list[str], scratch: Path) -> Iterator[subprocess.Popen[str]
 
 
 @contextlib.contextmanager
+def viewer_process(
+    arguments: Sequence[str], scratch: Path, port: int | None = None
+) -> Iterator[subprocess.Popen[str]]:
+    """Runs a viewer with arguments, and ends it with the block.
+
+    Args:
+        arguments: of the viewer's command line.
+        scratch: an empty folder for the viewer's settings.
+        port: waits until the viewer listens there.
+
+    Raises:
+        ViewerError: there is no viewer, or a headless one does not come to listen.
+    """
+    with _viewer([_executable(), *arguments], scratch) as viewer:
+        if port is not None and not _answers(port, viewer):
+            raise ViewerError(NO_DRIVER)
+        yield viewer
+
+
+@contextlib.contextmanager
 def _terminated_as_interrupted() -> Iterator[None]:
     """Lets SIGTERM end the block like Ctrl-C, so that no viewer is left behind."""
     if threading.current_thread() is not threading.main_thread():
@@ -227,7 +271,8 @@ def _terminated_as_interrupted() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A port of this machine that nobody listens on."""
     with socket.socket() as probe:
         probe.bind((LOCALHOST, 0))
         port: int = probe.getsockname()[1]

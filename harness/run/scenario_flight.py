@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +26,7 @@ from harness.files.errors import WriteError
 from harness.flight.closed_loop import Loop, Observer, Progress, fly
 from harness.flight.record import Flight
 from harness.mapping.sensed_map import SensedMap
+from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario, mission_of, performance_of
@@ -170,6 +171,9 @@ def fly_to_folder(
     make: Callable[[Scenario], Loop] = make_loop,
     watching: Sequence[Observer] = (),
     pilot: str | None = None,
+    identity: str | None = None,
+    varied: Mapping[str, str | float | int | bool] | None = None,
+    thin: bool = False,
     flown_by: Fly = fly,
     measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
 ) -> dict[str, Any]:
@@ -183,6 +187,9 @@ def fly_to_folder(
         make: makes the parts of the flight.
         watching: look on besides those that write the folder.
         pilot: stands in the recording's name; default: the planner's kind.
+        identity: of the recording among others; default: scenario, planner, aircraft and seed.
+        varied: keys that a campaign varied, for the recording's properties.
+        thin: whether the recording has no more than track, plans and obstacles.
         flown_by: flies the parts to an end.
         measured_by: gives the content of `metrics.json`.
 
@@ -198,7 +205,7 @@ def fly_to_folder(
             folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
             observers = [*watching]
             log = (
-                _recording(scenario, text, loop, folder, pilot or scenario.planner.kind)
+                _recording(scenario, text, loop, folder, pilot or scenario.planner.kind, identity, thin)
                 if recording
                 else None
             )
@@ -208,16 +215,19 @@ def fly_to_folder(
             flight = flown_by(loop, observers, progress)
             figures = measured_by(flight, flight_limits(scenario))
             if log is not None:
-                log.close(figures)
+                log.close(figures, run_properties(scenario, figures), varied)
             folder.finish(flight.track, flight.plans, figures)
     except OSError as error:
         raise WriteError.of("the run", out, error) from error
     return figures
 
 
-def _recording(scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pilot: str) -> Any:
+def _recording(
+    scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pilot: str, identity: str | None, thin: bool
+) -> Any:
     from harness.recording.blueprint import Scene
     from harness.recording.log import RerunLog
+    from harness.recording.thin import ThinLog
 
     title = f"{scenario.name}, {pilot}, {scenario.aircraft.model}, seed {scenario.seed}"
     scene = Scene(
@@ -228,7 +238,9 @@ def _recording(scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pil
         tuple(loop.world.obstacles),
         text,
     )
-    return RerunLog(folder.recording_path, scene, title, moving=lambda: loop.seen.moving)
+    if thin:
+        return ThinLog(folder.recording_path, scene, identity or title)
+    return RerunLog(folder.recording_path, scene, identity or title, moving=lambda: loop.seen.moving)
 
 
 def _stream(seed: int, number: int) -> np.random.SeedSequence:

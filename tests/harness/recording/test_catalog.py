@@ -1,0 +1,155 @@
+"""A campaign in rerun: thin recordings with typed properties, served as one table of runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from harness.analysis.metrics import metrics
+from harness.campaign.folder import recordings_of
+from harness.files.errors import RunFolderError
+from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.recording.catalog import catalog, properties_of, table_screenshot
+from harness.recording.properties import run_properties
+from harness.recording.thin import ThinLog
+from harness.recording.viewer import NO_DRIVER, ViewerError
+from harness.scenario.scenario import parse_scenario
+from tests.harness.recording.test_rerun_log import LIMITS, SCENE
+
+SCENARIO = """\
+schema: wayproof/scenario/1
+name: straight
+area: {bounds_m: [-2000, -1000, 2000, 3000]}
+mission: {start_m: [0, 0], goal_m: [0, 2500]}
+planner: {clearance_m: 100}
+environment: {wind: {speed_mps: 4, from_deg: 270}}
+"""
+
+MakeTrack = Callable[..., Track]
+MakePlan = Callable[..., AcceptedPlan]
+
+
+@pytest.fixture(autouse=True)
+def strict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bad data is an error, not a warning."""
+    monkeypatch.setattr(rr.error_utils, "_strict_mode", True)
+
+
+def flight(make_track: MakeTrack, make_plan: MakePlan, outcome: Outcome, clearance_m: float) -> Flight:
+    """100 s north."""
+    track = make_track(1001, clearance_m=np.linspace(500.0, clearance_m, 1001))
+    plans = (make_plan([(0, 0, 0, 1, 0.0, 2500.0)]),)
+    return Flight(track, plans, outcome, "as it was", (2.5,), 100.0, 0.1)
+
+
+def record(folder: Path, number: int, flown: Flight) -> dict[str, Any]:
+    """The thin recording of a run of a campaign; returns the properties it was given."""
+    path = folder / "runs" / str(number) / "flight.rrd"
+    path.parent.mkdir(parents=True)
+    figures = metrics(flown, LIMITS)
+    log = ThinLog(path, SCENE, f"run {number}")
+    for plan in flown.plans:
+        log.on_plan(plan, None)  # type: ignore[arg-type]
+    log.on_block(flown.track)
+    log.on_event(100.0, "over")
+    given = run_properties(parse_scenario(SCENARIO), figures)
+    log.close(figures, given, {"environment.wind.speed_mps": 4.0 + number})
+    return given
+
+
+@pytest.fixture
+def campaign(tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan) -> Path:
+    """Three runs; the second hit something, the third was close."""
+    for number, (outcome, clearance_m) in enumerate(
+        [(Outcome.REACHED, 250.0), (Outcome.COLLISION, -3.0), (Outcome.REACHED, 120.0)]
+    ):
+        record(tmp_path, number, flight(make_track, make_plan, outcome, clearance_m))
+    return tmp_path
+
+
+def test_a_thin_recording_is_small_and_has_typed_properties(
+    tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan
+) -> None:
+    given = record(tmp_path, 7, flight(make_track, make_plan, Outcome.TIMEOUT, 90.0))
+    (path,) = recordings_of(tmp_path)
+    assert path.stat().st_size < 300_000
+    assert properties_of(path) == pytest.approx(given)
+    kinds = {name: type(value) for name, value in properties_of(path).items()}
+    assert kinds["outcome"] is str
+    assert kinds["trackable"] is bool
+    assert kinds["replans"] is int
+    assert kinds["min_clearance_m"] is float
+    assert given["clearance_ratio"] == pytest.approx(0.9)
+    assert given["wind_mps"] == 4.0
+
+
+def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
+    rows: dict[str, int] = {}
+    for chunk in rr.chunk.RrdReader(str(recordings_of(campaign)[0])).stream():
+        rows[str(chunk.entity_path)] = rows.get(str(chunk.entity_path), 0) + chunk.to_record_batch().num_rows
+    assert rows["/world/aircraft"] == 1001 // 20 + 1
+    assert {
+        "/plan/chosen",
+        "/plan/waypoints",
+        "/plan/whole_track",
+        "/plan/outlines",
+        "/summary",
+        "/events",
+    } <= rows.keys()
+
+
+def test_severity_orders_outcomes_then_clearance(make_track: MakeTrack, make_plan: MakePlan) -> None:
+    scenario = parse_scenario(SCENARIO)
+
+    def severity(outcome: Outcome, clearance_m: float) -> float:
+        value = run_properties(
+            scenario, metrics(flight(make_track, make_plan, outcome, clearance_m), LIMITS)
+        )["severity"]
+        assert isinstance(value, float)
+        return value
+
+    worst_first = [
+        (Outcome.COLLISION, -5.0),
+        (Outcome.COLLISION, -1.0),
+        (Outcome.TIMEOUT, 30.0),
+        (Outcome.TIMEOUT, 300.0),
+        (Outcome.REACHED, 90.0),
+        (Outcome.REACHED, 300.0),
+    ]
+    figures = [severity(*each) for each in worst_first]
+    assert figures == sorted(figures, reverse=True)
+    assert len(set(figures)) == len(figures)
+
+
+def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:
+    pytest.importorskip("datafusion")
+    with catalog("small", recordings_of(campaign)) as served:
+        assert served.url.startswith("rerun+http://127.0.0.1:")
+        table = served.table().to_pydict()
+    assert table["rerun_segment_id"] == ["run 1", "run 2", "run 0"]
+    assert table["property:run:outcome"] == [["collision"], ["reached"], ["reached"]]
+    assert table["property:run:min_clearance_m"] == [[-3.0], [120.0], [250.0]]
+    varied = next(name for name in table if name.startswith("property:varied:"))
+    assert table[varied] == [[5.0], [6.0], [4.0]]
+
+
+def test_a_campaign_without_recordings_says_what_keeps_them(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="recordings: all"), catalog("empty", recordings_of(tmp_path)):
+        pass
+
+
+def test_the_table_is_drawn(campaign: Path, tmp_path: Path) -> None:
+    pytest.importorskip("datafusion")
+    png = tmp_path / "table.png"
+    try:
+        table_screenshot("small", recordings_of(campaign), png)
+    except ViewerError as error:
+        if str(error) != NO_DRIVER:
+            raise
+        pytest.skip(NO_DRIVER)
+    assert png.stat().st_size > 20_000
