@@ -1,1 +1,76 @@
-"""The closed loop: scenario, true world, sensing, flight, record, metrics, recording."""
+"""The closed loop: scenario, true world, sensing, flight, record, metrics, recording; and the front door in Python.
+
+`import wayproof` offers the same names as this package: see `harness.api`. Each is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+TYPE_CHECKING = False  # as of `typing`, which takes longer to import than all of this
+if TYPE_CHECKING:
+    from typing import Any
+
+    from aircraft.airframes import AircraftError
+    from harness.api.campaigns import compare, load_campaign, sweep
+    from harness.api.flights import fly, load_run
+    from harness.api.metrics import Metrics
+    from harness.api.paths import check
+    from harness.api.results import CampaignResult, ComparisonResult, FlightResult
+    from harness.files.crash import PlannerError
+    from harness.files.errors import WriteError
+    from harness.files.input_file import InputError
+    from harness.scenario.scenario import Scenario, dump_scenario, load_scenario
+    from planner.interface import Mission, Path, Plan, Planner, PlanRequest, PlanStatus
+    from planner.registry import PlannerKind
+
+__all__ = [
+    "AircraftError",
+    "CampaignResult",
+    "ComparisonResult",
+    "FlightResult",
+    "InputError",
+    "Metrics",
+    "Mission",
+    "Path",
+    "Plan",
+    "PlanRequest",
+    "PlanStatus",
+    "Planner",
+    "PlannerError",
+    "PlannerKind",
+    "Scenario",
+    "WriteError",
+    "check",
+    "compare",
+    "dump_scenario",
+    "fly",
+    "load_campaign",
+    "load_run",
+    "load_scenario",
+    "sweep",
+]
+
+_HOMES = {
+    "aircraft.airframes": ("AircraftError",),
+    "harness.api.campaigns": ("compare", "load_campaign", "sweep"),
+    "harness.api.flights": ("fly", "load_run"),
+    "harness.api.metrics": ("Metrics",),
+    "harness.api.paths": ("check",),
+    "harness.api.results": ("CampaignResult", "ComparisonResult", "FlightResult"),
+    "harness.files.crash": ("PlannerError",),
+    "harness.files.errors": ("WriteError",),
+    "harness.files.input_file": ("InputError",),
+    "harness.scenario.scenario": ("Scenario", "dump_scenario", "load_scenario"),
+    "planner.interface": ("Mission", "Path", "Plan", "PlanRequest", "PlanStatus", "Planner"),
+    "planner.registry": ("PlannerKind",),
+}
+"""The names of the front door, by the module in which each is made."""
+
+
+def __getattr__(name: str) -> Any:
+    """A name of the front door, imported now."""
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(home), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -120,6 +120,16 @@ def compile_all() -> None:
         while _waiting:
             _waiting[0].compile()
             del _waiting[0]
-        # The compiler stays for good: to look through it for garbage would hold a flight up for a tenth of a second.
-        gc.collect()
-        gc.freeze()
+        if _process_is_ours:
+            # The compiler stays for good: to look through it for garbage holds a flight up for a tenth of a second.
+            gc.collect()
+            gc.freeze()
+
+
+_process_is_ours = False
+
+
+def own_this_process() -> None:
+    """Says that nobody else's objects live in this process: what is there after compiling is never garbage."""
+    global _process_is_ours
+    _process_is_ours = True

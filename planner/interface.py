@@ -6,7 +6,7 @@ Curvature is positive for a left (counter-clockwise) turn.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -165,6 +165,24 @@ class Path:
         rows.setflags(write=False)
         object.__setattr__(self, "segments", rows)
 
+    @classmethod
+    def through(cls, points_m: Sequence[tuple[float, float]] | FloatArray) -> Path:
+        """Straight lines from point to point. At corners the direction jumps: an aircraft cuts them.
+
+        Args:
+            points_m: (n, 2) east, north; at least two, none equal to the one before.
+
+        Raises:
+            ValueError: there are fewer points, or two that follow one another are equal.
+        """
+        points = np.asarray(points_m, dtype=np.float64).reshape(-1, 2)
+        legs = np.diff(points, axis=0)
+        lengths = np.hypot(*legs.T)
+        if not len(lengths) or not lengths.all():
+            raise ValueError("a path goes through at least two points, each different from the one before")
+        zero = np.zeros(len(legs))
+        return cls(np.column_stack((points[:-1], legs / lengths[:, np.newaxis], zero, lengths)))
+
     @cached_property
     def length_m(self) -> float:
         """Length, one turn of a closing loiter circle included."""
@@ -241,7 +259,7 @@ class Plan:
     Attributes:
         status: how the call ended.
         reason: one sentence for the event log.
-        waypoints_m: (k, 2) fixed-altitude waypoints; empty unless FOUND.
+        waypoints_m: (k, 2) fixed-altitude waypoints, anything that numpy makes such an array of; empty unless FOUND.
         path: the curve through them; None unless FOUND.
         picture: makes a picture of how it came about, where the planner can tell: asked for only where somebody looks.
         wants_more_time: more is looked for: the planner wants to be asked again before the next scan.

@@ -20,6 +20,7 @@ from planner.rolling_window import config as rolling_window_config
 from planner.rolling_window import planner as rolling_window
 
 GROUP = "wayproof.planners"
+_registered: dict[str, PlannerKind] = {}
 
 
 @dataclass(frozen=True)
@@ -90,8 +91,8 @@ BUILT_IN = (
 )
 
 
-def planner_kinds() -> dict[str, PlannerKind]:
-    """All planner kinds by name, built-in ones first."""
+def installed_kinds() -> dict[str, PlannerKind]:
+    """The planner kinds that every process finds, by name, built-in ones first."""
     kinds = {kind.kind: kind for kind in BUILT_IN}
     for point in _outside(entry_points, tuple(sys.path)):
         with redirect_stdout(sys.stderr):
@@ -100,6 +101,24 @@ def planner_kinds() -> dict[str, PlannerKind]:
             raise TypeError(f"entry point {point.name!r} ({point.value}) is not a PlannerKind")
         kinds.setdefault(outside.kind, outside)
     return kinds
+
+
+def planner_kinds() -> dict[str, PlannerKind]:
+    """All planner kinds by name: the installed ones, and those that this process has registered."""
+    return {**installed_kinds(), **_registered}
+
+
+def register(kind: PlannerKind) -> None:
+    """Lets this process, and no other, know a planner by its name, as an entry point does for every process.
+
+    One that was registered under the same name before is replaced.
+
+    Raises:
+        ValueError: a built-in planner, or one of another distribution, has the name.
+    """
+    if kind.kind in installed_kinds():
+        raise ValueError(f"there is a planner called {kind.kind} already; give this one another name")
+    _registered[kind.kind] = kind
 
 
 def distribution_of(kind: str) -> str | None:

@@ -51,11 +51,16 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
         str(path.relative_to(ROOT))
         for room in ROOMS
         for path in (ROOT / room).rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
+        if path.is_file() and not {"__pycache__", "front_door"} & {*path.parts}
+    }
+    front_door = ROOT / "harness" / "front_door"
+    own = {
+        str(path.relative_to(front_door)) for path in (front_door / "wayproof").iterdir() if path.is_file()
     }
     shipped = [path for path in (ROOT / "scenarios").rglob("*") if path.is_file()]
     scenarios = {f"harness/{path.relative_to(ROOT)}" for path in shipped}
-    assert held == sources | scenarios
+    assert held == sources | scenarios | own
+    assert {"wayproof/__init__.py", "wayproof/py.typed"} <= own
     assert {"aircraft/systems/autopilot.xml", "aircraft/airframes.yaml", "planner/py.typed"} <= held
     assert {"LICENSE", "entry_points.txt", "METADATA"} <= notes
 
@@ -65,9 +70,11 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
         archive.extractall(tmp_path / "site")
     (tmp_path / "empty").mkdir()
     where = "import harness, sys; sys.stdout.write(harness.__file__)"
+    front_door = "import wayproof, sys; sys.stdout.write(wayproof.__file__ + wayproof.fly.__name__)"
     command = "from harness.cli.app import main; raise SystemExit(main())"
     for code, arguments, shown in (
         (where, [], str(tmp_path / "site")),
+        (front_door, [], str(tmp_path / "site" / "wayproof" / "__init__.pyfly")),
         (command, ["fly", "aerosonde_forest", "--no-recording"], "reached: inside the goal circle"),
         (command, ["sweep", "forest_planners"], "results: runs/forest_planners/results.parquet"),
     ):
@@ -77,7 +84,7 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
             env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=600,
             check=False,
         )
         assert run.returncode == 0, run.stderr

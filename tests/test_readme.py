@@ -49,7 +49,7 @@ COMMANDS = [
 
 
 def wayproof(
-    arguments: str, folder: Path, *, path: Path = ROOT, timeout_s: float = 120
+    arguments: str, folder: Path, *, path: Path = ROOT, timeout_s: float = 600
 ) -> subprocess.CompletedProcess[str]:
     """Runs the command in a folder, the packages taken from `path`."""
     return subprocess.run(

@@ -33,7 +33,8 @@ from harness.files.strict_yaml import (
     node_of,
     replaced,
 )
-from harness.scenario.scenario import Scenario, overridden, packed, unpacked, with_key
+from harness.scenario.overrides import overridden, with_key
+from harness.scenario.scenario import Scenario, packed, unpacked
 from harness.scenario.validation import faults, in_lines
 from harness.scenario.world_generators import generated
 

@@ -25,7 +25,7 @@ LOOK_S: Final = 2.0
 Progress = Callable[[Answer], None]
 
 
-def sweep(
+def fly_missing(
     runs: CampaignRuns, folder: CampaignFolder, workers: Workers, progress: Progress | None = None
 ) -> None:
     """Flies what is missing; whatever ends it, what is done is in the folder's tables.

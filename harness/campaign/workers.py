@@ -18,6 +18,7 @@ from typing import Any, Final, Protocol
 from harness.campaign.flight import Answer, Job, fly_job
 from harness.files.strict_yaml import InputError
 from harness.files.versions import versions
+from planner.compiled import own_this_process
 
 ONE_THREAD: Final = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"
@@ -316,6 +317,7 @@ def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # Standard output is the parent's alone: what a planner prints goes to standard error.
     os.dup2(2, 1)
+    own_this_process()
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent.join,), daemon=True).start()

@@ -27,6 +27,7 @@ from harness.cli.standard_output import kept_up, results_alone, results_over, sa
 from harness.cli.sweep import sweep
 from harness.cli.world import world
 from harness.flight.signals import taken_as_interrupt
+from planner.compiled import own_this_process
 
 INTERRUPTED: Final = 130
 COMPLETION: Final = "_WAYPROOF_COMPLETE"
@@ -87,6 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in given
     words = [word for word in given if word != "--debug"]
     if arguments is None:
+        own_this_process()
         results_alone()
     with taken_as_interrupt() as came:
         status = _run(words, debug)

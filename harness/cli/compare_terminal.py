@@ -13,7 +13,7 @@ from rich.table import Table
 
 from harness.analysis.rows import CRASHED, DASH, FIGURES, ON_TERMINAL, Row
 from harness.cli.terminal import plain
-from harness.compare.flights import Progress as Report
+from harness.comparison.flights import Progress as Report
 from harness.scenario.scenario import Scenario
 
 WIDTH = 80

@@ -20,6 +20,7 @@ from harness.cli.options import (
     chosen,
     flag,
     load,
+    planner_kind,
     print_json,
     setting,
     straight_m,
@@ -143,13 +144,13 @@ def compare(
 
     2 bad input or usage, nothing flown
     """
-    kinds = [kind.strip() for kind in planners.split(",")]
+    named = [kind.strip() for kind in planners.split(",")]
+    kinds = [planner_kind(kind) for kind in named]
     loaded = [load(scenario, chosen(kind)) for scenario in scenarios for kind in kinds]
 
     from aircraft.airframes import AircraftError
     from harness.cli.compare_terminal import comparison_bar, print_comparison
-    from harness.compare.comparison import INDEX, SCHEMA
-    from harness.compare.comparison import compare as fly_and_compare
+    from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
     from harness.files.errors import RunFolderError, WriteError
 
     try:
@@ -161,6 +162,7 @@ def compare(
                 kinematic=kinematic,
                 workers=workers or os.cpu_count() or 1,
                 progress=report,
+                sources=[kind for kind in named if ":" in kind],
             )
     except (RunFolderError, AircraftError) as error:
         raise bad_input(error) from error
@@ -267,7 +269,8 @@ def bench_worlds(most: int | None, as_json: bool) -> int:
 
 def _default_folder(scenario: Scenario, apart: str = "") -> Path:
     model = Path(scenario.aircraft.model).name
-    return Path("runs") / scenario.name / f"{scenario.planner.kind}-{model}-{scenario.seed}{apart}"
+    planner = scenario.planner.kind.replace(":", "-")
+    return Path("runs") / scenario.name / f"{planner}-{model}-{scenario.seed}{apart}"
 
 
 def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:

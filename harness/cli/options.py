@@ -78,7 +78,12 @@ _SCENARIO: Any = typer.Argument(
 ScenarioArgument = Annotated[str, _SCENARIO]
 OptionalScenario = Annotated[str | None, _SCENARIO]
 PlannerOption = Annotated[
-    str | None, typer.Option(metavar="KIND", help="Replaces planner.kind.", autocompletion=planners)
+    str | None,
+    typer.Option(
+        metavar="KIND",
+        help="Replaces planner.kind; FILE.py:NAME or MODULE:NAME too.",
+        autocompletion=planners,
+    ),
 ]
 AircraftOption = Annotated[
     str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=aircraft)
@@ -105,8 +110,18 @@ def chosen(
     """What --planner, --aircraft and --seed replace; a name is text, whatever YAML takes it for."""
     import json
 
-    given = {"planner.kind": planner, "aircraft.model": aircraft, "seed": seed}
+    given = {"planner.kind": planner and planner_kind(planner), "aircraft.model": aircraft, "seed": seed}
     return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
+
+
+def planner_kind(text: str) -> str:
+    """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
+    from planner.given import registered
+
+    try:
+        return registered(text)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--planner") from error
 
 
 def setting(text: str) -> tuple[str, str]:

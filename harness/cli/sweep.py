@@ -116,7 +116,7 @@ def _fly(
     from contextlib import nullcontext
 
     from harness.campaign.folder import INDEX, CampaignFolder
-    from harness.campaign.sweep import sweep as fly_missing
+    from harness.campaign.sweep import fly_missing
     from harness.cli.sweep_terminal import sweep_bar
     from harness.files.errors import RunFolderError
 

@@ -27,6 +27,8 @@ MAX_KEYS: Final = 1000
 MAX_KEY_LENGTH: Final = 100
 COMMAND_LINE: Final = 0
 """The `line` of a value that came from the command line."""
+IN_PYTHON: Final = -1
+"""The `line` of a value that was given in Python, to `Scenario.with_`."""
 
 Scalar: TypeAlias = str | int | float | bool | None
 Loc: TypeAlias = tuple[str | int, ...]
@@ -48,7 +50,7 @@ class Node:
 
     Attributes:
         value: a scalar, a dict of nodes by key, or a tuple of nodes.
-        line: line of its key, or of the value itself in a list; from 1, or COMMAND_LINE.
+        line: line of its key, or of the value itself in a list; from 1, or COMMAND_LINE, or IN_PYTHON.
     """
 
     value: Scalar | dict[str, Node] | tuple[Node, ...]
@@ -133,7 +135,7 @@ def as_spelt(path: str) -> str:
 
 def fault_line(source: str, line: int, loc: Loc, sentence: str) -> str:
     """One fault as a person reads it: `file:line: key.path: sentence`."""
-    where = "command line" if line == COMMAND_LINE else f"{source}:{line}"
+    where = {COMMAND_LINE: "command line", IN_PYTHON: "with_"}.get(line, f"{source}:{line}")
     return ": ".join(part for part in (where, key_path(loc), sentence) if part)
 
 
@@ -301,14 +303,25 @@ def _replaced(node: Node, loc: Loc, depth: int, new: Node) -> Node:
     if isinstance(value, tuple) and isinstance(step, int):
         if step >= len(value):
             sentence = f"does not exist; there are {len(value)}, counted from 0"
-            raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], sentence))
+            raise InputError(fault_line("", min(new.line, COMMAND_LINE), loc[: depth + 1], sentence))
         inner = _replaced(value[step], loc, depth + 1, new)
         return Node((*value[:step], inner, *value[step + 1 :]), node.line)
     if (value is None or isinstance(value, dict)) and isinstance(step, str):
         entries = value or {}
-        inner = _replaced(entries.get(step, Node({}, COMMAND_LINE)), loc, depth + 1, new)
+        inner = _replaced(entries.get(step, Node({}, min(new.line, COMMAND_LINE))), loc, depth + 1, new)
         return Node({**entries, step: inner}, node.line)
-    raise InputError(fault_line("", COMMAND_LINE, loc[: depth + 1], "no such key; see `wayproof schema`"))
+    where = min(new.line, COMMAND_LINE)
+    raise InputError(fault_line("", where, loc[: depth + 1], "no such key; see `wayproof schema`"))
+
+
+def without(node: Node, loc: Loc) -> Node:
+    """A copy of `node` in which a mapping lacks the key at `loc`; the same where it is not there."""
+    step, *rest = loc
+    inner = node.inner(step)
+    if inner is None or not isinstance(node.value, dict):
+        return node
+    kept = {key: value for key, value in node.value.items() if key != step}
+    return Node({**kept, str(step): without(inner, tuple(rest))} if rest else kept, node.line)
 
 
 # Writes text in quotes wherever a YAML 1.2 reader would take it for something else, and no aliases: those are refused.

@@ -206,7 +206,11 @@ def asked(
 
 
 def fly_check(
-    check: PathCheck, out: FilePath | None = None, recording: bool = False, progress: Progress | None = None
+    check: PathCheck,
+    out: FilePath | None = None,
+    recording: bool = False,
+    progress: Progress | None = None,
+    command: str | None = None,
 ) -> CheckedPath:
     """Flies a path, into a run folder if one is named.
 
@@ -215,6 +219,7 @@ def fly_check(
         out: the run folder; None: none is written.
         recording: whether to write `flight.rrd` there.
         progress: told of the flight as it goes on.
+        command: what the manifest says was called; default: the command line.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
@@ -234,6 +239,7 @@ def fly_check(
         pilot=GIVEN,
         flown_by=flown_by,
         measured_by=partial(measured, check),
+        command=command,
     )
     return CheckedPath(check, figures, out)
 

@@ -12,7 +12,8 @@ import numpy as np
 from harness.files import strict_yaml
 from harness.files.strict_yaml import Node
 from harness.run_files.given_path import SAME_PLACE_M, FloatArray
-from harness.scenario.scenario import Scenario, node_of_keys, overridden, validated, with_key
+from harness.scenario.overrides import overridden, with_key
+from harness.scenario.scenario import Scenario, node_of_keys, validated
 
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: so much, and so much of its span."""

@@ -176,6 +176,7 @@ def fly_to_folder(
     thin: bool = False,
     flown_by: Fly = fly,
     measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
+    command: str | None = None,
 ) -> dict[str, Any]:
     """Flies a scenario into a run folder and returns the content of its `metrics.json`.
 
@@ -192,6 +193,7 @@ def fly_to_folder(
         thin: whether the recording has no more than track, plans and obstacles.
         flown_by: flies the parts to an end.
         measured_by: gives the content of `metrics.json`.
+        command: what the manifest says was called; default: the command line.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
@@ -202,7 +204,7 @@ def fly_to_folder(
     text = dump_scenario(scenario)
     try:
         with ExitStack() as stack:
-            folder = stack.enter_context(RunFolder.create(out, text, [shlex.join(sys.argv)]))
+            folder = stack.enter_context(RunFolder.create(out, text, [command or shlex.join(sys.argv)]))
             observers = [*watching]
             log = (
                 _recording(scenario, text, loop, folder, pilot or scenario.planner.kind, identity, thin)

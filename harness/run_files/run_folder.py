@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
@@ -28,6 +28,9 @@ from harness.files.versions import FLOWN_WITH, versions
 from harness.files.whole_file import PARTIAL, replace_text
 from harness.flight.record import TRACK_FIELDS, AcceptedPlan, Track
 from harness.run_files.plans_table import PlanRow, plan_rows, plans_table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 SCENARIO = "scenario.yaml"
 MANIFEST = "manifest.json"
@@ -141,12 +144,11 @@ class RunFolder:
         """
         if not len(track):
             raise RunFolderError(f"the run in {self.path} has no track: nothing was flown")
-        import pyarrow as pa
         import pyarrow.parquet as pq
 
         text = _json(metrics)
         # At once: whatever is written while flying costs the flight its place in the caches.
-        rows = pa.table({name: getattr(track, name) for name in TRACK_FIELDS})
+        rows = track_table(track)
         split = {"use_dictionary": False, "use_byte_stream_split": SPLIT}
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
             pq.write_table(table, self.path / (name + PARTIAL), compression=COMPRESSION, **how)
@@ -163,6 +165,20 @@ class RunFolder:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self._lock.release()
+
+
+def track_table(track: Track) -> pa.Table:
+    """A track as the table that `track.parquet` holds."""
+    import pyarrow as pa
+
+    return pa.table({name: getattr(track, name) for name in TRACK_FIELDS})
+
+
+def tables(path: Path) -> tuple[pa.Table, pa.Table]:
+    """Track and plans of a run folder that `load_run` has read without a fault, all their columns."""
+    import pyarrow.parquet as pq
+
+    return pq.read_table(path / TRACK), pq.read_table(path / PLANS)
 
 
 def load_run(path: Path) -> Run:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import fields
 from functools import cache
 from typing import TYPE_CHECKING, Any, get_type_hints
@@ -13,7 +14,8 @@ from harness.files.printing import PrintingAside
 from harness.scenario.sections import PlannerSpec, Section, key
 from harness.scenario.validation import KeyFault, first_fault, unknown_key
 from planner.compiled import compile_all
-from planner.registry import PlannerKind, planner_kinds
+from planner.given import is_source
+from planner.registry import PlannerKind, installed_kinds, planner_kinds
 
 if TYPE_CHECKING:
     from planner.interface import Mission, Planner
@@ -32,7 +34,7 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
 def _resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
     kinds = planner_kinds()
     if spec.kind not in kinds:
-        raise KeyFault(("planner", "kind"), f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}")
+        raise KeyFault(("planner", "kind"), _unknown(spec.kind, kinds))
     kind = kinds[spec.kind]
     known = tuple(field.name for field in fields(kind.config))
     for name in spec.own:
@@ -53,6 +55,12 @@ def _resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
     except BaseException as error:
         raise KeyFault(("planner", "kind"), f"cannot be configured: {sentence(error)}") from error
     return spec.model_copy(update={name: getattr(config, name) for name in known})
+
+
+def _unknown(kind: str, kinds: Iterable[str]) -> str:
+    if is_source(kind):
+        return f"is {kind[:80]!r}, which no file may name: code is only run for --planner {kind[:80]}, or in Python"
+    return f"is {kind[:40]!r}; must be one of {', '.join(kinds)}"
 
 
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
@@ -78,7 +86,7 @@ def json_schema(common: dict[str, Any]) -> dict[str, Any]:
     Args:
         common: the schema of `PlannerSpec`.
     """
-    kinds = [_kind_schema(common, kind) for kind in planner_kinds().values()]
+    kinds = [_kind_schema(common, kind) for kind in installed_kinds().values()]
     return {"description": common["description"], "anyOf": kinds}
 
 

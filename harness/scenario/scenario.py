@@ -15,13 +15,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 from pydantic import FailFast, Strict, ValidationError, ValidationInfo, model_validator
 
 from harness.files import strict_yaml
-from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node
+from harness.files.strict_yaml import COMMAND_LINE, Node
+from harness.files.wording import counted
 from harness.files.yaml_pieces import dump_in_pieces
 from harness.scenario import planner_keys
 from harness.scenario.checks import check_local_plane, check_start_and_goal
 from harness.scenario.files_resolved import plane_point, resolved
 from harness.scenario.ground import GroundSpec, SourceSpec
 from harness.scenario.obstacles import Obstacle
+from harness.scenario.overrides import Given, changed, overridden
 from harness.scenario.sections import (
     AircraftSpec,
     Area,
@@ -33,6 +35,7 @@ from harness.scenario.sections import (
     TrackabilitySpec,
     key,
 )
+from harness.scenario.shipped import scenario_path
 from harness.scenario.validation import KeyFault, input_error
 
 if TYPE_CHECKING:
@@ -79,6 +82,8 @@ class Scenario(Section):
     def _complete(self, info: ValidationInfo) -> Scenario:
         """Fills in derived defaults, each after those it depends on, and checks across sections."""
         folder = (info.context or {}).get("folder")
+        given = Given({name: getattr(self, name) for name in self.model_fields_set}, folder)
+        object.__setattr__(self, "_given", given)
         self._place_ends()
         found = model_or_folder(self.aircraft.model, folder)
         object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))
@@ -137,12 +142,37 @@ class Scenario(Section):
         missing = {key: value for key, value in defaults.items() if getattr(section, key) is None}
         object.__setattr__(self, name, section.model_copy(update=missing))
 
+    def with_(self, keys: Mapping[str, Any]) -> Scenario:
+        """This scenario with some keys changed, checked anew; defaults that follow from others are derived anew.
 
-def load_scenario(path: Path, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+        A key counts as given where the scenario's file, or an earlier `with_`, named it; all others follow. A new
+        `planner.kind` drops the own keys of the planner before. This scenario stays as it is.
+
+        Args:
+            keys: values by key path, as `{"seed": 3, "planner.clearance_m": 400, "obstacles[0].circle.radius_m": 50}`;
+                plain values, numpy's, or sections. None stands for the default.
+
+        Raises:
+            InputError: the changed scenario is none that can be flown; the fault names the key.
+        """
+        given: Given = self.__dict__["_given"]
+        return validated(changed(given, keys), "with_", given.folder)
+
+    def __repr__(self) -> str:
+        """A line for people; `dump_scenario` gives all of it."""
+        return (
+            f"Scenario({self.name}: {self.planner.kind}, {Path(self.aircraft.model).name}, seed {self.seed}, "
+            f"{counted(len(self.obstacles), 'obstacle')})"
+        )
+
+    __str__ = __repr__
+
+
+def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """Reads a scenario file, every default filled in.
 
     Args:
-        path: the file.
+        path: the file, or the name of a scenario that comes with wayproof, such as `paper_circles`.
         overrides: keys to replace before anything is checked, as (`"sensor.range_m"`, `"5000"`): key path and
             value as YAML; `obstacles[0].circle.radius_m` reaches into a list. A new `planner.kind` drops
             the own keys of the planner that the file names.
@@ -150,6 +180,7 @@ def load_scenario(path: Path, overrides: Sequence[tuple[str, str]] = ()) -> Scen
     Raises:
         InputError: the file cannot be read or is not a scenario; a line of its text names file, line and key.
     """
+    path = scenario_path(str(path))
     root = strict_yaml.read(path)
     return validated(overridden(root, overrides), str(path), path.parent)
 
@@ -284,47 +315,6 @@ def validated(root: Node, source: str, folder: Path | None = None, ends_checked:
         return Scenario.model_validate(root.plain(), context=context)
     except ValidationError as error:
         raise input_error(error, Scenario, root, source) from error
-
-
-def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
-    """A scenario's keys with some replaced, as `load_scenario` takes them.
-
-    Raises:
-        InputError: one is not a key path, has no value or leads nowhere.
-    """
-    for name, text in overrides:
-        root = _overridden(root, name, text)
-    return root
-
-
-def _overridden(root: Node, name: str, text: str) -> Node:
-    try:
-        loc = strict_yaml.loc_of(name)
-    except ValueError as error:
-        raise InputError(f"command line: {error}") from error
-    if not text.strip():
-        raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
-    return with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
-
-
-def with_key(root: Node, loc: Loc, new: Node) -> Node:
-    """A scenario's keys with one replaced; a new `planner.kind` drops the own keys of the planner before.
-
-    Raises:
-        InputError: there is no such key, as far as it can be told without the scenario's types.
-    """
-    if loc == ("planner", "kind"):
-        root = _without_own_keys(root, new)
-    return strict_yaml.replaced(root, loc, new)
-
-
-def _without_own_keys(root: Node, kind: Node) -> Node:
-    """`root` without the keys that only the planner it names knows, unless `kind` is that planner."""
-    planner = root.value.get("planner") if isinstance(root.value, dict) else None
-    if planner is None or not isinstance(planner.value, dict) or planner.plain().get("kind") == kind.value:
-        return root
-    common = {name: node for name, node in planner.value.items() if name in PlannerSpec.model_fields}
-    return strict_yaml.replaced(root, ("planner",), Node(common, planner.line))
 
 
 def model_or_folder(model: str, folder: Path | None) -> str:

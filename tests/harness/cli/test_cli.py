@@ -503,7 +503,7 @@ def test_an_interrupt_before_a_comparison_or_a_campaign_has_begun_promises_nothi
         raise KeyboardInterrupt
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("harness.compare.comparison.compare", interrupted)
+    monkeypatch.setattr("harness.comparison.comparison.fly_and_compare", interrupted)
     monkeypatch.setattr("harness.campaign.folder.CampaignFolder", interrupted)
     for arguments in (["compare", "paper_circles", "--planners", "bug2"], ["sweep", "forest_planners"]):
         assert main([*arguments, "--out", "here"]) == 130

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -464,3 +465,47 @@ def test_a_model_folder_is_sought_beside_the_scenario_and_then_from_here(
     assert parse_scenario(dump_scenario(load_scenario(file))) == load_scenario(file)
     with pytest.raises(InputError, match=r"s.yaml:\d+: aircraft.model: unknown aircraft 'nowhere/mine'"):
         model("nowhere/mine")
+
+
+def test_a_scenario_with_other_keys_is_derived_anew_and_the_first_one_stays() -> None:
+    first = load_scenario("aerosonde_forest")
+    before = dump_scenario(first)
+    other = first.with_(
+        {"planner.clearance_m": 60, "seed": np.int64(3), "sensor": {"range_m": np.float64(900)}}
+    )
+    assert (other.planner.clearance_m, other.seed, other.sensor.range_m) == (60, 3, 900.0)
+    assert other.planner.own["margin_m"] == pytest.approx(1.5 * first.planner.own["margin_m"])
+    assert dump_scenario(first) == before
+    assert other.with_({"planner.clearance_m": 40, "seed": 1, "sensor": first.sensor}) == first
+
+
+def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
+    bare = parse_scenario(
+        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [0, 0, 9000, 9000]},"
+        " mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}}"
+    )
+    faster = bare.with_({"aircraft.model": "c172p", "environment.wind.speed_mps": 5})
+    written = parse_scenario(
+        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [0, 0, 9000, 9000]},"
+        " mission: {start_m: [1000, 1000], goal_m: [8000, 8000]},"
+        " aircraft: {model: c172p}, environment: {wind: {speed_mps: 5}}}"
+    )
+    assert faster == written
+    assert faster.planner != bare.planner
+    assert faster.with_({"aircraft": None, "environment": None}) == bare
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"planner.clearance_m": -1}, "with_: planner.clearance_m: is -1; must be at least 0"),
+        ({"no_such": 1}, "with_: no_such: unknown key"),
+        ({"obstacles[9999].circle.radius_m": 2}, "with_: obstacles[9999]: does not exist"),
+        ({"a..b": 1}, "with_: 'a..b' is not a key path"),
+        ({"name.inner": 1}, "with_: name.inner: no such key"),
+        ({"seed": math.nan}, "with_: seed: "),
+    ],
+)
+def test_a_wrong_key_of_a_changed_scenario_is_told(keys: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(said)}"):
+        load_scenario("aerosonde_forest").with_(keys)

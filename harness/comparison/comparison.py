@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.analysis.rows import CRASHED, Row, to_csv, to_markdown
-from harness.compare.flights import Answer, Job, Progress, fly_all
+from harness.comparison.flights import Answer, Job, Progress, fly_all
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.files.input_file import read_index
@@ -64,7 +64,7 @@ class Comparison:
         return {"schema": SCHEMA, "complete": complete, **asdict(self)}
 
 
-def compare(
+def fly_and_compare(
     scenarios: Sequence[Scenario],
     out: Path,
     *,
@@ -72,6 +72,8 @@ def compare(
     kinematic: bool = False,
     workers: int = 1,
     progress: Progress | None = None,
+    command: str | None = None,
+    sources: Sequence[str] = (),
 ) -> Comparison:
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
 
@@ -82,15 +84,19 @@ def compare(
         kinematic: a point that follows the plans exactly flies instead of the aircraft.
         workers: flights at the same time.
         progress: told of every flight, by its index, as it goes on.
+        command: what the report says was called; default: the command line.
+        sources: planners among them that are given as FILE.py:NAME or MODULE:NAME.
 
     Raises:
         InputError: a scenario is there twice with the same planner, or has the name of a file of the comparison.
         RunFolderError: the folder holds something else or cannot be written.
     """
     jobs = [
-        Job(each, out / each.name / each.planner.kind, recording, kinematic) for each in _distinct(scenarios)
+        Job(each, out / each.name / each.planner.kind, recording, kinematic, tuple(sources))
+        for each in _distinct(scenarios)
     ]
-    begun = Comparison(shlex.join(["wayproof", *sys.argv[1:]]), _now(), {}, kinematic, ())
+    called = command or shlex.join(["wayproof", *sys.argv[1:]])
+    begun = Comparison(called, _now(), {}, kinematic, ())
     lock = _claim(out, begun)
     try:
         return _compared(jobs, scenarios, out, begun, workers, progress)

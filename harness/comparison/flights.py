@@ -28,12 +28,14 @@ class Job:
         folder: the run folder to write.
         recording: whether to write `flight.rrd`.
         kinematic: a point that follows the plans exactly flies instead of the aircraft.
+        sources: planners that the flight's process has to import, as FILE.py:NAME or MODULE:NAME.
     """
 
     scenario: Scenario
     folder: Path
     recording: bool
     kinematic: bool
+    sources: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,12 @@ def _fly(job: Job, theirs: Connection) -> None:
 
 def _write(job: Job, theirs: Connection) -> None:
     from harness.run.scenario_flight import fly_to_folder, kinematic_loop, make_loop
+    from planner.compiled import own_this_process
+    from planner.given import registered_source
 
+    own_this_process()
+    for source in job.sources:
+        registered_source(source)
     fly_to_folder(
         job.scenario,
         job.folder,

@@ -1,0 +1,20 @@
+"""Errors as the command line words them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
+
+
+@contextmanager
+def as_input_errors() -> Iterator[None]:
+    """Lets an error about an aircraft or a folder come out as an InputError with the text of the command line."""
+    from aircraft.airframes import AircraftError
+
+    try:
+        yield
+    except (AircraftError, RunFolderError) as error:
+        raise InputError(f"wayproof: {error}") from error

@@ -1,0 +1,126 @@
+"""Flights from Python: `fly`, and reading back what was flown."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from harness.api.errors import as_input_errors
+from harness.api.metrics import Metrics
+from harness.api.results import FlightResult
+from harness.files.input_file import InputError
+from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
+from planner.given import registered
+
+if TYPE_CHECKING:
+    from harness.flight.closed_loop import Progress
+
+
+def fly(
+    scenario: Scenario | str | Path,
+    planner: object = None,
+    guidance: object = None,
+    out: str | Path | None = None,
+    recording: bool = False,
+    *,
+    progress: Progress | None = None,
+) -> FlightResult:
+    """Flies a scenario to its end, closed loop.
+
+        run = wayproof.fly("aerosonde_forest", planner=MyPlanner)
+
+    Args:
+        scenario: a scenario, its file, or the name of one that comes with wayproof.
+        planner: what plans in place of the scenario's planner: a kind that `wayproof list planners` prints,
+            `FILE.py:NAME` or `MODULE:NAME`, a class or function that takes the mission or nothing and makes the
+            planner, or an object with the method `plan(request)`. None: as the scenario says.
+        guidance: what steers in place of the scenario's guidance law, in the same ways.
+        out: the run folder, made or written anew; None: none is kept.
+        recording: whether to record the flight for rerun (`run.show()`).
+        progress: called every few simulated seconds with simulated time (s), distance to go (m) and a word.
+
+    Returns:
+        What was flown, whatever its outcome.
+
+    Raises:
+        InputError: the scenario, planner or folder cannot be used; nothing was flown.
+        PlannerError: the planner cannot be made.
+        WriteError: the run could not be written to its end.
+    """
+    flown = _with_planner(_scenario(scenario), planner)
+    return _flown(flown, Path(out) if out is not None else None, recording, progress)
+
+
+def load_run(folder: str | Path) -> FlightResult:
+    """Reads a run folder back.
+
+    Raises:
+        InputError: it is none, or its run is incomplete or damaged.
+    """
+    from harness.run_files import run_folder
+
+    with as_input_errors():
+        run = run_folder.load_run(Path(folder))
+    track, plans = run_folder.tables(run.folder)
+    source, checked = str(run.folder / run_folder.SCENARIO), "check" in run.metrics
+    return FlightResult(
+        parse_scenario(run.scenario_yaml, source, ends_checked=not checked),
+        Metrics.of(run.metrics),
+        track,
+        plans,
+        run.folder,
+        run.manifest,
+    )
+
+
+def in_python(what: str) -> str:
+    """The command of a manifest, for what was done in Python: what was called, and from where."""
+    main = sys.modules.get("__main__")
+    script = getattr(main, "__file__", None)
+    if "ipykernel" in sys.modules and script is not None and "ipykernel" in str(script):
+        return f"{what} in a notebook"
+    return f"{what} in {Path(script).name}" if script else f"{what} in Python"
+
+
+def _scenario(given: Scenario | str | Path) -> Scenario:
+    return given if isinstance(given, Scenario) else load_scenario(given)
+
+
+def _with_planner(scenario: Scenario, planner: object) -> Scenario:
+    """The scenario flown by a planner, which is known by its name from here on."""
+    if planner is None:
+        return scenario
+    try:
+        kind = registered(planner)
+    except ValueError as error:
+        raise InputError(f"wayproof: planner: {error}") from error
+    return scenario if kind == scenario.planner.kind else scenario.with_({"planner.kind": kind})
+
+
+def _flown(scenario: Scenario, out: Path | None, recording: bool, progress: Progress | None) -> FlightResult:
+    from harness.run.scenario_flight import fly_to_folder
+
+    if out is None and not recording:
+        return _in_memory(scenario, progress)
+    scratch = TemporaryDirectory(prefix="wayproof-run-") if out is None else None
+    folder = Path(scratch.name) if scratch else Path(out or "")
+    command = in_python(f"wayproof.fly({scenario.name!r}, planner={scenario.planner.kind!r})")
+    with as_input_errors():
+        fly_to_folder(scenario, folder, recording, progress, command=command)
+    read: dict[str, Any] = dict(vars(load_run(folder)))
+    return FlightResult(**{**read, "scenario": scenario, "_scratch": scratch})
+
+
+def _in_memory(scenario: Scenario, progress: Progress | None) -> FlightResult:
+    from harness.analysis.metrics import metrics
+    from harness.flight.closed_loop import fly as fly_loop
+    from harness.run.scenario_flight import flight_limits, make_loop
+    from harness.run_files.plans_table import plans_table
+    from harness.run_files.run_folder import track_table
+
+    with as_input_errors():
+        flight = fly_loop(make_loop(scenario), (), progress)
+    figures = Metrics.of(metrics(flight, flight_limits(scenario)))
+    return FlightResult(scenario, figures, track_table(flight.track), plans_table(flight.plans))

@@ -1,0 +1,219 @@
+"""The content of `metrics.json` with names and types: what `run.metrics` is.
+
+A figure that does not exist is None. A key that a newer version wrote, and that has no field here, is an attribute all
+the same, as JSON has it.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, PrivateAttr
+
+
+class Figures(BaseModel):
+    """A mapping of `metrics.json`: frozen, and with every key that is there."""
+
+    model_config = ConfigDict(frozen=True, extra="allow", protected_namespaces=())
+
+    def __repr__(self) -> str:
+        """Its numbers, shortened."""
+        return f"{type(self).__name__}({', '.join(_short(*each) for each in self)})"
+
+    __str__ = __repr__
+
+
+class Spread(Figures):
+    """A figure over all rows of the track.
+
+    Attributes:
+        rms: root mean square.
+        p95: 95th percentile of the absolute value.
+        max: largest absolute value.
+    """
+
+    rms: float | None = None
+    p95: float | None = None
+    max: float | None = None
+
+
+class Percentiles(Figures):
+    """Times of the planner's calls in which it searched, ms of wall clock.
+
+    Attributes:
+        p50: median.
+        p99: 99th percentile.
+        max: the longest.
+    """
+
+    p50: float | None = None
+    p99: float | None = None
+    max: float | None = None
+
+
+class PathFigures(Figures):
+    """How smooth a path is; `harness.analysis.smoothness` defines each figure.
+
+    Attributes:
+        heading_change_deg: total absolute change of direction.
+        bending_energy_1pm: integral of the squared curvature over the length, 1/m.
+        max_curvature_1pm: largest absolute curvature, 1/m.
+        max_curvature_rate_1pm2: largest change of curvature per length, 1/m^2.
+    """
+
+    heading_change_deg: float | None = None
+    bending_energy_1pm: float | None = None
+    max_curvature_1pm: float | None = None
+    max_curvature_rate_1pm2: float | None = None
+
+
+class PlannedAndFlown(Figures):
+    """The same figures of the path as planned and as flown.
+
+    Attributes:
+        planned: of the parts of the plans that were in effect.
+        flown: of the flown track.
+    """
+
+    planned: PathFigures
+    flown: PathFigures
+
+
+class LegVerdict(Figures):
+    """Whether one leg was tracked; `harness.analysis.trackability.Leg` says how it is told.
+
+    Attributes:
+        start_s: simulated time of its first row.
+        end_s: simulated time of its last row.
+        max_cross_track_m: largest absolute cross-track error.
+        threshold_m: what it may be.
+        trackable: whether it stayed within all that it may be.
+        cause: why not; None where trackable.
+    """
+
+    start_s: float
+    end_s: float
+    max_cross_track_m: float | None = None
+    threshold_m: float | None = None
+    trackable: bool
+    cause: str | None = None
+
+
+class Timing(Figures):
+    """What the flight took.
+
+    Attributes:
+        sim_s: simulated time.
+        wall_s: wall-clock time.
+        realtime_factor: the first over the second.
+    """
+
+    sim_s: float
+    wall_s: float
+    realtime_factor: float | None = None
+
+
+class CheckVerdict(Figures):
+    """Whether a path can be flown as given.
+
+    Attributes:
+        ok: tracked, nothing touched, no fence or bound crossed.
+        verdict: the answer as a sentence.
+        drawn: the line itself was to be flown; else a mission, whose corners may be cut.
+        points: number of points given.
+        given: how smooth the path as given is.
+        corners: that had to be cut, as JSON has them.
+    """
+
+    ok: bool
+    verdict: str
+    drawn: bool = True
+    points: int
+    given: PathFigures
+    corners: tuple[dict[str, Any], ...] = ()
+
+
+class Metrics(Figures):
+    """All figures of one run, as in its `metrics.json`; `harness.analysis.metrics` defines each.
+
+    Attributes:
+        outcome: how the flight ended: `reached`, `collision`, `timeout`, ...
+        reason: the same as a sentence.
+        flown_length_m: length of the flown track.
+        planned_length_m: length of those parts of the plans that were in effect.
+        flight_time_s: simulated time from start to end.
+        min_clearance_m: least true distance to an obstacle edge; None without obstacles.
+        clearance_violation_s: time below the wanted clearance.
+        cross_track_m: distance from the plan being flown.
+        altitude_error_m: distance from the mission's altitude.
+        smoothness: of the path as planned and as flown.
+        bank_saturation_fraction: share of the rows in which the bank was at its limit.
+        max_load_factor: largest load factor.
+        trackable: whether every leg was tracked.
+        trackability: verdict and cause, leg by leg.
+        replans: plans accepted after the first.
+        compute_ms: planner's times.
+        timing: simulated and wall-clock time.
+        digest: SHA-256 of the track.
+        error: traceback of what the planner raised; None where it did not.
+        deviation_from_given_m: of a checked path: distance of the track from the path as given.
+        contact: of a checked path: whether an obstacle was touched.
+        contacts: of a checked path: which, as JSON has it.
+        breaches: of a checked path: fences and bounds that were crossed, as JSON has it.
+        check: of a checked path: the verdict; None of any other run.
+    """
+
+    outcome: str
+    reason: str
+    flown_length_m: float
+    planned_length_m: float
+    flight_time_s: float
+    min_clearance_m: float | None = None
+    clearance_violation_s: float
+    cross_track_m: Spread
+    altitude_error_m: Spread
+    smoothness: PlannedAndFlown
+    bank_saturation_fraction: float
+    max_load_factor: float | None = None
+    trackable: bool
+    trackability: tuple[LegVerdict, ...]
+    replans: int
+    compute_ms: Percentiles
+    timing: Timing
+    digest: str
+    error: str | None = None
+    deviation_from_given_m: Spread | None = None
+    contact: bool | None = None
+    contacts: tuple[dict[str, Any], ...] = ()
+    breaches: tuple[dict[str, Any], ...] = ()
+    check: CheckVerdict | None = None
+
+    _content: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> Metrics:
+        """The metrics in the content of a `metrics.json`."""
+        plain = json.loads(json.dumps(content))
+        metrics = cls.model_validate(plain)
+        metrics._content = plain
+        return metrics
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `metrics.json`, key by key; yours to change."""
+        return copy.deepcopy(self._content)
+
+    def __repr__(self) -> str:
+        """Outcome and the figures that most ask for."""
+        return (
+            f"Metrics({self.outcome}, flown_length_m={self.flown_length_m:.0f}, trackable={self.trackable}, "
+            f"cross_track_m={self.cross_track_m}, ...)"
+        )
+
+    __str__ = __repr__
+
+
+def _short(name: str, value: object) -> str:
+    return f"{name}={value:.4g}" if isinstance(value, float) else f"{name}={value!r}"

@@ -1,0 +1,100 @@
+"""A given path from Python: `check`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from harness.api.errors import as_input_errors
+from harness.api.flights import in_python, load_run
+from harness.api.results import FlightResult
+from harness.scenario.scenario import Scenario, dump_scenario
+from harness.scenario.shipped import scenario_path
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    Points = Sequence[Sequence[float]] | np.ndarray[Any, Any]
+
+
+def check(
+    path: str | Path | Points,
+    aircraft: str = "aerosonde",
+    scenario: Scenario | str | Path | None = None,
+    *,
+    airspeed_mps: float | None = None,
+    altitude_m: float | None = None,
+    wind: tuple[float, float] | None = None,
+    corner_m: float | None = None,
+    settings: Mapping[str, str] | None = None,
+    out: str | Path | None = None,
+    recording: bool = False,
+) -> FlightResult:
+    """Flies a path with the real aircraft and says whether it can be flown as given.
+
+        run = wayproof.check("survey.plan", aircraft="aerosonde", wind=(8, 270))
+        run.metrics.check.ok, run.metrics.check.verdict
+
+    Args:
+        path: a file that `wayproof check` takes, or points (n, 2): east and north in metres; a third column is the
+            altitude.
+        aircraft: a name that `wayproof list aircraft` prints, or a folder.
+        scenario: whose obstacles, bounds, air and altitude the path is flown in; None: nothing is there.
+        airspeed_mps: true airspeed; None: the aircraft's cruising speed.
+        altitude_m: above mean sea level; None: the path's, else the scenario's, else 300 m.
+        wind: speed (m/s) and the direction it blows from (degrees); None: the scenario's, else calm.
+        corner_m: how far off corners may be passed; None: the cross-track threshold for a drawn path; for a mission
+            the acceptance radius of the file, else the clearance.
+        settings: further keys of a scenario, by key path; values as YAML.
+        out: the run folder; None: none is kept.
+        recording: whether to record the flight for rerun.
+
+    Raises:
+        InputError: path, scenario, aircraft or folder cannot be used; nothing was flown.
+    """
+    from harness.run.path_check import asked, fly_check, origin_of
+    from harness.run_files.path_files import given_points, read_path
+
+    sections: dict[str, dict[str, Any]] = {"aircraft": {"model": aircraft}, "environment": {}}
+    if airspeed_mps is not None:
+        sections["aircraft"]["airspeed_mps"] = airspeed_mps
+    if wind is not None:
+        sections["environment"]["wind"] = {"speed_mps": wind[0], "from_deg": wind[1]}
+    keep = out is not None or recording
+    with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as kept:
+        world = _world(scenario, Path(kept))
+        if isinstance(path, str | Path):
+            given = read_path(Path(path), altitude_m is not None, origin_of(world))
+        else:
+            given = given_points(path)
+        check = asked(
+            given,
+            sections,
+            list((settings or {}).items()),
+            world=world,
+            altitude_m=altitude_m,
+            corner_m=corner_m,
+        )
+        scratch = TemporaryDirectory(prefix="wayproof-run-") if out is None else None
+        folder = Path(scratch.name) if scratch else Path(out or "")
+        what = f"wayproof.check({str(path) if isinstance(path, str | Path) else 'points'!r}, {aircraft!r})"
+        fly_check(check, folder, recording, command=in_python(what))
+    read = dict(vars(load_run(folder)))
+    if scratch is not None and not keep:
+        scratch.cleanup()
+    return FlightResult(
+        **{**read, "scenario": check.scenario, "_scratch": scratch, "folder": folder if keep else None}
+    )
+
+
+def _world(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:
+    """The file of a scenario."""
+    if scenario is None:
+        return None
+    if not isinstance(scenario, Scenario):
+        return scenario_path(str(scenario))
+    path = folder / f"{scenario.name}.yaml"
+    path.write_text(dump_scenario(scenario), encoding="utf-8")
+    return path

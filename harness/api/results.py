@@ -1,0 +1,171 @@
+"""What a flight, a comparison and a campaign give back: typed figures, tables, and a look for notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from harness.api.look import campaign_html, comparison_html, flight_html
+from harness.api.metrics import Metrics
+from harness.files.input_file import InputError
+from harness.scenario.scenario import Scenario
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from harness.campaign.summary import Summary
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FlightResult:
+    """One flight that is over.
+
+    Attributes:
+        scenario: what was flown, every default filled in.
+        metrics: its figures, as in `metrics.json`.
+        track: the flown track, a row per log tick, with the columns of `track.parquet`.
+        plans: the accepted plans, a row each, with the columns of `plans.parquet`.
+        folder: its run folder; None where none was kept.
+        manifest: versions, platform, command and start time; empty without a run folder.
+    """
+
+    scenario: Scenario
+    metrics: Metrics
+    track: pa.Table
+    plans: pa.Table
+    folder: Path | None = None
+    manifest: Mapping[str, Any] = field(default_factory=dict)
+    _scratch: TemporaryDirectory[str] | None = None
+
+    @property
+    def outcome(self) -> str:
+        """How it ended: a value of `harness.flight.record.Outcome`, such as `reached` or `collision`."""
+        return self.metrics.outcome
+
+    @property
+    def reason(self) -> str:
+        """The same as a sentence."""
+        return self.metrics.reason
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the track: the same for the same scenario, seed and versions."""
+        return self.metrics.digest
+
+    @property
+    def recording(self) -> Path | None:
+        """The rerun recording; None where none was made."""
+        from harness.run_files.run_folder import RECORDING
+
+        path = self.folder / RECORDING if self.folder else None
+        return path if path and path.is_file() else None
+
+    def show(self, width_px: int = 1000, height_px: int = 600) -> Any:
+        """The recording in rerun's viewer: in a notebook as a widget, elsewhere in a window of its own.
+
+        Args:
+            width_px: of the widget.
+            height_px: of the widget.
+
+        Raises:
+            InputError: there is no recording, or what is needed to show it is missing.
+        """
+        if self.recording is None:
+            raise InputError("wayproof: the run has no recording to show; fly it with recording=True")
+        from harness.recording.notebook import NotebookError, in_notebook, viewer_widget
+        from harness.recording.viewer import ViewerError, open_viewer
+
+        try:
+            if in_notebook():
+                return viewer_widget(self.recording, width_px, height_px)
+            open_viewer([self.recording.parent])
+        except (NotebookError, ViewerError) as error:
+            raise InputError(f"wayproof: {error}") from error
+        return None
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        where = f", in {self.folder}" if self.folder and self._scratch is None else ""
+        scenario = self.scenario
+        return (
+            f"FlightResult({scenario.name}: {self.outcome}; {self.pilot}, {Path(scenario.aircraft.model).name}, "
+            f"seed {scenario.seed}{where})"
+        )
+
+    @property
+    def pilot(self) -> str:
+        """The planner's kind; of a checked path what stands for it."""
+        from harness.run_files.given_path import GIVEN
+
+        return GIVEN if self.metrics.check is not None else self.scenario.planner.kind
+
+    def _repr_html_(self) -> str:
+        return flight_html(repr(self)[len("FlightResult(") : -1], self.metrics.to_dict())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComparisonResult:
+    """Planners side by side.
+
+    Attributes:
+        table: a row a scenario and planner: outcome, reason, lengths, errors, times.
+        folder: the comparison's folder, with `report.html` and a run folder for each flight.
+    """
+
+    table: pa.Table
+    folder: Path
+
+    @property
+    def all_reached(self) -> bool:
+        """Whether every planner reached every goal."""
+        return set(self.table["outcome"].to_pylist()) <= {"reached"}
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        reached = self.table["outcome"].to_pylist().count("reached")
+        return f"ComparisonResult({len(self.table)} flights, {reached} reached; {self.folder})"
+
+    def _repr_html_(self) -> str:
+        return comparison_html(repr(self)[len("ComparisonResult(") : -1], self.table)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CampaignResult:
+    """A campaign that was flown, or as much of it as has been.
+
+    Attributes:
+        folder: the campaign's folder.
+    """
+
+    folder: Path
+
+    @cached_property
+    def table(self) -> pa.Table:
+        """One row a run, with the columns of `results.parquet`."""
+        from harness.campaign.table import load_tables
+
+        return load_tables(self.folder)[0]
+
+    @cached_property
+    def summary(self) -> Summary:
+        """Its answers: goals reached with intervals, lengths, clearances, by any two varied keys; the worst runs."""
+        from harness.campaign.summary import summarise
+
+        return summarise(self.folder)
+
+    @property
+    def outcomes(self) -> dict[str, int]:
+        """How many runs ended how, the most frequent first."""
+        return dict(self.summary.outcomes)
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        ends = ", ".join(f"{number} {outcome}" for outcome, number in self.outcomes.items())
+        return f"CampaignResult({len(self.table)} runs: {ends}; {self.folder})"
+
+    def _repr_html_(self) -> str:
+        return campaign_html(repr(self)[len("CampaignResult(") : -1], self.summary)

@@ -1,0 +1,31 @@
+"""The packages that wayproof is made of: they have common names, and a folder of the user's own may hide one."""
+
+import functools
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+ROOMS = ("planner", "aircraft", "harness")
+
+
+@functools.cache
+def own_packages() -> Any:
+    """The package `harness`, after a look at whether it and the others are ours.
+
+    Raises:
+        ImportError: Python finds another package, or module, of one of these names first.
+    """
+    here = Path(__file__).resolve().parents
+    root = here[1] if (here[1] / "harness").is_dir() else here[3]  # installed, or in a checkout
+    for room in ROOMS:
+        spec = find_spec(room)
+        found = Path(spec.origin).resolve() if spec and spec.origin else None
+        if found is None or found.parent != root / room:
+            what = "does not find it" if found is None else f"finds another one first, {found}"
+            raise ImportError(
+                f"wayproof needs its own package {room!r}, and Python {what}: rename that folder or file, or start "
+                "Python in another folder",
+                name=room,
+            )
+    return import_module("harness")

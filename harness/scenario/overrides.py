@@ -1,0 +1,103 @@
+"""A scenario's keys with some replaced: on the command line, by a campaign, or in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from harness.files import strict_yaml
+from harness.files.strict_yaml import COMMAND_LINE, IN_PYTHON, InputError, Loc, Node, loc_of, node_of
+from harness.scenario.sections import PlannerSpec, Section
+
+
+def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
+    """A scenario's keys with some replaced, as `load_scenario` takes them.
+
+    Raises:
+        InputError: one is not a key path, has no value or leads nowhere.
+    """
+    for name, text in overrides:
+        root = _overridden(root, name, text)
+    return root
+
+
+def _overridden(root: Node, name: str, text: str) -> Node:
+    try:
+        loc = strict_yaml.loc_of(name)
+    except ValueError as error:
+        raise InputError(f"command line: {error}") from error
+    if not text.strip():
+        raise InputError(f"command line: {name}: has no value; write {name}=VALUE")
+    return with_key(root, loc, strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE))
+
+
+def with_key(root: Node, loc: Loc, new: Node) -> Node:
+    """A scenario's keys with one replaced; a new `planner.kind` drops the own keys of the planner before.
+
+    Raises:
+        InputError: there is no such key, as far as it can be told without the scenario's types.
+    """
+    if loc == ("planner", "kind"):
+        root = _without_own_keys(root, new)
+    return strict_yaml.replaced(root, loc, new)
+
+
+def _without_own_keys(root: Node, kind: Node) -> Node:
+    """`root` without the keys that only the planner it names knows, unless `kind` is that planner."""
+    planner = root.value.get("planner") if isinstance(root.value, dict) else None
+    if planner is None or not isinstance(planner.value, dict) or planner.plain().get("kind") == kind.value:
+        return root
+    common = {name: node for name, node in planner.value.items() if name in PlannerSpec.model_fields}
+    return strict_yaml.replaced(root, ("planner",), Node(common, planner.line))
+
+
+class Given(NamedTuple):
+    """What a scenario was made of, before any default was derived or any file expanded.
+
+    Attributes:
+        sections: the keys that were given, by their attributes; sections without the defaults that follow from others.
+        folder: of the scenario file; None where there was none.
+    """
+
+    sections: Mapping[str, Any]
+    folder: Path | None
+
+
+def changed(given: Given, keys: Mapping[str, Any]) -> Node:
+    """The keys that a scenario was given, and no default, with some changed.
+
+    Args:
+        given: what it was made of.
+        keys: values by key path; None takes a key away.
+
+    Raises:
+        InputError: one is not a key path, or leads nowhere.
+    """
+    plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
+    root = node_of(plain, IN_PYTHON)
+    for name, value in keys.items():
+        try:
+            loc = loc_of(name)
+        except ValueError as error:
+            raise InputError(f"with_: {error}") from error
+        if value is None:
+            root = strict_yaml.without(root, loc)
+        else:
+            root = with_key(root, loc, node_of(_plain(value), IN_PYTHON))
+    return root
+
+
+def _plain(value: Any) -> Any:
+    """What somebody gives in Python, as YAML has it."""
+    if isinstance(value, Section):
+        return value.model_dump(by_alias=True, exclude_none=True, exclude_unset=True)
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return {str(name): _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(_plain(each) for each in value)
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,65 @@
+"""Many flights from Python."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+import wayproof
+from tests.harness.api.worlds import SCENARIO, small, source_file
+
+CAMPAIGN = """
+schema: wayproof/campaign/1
+name: two
+seed: 1
+scenarios: [short.yaml]
+planners: [bug2, vfh_plus]
+"""
+
+
+def test_a_campaign_is_flown_and_read_back(tmp_path: Path) -> None:
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    (tmp_path / "two.yaml").write_text(CAMPAIGN)
+    told: list[int] = []
+    flown = wayproof.sweep(
+        str(tmp_path / "two.yaml"),
+        out=tmp_path / "out",
+        workers=1,
+        progress=lambda answer: told.append(answer.run),
+    )
+    assert sorted(told) == [0, 1]
+    assert flown.outcomes == {"reached": 2}
+    assert flown.table.num_rows == pq.read_table(tmp_path / "out" / "results.parquet").num_rows == 2
+    assert (tmp_path / "out" / "summary.html").is_file()
+    read = wayproof.load_campaign(tmp_path / "out")
+    assert read.summary.total == flown.summary.total
+    assert repr(read) == f"CampaignResult(2 runs: 2 reached; {tmp_path / 'out'})"
+    assert "all runs" in read._repr_html_()
+    assert "vfh_plus" in read._repr_html_()
+    with pytest.raises(wayproof.InputError, match="go on with --resume"):
+        wayproof.sweep(tmp_path / "two.yaml", out=tmp_path / "out")
+    with pytest.raises(wayproof.InputError, match="fly the file with sweep"):
+        wayproof.load_campaign(tmp_path / "two.yaml")
+
+
+def test_planners_are_compared_and_one_of_them_comes_from_a_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    source = source_file(tmp_path)
+    compared = wayproof.compare(small(), ["vfh_plus", f"{source}:Beeline"], out=tmp_path / "out", workers=1)
+    assert compared.all_reached
+    assert compared.table["planner"].to_pylist() == ["vfh_plus", "planner.py:Beeline"]
+    assert "vfh_plus" in compared._repr_html_()
+    assert len(repr(compared)) < 200
+    index = json.loads((tmp_path / "out" / "comparison.json").read_text())
+    assert index["command"].startswith("wayproof.compare(['short'], ['vfh_plus', 'planner.py:Beeline'])")
+
+
+def test_objects_are_not_compared() -> None:
+    with pytest.raises(wayproof.InputError, match="by name"):
+        wayproof.compare(small(), [object()])  # type: ignore[list-item]

@@ -1,0 +1,225 @@
+"""Flying from Python."""
+
+from __future__ import annotations
+
+import gc
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import harness
+import wayproof
+from harness.api.metrics import Figures, Metrics
+from harness.cli.app import main
+from harness.flight.record import TRACK_FIELDS
+from tests.harness.api.worlds import SCENARIO, Beeline, small, source_file
+
+
+@pytest.fixture(scope="module")
+def run() -> wayproof.FlightResult:
+    return wayproof.fly(small())
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> wayproof.FlightResult:
+    return wayproof.fly(small(), out=tmp_path_factory.mktemp("kept") / "run", recording=True)
+
+
+def test_a_flight_has_its_outcome_figures_and_tables(run: wayproof.FlightResult) -> None:
+    assert (run.outcome, run.folder, run.recording) == ("reached", None, None)
+    assert run.reason.startswith("inside the goal circle")
+    assert run.metrics.cross_track_m.p95 is not None
+    assert 0.0 <= run.metrics.cross_track_m.p95 < 1.0
+    assert run.metrics.trackability[0].trackable
+    assert tuple(run.track.column_names) == TRACK_FIELDS
+    assert run.plans["plan_index"].to_pylist() == list(range(run.metrics.replans + 1))
+    assert run.scenario == small()
+    assert run.digest == run.metrics.digest
+
+
+def test_in_memory_and_into_a_folder_the_same_is_flown(
+    run: wayproof.FlightResult, kept: wayproof.FlightResult
+) -> None:
+    assert kept.digest == run.digest
+    assert kept.track.equals(run.track)
+    assert kept.folder is not None
+    written = json.loads((kept.folder / "metrics.json").read_text())
+    assert kept.metrics.to_dict() == written
+    assert kept.recording == kept.folder / "flight.rrd"
+    again = wayproof.load_run(str(kept.folder))
+    assert (again.digest, again.scenario, again.metrics) == (kept.digest, kept.scenario, kept.metrics)
+    assert again.plans.equals(kept.plans)
+
+
+def test_every_figure_has_a_field_with_a_type(
+    run: wayproof.FlightResult, kept: wayproof.FlightResult
+) -> None:
+    def untyped(figures: Figures) -> list[str]:
+        found = list(figures.model_extra or {})
+        for name in type(figures).model_fields:
+            value = getattr(figures, name)
+            found += untyped(value) if isinstance(value, Figures) else []
+        return found
+
+    leg, path = run.metrics.trackability[0], run.metrics.smoothness.flown
+    assert untyped(run.metrics) == [*(path.model_extra or {}), *(path.model_extra or {})]
+    assert leg.cause is None
+    assert Metrics.of({**kept.metrics.to_dict(), "a_later_figure": 3}).to_dict()["a_later_figure"] == 3
+
+
+def test_what_to_dict_gives_is_a_copy(run: wayproof.FlightResult) -> None:
+    run.metrics.to_dict()["cross_track_m"]["p95"] = -1.0
+    assert run.metrics.to_dict()["cross_track_m"]["p95"] == run.metrics.cross_track_m.p95
+
+
+def test_reprs_are_short_and_a_notebook_sees_a_table(
+    run: wayproof.FlightResult, kept: wayproof.FlightResult
+) -> None:
+    for thing in (run, kept, run.metrics, run.scenario, run.metrics.cross_track_m):
+        assert len(repr(thing)) < 250
+    assert repr(run) == "FlightResult(short: reached; rolling_window, aerosonde, seed 1)"
+    page = kept._repr_html_()
+    assert "<table>" in page
+    assert "cross-track error" in page
+    assert "[bold" not in page
+
+
+def test_the_manifest_says_that_it_was_python(kept: wayproof.FlightResult) -> None:
+    (command,) = kept.manifest["command"]
+    assert command.startswith("wayproof.fly('short', planner='rolling_window')")
+
+
+def test_nothing_of_the_caller_is_frozen(run: wayproof.FlightResult) -> None:
+    assert run.outcome == "reached"
+    assert gc.get_freeze_count() == 0
+
+
+@pytest.mark.parametrize("how", ["class", "factory", "object", "no argument"])
+def test_a_planner_is_given_as_an_object(how: str) -> None:
+    class Ready(Beeline):
+        def __init__(self) -> None:
+            self.goal_m = small().mission.goal_m
+
+    given = {
+        "class": Beeline,
+        "factory": lambda mission: Beeline(mission),
+        "object": Ready(),
+        "no argument": Ready,
+    }[how]
+    flown = wayproof.fly(small(), planner=given)
+    assert flown.outcome == "reached"
+    assert flown.metrics.replans == 0
+    assert ":" in flown.scenario.planner.kind
+    assert flown.plans["path"][0].as_py()[-1] == [1200.0, 1000.0]
+
+
+def test_a_kind_by_name_replaces_the_planner_and_its_own_keys() -> None:
+    scenario = small().with_({"planner.steps": 4, "mission.time_limit_s": 5})
+    assert wayproof.fly(scenario, planner="bug2").scenario.planner.own.keys() == {
+        "turn",
+        "margin_m",
+        "horizon_m",
+    }
+
+
+def test_a_planner_from_a_file_flies_in_python_and_on_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    source = source_file(tmp_path)
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    flown = wayproof.fly(tmp_path / "short.yaml", planner=f"{source}:Beeline", out=tmp_path / "a")
+    assert (flown.outcome, flown.scenario.planner.kind) == ("reached", "planner.py:Beeline")
+    arguments = ["--planner", f"{source}:Beeline", "--no-recording", "--quiet"]
+    assert main(["fly", str(tmp_path / "short.yaml"), *arguments, "--out", str(tmp_path / "b")]) == 0
+    assert wayproof.load_run(tmp_path / "b").digest == flown.digest
+
+
+def test_a_scenario_file_never_runs_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = source_file(tmp_path)
+    source.write_text("raise SystemExit(3)\n")
+    text = SCENARIO + f"planner: {{kind: '{source}:Beeline'}}\n"
+    (tmp_path / "short.yaml").write_text(text)
+    assert main(["fly", str(tmp_path / "short.yaml")]) == 2
+    said = capsys.readouterr().err
+    assert "planner.kind" in said
+    assert "--planner" in said
+
+
+def test_faults_have_the_text_of_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / "broken.yaml"
+    broken.write_text(SCENARIO.replace("goal_m: [1200, 1000]", "goal_m: [1000, 1700]"))
+    for command, call in (
+        (["fly", str(broken)], lambda: wayproof.fly(str(broken))),
+        (["fly", "no_such"], lambda: wayproof.load_scenario("no_such")),
+        (["report", str(tmp_path)], lambda: wayproof.load_run(tmp_path)),
+    ):
+        assert main(command) == 2
+        with pytest.raises(wayproof.InputError) as raised:
+            call()
+        assert f"{raised.value}\n" == capsys.readouterr().err
+        assert isinstance(raised.value, ValueError)
+    assert [each.name for each in tmp_path.iterdir()] == ["broken.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (3, "this is a int"),
+        ("nix", "must be one of rolling_window"),
+        ("nix.py:Beeline", "no such file"),
+        ("no_such_module:Beeline", "there is no module no_such_module"),
+        ("math:nix", "math has no nix"),
+        (lambda mission, gain: None, "must need the mission alone"),
+    ],
+)
+def test_what_is_no_planner_is_refused(given: object, said: str) -> None:
+    with pytest.raises(wayproof.InputError, match=said):
+        wayproof.fly(small(), planner=given)
+
+
+def test_a_factory_that_makes_no_planner_is_told() -> None:
+    with pytest.raises(wayproof.PlannerError, match="has no method plan"):
+        wayproof.fly(small(), planner=lambda mission: mission)
+
+
+def test_show_without_a_recording_says_what_to_do(run: wayproof.FlightResult) -> None:
+    with pytest.raises(wayproof.InputError, match="recording=True"):
+        run.show()
+
+
+def test_progress_is_told(tmp_path: Path) -> None:
+    told: list[float] = []
+    wayproof.fly(small(), progress=lambda time_s, to_go_m, word: told.append(to_go_m))
+    assert told == sorted(told, reverse=True)
+    assert len(told) > 3
+
+
+def test_the_names_are_those_of_harness() -> None:
+    assert dir(wayproof) == sorted(harness.__all__)
+    for name in harness.__all__:
+        assert getattr(wayproof, name) is getattr(harness, name)
+    assert sorted(name for names in harness._HOMES.values() for name in names) == sorted(harness.__all__)
+    for module in (harness, wayproof):
+        with pytest.raises(AttributeError):
+            _ = module.no_such_name
+
+
+def test_importing_it_loads_nothing_heavy() -> None:
+    code = (
+        "import sys, wayproof; heavy = {'numpy', 'pydantic', 'numba', 'pyarrow', 'rerun', 'harness'} & {*sys.modules};"
+        "sys.exit(', '.join(heavy) or 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=_environment(), capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def _environment() -> dict[str, str]:
+    import os
+
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}

@@ -1,0 +1,44 @@
+"""Checking a path from Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wayproof
+from tests.harness.api.worlds import small
+
+LINE = [(300.0, 1000.0), (900.0, 1000.0)]
+
+
+def test_points_are_checked_and_nothing_is_left_behind() -> None:
+    run = wayproof.check(np.array(LINE))
+    assert run.metrics.check is not None
+    assert run.metrics.check.ok
+    assert (run.outcome, run.folder, run.pilot) == ("reached", None, "path as given")
+    assert run.metrics.deviation_from_given_m is not None
+    assert run.track.num_rows > 200
+    assert "flown as given" in run._repr_html_()
+    assert run.metrics.model_extra == {}
+
+
+def test_a_path_through_an_obstacle_of_a_scenario_is_told(tmp_path: Path) -> None:
+    line = [(300.0, 1700.0), (1800.0, 1700.0)]
+    run = wayproof.check(line, scenario=small(), out=tmp_path / "run")
+    assert run.metrics.check is not None
+    assert (run.metrics.check.ok, run.metrics.contact) == (False, True)
+    assert run.manifest["command"][0].startswith("wayproof.check('points', 'aerosonde')")
+    read = wayproof.load_run(tmp_path / "run")
+    assert (read.digest, read.metrics, read.scenario) == (run.digest, run.metrics, run.scenario)
+
+
+def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "path.txt").touch()
+    with pytest.raises(wayproof.InputError, match="is none of"):
+        wayproof.check(str(tmp_path / "path.txt"))
+    with pytest.raises(wayproof.InputError, match="has the shape"):
+        wayproof.check([(0.0, 0.0)])
+    with pytest.raises(wayproof.InputError, match="no such file"):
+        wayproof.check(LINE, scenario="no_such")

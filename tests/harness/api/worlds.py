@@ -1,0 +1,67 @@
+"""A small world and planners for the front door's tests."""
+
+from __future__ import annotations
+
+from pathlib import Path as FilePath
+
+import numpy as np
+
+import wayproof
+from wayproof import Mission, Path, Plan, PlanRequest, PlanStatus
+
+SCENARIO = """
+schema: wayproof/scenario/1
+name: short
+area: {bounds_m: [0, 0, 3000, 2000]}
+obstacles:
+  - circle: {center_m: [1000, 1700], radius_m: 100}
+mission: {start_m: [300, 1000], goal_m: [1200, 1000], goal_radius_m: 60}
+sensor: {range_m: 1200}
+"""
+
+SOURCE = '''
+"""Planners in a file of their own."""
+
+from beside import WHY
+from planner.interface import Path, Plan, PlanStatus
+
+
+class Beeline:
+    """Straight to the goal, whatever is in the way."""
+
+    def __init__(self, mission):
+        self.goal_m = mission.goal_m
+
+    def plan(self, request):
+        if request.flown is not None:
+            return Plan(PlanStatus.KEPT, "still on the line")
+        line = [request.position_m, self.goal_m]
+        return Plan(PlanStatus.FOUND, WHY, line, Path.through(line))
+'''
+
+
+class Beeline:
+    """Straight to the goal, whatever is in the way."""
+
+    def __init__(self, mission: Mission) -> None:
+        self.goal_m = mission.goal_m
+
+    def plan(self, request: PlanRequest) -> Plan:
+        if request.flown is not None:
+            return Plan(PlanStatus.KEPT, "still on the line")
+        line = [request.position_m, self.goal_m]
+        return Plan(PlanStatus.FOUND, "straight to the goal", np.array(line), Path.through(line))
+
+
+def small() -> wayproof.Scenario:
+    from harness.scenario.scenario import parse_scenario
+
+    return parse_scenario(SCENARIO)
+
+
+def source_file(folder: FilePath) -> FilePath:
+    """A file with a planner, which is called as our own package is, and one beside it that it imports."""
+    (folder / "beside.py").write_text('WHY = "straight on"\n')
+    path = folder / "planner.py"
+    path.write_text(SOURCE)
+    return path
