@@ -24,8 +24,8 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     """All figures of a flight, ready for JSON: a figure that does not exist is None, never NaN or infinity.
 
     Distances are of the flown track as logged. `planned_length_m` is the curve length of those parts of the
-    plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two.
-    Cross-track
+    plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two;
+    `min_altitude_above_ground_m` is over the true ground, None where that is not known. Cross-track
     figures are of the rows flown under a plan, altitude figures of all rows. `clearance_violation_s` counts the
     intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
     `replans` counts the plans accepted after the first. `compute_ms` is over all calls in which the planner searched,
@@ -59,6 +59,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "planned_length_m": planned_m,
         "flight_time_s": float(track.time_s[-1] - track.time_s[0]),
         "min_clearance_m": _finite(nearest_m.min()),
+        "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
         "cross_track_m": error_figures(followed),
         "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
@@ -115,6 +116,12 @@ def planned_length_m(flight: Flight) -> float:
         length = math.inf if plan.loiter else float(plan.segments[:, 5].sum())
         flown_m += max(min(end, length) - start, 0.0)
     return flown_m
+
+
+def _least(values: FloatArray | None) -> float | None:
+    """The least of those that are known."""
+    known = np.zeros(0) if values is None else values[np.isfinite(values)]
+    return float(known.min()) if len(known) else None
 
 
 def _finite(value: np.float64) -> float | None:

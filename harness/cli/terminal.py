@@ -112,12 +112,19 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "flight time": f"{_number(metrics['flight_time_s'])} s",
         "least clearance": f"{_number(metrics['min_clearance_m'])} m, "
         f"below the wanted one for {_number(metrics['clearance_violation_s'])} s",
+        **_over_ground(metrics),
         "cross-track error": f"{_spread(metrics['cross_track_m'])} m",
         "altitude error": f"{_spread(metrics['altitude_error_m'])} m",
         "trackable": _tracked(metrics),
         "replans": f"{metrics['replans']}, p99 {_number(compute['p99'])} ms, max {_number(compute['max'])} ms",
         "speed": f"{_number(timing['realtime_factor'])} x real time, {_number(timing['wall_s'])} s",
     }
+
+
+def _over_ground(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """A row on the height above ground, where that is known."""
+    least_m = metrics.get("min_altitude_above_ground_m")
+    return {} if least_m is None else {"above ground": f"at least {_number(least_m)} m"}
 
 
 def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:

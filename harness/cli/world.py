@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from harness.cli.options import aircraft as aircraft_names
+from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
     from harness.world_files.siting import Craft, Site
@@ -98,7 +99,7 @@ def world(
 
 
 def _tell(what: str) -> None:
-    typer.echo(f"wayproof: {what}", err=True)
+    say(f"wayproof: {what}", err=True)
 
 
 def _ends(start: str | None, goal: str | None) -> tuple[Pair, Pair] | None:
@@ -127,8 +128,8 @@ def _craft(name: str, clearance_m: float | None) -> Craft:
     keys: dict[str, Any] = {
         "schema": "wayproof/scenario/1",
         "name": "room",
-        "area": {"bounds_m": [0.0, 0.0, 1e6, 1e6]},
-        "mission": {"start_m": [3e5, 3e5], "goal_m": [7e5, 7e5]},
+        "area": {"bounds_m": [-1.5e5, -1.5e5, 1.5e5, 1.5e5]},
+        "mission": {"start_m": [-1e5, 0.0], "goal_m": [1e5, 0.0]},
         "aircraft": {"model": name},
     }
     if clearance_m is not None:
@@ -221,7 +222,7 @@ def _write(out: Path, text: str) -> None:
 def _print(found: Site, out: Path) -> None:
     import math
 
-    from harness.cli.terminal import print_table
+    from harness.cli.terminal import plain, print_table
 
     xmin, ymin, xmax, ymax = found.bounds_m
     solid = [each for source in found.expanded.sources for each in source.polygons]
@@ -236,5 +237,5 @@ def _print(found: Site, out: Path) -> None:
         "ground": "from terrain" if found.expanded.ground is not None else "not known",
     }
     for number, note in enumerate(_notes(found), 1):
-        rows[f"note {number}"] = note.replace("[", "\\[")
-    print_table(f"{out}: fly it with `wayproof fly {out}`", rows)
+        rows[f"note {number}"] = plain(note)
+    print_table(plain(f"{out}: fly it with `wayproof fly {out}`"), rows)

@@ -105,7 +105,9 @@ def _flown(
     begun = time.perf_counter()
     model, guidance, seen, mission = loop.model, loop.guidance, loop.seen, loop.mission
     strides, at = _strides(model.step_rate_hz, loop.scan_rate_hz), 0
-    log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
+    log = TrackLog(
+        loop.world.clearance, [observer.on_block for observer in observers], ground=loop.world.ground_heights
+    )
     plans = _Plans(loop, observers)
     judge = Termination(loop.world, mission, loop.time_limit_s, model.fault)
     late: deque[RangeScan] = deque()

@@ -86,6 +86,7 @@ class Track:
         plan_index: row of `plans.parquet` being flown, -1 before the first.
         arc_length_m: distance along that plan; NaN before the first plan.
         throttle: throttle command, 0 to 1; NaN for a flight model without an engine.
+        altitude_above_ground_m: height above the true ground; NaN where that is not known, the default.
     """
 
     time_s: FloatArray
@@ -105,8 +106,11 @@ class Track:
     plan_index: IntArray
     arc_length_m: FloatArray
     throttle: FloatArray
+    altitude_above_ground_m: FloatArray | None = None
 
     def __post_init__(self) -> None:
+        if self.altitude_above_ground_m is None:
+            object.__setattr__(self, "altitude_above_ground_m", np.full(len(self.time_s), math.nan))
         for name in TRACK_FIELDS:
             column = np.array(getattr(self, name), dtype="<i8" if name == "plan_index" else "<f8")
             if column.shape != (len(self.time_s),):
@@ -133,7 +137,7 @@ class Track:
         )
 
 
-TRACK_FIELDS = (*COLUMNS, "arc_length_m", "throttle")
+TRACK_FIELDS = (*COLUMNS, "arc_length_m", "throttle", "altitude_above_ground_m")
 """All columns of `track.parquet`."""
 
 
@@ -152,6 +156,7 @@ class TrackLog:
 
     Args:
         clearance: distance to the nearest obstacle edge, vectorised.
+        ground: height of the ground at east and north, vectorised; None where it is not known.
         sinks: each is called with every finished block, in order.
         block_rows: rows a block.
     """
@@ -161,8 +166,9 @@ class TrackLog:
         clearance: Clearance,
         sinks: Iterable[Callable[[Track], None]] = (),
         block_rows: int = BLOCK_ROWS,
+        ground: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
     ) -> None:
-        self._clearance = clearance
+        self._clearance, self._ground = clearance, ground
         self._sinks = tuple(sinks)
         self._table = np.zeros((block_rows, ROW))  # no more objects while flying than now
         self._row = 0
@@ -219,6 +225,7 @@ class TrackLog:
             plan_index=plan_index,
             arc_length_m=station,
             throttle=throttle,
+            altitude_above_ground_m=None if self._ground is None else up - self._ground(east, north),
         )
         self._blocks.append(block)
         for sink in self._sinks:

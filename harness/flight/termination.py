@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from aircraft.interface import AircraftState
 from harness.flight.record import Outcome
+from harness.world.ground import Ground, Position
 from harness.world.world import Fix, World
 from planner.interface import Mission
 
@@ -33,6 +34,7 @@ class Termination:
         self._appears_s = -math.inf
         # At the last look at the obstacles: where, when, and how much clearance.
         self._measured = (0.0, 0.0, 0.0, 0.0)
+        self._over: Position | None = None  # where it was at the last look at the ground
         self._looked: tuple[Fix, float] | None = None  # at the last look of all: surely so much clearance
         self.contact_m = math.inf
         """Clearance at a contact since the look before the last; +inf without."""
@@ -56,6 +58,8 @@ class Termination:
             return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
         if self.contact_m < 0.0:
             return Outcome.COLLISION, "touched an obstacle between two steps"
+        if world.ground is not None and (hit := self._ground_hit(world.ground, state)):
+            return Outcome.COLLISION, hit
         if not world.inside_bounds(east, north):
             return Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m"
         to_go = self.to_go_m(state)
@@ -68,10 +72,24 @@ class Termination:
         # Whatever it turns to: the wind is no faster than both speeds together.
         fastest = state.groundspeed_mps + 2.0 * state.airspeed_mps
         wait = min(clearance / (fastest + world.max_obstacle_speed_mps), room / fastest, LONGEST_UNCHECKED_S)
+        if world.ground is not None:
+            reach_m = world.ground.reach_m((east, north, state.up_m))
+            wait = min(wait, reach_m / (fastest + state.airspeed_mps))
         if self._appears_s <= state.time_s:
             self._appears_s = world.next_appearance(state.time_s)
         self.next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)
         return None
+
+    def _ground_hit(self, ground: Ground, state: AircraftState) -> str:
+        """A sentence if the aircraft is below the ground, or was since the last look; else empty."""
+        here = state.east_m, state.north_m, state.up_m
+        before, self._over = self._over, here
+        above_m = ground.above_m(here)
+        if above_m <= 0.0:
+            return f"flew into the terrain: {-above_m:.1f} m below the ground at {here[2] - above_m:.0f} m"
+        if before is not None and ground.contact_between(before, here):
+            return "flew into the terrain between two steps"
+        return ""
 
     def _surely_clear_m(self, east: float, north: float, time_s: float) -> float:
         """The true clearance; or what is surely left of that of the last look, while more than a quarter is."""

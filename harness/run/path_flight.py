@@ -44,7 +44,9 @@ def _flown(
     path = Path(way.segments)
     plan = Plan(PlanStatus.FOUND, "the path as given", way.waypoints_m, path)
     accepted = AcceptedPlan(0, 0.0, 0.0, plan)
-    log = TrackLog(loop.world.clearance, [observer.on_block for observer in observers])
+    log = TrackLog(
+        loop.world.clearance, [observer.on_block for observer in observers], ground=loop.world.ground_heights
+    )
     limit_s = 2.0 * path.length_m / max(_slowest_mps(loop), 1.0) + 60.0
     guidance.follow(Route(path.segments))
     for observer in observers:

@@ -204,7 +204,8 @@ def fly_to_folder(
     text = dump_scenario(scenario)
     try:
         with ExitStack() as stack:
-            folder = stack.enter_context(RunFolder.create(out, text, [command or shlex.join(sys.argv)]))
+            told = [command or shlex.join(sys.argv)]
+            folder = stack.enter_context(RunFolder.create(out, text, told, _sources(scenario)))
             observers = [*watching]
             log = (
                 _recording(scenario, text, loop, folder, pilot or scenario.planner.kind, identity, thin)
@@ -222,6 +223,11 @@ def fly_to_folder(
     except OSError as error:
         raise WriteError.of("the run", out, error) from error
     return figures
+
+
+def _sources(scenario: Scenario) -> list[dict[str, str]]:
+    """Files that obstacles and ground were made of, for the manifest."""
+    return [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
 
 
 def _recording(

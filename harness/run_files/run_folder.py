@@ -55,6 +55,8 @@ MAX_BYTES = 64_000_000
 SCHEMA = "wayproof/run/1"
 DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
 COMPRESSION = "lz4"
+ADDED = ("altitude_above_ground_m",)
+"""Columns that older runs lack."""
 SPLIT = [name for name in TRACK_FIELDS if name != "plan_index"]
 """Columns whose bytes are written first bytes first: half the size and half the time."""
 
@@ -92,13 +94,16 @@ class RunFolder:
         self._lock = lock
 
     @classmethod
-    def create(cls, path: Path, scenario_yaml: str, command: Sequence[str]) -> RunFolder:
+    def create(
+        cls, path: Path, scenario_yaml: str, command: Sequence[str], sources: Sequence[Mapping[str, str]] = ()
+    ) -> RunFolder:
         """Makes the folder, marked incomplete, with scenario and manifest; removes a former run's files.
 
         Args:
             path: the folder; made with its parents where missing.
             scenario_yaml: the scenario as flown, all defaults filled in.
             command: command line, for the manifest.
+            sources: path and SHA-256 of each file that obstacles were made of, for the manifest.
 
         Raises:
             RunFolderError: the path is a file, a folder with other things in it or that another process is
@@ -109,6 +114,7 @@ class RunFolder:
             "complete": False,
             "command": list(command),
             "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            **({"sources": [dict(each) for each in sources]} if sources else {}),
             "versions": versions(DISTRIBUTIONS),
             "platform": {
                 "system": platform.platform(),
@@ -199,12 +205,17 @@ def load_run(path: Path) -> Run:
     try:
         for name in (TRACK, PLANS):
             _check(path / name, manifest)
-        table = pq.read_table(path / TRACK, columns=list(TRACK_FIELDS))
+        table = pq.read_table(path / TRACK)
+        columns = {
+            name: table[name].to_numpy()
+            for name in TRACK_FIELDS
+            if name not in ADDED or name in table.column_names
+        }
         return Run(
             folder=path,
             scenario_yaml=read_text(path / SCENARIO, MAX_BYTES, "a scenario, in YAML"),
             manifest=manifest,
-            track=Track(**{name: table[name].to_numpy() for name in TRACK_FIELDS}),
+            track=Track(**columns),
             plans=plan_rows(pq.read_table(path / PLANS)),
             metrics=json.loads(read_text(path / METRICS, MAX_JSON_BYTES, "metrics, in JSON")),
         )

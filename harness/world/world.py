@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from harness.world.ground import Ground
 from harness.world.linear_motion import LinearMotions, gaps_to
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from planner.interface import FloatArray, IntArray
@@ -101,11 +102,18 @@ class World:
     Args:
         obstacles: their order gives their index.
         bounds_m: xmin, ymin, xmax, ymax of the area.
+        ground: its heights; None where they are not known.
     """
 
-    def __init__(self, obstacles: Iterable[Obstacle], bounds_m: tuple[float, float, float, float]) -> None:
+    def __init__(
+        self,
+        obstacles: Iterable[Obstacle],
+        bounds_m: tuple[float, float, float, float],
+        ground: Ground | None = None,
+    ) -> None:
         self.obstacles: tuple[Obstacle, ...] = tuple(obstacles)
         self.bounds_m = bounds_m
+        self.ground = ground
         self._boxes = np.array([o.shape.rounded_box for o in self.obstacles]).reshape(-1, 5).T.copy()
         self._discs = self._boxes[[0, 1, 4]]
         self._circular = np.array([isinstance(o.shape, Circle) for o in self.obstacles], dtype=np.bool_)
@@ -128,7 +136,13 @@ class World:
             else:
                 raise ValueError(f"an obstacle needs a circle or a polygon; got {each}")
             obstacles.append(Obstacle(shape, each.velocity_mps or (0.0, 0.0), each.active_s))
-        return cls(obstacles, scenario.area.bounds_m)
+        ground = None if scenario.ground is None else Ground(scenario.ground.field())
+        return cls(obstacles, scenario.area.bounds_m, ground)
+
+    @property
+    def ground_heights(self) -> Callable[[FloatArray, FloatArray], FloatArray] | None:
+        """Gives (k,) heights of the ground at east and north (m); None where it is not known anywhere."""
+        return None if self.ground is None else self.ground.field.at
 
     @cached_property
     def max_obstacle_speed_mps(self) -> float:

@@ -68,10 +68,11 @@ class Mapping:
 
     @cached_property
     def _transformer(self) -> Any:
+        """From the file to the plane. Its datum must be named: of an ellipsoid alone no datum shift is made."""
         from pyproj import Transformer
 
         plane = (
-            f"+proj=aeqd +lat_0={self.place.latitude_deg!r} +lon_0={self.place.longitude_deg!r} +ellps=WGS84"
+            f"+proj=aeqd +lat_0={self.place.latitude_deg!r} +lon_0={self.place.longitude_deg!r} +datum=WGS84"
         )
         return Transformer.from_crs(flat_crs(self.crs or WGS84), plane, always_xy=True)
 

@@ -164,10 +164,11 @@ def read_gazebo(path: Path, reading: Reading) -> Contents:
     scale = (reading.metres_per_cell or BARN_CELL_M) / BARN_CELL_M
     parts: list[Part] = []
     passed = 0
-    for _, element in xml_events(read_bytes(path, MAX_TREE_BYTES)):
+    in_state = False  # where the models are listed again, as they were when the world was saved
+    for event, element in xml_events(read_bytes(path, MAX_TREE_BYTES), ends_only=False):
         if element.tag == "state":
-            element.clear()  # the same models again, without their shapes
-        if element.tag != "model":
+            in_state = event == "start"
+        if element.tag != "model" or event == "start" or in_state:
             continue
         pose = _pose(element)
         for link in element.iter("link"):

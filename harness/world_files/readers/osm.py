@@ -1,12 +1,13 @@
 """Buildings of OpenStreetMap: XML with the standard library, PBF with osmium (`wayproof[maps]`).
 
 Buildings and their parts (`building:part`) are all taken, each with its own height: where they overlap the union is
-solid, which is never less than the Simple 3D Buildings scheme has it.
+solid, which is never less than the Simple 3D Buildings scheme has it. Outlines that the edge of an extract has cut
+open are closed by a straight line.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,8 +15,14 @@ from harness.world_files.bounded import read_bytes, xml_events
 from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError, counted
 from harness.world_files.readers import limits
 
-MAX_XML_BYTES: Final = 400_000_000
+MAX_BYTES: Final = 400_000_000
 AREAS: Final = ("building", "building:part")
+MULTIPOLYGON: Final = "multipolygon"
+
+Line = list[tuple[float, float]]
+"""Longitude and latitude of the nodes of a way that are known."""
+Member = tuple[int, bool]
+"""Number of a way, and whether it is an inner ring."""
 
 
 class _Collected:
@@ -24,17 +31,39 @@ class _Collected:
     def __init__(self, reading: Reading) -> None:
         self.parts: list[Part] = []
         self.reading = reading
-        self.guessed = self.broken = 0
+        self.guessed = self.broken = self.closed = 0
 
-    def add(self, tags: dict[str, str], footprint: Any, name: str) -> None:
-        if footprint is None or footprint.is_empty:
+    def way(self, tags: Mapping[str, str], line: Line, name: str) -> None:
+        """A building that is one way."""
+        self._add(tags, [line], [], name)
+
+    def relation(
+        self, tags: Mapping[str, str], members: Iterable[Member], ways: Mapping[int, Line], name: str
+    ) -> None:
+        """A building of several ways, as far as they are in the file."""
+        there = [(ways[number], inner) for number, inner in members if number in ways]
+        self._add(tags, [w for w, inner in there if not inner], [w for w, inner in there if inner], name)
+
+    def _add(self, tags: Mapping[str, str], outer: Sequence[Line], inner: Sequence[Line], name: str) -> None:
+        import shapely
+
+        solid, closed = _area(outer)
+        if solid is None:
             self.broken += 1
             return
+        self.closed += closed
+        hollow, _ = _area(inner) if inner else (None, False)
+        footprint = solid if hollow is None else shapely.difference(solid, hollow)
         part, guessed = limits.building(tags, footprint, self.reading, name)
         self.parts.append(part)
         self.guessed += guessed
 
     def contents(self) -> Contents:
+        """What was found.
+
+        Raises:
+            WorldFileError: nothing was.
+        """
         if not self.parts:
             raise WorldFileError("has no building; must be an extract of OpenStreetMap with some")
         notes = []
@@ -44,8 +73,10 @@ class _Collected:
                 f"{counted(self.guessed, 'building')} without height and levels taken as {height_m:g} m high"
                 " (default_height_m)"
             )
+        if self.closed:
+            notes.append(f"{counted(self.closed, 'building')} cut open by the edge of the extract closed")
         if self.broken:
-            notes.append(f"{counted(self.broken, 'building')} whose outline is not whole passed over")
+            notes.append(f"{counted(self.broken, 'building')} whose outline is not there passed over")
         return Contents("osm", WGS84, tuple(self.parts), notes=tuple(notes))
 
 
@@ -55,29 +86,41 @@ def read_xml(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is not whole, or has no building.
     """
-    places: dict[str, tuple[float, float]] = {}
-    ways: dict[str, list[str]] = {}
+    places: dict[int, tuple[float, float]] = {}
+    ways: dict[int, Line] = {}
     found = _Collected(reading)
     root = None
-    for event, element in xml_events(read_bytes(path, MAX_XML_BYTES), ends_only=False):
+    for event, element in xml_events(read_bytes(path, MAX_BYTES), ends_only=False):
         root = element if root is None else root
         if event == "start" or element.tag not in ("node", "way", "relation"):
             continue
-        number = str(element.get("id"))
+        number = _number(element, "id")
         if element.tag == "node":
             if element.get("visible") != "false":
                 places[number] = _place(element)
         elif element.tag == "way":
-            ways[number] = [str(nd.get("ref")) for nd in element.iter("nd")]
-            tags = _tags(element)
-            if _is_area(tags):
-                found.add(tags, _polygons([_line(ways[number], places)], []), f"way {number}")
-        else:
-            tags = _tags(element)
-            if _is_area(tags) and tags.get("type", "multipolygon") == "multipolygon":
-                found.add(tags, _relation(element, ways, places), f"relation {number}")
+            refs = [_number(nd, "ref") for nd in element.iter("nd")]
+            ways[number] = [places[ref] for ref in refs if ref in places]
+            if _is_building(tags := _tags(element)):
+                found.way(tags, ways[number], f"way {number}")
+        elif _is_building(tags := _tags(element)) and tags.get("type", MULTIPOLYGON) == MULTIPOLYGON:
+            inner = [
+                (_number(member, "ref"), member.get("role") == "inner")
+                for member in element.iter("member")
+                if member.get("type") == "way"
+            ]
+            found.relation(tags, inner, ways, f"relation {number}")
         root.clear()  # what has been read is not kept
     return found.contents()
+
+
+def _number(element: Any, name: str) -> int:
+    try:
+        return int(element.get(name, ""))
+    except ValueError as error:
+        raise WorldFileError(
+            f"has a {element.tag} whose {name} is no number; must be OpenStreetMap XML"
+        ) from error
 
 
 def _place(element: Any) -> tuple[float, float]:
@@ -96,44 +139,28 @@ def _tags(element: Any) -> dict[str, str]:
     return {str(tag.get("k")): str(tag.get("v")) for tag in element.iter("tag")}
 
 
-def _is_area(tags: dict[str, str]) -> bool:
+def _is_building(tags: Mapping[str, str]) -> bool:
     return any(tags.get(name, "no") != "no" for name in AREAS)
 
 
-def _line(refs: Iterable[str], places: dict[str, tuple[float, float]]) -> list[tuple[float, float]]:
-    return [places[ref] for ref in refs if ref in places]
-
-
-def _relation(element: Any, ways: dict[str, list[str]], places: dict[str, tuple[float, float]]) -> Any:
-    """Footprint of a multipolygon; None where ways of it are missing."""
-    rings: dict[bool, list[list[tuple[float, float]]]] = {True: [], False: []}
-    for member in element.iter("member"):
-        ref = str(member.get("ref"))
-        if member.get("type") != "way":
-            continue
-        if ref not in ways:  # cut off at the edge of the extract
-            return None
-        rings[member.get("role") != "inner"].append(_line(ways[ref], places))
-    return _polygons(rings[True], rings[False])
-
-
-def _polygons(outer: Sequence[list[tuple[float, float]]], inner: Sequence[list[tuple[float, float]]]) -> Any:
-    """The area inside closed lines but outside others; lines may be pieces of rings. None where nothing closes."""
+def _area(lines: Sequence[Line]) -> tuple[Any, bool]:
+    """The area inside lines that are rings or pieces of them, None without; and whether any had to be closed."""
     import shapely
 
-    def area(lines: Sequence[list[tuple[float, float]]]) -> Any:
-        whole = [line for line in lines if len(line) >= 4 and line[0] == line[-1]]
-        pieces = [line for line in lines if len(line) >= 2 and line[0] != line[-1]]
-        shapes = [shapely.Polygon(line) for line in whole]
-        if pieces:
-            shapes += list(shapely.polygonize([shapely.LineString(line) for line in pieces]).geoms)
-        valid = [shapely.make_valid(each, method="structure", keep_collapsed=False) for each in shapes]
-        return shapely.union_all(valid) if len(valid) != 1 else valid[0]
-
-    solid = area(outer)
-    if solid.is_empty or solid.area == 0.0:
-        return None
-    return shapely.difference(solid, area(inner)) if inner else solid
+    rings = [line for line in lines if len(line) >= 4 and line[0] == line[-1]]
+    pieces = [shapely.LineString(line) for line in lines if len(line) >= 2 and line[0] != line[-1]]
+    closed = False
+    if pieces:
+        joined = shapely.line_merge(shapely.MultiLineString(pieces))
+        for chain in shapely.get_parts(joined):
+            corners = list(chain.coords)
+            if len(corners) >= 3:
+                closed |= corners[0] != corners[-1]
+                rings.append(corners)
+    shapes = [shapely.Polygon(ring) for ring in rings]
+    valid = [shapely.make_valid(each, method="structure", keep_collapsed=False) for each in shapes]
+    whole = valid[0] if len(valid) == 1 else shapely.union_all(valid)
+    return (None if whole.is_empty or whole.area == 0.0 else whole), closed
 
 
 def read_pbf(path: Path, reading: Reading) -> Contents:
@@ -148,30 +175,33 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
         raise WorldFileError(
             "is OpenStreetMap PBF, which osmium reads: pip install 'wayproof[maps]'"
         ) from error
-    import shapely
-
-    if path.stat().st_size > MAX_XML_BYTES:
+    if path.stat().st_size > MAX_BYTES:
         raise WorldFileError(
-            f"is larger than {MAX_XML_BYTES // 10**6} MB; cut the area of interest out of it first"
+            f"is larger than {MAX_BYTES // 10**6} MB; cut the area of interest out of it first"
         )
     found = _Collected(reading)
-    factory = osmium.geom.WKBFactory()
+    buildings = osmium.filter.KeyFilter(*AREAS)
     try:
-        areas = osmium.FileProcessor(str(path)).with_areas(osmium.filter.KeyFilter(*AREAS))
-        for each in areas.with_filter(osmium.filter.KeyFilter(*AREAS)):
-            if not each.is_area():
-                continue
+        wanted: dict[int, tuple[dict[str, str], list[Member]]] = {}
+        for each in osmium.FileProcessor(str(path), osmium.osm.RELATION).with_filter(buildings):
             tags = {tag.k: tag.v for tag in each.tags}
-            if not _is_area(tags):
+            if _is_building(tags) and tags.get("type", MULTIPOLYGON) == MULTIPOLYGON:
+                wanted[each.id] = tags, [(m.ref, m.role == "inner") for m in each.members if m.type == "w"]
+        needed = {number for _, members in wanted.values() for number, _ in members}
+        ways: dict[int, Line] = {}
+        entities = osmium.osm.NODE | osmium.osm.WAY
+        for each in osmium.FileProcessor(str(path), entities).with_locations():
+            if not each.is_way() or not (each.id in needed or any(name in each.tags for name in AREAS)):
                 continue
-            kind = "way" if each.from_way() else "relation"
-            try:
-                shape = shapely.from_wkb(factory.create_multipolygon(each))
-            except (RuntimeError, ValueError):
-                shape = None
-            found.add(tags, shape, f"{kind} {each.orig_id()}")
+            line = [(node.lon, node.lat) for node in each.nodes if node.location.valid()]
+            if each.id in needed:
+                ways[each.id] = line
+            if _is_building(tags := {tag.k: tag.v for tag in each.tags}):
+                found.way(tags, line, f"way {each.id}")
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
         raise WorldFileError(
             f"cannot be read as PBF ({' '.join(str(error).split())[:80]}); it may be torn"
         ) from error
+    for number, (tags, members) in wanted.items():
+        found.relation(tags, members, ways, f"relation {number}")
     return found.contents()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,12 @@ MAX_FEATURES = 300_000
 
 
 def read(path: Path, reading: Reading) -> Contents:
+    """Reads the polygons of a file, as `_read` has it, without the warnings of GDAL: what is left out is counted."""
+    with warnings.catch_warnings():
+        return _read(path, reading)
+
+
+def _read(path: Path, reading: Reading) -> Contents:
     """Reads the polygons of a file's layers; heights and limits are told from their attributes as in GeoJSON.
 
     Raises:
@@ -30,6 +37,7 @@ def read(path: Path, reading: Reading) -> Contents:
     crs: str | None = None
     passed = 0
     try:
+        warnings.simplefilter("ignore")
         for layer in np.atleast_2d(pyogrio.list_layers(path))[:, 0]:
             if pyogrio.read_info(path, layer=layer)["features"] > MAX_FEATURES:
                 raise WorldFileError(

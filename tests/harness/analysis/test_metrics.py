@@ -33,6 +33,7 @@ KEYS = {
     "planned_length_m",
     "flight_time_s",
     "min_clearance_m",
+    "min_altitude_above_ground_m",
     "clearance_violation_s",
     "cross_track_m",
     "altitude_error_m",
@@ -69,6 +70,7 @@ def test_figures_of_a_straight_flight(make_track: Callable[..., Track], straight
     assert figures["planned_length_m"] == pytest.approx(250.0)
     assert figures["flight_time_s"] == 10.0
     assert figures["min_clearance_m"] == 150.0
+    assert figures["min_altitude_above_ground_m"] is None
     assert figures["clearance_violation_s"] == pytest.approx(3.0)
     assert figures["cross_track_m"] == {"rms": pytest.approx(math.sqrt(40 / 101)), "p95": 2.0, "max": 2.0}
     assert figures["altitude_error_m"] == {"rms": 1.0, "p95": 1.0, "max": 1.0}
@@ -79,6 +81,13 @@ def test_figures_of_a_straight_flight(make_track: Callable[..., Track], straight
     assert figures["compute_ms"] == {"p50": 2.0, "p99": pytest.approx(2.98), "max": 3.0}
     assert figures["timing"] == {"sim_s": 10.0, "wall_s": 0.5, "realtime_factor": 20.0}
     assert figures["digest"] == digest(track)
+
+
+def test_the_least_height_above_ground_is_over_what_is_known(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    track = make_track(10, altitude_above_ground_m=np.repeat([120.0, np.nan, 80.0], [4, 3, 3]))
+    assert metrics(flight(track, straight_plan), LIMITS)["min_altitude_above_ground_m"] == 80.0
 
 
 def test_smoothness_of_planned_and_flown_agree_on_a_circle(

@@ -28,7 +28,7 @@ def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
 
 def test_columns_are_those_of_the_contract() -> None:
     assert " ".join(COLUMNS) == CONTRACT
-    assert (*COLUMNS, "arc_length_m", "throttle") == TRACK_FIELDS
+    assert list(TRACK_FIELDS) == [*COLUMNS, "arc_length_m", "throttle", "altitude_above_ground_m"]
 
 
 def test_row_holds_the_state_in_the_units_of_the_file() -> None:

@@ -1,0 +1,81 @@
+"""A flight ends where the true aircraft meets the true ground."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from aircraft.interface import AircraftState
+from harness.flight.record import Outcome
+from harness.flight.termination import Termination
+from harness.world.ground import Ground
+from harness.world.world import World
+from harness.world_files.height_field import HeightField
+from planner.interface import Mission
+
+BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
+MISSION = Mission(
+    goal_m=(19_000.0, 10_000.0),
+    goal_radius_m=100.0,
+    bounds_m=BOUNDS,
+    clearance_m=100.0,
+    turn_radius_m=100.0,
+    speed_mps=25.0,
+    roll_in_s=0.5,
+    tracking_error_m=1.0,
+    sensor_range_m=1000.0,
+    compute_latency_s=0.0,
+    sensor_latency_s=0.0,
+    wind_mps=0.0,
+)
+
+
+def ridge() -> Ground:
+    """Flat at 100 m, with a ridge of 400 m, a cell of 50 m wide, from south to north at 8 km east."""
+    heights = np.full((401, 401), 100.0)
+    heights[:, 160] = 400.0
+    return Ground(HeightField((0.0, 0.0), (50.0, 50.0), heights))
+
+
+def flight(up_m: float, climb_mps: float = 0.0) -> Iterator[AircraftState]:
+    """Eastwards at 25 m/s from 1 km east, ten states a second."""
+    for k in range(7300):
+        time_s = k / 10.0
+        yield AircraftState(
+            time_s, 1000.0 + 25.0 * time_s, 10_000.0, up_m + climb_mps * time_s, 25.0, 0.0, climb_mps,
+            math.pi / 2, 0.0, 0.0, 25.0, 1.0,
+        )  # fmt: skip
+
+
+def end(up_m: float, climb_mps: float = 0.0) -> tuple[Outcome, str, AircraftState, int]:
+    judge = Termination(World([], BOUNDS, ridge()), MISSION, 1e4, lambda: None)
+    looks = 0
+    for state in flight(up_m, climb_mps):
+        looks += state.time_s >= judge.next_look_s
+        verdict = judge.verdict(state)
+        if verdict is not None:
+            return *verdict, state, looks
+    raise AssertionError("the flight has no end")
+
+
+def test_a_flight_into_a_ridge_ends_there() -> None:
+    outcome, reason, state, _ = end(300.0)
+    assert outcome is Outcome.COLLISION
+    assert reason.startswith("flew into the terrain: ")
+    # The slope of 6 m a metre reaches 300 m at a third of the cell before its top.
+    assert state.east_m == pytest.approx(8000.0 - 50.0 / 3.0, abs=3.0)
+
+
+def test_a_flight_over_it_is_looked_at_seldom() -> None:
+    outcome, _, _, looks = end(500.0)
+    assert outcome is Outcome.REACHED
+    assert looks < 2000
+
+
+def test_a_descent_into_flat_ground_ends_where_they_meet() -> None:
+    outcome, _, state, _ = end(300.0, climb_mps=-2.0)
+    assert outcome is Outcome.COLLISION
+    assert state.up_m == pytest.approx(100.0, abs=0.3)

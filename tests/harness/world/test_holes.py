@@ -1,0 +1,93 @@
+"""Polygons with holes: free inside for distance, contact, sensor and optimum, and in a scenario file."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from harness.files.input_file import InputError
+from harness.scenario.scenario import dump_scenario, parse_scenario
+from harness.scenario.sections import Sensor
+from harness.world.obstacle import Obstacle, Polygon
+from harness.world.optimum import shortest_path
+from harness.world.range_sensor import RangeSensor
+from harness.world.world import World
+
+OUTER = ((0.0, 0.0), (1000.0, 0.0), (1000.0, 1000.0), (0.0, 1000.0))
+HOLE = ((300.0, 200.0), (300.0, 800.0), (700.0, 800.0), (700.0, 200.0))
+RING = Polygon(OUTER, (HOLE,))
+BOUNDS = (-500.0, -500.0, 1500.0, 1500.0)
+
+YAML = """schema: wayproof/scenario/1
+name: holes
+area: {{bounds_m: [-5000, -5000, 6000, 6000]}}
+obstacles:
+  - polygon:
+      vertices_m: [[0, 0], [1000, 0], [1000, 1000], [0, 1000], [0, 0]]
+      holes_m: {holes}
+mission: {{start_m: [-3000, 0], goal_m: [4000, 0]}}
+"""
+
+
+def test_distances_are_those_of_shapely() -> None:
+    shape = shapely.Polygon(OUTER, [HOLE])
+    rng = np.random.default_rng(3)
+    east, north = rng.uniform(-400.0, 1400.0, (2, 500))
+    points = shapely.points(east, north)
+    expected = np.where(
+        shapely.contains(shape, points),
+        -shapely.distance(shape.boundary, points),
+        shapely.distance(shape, points),
+    )
+    assert RING.distance(east, north) == pytest.approx(expected, abs=1e-9)
+    assert RING.distance(np.array([500.0]), np.array([500.0]))[0] == pytest.approx(200.0)
+
+
+def test_the_sensor_sees_the_inner_walls_from_the_hole() -> None:
+    world = World([Obstacle(RING)], BOUNDS)
+    sensor = RangeSensor(world, Sensor(range_m=2000.0, rays=8), np.random.SeedSequence(1))
+    scan = sensor.scan(500.0, 500.0, 0.0, 0.0)
+    assert np.isfinite(scan.ranges_m).all()
+    assert scan.ranges_m.min() == pytest.approx(200.0 / math.cos(math.radians(22.5)))
+
+
+def test_a_contact_is_found_on_the_way_out_of_a_hole() -> None:
+    world = World([Obstacle(RING)], BOUNDS)
+    assert world.clearance_at(500.0, 500.0, 0.0) == pytest.approx(200.0)
+    begin, end = (500.0, 500.0, 0.0), (1200.0, 500.0, 10.0)
+    assert world.contact_between(begin, 200.0, end, 200.0) < 0.0
+
+
+def test_the_optimum_goes_through_a_hole_that_is_open_to_nothing_only_from_inside() -> None:
+    inside = shortest_path([Obstacle(RING)], BOUNDS, (400.0, 300.0), (600.0, 700.0), 20.0)
+    assert inside.length_m == pytest.approx(math.dist((400.0, 300.0), (600.0, 700.0)))
+    out = shortest_path([Obstacle(RING)], BOUNDS, (400.0, 300.0), (1200.0, 700.0), 20.0)
+    assert out.length_m is None
+
+
+def test_a_scenario_keeps_its_holes() -> None:
+    text = YAML.format(holes="[[[200, 200], [200, 200], [800, 200], [800, 800], [200, 200]]]")
+    scenario = parse_scenario(text)
+    polygon = scenario.obstacles[0].polygon
+    assert polygon is not None
+    assert polygon.holes_m == (((200.0, 200.0), (800.0, 200.0), (800.0, 800.0)),)
+    assert parse_scenario(dump_scenario(scenario)) == scenario
+    world = World.from_scenario(scenario)
+    assert world.clearance_at(700.0, 300.0, 0.0) == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(
+    ("holes", "sentence"),
+    [
+        ("[[[200, 200], [1800, 200], [800, 800]]]", "has holes_m that lie outside of it, cross or touch"),
+        ("[[[2000, 200], [2800, 200], [2800, 800]]]", "has holes_m that lie outside of it, cross or touch"),
+        ("[[[200, 200], [800, 800], [800, 200], [200, 800]]]", "hole 0 crosses or touches itself"),
+        ("[[[200, 200], [800, 800]]]", "hole 0 has 2 distinct vertices"),
+    ],
+)
+def test_holes_that_are_none_are_refused(holes: str, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        parse_scenario(YAML.format(holes=holes))

@@ -1,0 +1,169 @@
+"""World files that are broken, torn, huge or no world at all: one line each, and nothing flown or written."""
+
+from __future__ import annotations
+
+import json
+import os
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.cli.app import main
+from harness.world_files.kinds import read
+from harness.world_files.parts import Reading, WorldFileError
+from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, npy, osm, zipped
+
+BOMB = '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "lol"><!ENTITY b "&a;&a;">]><osm>&b;</osm>'
+
+
+def text(name: str, content: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        (folder / name).write_text(content)
+        return folder / name
+
+    return make
+
+
+def data(name: str, content: bytes) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        (folder / name).write_bytes(content)
+        return folder / name
+
+    return make
+
+
+def _zip_bomb(folder: Path) -> Path:
+    path = folder / "N46E009.hgt.zip"
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("N46E009.hgt", "w") as member,
+    ):
+        for _ in range(64):
+            member.write(bytes(1_000_000))
+    return path
+
+
+def _torn_tiff(folder: Path) -> Path:
+    path = geotiff(folder / "a.tif", np.ones((200, 200)), (0.0, 0.0), 10.0, 32632)
+    path.write_bytes(path.read_bytes()[:5000])
+    return path
+
+
+def _nan_json(folder: Path) -> Path:
+    path = geojson(folder / "a.geojson", feature({}))
+    path.write_text(path.read_text().replace("47.01", "NaN", 1))
+    return path
+
+
+def _no_building(folder: Path) -> Path:
+    return osm(folder / "a.osm", [({"highway": "x"}, [(8, 47), (8, 48), (9, 47)])])
+
+
+FLAT = {"type": "Building", "geometry": [{"type": "MultiSurface", "boundaries": [[[0, 1, 9]]]}]}
+GRID = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n"
+HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
+    "empty": (text("a.tif", ""), "is empty"),
+    "a picture": (data("a.png", b"\x89PNG\r\n\x1a\n" + bytes(50)), "is an image; give the YAML file"),
+    "a program": (data("a.out", b"\x7fELF" + bytes(200)), "is of no kind that is known; give terrain"),
+    "prose": (text("a.txt", "Once upon a time\n"), "is of no kind that is known"),
+    "torn JSON": (text("a.geojson", '{"type": "FeatureCollection", "features": [{"ty'), "is not whole JSON"),
+    "deep JSON": (text("a.json", "[" * 100_000), "is nested too deeply"),
+    "NaN": (_nan_json, "has the number NaN"),
+    "no features": (text("a.json", '{"type": "FeatureCollection", "features": []}'), "has no polygon"),
+    "words for numbers": (
+        lambda folder: geojson(folder / "a.json", feature({}, [["a", "b"], ["c", "d"], ["e", "f"]])),  # type: ignore[list-item]
+        "position that is not two numbers",
+    ),
+    "entities": (text("a.osm", BOMB), "declares XML entities"),
+    "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "is not whole XML"),
+    "no building": (_no_building, "has no building"),
+    "a place that is none": (
+        lambda folder: osm(folder / "a.osm", [({"building": "yes"}, [(8, 147), (8, 48), (9, 47)])]),
+        "must be degrees",
+    ),
+    "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
+    "a torn ZIP": (data("a.zip", b"PK\x03\x04" + bytes(30)), "is a damaged ZIP archive"),
+    "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"), "is of no kind"),
+    "a torn tile": (data("N46E009.hgt", bytes(1000)), "it may be torn"),
+    "a nameless tile": (data("tile.hgt", bytes(2 * 1201 * 1201)), "its name must say where it lies"),
+    "a torn TIFF": (_torn_tiff, "cannot be read"),
+    "a torn grid": (text("a.asc", GRID + "1 2 3\n"), "it may be torn"),
+    "a grid of words": (text("a.asc", GRID + "1 2 x 4\n"), "it may be torn|no number among"),
+    "a grid of 10^12 cells": (
+        text("a.asc", GRID.replace("ncols 2", "ncols 1000000").replace("nrows 2", "nrows 1000000")),
+        "must have at most 60,000,000",
+    ),
+    "a grid without size": (text("a.asc", "ncols 2\nnrows 2\n1 2 3 4\n"), "positive cellsize"),
+    "a grid of nothing": (text("a.asc", GRID + "-9999 " * 4), "has no cell with a height"),
+    "a pickle": (
+        lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([{}], dtype=object))),
+        "must be numbers",
+    ),
+    "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n"), "it may be torn"),
+    "a map of other cells": (text("a.map", "type octile\nheight 1\nwidth 3\nmap\n.x.\n"), "has the cell 'x'"),
+    "a map without its image": (text("a.yaml", "image: no.pgm\nresolution: 1\n"), "cannot be read"),
+    "an arc about nothing": (
+        text("a.txt", "AC R\nDA 5,0,90\n"),
+        "line 2: has an arc or circle before its centre",
+    ),
+    "a place of words": (text("a.txt", "AC R\nDP here\n"), "line 2: has 'here'; must be a place"),
+    "an airspace of nothing": (text("a.txt", "AC R\nAN x\n"), "has no airspace with an area"),
+    "an empty fence": (text("a.plan", '{"fileType": "Plan", "geoFence": {}}'), "has an empty fence"),
+    "a fence of a line": (
+        text("fence.txt", "47.0 8.0\n47.0 8.0\n47.1 8.1\n47.0 8.0\n"),
+        "fewer than three corners",
+    ),
+    "CityJSON of nothing": (text("a.json", '{"CityObjects": {}}'), "has no building"),
+    "a vertex that is not there": (
+        text("a.json", json.dumps({"CityObjects": {"b": FLAT}, "vertices": [[0, 0, 0]]})),
+        "with a vertex that is not there",
+    ),
+    "a zone without a shape": (
+        text("a.json", '{"UASZoneList": [{"geometry": [{}]}]}'),
+        "without a horizontalProjection",
+    ),
+}
+
+
+@pytest.mark.parametrize(("make", "sentence"), HOSTILE.values(), ids=HOSTILE)
+def test_a_hostile_file_is_told_in_one_sentence(
+    make: Callable[[Path], Path], sentence: str, tmp_path: Path
+) -> None:
+    with pytest.raises(WorldFileError, match=sentence) as caught:
+        read(make(tmp_path), None, Reading())
+    assert "\n" not in str(caught.value)
+
+
+def test_the_command_and_the_scenario_say_it_with_status_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = tmp_path / "a.geojson", tmp_path / "out.yaml"
+    path.write_text("{")
+    assert main(["world", str(path), "--altitude-m", "300", "--out", str(out)]) == 2
+    assert not out.exists()
+    assert f"{path}: is not whole JSON" in capsys.readouterr().err.splitlines()[-1]
+    scenario = tmp_path / "s.yaml"
+    scenario.write_text(
+        "schema: wayproof/scenario/1\nname: s\narea: {bounds_m: [0, 0, 9000, 9000]}\n"
+        "obstacles:\n  - file: {path: a.geojson}\n"
+        "mission: {start_m: [1000, 1000], goal_m: [8000, 8000]}\n"
+    )
+    assert main(["validate", str(scenario)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"{scenario}:5: obstacles[0].file: a.geojson is not whole JSON")
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(WorldFileError, match="is a pipe"):
+        read(tmp_path / "pipe", None, Reading())
+
+
+def test_a_self_crossing_ring_is_made_valid(tmp_path: Path) -> None:
+    bow = [SQUARE[0], SQUARE[2], SQUARE[1], SQUARE[3], SQUARE[0]]
+    (part,) = read(geojson(tmp_path / "a.json", feature({}, bow)), None, Reading()).parts
+    assert part.footprint.is_valid
+    assert part.footprint.area == pytest.approx(5e-5)

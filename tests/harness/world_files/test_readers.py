@@ -1,0 +1,368 @@
+"""Every kind of world file: what is read of it, and that its kind is told from what stands in it."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from PIL import Image
+
+from harness.world_files.kinds import kind_of, read
+from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
+from harness.world_files.plane import Mapping, Place
+from harness.world_files.readers.limits import limit_of, metres_of
+from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, npy, osm, zipped
+
+
+def read_any(path: Path, **reading: Any) -> Contents:
+    return read(path, None, Reading(**reading))
+
+
+def test_a_geotiff_has_its_place_and_its_voids(tmp_path: Path) -> None:
+    heights = np.arange(12.0).reshape(3, 4)
+    heights[0, 0] = -9999.0
+    found = read_any(geotiff(tmp_path / "a.tif", heights, (780_000.0, 190_000.0), 10.0, 21781))
+    assert (found.kind, found.crs) == ("geotiff", "EPSG:21781")
+    assert found.terrain is not None
+    assert found.terrain.affine == (10.0, 0.0, 780_000.0, 0.0, -10.0, 190_000.0)
+    assert np.isnan(found.terrain.values[0, 0])
+    assert found.terrain.values[2, 3] == 11.0
+
+
+def test_an_ascii_grid_has_rows_from_the_north(tmp_path: Path) -> None:
+    path = tmp_path / "a.asc"
+    path.write_text(
+        "ncols 3\nnrows 2\nxllcorner 100\nyllcorner 200\ncellsize 10\nNODATA_value -9999\n1 2 3\n4 -9999 6\n"
+    )
+    found = read_any(path)
+    assert found.kind == "ascii_grid"
+    assert found.terrain is not None
+    x, y = found.terrain.places(np.array([0.0]), np.array([0.0]))
+    assert (x[0], y[0]) == (100.0, 220.0)
+    assert found.terrain.values[1, 0] == 4.0
+    assert np.isnan(found.terrain.values[1, 1])
+    scaled = read_any(path, metres_per_cell=50.0).terrain
+    assert scaled is not None
+    assert scaled.affine == (50.0, 0.0, 500.0, 0.0, -50.0, 1100.0)
+
+
+@pytest.mark.parametrize("packed", ["plain", "zip", "gz"])
+def test_an_srtm_tile_lies_where_its_name_says(packed: str, tmp_path: Path) -> None:
+    tile = np.full((1201, 1201), 7, dtype=">i2")
+    tile[0, 0], tile[-1, -1] = 100, -32768
+    data = tile.tobytes()
+    path = tmp_path / {"plain": "S36E149.hgt", "zip": "some.zip", "gz": "S36E149.hgt.gz"}[packed]
+    if packed == "zip":
+        zipped(path, S36E149__hgt=data)
+    else:
+        path.write_bytes(gzip.compress(data) if packed == "gz" else data)
+    found = read_any(path)
+    assert found.kind == "srtm"
+    assert found.terrain is not None
+    x, y = found.terrain.places(np.array([0.5, 1200.5]), np.array([0.5, 1200.5]))
+    assert (x.tolist(), y.tolist()) == (pytest.approx([149.0, 150.0]), pytest.approx([-35.0, -36.0]))
+    assert found.terrain.values[0, 0] == 100.0
+    assert np.isnan(found.terrain.values[-1, -1])
+
+
+def test_a_numpy_archive_may_have_its_north_as_ymin(tmp_path: Path) -> None:
+    edges = {"xmin": 8.0, "xmax": 8.2, "ymin": 47.1, "ymax": 47.0}
+    arrays = {f"{name}__npy": npy(np.array(value)) for name, value in edges.items()}
+    path = zipped(
+        tmp_path / "a.npz", elevation__npy=npy(np.array([[1, 2], [3, 4]], dtype=np.int16)), **arrays
+    )
+    found = read_any(path).terrain
+    assert found is not None
+    x, y = found.places(np.array([0.0, 2.0]), np.array([0.0, 2.0]))
+    assert (x.tolist(), y.tolist()) == (pytest.approx([8.0, 8.2]), pytest.approx([47.1, 47.0]))
+
+
+RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
+
+
+@pytest.mark.parametrize(
+    ("tags", "bottom_m", "top_m"),
+    [
+        ({"building": "yes", "height": "12.5"}, -math.inf, 12.5),
+        ({"building": "yes", "height": "40 ft"}, -math.inf, 40 * FOOT_M),
+        ({"building": "yes", "building:levels": "4"}, -math.inf, 12.0),
+        ({"building": "yes", "building:levels": "4", "roof:levels": "1"}, -math.inf, 15.0),
+        ({"building": "yes", "height": "no idea"}, -math.inf, 6.0),
+        ({"building:part": "yes", "height": "30", "min_height": "20"}, 20.0, 30.0),
+        ({"building:part": "yes", "building:levels": "9", "building:min_level": "2"}, 6.0, 27.0),
+    ],
+)
+def test_heights_of_buildings_follow_the_rule(
+    tags: dict[str, str], bottom_m: float, top_m: float, tmp_path: Path
+) -> None:
+    found = read_any(osm(tmp_path / "a.osm", [(tags, RING), ({"highway": "path"}, RING)]))
+    assert found.kind == "osm"
+    (part,) = found.parts
+    assert part.rigid
+    assert part.top.height_m == pytest.approx(top_m)
+    assert part.top.datum is Datum.GROUND
+    assert part.bottom.height_m == pytest.approx(bottom_m)
+    same = read_any(geojson(tmp_path / "a.geojson", feature(tags))).parts
+    assert [(each.bottom, each.top) for each in same] == [(part.bottom, part.top)]
+
+
+def test_a_multipolygon_of_pieces_has_its_courtyard(tmp_path: Path) -> None:
+    corners = [(0, 0), (4, 0), (4, 4), (0, 4), (1, 1), (3, 1), (3, 3), (1, 3)]
+    nodes = "".join(
+        f'<node id="{k}" lon="{8 + x / 1e3}" lat="{47 + y / 1e3}"/>' for k, (x, y) in enumerate(corners)
+    )
+    ways = {1: (0, 1, 2), 2: (2, 3, 0), 3: (4, 5, 6, 7, 4)}
+    lines = "".join(
+        f'<way id="{number}">{"".join(f"<nd ref={chr(34)}{ref}{chr(34)}/>" for ref in refs)}</way>'
+        for number, refs in ways.items()
+    )
+    members = "".join(
+        f'<member type="way" ref="{ref}" role="{role}"/>'
+        for ref, role in ((1, "outer"), (2, "outer"), (3, "inner"))
+    )
+    tags = '<tag k="type" v="multipolygon"/><tag k="building" v="yes"/>'
+    path = tmp_path / "a.osm"
+    path.write_text(f"<osm>{nodes}{lines}<relation id='9'>{members}{tags}</relation></osm>")
+    (part,) = read_any(path).parts
+    assert part.footprint.area == pytest.approx(12e-6)
+    assert len(part.footprint.interiors) == 1
+
+
+def test_city_objects_stand_between_their_vertices(tmp_path: Path) -> None:
+    box = [[x, y, z] for z in (5000, 17000) for x, y in ((0, 0), (10000, 0), (10000, 8000), (0, 8000))]
+    walls = [[[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4]] for k in range(4)]
+    solid = {"type": "Solid", "lod": "1", "boundaries": [[[[3, 2, 1, 0]], [[4, 5, 6, 7]], *walls]]}
+    flat = {"type": "MultiSurface", "lod": "0", "boundaries": [[[0, 1, 2, 3]]]}
+    content = {
+        "type": "CityJSON",
+        "version": "2.0",
+        "metadata": {"referenceSystem": "https://www.opengis.net/def/crs/EPSG/0/7415"},
+        "transform": {"scale": [0.001, 0.001, 0.001], "translate": [84000.0, 446000.0, 0.0]},
+        "CityObjects": {
+            "b": {"type": "Building", "geometry": [flat, solid]},
+            "w": {"type": "WaterBody", "geometry": [flat]},
+        },
+        "vertices": box,
+    }
+    path = tmp_path / "a.city.json"
+    path.write_text(json.dumps(content))
+    found = read_any(path)
+    assert (found.kind, found.crs) == ("cityjson", "EPSG:7415")
+    (part,) = found.parts
+    assert part.footprint.bounds == pytest.approx((84000.0, 446000.0, 84010.0, 446008.0))
+    assert (part.bottom, part.top) == (Limit(5.0), Limit(17.0))
+    assert found.notes == ("passed over: 1 WaterBody",)
+
+
+@pytest.mark.parametrize(
+    ("text", "limit"),
+    [
+        ("SFC", NO_BOTTOM),
+        ("GND", NO_BOTTOM),
+        ("0", NO_BOTTOM),
+        ("UNLIM", NO_TOP),
+        ("UNL FT", NO_TOP),
+        ("2500 ft", Limit(2500 * FOOT_M)),
+        ("2500FT AMSL", Limit(2500 * FOOT_M)),
+        ("1000 ft AGL", Limit(1000 * FOOT_M, Datum.GROUND)),
+        ("100m GND", Limit(100.0, Datum.GROUND)),
+        ("3000m AMSL", Limit(3000.0)),
+        ("450m", Limit(450.0)),
+        ("FL 65", Limit(6500 * FOOT_M)),
+        ("FL140", Limit(14000 * FOOT_M)),
+        ("5000 STD", Limit(5000 * FOOT_M)),
+        ("BY NOTAM", None),
+    ],
+)
+def test_limits_are_read_as_airspace_files_write_them(text: str, limit: Limit | None) -> None:
+    found = limit_of(text)
+    if limit is None:
+        assert found is None
+    else:
+        assert found is not None
+        assert found.height_m == pytest.approx(limit.height_m)
+        assert found.datum is limit.datum
+
+
+@pytest.mark.parametrize(
+    ("value", "metres"),
+    [
+        ("12", 12.0),
+        ("12,5 m", 12.5),
+        ("20 ft", 20 * FOOT_M),
+        ("6'6\"", 6.5 * FOOT_M),
+        (True, None),
+        ("x", None),
+        (None, None),
+    ],
+)
+def test_heights_of_buildings_are_read_in_their_unit(value: object, metres: float | None) -> None:
+    assert metres_of(value) == (None if metres is None else pytest.approx(metres))
+
+
+def in_plane(shape: Any, longitude: float, latitude: float) -> Any:
+    return Mapping("EPSG:4326", Place(latitude, longitude)).geometries(shape)
+
+
+def test_an_arc_goes_round_its_centre_the_way_it_is_told(tmp_path: Path) -> None:
+    text = "AC R\nAN half\nAL SFC\nAH 2000 ft\nV X=47:00:00 N 008:00:00 E\nV D={}\nDA 5,0,180\n"
+    areas = {}
+    for sign, side in (("+", 1), ("-", -1)):
+        path = tmp_path / "a.txt"
+        path.write_text(text.format(sign))
+        (part,) = read_any(path).parts
+        shape = in_plane(part.footprint, 8.0, 47.0)
+        assert math.copysign(1.0, shape.centroid.x) == side
+        areas[sign] = shape.area
+    assert areas["+"] == pytest.approx(math.pi * (5 * 1852.0) ** 2 / 2, rel=1e-3)
+    assert areas["-"] == pytest.approx(areas["+"], rel=1e-6)
+
+
+def test_a_circle_lies_inside_its_polygon(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_text("AC CTR\nAN c\nAL GND\nAH FL 100\nV X=47:00:00 N 008:00:00 E\nDC 3\n")
+    (part,) = read_any(path).parts
+    shape = in_plane(part.footprint, 8.0, 47.0)
+    assert shapely.Point(0, 0).buffer(3 * 1852.0, quad_segs=256).difference(shape).area < 1.0
+    assert shape.area == pytest.approx(math.pi * (3 * 1852.0) ** 2, rel=1e-3)
+
+
+def zone(kind: str, **limits: Any) -> dict[str, Any]:
+    circle = {"type": "Circle", "center": [8.0, 47.0], "radius": 500}
+    return {
+        "identifier": "Z1",
+        "restriction": kind,
+        "geometry": [{"uomDimensions": "FT", "horizontalProjection": circle, **limits}],
+    }
+
+
+def test_ed269_zones_have_their_own_unit_and_reference(tmp_path: Path) -> None:
+    above = {
+        "lowerLimit": 100,
+        "lowerVerticalReference": "AMSL",
+        "upperLimit": 400,
+        "upperVerticalReference": "AGL",
+    }
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps({"features": [zone("PROHIBITED", **above), zone("NO_RESTRICTION", **above)]}))
+    found = read_any(path)
+    assert found.kind == "ed269"
+    (part,) = found.parts
+    assert part.bottom.height_m == pytest.approx(100 * FOOT_M)
+    assert part.top.height_m == pytest.approx(400 * FOOT_M)
+    assert (part.bottom.datum.name, part.top.datum.name) == ("SEA", "GROUND")
+    assert in_plane(part.footprint, 8.0, 47.0).area == pytest.approx(math.pi * 500.0**2, rel=1e-3)
+
+
+def test_ed318_layers_and_extents(tmp_path: Path) -> None:
+    layer = {"upper": 150, "upperReference": "AMSL", "lower": 50, "lowerReference": "AMSL", "uom": "m"}
+    round_ = {
+        "type": "Point",
+        "coordinates": [8, 47],
+        "extent": {"subType": "Circle", "radius": 900},
+        "layer": layer,
+    }
+    square = {"type": "Polygon", "coordinates": [SQUARE], "layer": {**layer, "upper": 500, "uom": "ft"}}
+    both = {"type": "GeometryCollection", "geometries": [round_, square]}
+    content = {
+        "type": "FeatureCollection",
+        "features": [{"type": "Feature", "properties": {}, "geometry": both}],
+    }
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(content))
+    found = read_any(path)
+    assert found.kind == "ed318"
+    assert [part.top.height_m for part in found.parts] == pytest.approx([150.0, 500 * FOOT_M])
+
+
+def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) -> None:
+    ring = " ".join(f"{x},{y},570" for x, y in SQUARE)
+    places = "".join(
+        f"<Placemark><name>{mode}</name><Polygon><altitudeMode>{mode}</altitudeMode><outerBoundaryIs><LinearRing>"
+        f"<coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark>"
+        for mode in ("absolute", "relativeToGround", "clampToGround")
+    )
+    path = tmp_path / "a.kml"
+    path.write_text(f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{places}</Document></kml>')
+    found = read_any(path)
+    assert [part.top for part in found.parts] == [Limit(570.0), Limit(570.0, Datum.GROUND), NO_TOP]
+    assert read_any(zipped(tmp_path / "a.kmz", doc__kml=path.read_bytes())).kind == "kml"
+
+
+def test_fences_keep_in_and_out(tmp_path: Path) -> None:
+    ring = [[47.0, 8.0], [47.0, 8.01], [47.01, 8.01]]
+    plan = tmp_path / "a.plan"
+    circle = {"circle": {"center": [47.0, 8.0], "radius": 100.0}, "inclusion": False}
+    polygons = [{"polygon": ring, "inclusion": True}, {"polygon": ring, "inclusion": True}]
+    for firmware, keep_ins in ((12, 1), (3, 2)):
+        content = {"fileType": "Plan", "geoFence": {"polygons": polygons, "circles": [circle]}}
+        plan.write_text(json.dumps({**content, "mission": {"firmwareType": firmware}}))
+        assert [part.keep_in for part in read_any(plan).parts] == [True] * keep_ins + [False]
+    lines = tmp_path / "fence.txt"
+    lines.write_text("47.005 8.005\n47.0 8.0\n47.0 8.01\n47.01 8.01\n47.0 8.0\n")
+    (part,) = read_any(lines).parts
+    assert part.keep_in
+    assert part.footprint.bounds == (8.0, 47.0, 8.01, 47.01)
+    items = tmp_path / "fence.waypoints"
+    rows = [f"{k}\t0\t3\t5002\t3\t0\t0\t0\t{x}\t{y}\t0\t1" for k, (x, y) in enumerate(ring)]
+    items.write_text("QGC WPL 110\n" + "\n".join(rows) + "\n")
+    assert [part.keep_in for part in read_any(items).parts] == [False]
+
+
+def test_a_ros_map_has_occupied_free_and_unknown_cells(tmp_path: Path) -> None:
+    Image.fromarray(np.array([[0, 254], [205, 254]], dtype=np.uint8)).save(tmp_path / "m.pgm")
+    path = tmp_path / "m.yaml"
+    path.write_text(
+        "image: m.pgm\nresolution: 0.05\norigin: [-1.0, -2.0, 0.0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    found = read_any(path).occupied
+    assert found is not None
+    assert found.values[0].tolist() == [1.0, 0.0]
+    assert np.isnan(found.values[1, 0])
+    x, y = found.places(np.array([0.0]), np.array([2.0]))
+    assert (x[0], y[0]) == pytest.approx((-1.0, -2.0))
+
+
+def test_a_moving_ai_map_is_as_large_as_its_cells(tmp_path: Path) -> None:
+    path = tmp_path / "a.map"
+    path.write_text("type octile\nheight 2\nwidth 3\nmap\n.@.\nTTG\n")
+    found = read_any(path, metres_per_cell=20.0).occupied
+    assert found is not None
+    assert found.values.tolist() == [[0, 1, 0], [1, 1, 0]]
+    assert found.affine == (20.0, 0.0, 0.0, 0.0, -20.0, 40.0)
+
+
+def test_a_gazebo_world_has_its_cylinders_where_their_poses_put_them(tmp_path: Path) -> None:
+    cylinder = "<collision><geometry><cylinder><radius>0.075</radius></cylinder></geometry></collision>"
+    model = (
+        f"<model name='m'><pose>1 2 0 0 0 0</pose><link><pose>0.5 0 0 0 0 0</pose>{cylinder}</link></model>"
+    )
+    path = tmp_path / "a.world"
+    path.write_text(f"<sdf version='1.6'><world name='w'>{model}<state>{model}</state></world></sdf>")
+    (part,) = read_any(path, metres_per_cell=0.3).parts
+    assert (part.footprint.centroid.x, part.footprint.centroid.y) == (pytest.approx(3.0), pytest.approx(4.0))
+    assert part.footprint.area == pytest.approx(math.pi * 0.15**2, rel=0.01)
+
+
+def test_kinds_are_told_from_what_stands_in_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "nothing.says"
+    for text, kind in (
+        ("ncols 2\nnrows 2\n", "ascii_grid"),
+        ("type octile\nheight 1\nwidth 1\nmap\n.\n", "moving_ai"),
+        ("* comment\nAC R\nAN x\n", "openair"),
+        ('{"UASZoneList": []}', "ed269"),
+        ('{"type": "FeatureCollection", "features": []}', "geojson"),
+        ("<?xml version='1.0'?><osm/>", "osm"),
+        ("<sdf/>", "gazebo_world"),
+        ("image: a.pgm\nresolution: 1\n", "ros_map"),
+        ("QGC WPL 110\n", "ardupilot_fence"),
+    ):
+        path.write_text(text)
+        assert kind_of(path) == kind

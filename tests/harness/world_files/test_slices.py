@@ -1,0 +1,309 @@
+"""What is solid at one altitude, held against independent readers: area, nothing missing, validity, ground."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from aircraft.frames import LocalPlane
+from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
+from harness.world_files.growing import simplified
+from harness.world_files.plane import Mapping, Place, geodetic
+from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
+
+ALPS = Place(46.82, 9.83)
+AROUND = (-4000.0, -4000.0, 4000.0, 4000.0)
+
+real = pytest.mark.skipif(not SHARED.is_dir(), reason="real files are not beside this checkout")
+
+
+def cut(path: Path, altitude_m: float, **keys: Any) -> tuple[Expanded, Mapping]:
+    """A file cut at an altitude, in a plane about its middle and an area as large as it is."""
+    spec = FileSpec(path, **keys)
+    contents = loaded_file(path, spec.kind, spec.reading)
+    place = Place(47.0, 8.0)
+    if contents.crs:
+        latitude, longitude = geodetic(contents.crs, *corners_of(contents))
+        place = Place(*(round(float(each.min() + each.max()) / 2, 5) for each in (latitude, longitude)))
+    mapping = Mapping(contents.crs, place)
+    east, north = mapping.to_plane(*corners_of(contents))
+    bounds = (float(east.min()), float(north.min()), float(east.max()), float(north.max()))
+    return expanded([spec], place, bounds, altitude_m), mapping
+
+
+def union(found: Expanded) -> Any:
+    return shapely.union_all([each for source in found.sources for each in source.polygons])
+
+
+def check_covers(found: Expanded, expected: Any, share: float = 0.01) -> None:
+    """Nothing solid is missing, and what is added is less than a share."""
+    solid = union(found)
+    assert all(each.is_valid for source in found.sources for each in source.polygons)
+    assert shapely.difference(expected, solid).area <= 1e-6 * expected.area + 1.0
+    assert solid.area <= (1.0 + share) * expected.area + 1.0
+
+
+@real
+@pytest.mark.parametrize(
+    ("name", "altitude_m"),
+    [("davosdorf.tif", 2000), ("davosdorf.tif", 1700), ("sertig_valley.tif", 2200), ("S36E149.hgt.zip", 900)],
+)
+def test_terrain_is_what_rasterio_outlines(name: str, altitude_m: float) -> None:
+    rasterio = pytest.importorskip("rasterio")
+    features = pytest.importorskip("rasterio.features")
+    path = SHARED / "terrain" / name
+    source = f"zip://{path}!S36E149.hgt" if name.endswith(".zip") else str(path)
+    with rasterio.open(source) as dataset:
+        heights, transform, crs = dataset.read(1), dataset.transform, dataset.crs.to_epsg()
+    mask = (heights >= altitude_m - 10.0).astype(np.uint8)
+    shapes = [
+        shapely.geometry.shape(shape) for shape, _ in features.shapes(mask, mask > 0, transform=transform)
+    ]
+    found, mapping = cut(path, altitude_m)
+    plain = Mapping(f"EPSG:{crs}", mapping.place)
+    dense = shapely.segmentize(np.array(shapes, dtype=object), 32 * abs(transform.a))
+    check_covers(found, shapely.union_all(plain.geometries(dense)))
+    assert found.ground is not None
+
+
+@real
+def test_the_ground_is_rasterios_under_true_north() -> None:
+    rasterio = pytest.importorskip("rasterio")
+    found, mapping = cut(SHARED / "terrain" / "davosdorf.tif", 2000)
+    assert found.ground is not None
+    with rasterio.open(SHARED / "terrain" / "davosdorf.tif") as dataset:
+        heights = dataset.read(1)
+        rng = np.random.default_rng(2)
+        rows, columns = rng.integers(5, 490, 200), rng.integers(5, 550, 200)
+        x, y = rasterio.transform.xy(dataset.transform, rows, columns)
+    east, north = mapping.to_plane(np.array(x), np.array(y))
+    error = found.ground.at(east, north) - heights[rows, columns]
+    assert np.abs(error).mean() < 1.0  # it is kept on a grid of its own, askew to the file's by 2 degrees
+    east, north = mapping.to_plane(np.array([782e3, 782e3]), np.array([187e3, 188e3]))
+    turned_deg = math.degrees(math.atan2(float(east[1] - east[0]), float(north[1] - north[0])))
+    assert turned_deg == pytest.approx(1.73, abs=0.05)  # grid north lies east of true north
+
+
+def test_the_plane_is_the_one_that_is_flown_in_and_datums_are_shifted() -> None:
+    """Zimmerwald (swisstopo): LV03 602030.68, 191775.03 is 46 52 37.5405 N, 7 27 54.9835 E."""
+    plane = LocalPlane(46.9, 7.4)
+    mapping = Mapping("EPSG:21781", Place(46.9, 7.4))
+    east, north = mapping.to_plane(np.array([602_030.68]), np.array([191_775.03]))
+    assert (east[0], north[0]) == pytest.approx(plane.plane(46.877_094_6, 7.465_273_2), abs=2.0)
+    back = mapping.from_plane(east, north)
+    assert (back[0][0], back[1][0]) == pytest.approx((602_030.68, 191_775.03), abs=0.01)
+
+
+@real
+@pytest.mark.filterwarnings("ignore")  # GDAL warns of rings that are not closed, through pyogrio
+@pytest.mark.parametrize(
+    ("name", "altitude_m"), [("Helsinki.osm.pbf", 20), ("osmnx_planet_10.068_48.135.osm", 10)]
+)
+def test_buildings_are_what_gdal_reads(name: str, altitude_m: float) -> None:
+    """An independent reader: GDAL's OSM driver, with heights told from its tags once more."""
+    pyogrio = pytest.importorskip("pyogrio")
+    path = SHARED / "buildings" / name
+    if name.endswith(".pbf"):
+        pytest.importorskip("osmium")
+    meta, _, geometries, columns = pyogrio.raw.read(path, layer="multipolygons")
+    names = [str(each) for each in meta["fields"]]
+    tags = dict(zip(names, columns, strict=True))
+    solid = []
+    for row, wkb in enumerate(geometries):
+        shape = shapely.from_wkb(wkb, on_invalid="ignore")
+        other = str(tags["other_tags"][row] or "")
+        if shape is None or not tags["building"][row] or shape.area == 0:
+            continue
+        found = dict(part.split('"=>"') for part in other.strip('"').split('","') if '"=>"' in part)
+        height = found.get("height", "").replace(" m", "")
+        levels = float(found.get("building:levels", 0)) + float(found.get("roof:levels", 0))
+        top = float(height) if height else 3.0 * levels if "building:levels" in found else 6.0
+        bottom = float(found.get("min_height", 3.0 * float(found.get("building:min_level", 0))))
+        if top >= altitude_m - 10.0 and bottom <= altitude_m + 10.0:
+            solid.append(shapely.make_valid(shape))
+    cuts, mapping = cut(path, altitude_m)
+    expected = shapely.union_all(mapping.geometries(np.array(solid, dtype=object)))
+    missing = shapely.difference(expected, union(cuts)).area
+    assert missing <= 0.01 * expected.area
+    assert len(solid) > 15
+
+
+@real
+def test_city_objects_are_the_unions_of_their_surfaces() -> None:
+    path = SHARED / "buildings" / "delft.city.json"
+    content = json.loads(path.read_text())
+    vertices = (
+        np.array(content["vertices"]) * content["transform"]["scale"] + content["transform"]["translate"]
+    )
+    solid = []
+    for thing in content["CityObjects"].values():
+        if not thing["type"].startswith(("Building", "Bridge")):
+            continue
+        rings = [np.array(ring) for shape in thing["geometry"] for ring in flat(shape["boundaries"])]
+        z = np.concatenate([vertices[ring][:, 2] for ring in rings])
+        if z.max() >= 2.0 and z.min() <= 22.0:
+            polygons = [shapely.make_valid(shapely.Polygon(vertices[ring][:, :2])) for ring in rings]
+            solid.append(shapely.union_all([each for each in polygons if each.area > 0]))
+    found, mapping = cut(path, 12.0)
+    check_covers(found, shapely.union_all(mapping.geometries(np.array(solid, dtype=object))))
+
+
+def flat(boundaries: Any) -> list[list[int]]:
+    """Outer rings of nested boundaries."""
+    if isinstance(boundaries[0][0], int):
+        return [boundaries[0]]
+    return [ring for each in boundaries for ring in flat(each)]
+
+
+@real
+@pytest.mark.parametrize("altitude_m", [150.0, 500.0, 3000.0])
+def test_airspace_is_what_aerofiles_reads(altitude_m: float) -> None:
+    openair = pytest.importorskip("aerofiles.openair")
+    path = SHARED / "airspace" / "openair_australia_2008.txt"
+    place, bounds = Place(-33.9, 151.2), (-150e3, -150e3, 150e3, 150e3)
+    found = expanded([FileSpec(path)], place, bounds, altitude_m)
+    with path.open(encoding="latin-1") as file:
+        records = [record for record, error in openair.Reader(file) if record and not error]
+    mapping, low, high = Mapping("EPSG:4326", place), altitude_m - 10.0, altitude_m + 10.0
+    window, solid = shapely.box(*bounds), []
+    for record in records:
+        corners = [each["location"] for each in record["elements"] if each["type"] == "point"]
+        if len(corners) != len(record["elements"]) or len(corners) < 3:
+            continue  # arcs and circles are ours alone
+        bottom, top = (metres(str(record[key]), none) for key, none in (("floor", -1e9), ("ceiling", 1e9)))
+        if bottom <= high and top >= low:
+            ring = shapely.make_valid(shapely.Polygon([(lon, lat) for lat, lon in corners]))
+            solid.append(shapely.intersection(mapping.geometries(ring), window))
+    expected = shapely.union_all(solid)
+    assert expected.area > 1e9
+    assert shapely.difference(expected, union(found)).area <= 1e-5 * expected.area
+
+
+def metres(text: str, none: float) -> float:
+    """Metres of what this one file has: feet, flight levels, SFC, UNL, NOTAM, BCTA."""
+    digits = "".join(each for each in text if each.isdigit())
+    if not digits or "SFC" in text:
+        return none
+    return float(digits) * 0.3048 * (100.0 if "FL" in text else 1.0)
+
+
+@real
+@pytest.mark.parametrize("name", ["Boston_0_256.map", "random-32-32-10.map"])
+def test_occupied_cells_are_solid_and_no_others(name: str) -> None:
+    lines = (SHARED / "occupancy" / name).read_text().splitlines()[4:]
+    boxes = [
+        shapely.box(20.0 * x, 20.0 * (len(lines) - 1 - y), 20.0 * (x + 1), 20.0 * (len(lines) - y))
+        for y, line in enumerate(lines)
+        for x, cell in enumerate(line)
+        if cell in "@OTW"
+    ]
+    found, _ = cut(SHARED / "occupancy" / name, 300.0, metres_per_cell=20.0)
+    check_covers(found, shapely.union_all(boxes))
+
+
+def slope(folder: Path) -> Path:
+    """Terrain that rises from west to east, 1 m in 10 m, from 1000 m; 4 km wide, in Swiss coordinates."""
+    heights = np.tile(1000.0 + np.arange(400.0), (400, 1))
+    return geotiff(folder / "slope.tif", heights, (781_000.0, 189_500.0), 10.0, 21781)
+
+
+def at_slope(file: Path, *more: FileSpec, altitude_m: float = 1200.0) -> Expanded:
+    x, y = np.array([783_000.0]), np.array([187_500.0])
+    latitude, longitude = geodetic("EPSG:21781", x, y)
+    place = Place(float(latitude[0]), float(longitude[0]))
+    return expanded([FileSpec(file), *more], place, (-1800.0, -1800.0, 1800.0, 1800.0), altitude_m)
+
+
+def zone_on_slope(folder: Path, **limits: Any) -> FileSpec:
+    """A zone of 2 km by 2 km in the middle of the slope."""
+    x, y = np.array([782e3, 784e3, 784e3, 782e3]), np.array([186_500.0, 186_500.0, 188_500.0, 188_500.0])
+    latitude, longitude = geodetic("EPSG:21781", x, y)
+    ring = [[east, north] for east, north in zip(longitude, latitude, strict=True)]
+    return FileSpec(geojson(folder / "zone.geojson", feature(limits, [*ring, ring[0]])))
+
+
+def test_limits_above_ground_follow_the_terrain(tmp_path: Path) -> None:
+    zone = zone_on_slope(tmp_path, lowerLimit="GND", upperLimit="150 m AGL")
+    found = at_slope(slope(tmp_path), zone)
+    terrain, strip = (shapely.union_all(list(source.polygons)) for source in found.sources)
+    # The ground is at 1190 m, where the terrain begins to be solid, 190 columns east; the zone begins 150 m lower.
+    assert strip.bounds[0] == pytest.approx(-1000.0, abs=90.0)
+    assert strip.area == pytest.approx(2000.0**2, rel=0.02)
+    assert terrain.bounds[0] == pytest.approx(-100.0, abs=80.0)
+    lower = at_slope(slope(tmp_path), zone_on_slope(tmp_path, lowerLimit="GND", upperLimit="50 m AGL"))
+    strip = shapely.union_all(list(lower.sources[1].polygons))
+    assert strip.area == pytest.approx(2000.0 * 1600.0, rel=0.03)  # where the ground is above 1140 m
+
+
+def test_limits_above_ground_are_refused_where_the_ground_is_not_known(tmp_path: Path) -> None:
+    path = geojson(
+        tmp_path / "a.geojson", feature({"name": "Z", "lowerLimit": "GND", "upperLimit": "120 m AGL"})
+    )
+    place = Place(47.005, 8.005)
+    with pytest.raises(
+        FileFault, match=r"1 part with limits above ground \(Z\).*give a terrain file too, or ground_m"
+    ):
+        expanded([FileSpec(path)], place, AROUND, 300.0)
+    assert len(expanded([FileSpec(path, ground_m=200.0)], place, AROUND, 300.0).sources[0].polygons) == 1
+    assert len(expanded([FileSpec(path, ground_m=100.0)], place, AROUND, 300.0).sources[0].polygons) == 0
+
+
+def test_a_building_stands_on_the_terrain(tmp_path: Path) -> None:
+    tower = {"building": "yes", "height": "100"}
+    spec = zone_on_slope(tmp_path, **tower)
+    assert len(at_slope(slope(tmp_path), spec, altitude_m=1400.0).sources[1].polygons) == 1  # 1300 + 100
+    assert len(at_slope(slope(tmp_path), spec, altitude_m=1420.0).sources[1].polygons) == 0
+
+
+def test_a_file_far_away_says_where_it_lies(tmp_path: Path) -> None:
+    path = geojson(tmp_path / "a.geojson", feature({}))
+    with pytest.raises(
+        FileFault, match=r"lies outside the area.*latitude_deg: 47\.00\d\d, longitude_deg: 8\.00\d\d"
+    ):
+        expanded([FileSpec(path)], Place(46.0, 9.0), AROUND, 300.0)
+
+
+def test_holes_are_kept_filled_or_kept_where_one_can_turn(tmp_path: Path) -> None:
+    shape = feature({})
+    inner = [[8.002, 47.002], [8.004, 47.002], [8.004, 47.008], [8.002, 47.008]]  # 152 m by 668 m
+    tiny = [[8.006, 47.006], [8.0065, 47.006], [8.0065, 47.0065], [8.006, 47.0065]]
+    shape["geometry"]["coordinates"] += [[*inner, inner[0]], [*tiny, tiny[0]]]
+    path = geojson(tmp_path / "a.geojson", shape)
+    holes = {}
+    for name in ("keep", "fill", "flyable"):
+        found = expanded([FileSpec(path, holes=name)], Place(47.005, 8.005), AROUND, 300.0, turn_room_m=60.0)
+        (polygon,) = found.sources[0].polygons
+        holes[name] = len(polygon.interiors)
+    assert holes == {"keep": 2, "fill": 0, "flyable": 1}
+
+
+def test_outlines_only_grow_and_by_no_more_than_they_may() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(40):
+        cells = shapely.union_all(
+            [shapely.box(x, y, x + 1, y + 1) for x, y in rng.integers(0, 12, (70, 2)).tolist()]
+        )
+        polygons = [each for each in shapely.get_parts(cells) if each.is_valid]
+        grown = simplified(polygons, 1.0)
+        assert shapely.difference(cells, shapely.union_all(grown)).area < 1e-9
+        assert sum(each.area for each in grown) <= 1.006 * cells.area
+        assert all(each.is_valid for each in grown)
+
+
+def test_a_keep_in_fence_leaves_its_inside_free(tmp_path: Path) -> None:
+    ring = [[y, x] for x, y in SQUARE[:-1]]
+    path = tmp_path / "a.plan"
+    path.write_text(
+        json.dumps({"fileType": "Plan", "geoFence": {"polygons": [{"polygon": ring, "inclusion": True}]}})
+    )
+    found = expanded([FileSpec(path)], Place(47.005, 8.005), AROUND, 300.0)
+    (polygon,) = found.sources[0].polygons
+    assert len(polygon.interiors) == 1
+    assert shapely.Polygon(polygon.interiors[0]).area == pytest.approx(759.5 * 1111.9, rel=0.01)
+    assert polygon.contains(shapely.Point(3000, 3000))
