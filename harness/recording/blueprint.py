@@ -1,16 +1,12 @@
-"""How recordings look: entities, colours, views and panels. Nothing here depends on a flight."""
+"""How recordings look: their entities and colours. Nothing here depends on a flight."""
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
 if TYPE_CHECKING:
     from harness.analysis.trackability import FlightLimits
@@ -27,6 +23,10 @@ STATES = "states"
 ATTITUDE = "attitude"
 EVENTS = "events"
 SUMMARY = "summary"
+COLOURS = "colours"
+"""What the colours of the views mean, as a page."""
+END = "end"
+"""Below WORLD and PLAN: where a flight ended that did not end at the goal."""
 FRAME = "frame"
 """Property of the recording that holds the `Frame`."""
 WHOLE = "whole_track"
@@ -44,16 +44,17 @@ Colour = tuple[int, int, int]
 
 BACKGROUND: Colour = (17, 19, 24)
 BOUNDS: Colour = (128, 134, 146)
-OUTLINE: Colour = (62, 67, 78)
-OBSTACLE: Colour = (84, 91, 106)
+OUTLINE: Colour = (104, 112, 128)
+OBSTACLE: Colour = (112, 120, 138)
 EDGE: Colour = (214, 218, 226)
 MOVING: Colour = (176, 116, 92)
 MOVES: Colour = (255, 150, 96)
 """Of what the map takes to move."""
 MET: Colour = (196, 124, 232)
 MOVING_DIM: Colour = (96, 68, 56)
-START: Colour = (225, 228, 235)
-GOAL: Colour = (96, 211, 130)
+START: Colour = (128, 140, 160)
+GOAL: Colour = (52, 160, 92)
+"""Of start and goal: their labels are legible on black and on white."""
 GOAL_DIM: Colour = (48, 112, 72)
 AIRCRAFT: Colour = (255, 255, 255)
 TRACK: Colour = (255, 179, 64)
@@ -150,6 +151,7 @@ class Scene:
         limits: altitude to be held, bank limit, and the error from which on a plan is not tracked.
         obstacles: the true obstacles.
         scenario_yaml: the scenario as flown, for the summary.
+        searches: whether a planner searches; not where a given path is flown.
     """
 
     name: str
@@ -158,11 +160,18 @@ class Scene:
     limits: FlightLimits
     obstacles: tuple[Obstacle, ...]
     scenario_yaml: str = ""
+    searches: bool = True
 
     @property
     def altitude_m(self) -> float:
         """Altitude to be held, above mean sea level."""
         return self.limits.altitude_m
+
+    @property
+    def empty_series(self) -> tuple[str, ...]:
+        """Time series that have nothing to show: clearance where there is no obstacle, search where nothing is."""
+        without = () if self.obstacles else ("clearance",)
+        return without if self.searches else (*without, "search")
 
     @property
     def frame(self) -> Frame:
@@ -178,201 +187,3 @@ class Scene:
 def time_column(time_s: FloatArray) -> rr.TimeColumn:
     """Simulated time, rounded to nanoseconds (rerun truncates floats)."""
     return rr.TimeColumn(TIMELINE, duration=np.round(time_s * 1e9).astype("timedelta64[ns]"))
-
-
-class Layout(rrb.Blueprint):
-    """A blueprint that can be let go of.
-
-    rerun 0.41 keeps what it writes one to for as long as the process lives: two threads and 3 MB each
-    (rerun-io/rerun#2116).
-    """
-
-    _stream: rr.RecordingStream | None = None
-
-    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
-        self._stream = stream
-        super()._log_to_stream(stream)
-
-    def let_go(self) -> None:
-        """Once it has been sent."""
-        if self._stream is not None:
-            self._stream.disconnect()
-            self._stream = None
-
-
-def blueprint(frame: Frame, runs: Sequence[str] = ("",)) -> Layout:
-    """The layout: plan view and 3-D flight, states, events and summary, time series.
-
-    Args:
-        frame: what to frame the views on.
-        runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording the empty
-            string.
-    """
-    events = rrb.TextLogView(
-        origin=EVENTS,
-        name="Events",
-        columns=rrb.TextLogColumns(
-            timeline_columns=[rrb.encodings.TimelineColumn(TIMELINE, visible=False)],
-            text_log_columns=["Body"],
-        ),
-    )
-    about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
-    states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
-    below = [events, about, *([attitude_view()] if len(runs) == 1 else [])]
-    return Layout(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Horizontal(plan_view(frame, runs), flight_view(frame, runs), column_shares=[1, 1]),
-                states,
-                rrb.Horizontal(*below, column_shares=[5, 4, 3][: len(below)]),
-                row_shares=[12, 1.5 + 0.85 * (3 if len(runs) == 1 else 2 * len(runs)), 5],
-            ),
-            rrb.Vertical(*series_views(frame, runs)),
-            column_shares=[13, 6],
-        ),
-        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_layout=False,
-        auto_views=False,
-    )
-
-
-THIN_SERIES: Final = ("cross_track", "clearance", "bank")
-"""Time series of a thin recording."""
-
-
-def thin_blueprint(frame: Frame) -> Layout:
-    """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series."""
-    events = rrb.TextLogView(origin=EVENTS, name="Events")
-    about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
-    return Layout(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Horizontal(plan_view(frame, ("",)), flight_view(frame, ("",))),
-                rrb.Horizontal(events, about),
-                row_shares=[12, 5],
-            ),
-            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES)),
-            column_shares=[13, 6],
-        ),
-        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
-        rrb.BlueprintPanel(state="hidden"),
-        rrb.SelectionPanel(state="hidden"),
-        auto_layout=False,
-        auto_views=False,
-    )
-
-
-def plan_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial2DView:
-    """The plan view, north up, framed on the area.
-
-    A 2-D view counts its second axis downwards; the transform at PLAN turns it round.
-    """
-    xmin, ymin, xmax, ymax = frame.bounds_m
-    margin = 0.03 * frame.span_m
-    return rrb.Spatial2DView(
-        origin="/",
-        contents=[f"/{PLAN}/**"],
-        name="Plan view (north up)",
-        background=list(BACKGROUND),
-        visual_bounds=rrb.VisualBounds2D(
-            x_range=[xmin - margin, xmax + margin], y_range=[-ymax - margin, -ymin + margin]
-        ),
-        overrides={f"{PLAN}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, SENSED)},
-    )
-
-
-def flight_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial3DView:
-    """The 3-D view: the whole area, seen from the south-west and above."""
-    xmin, ymin, xmax, ymax = frame.bounds_m
-    middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), frame.altitude_m)
-    away = 1.25 * frame.span_m
-    azimuth, elevation = math.radians(-97.0), math.radians(45.0)
-    eye = (
-        middle[0] + away * math.cos(elevation) * math.cos(azimuth),
-        middle[1] + away * math.cos(elevation) * math.sin(azimuth),
-        middle[2] + away * math.sin(elevation),
-    )
-    contents = [f"/{WORLD}/**"]
-    if len(runs) == 1:
-        contents.append(f"- /{WORLD}/{TRUE}/**")
-    return rrb.Spatial3DView(
-        origin=WORLD,
-        contents=contents,
-        name="3-D flight",
-        background=list(BACKGROUND),
-        line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)
-        ),
-        overrides={f"{WORLD}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, SENSED)},
-    )
-
-
-def attitude_view() -> rrb.Spatial3DView:
-    """Bank and pitch of the aircraft, seen from behind."""
-    return rrb.Spatial3DView(
-        origin=ATTITUDE,
-        name="Attitude, from behind",
-        background=list(BACKGROUND),
-        line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=(0.0, -2.9, 1.1),
-            look_target=(0.0, 0.0, 0.1),
-            eye_up=(0.0, 0.0, 1.0),
-        ),
-    )
-
-
-def series_views(
-    frame: Frame, runs: Sequence[str], only: Sequence[str] | None = None
-) -> list[rrb.TimeSeriesView]:
-    """The time series, one a question, each over the whole flight.
-
-    Args:
-        frame: what to frame the views on.
-        runs: as in `blueprint`.
-        only: names of the series shown; default: all.
-    """
-    wanted = max(frame.clearance_m, 1.0)
-    lines = Counter(line.split("/")[0] for line in SERIES_STYLE)
-    bank = "Attitude and saturation: bank and pitch, deg (right +, up +)"
-    if len(runs) > 1:
-        bank = "Attitude: bank, deg (right +)"
-    rows: list[tuple[str, str, tuple[float, float] | None]] = [
-        ("cross_track", "Tracking: cross-track error, m (right +)", None),
-        ("clearance", "Safety: clearance to the nearest edge, m", (-0.5 * wanted, 6.0 * wanted)),
-        ("bank", bank, None),
-        ("speed", "Speed, m/s", None),
-        ("altitude_error", "Altitude error, m (high +)", None),
-        ("search", "Planner: one point a plan, time of its search, ms", None),
-    ]
-    return [
-        rrb.TimeSeriesView(
-            origin=f"{SERIES}/{entity}",
-            name=title,
-            background=rrb.archetypes.PlotBackground(color=list(BACKGROUND), show_grid=True),
-            axis_x=_whole_flight(),
-            axis_y=rrb.ScalarAxis(range=limits) if limits else None,
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=max(lines[entity], 1) * len(runs) > 1),
-        )
-        for entity, title, limits in rows
-        if only is None or entity in only
-    ]
-
-
-def _whole_flight() -> rrb.TimeAxis:
-    return rrb.TimeAxis(
-        view_range=rr.TimeRange(
-            start=rr.TimeRangeBoundary.absolute(seconds=0.0), end=rr.TimeRangeBoundary.infinite()
-        )
-    )
-
-
-def _up_to_cursor() -> rrb.VisibleTimeRanges:
-    """Shows all there was of an entity up to the time cursor, not only the latest."""
-    return rrb.VisibleTimeRanges(
-        timeline=TIMELINE, start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.cursor_relative()
-    )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import rerun as rr
 
-from harness.recording.blueprint import Layout
+from harness.recording.layout import Layout
 
 _AT_ONCE_BYTES = 1 << 20
 _HEADER_BYTES = 12

@@ -20,10 +20,19 @@ from aircraft.interface import AircraftState
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
+from harness.recording.layout import blueprint
 from harness.recording.moving import Tracked, log_tracked_style
 from harness.recording.plans import log_plan_style, send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import lines_2d, log_moving, log_obstacle, log_scene, log_summary, quaternions
+from harness.recording.scene import (
+    lines_2d,
+    log_end,
+    log_moving,
+    log_obstacle,
+    log_scene,
+    log_summary,
+    quaternions,
+)
 from harness.recording.sensed import News, Sensed, returns_m
 from harness.recording.states import (
     AT_LIMIT,
@@ -76,7 +85,7 @@ class RerunLog:
             raise FileNotFoundError(f"no folder {path.parent} for the recording")
         self._scene = scene
         self._rec = recording_stream(recording_id)
-        self._file = RecordingFile(self._rec, path, look.blueprint(scene.frame))
+        self._file = RecordingFile(self._rec, path, blueprint(scene.frame, without=scene.empty_series))
         self._rec.send_recording_name(scene.name)
         span_m = scene.frame.span_m
         self._chord_error_m = 1e-5 * span_m
@@ -91,6 +100,7 @@ class RerunLog:
         self._states = States(math.degrees(scene.limits.bank_limit_rad))
         self._last_point: FloatArray = np.zeros((0, 3))
         self._whole: list[FloatArray] = []
+        self._last: Track | None = None
         self._shown_until_s = -math.inf
         self._known_to_move, self._tracked = moving, Tracked()
         self._moving = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
@@ -123,6 +133,7 @@ class RerunLog:
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and what happened meanwhile."""
         self._send_happened()
+        self._last = block
         times = look.time_column(block.time_s)
         position = np.column_stack((block.east_m, block.north_m, block.up_m))
         self._rec.send_columns(
@@ -181,6 +192,8 @@ class RerunLog:
             causes = dict.fromkeys((state for _, state in changes), look.HIT)
             log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM})
             log_summary(self._rec, self._scene, metrics)
+            if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):
+                log_end(self._rec, self._last, metrics["outcome"])
             self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
         send_properties(self._rec, RUN, run or {})
         send_properties(self._rec, VARIED, varied or {})

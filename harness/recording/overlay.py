@@ -15,10 +15,11 @@ from harness.analysis.rows import escaped, number
 from harness.files.errors import RunFolderError
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
+from harness.recording.layout import blueprint
 
 SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
 """Below PLAN and WORLD: what all runs of a scenario have in common."""
-OWN = (look.FLOWN, look.WHOLE, "aircraft")
+OWN = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 """Below PLAN and WORLD: what is drawn of every run."""
 
 COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
@@ -44,7 +45,7 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
     runs = [f"runs/{place}/" for place in range(len(recordings))]
     title = ", ".join(names)
     with recording_stream(f"overlay: {title}") as rec:
-        file = RecordingFile(rec, path, look.blueprint(_frame(chunks[0], recordings[0]), runs))
+        file = RecordingFile(rec, path, blueprint(_frame(chunks[0], recordings[0]), runs))
         rec.send_recording_name(title)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
@@ -70,7 +71,7 @@ def send_recording(recording: Path, runs: int, address: str) -> None:
     chunks = _chunks(recording)
     names = [f"runs/{place}/" for place in range(runs)] if runs > 1 else [""]
     with recording_stream(str(recording)) as rec:
-        layout = look.blueprint(_frame(chunks, recording), names)
+        layout = blueprint(_frame(chunks, recording), names)
         rec.connect_grpc(address, default_blueprint=layout)
         layout.let_go()
         rec.send_chunks(chunks)

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from harness.flight.record import FloatArray
+from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
+from harness.recording.layout import THIN_SERIES
 from harness.recording.strips import strips_2d, strips_3d
-from harness.recording.summary import summary
+from harness.recording.summary import colours, summary
 from harness.world.obstacle import Circle, Polygon
 
 CIRCLE_POINTS = 72
@@ -71,11 +72,12 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         log_solids(rec, f"{look.WORLD}/{solid}", standing, scene.obstacle_top_m, look.OBSTACLE)
     _log_aircraft(rec, scene, thin)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
-        if thin and entity.partition("/")[0] not in look.THIN_SERIES:
+        if thin and entity.partition("/")[0] not in THIN_SERIES:
             continue
         style = rr.SeriesLines(names=[name], colors=[colour], widths=[width])
         rec.log(f"{look.SERIES}/{entity}", style, static=True)
     if not thin:
+        log_colours_page(rec, scene)
         log_summary(rec, scene, None)
 
 
@@ -98,6 +100,29 @@ def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     shape = scene.obstacles[index].shape
     rec.log(f"{look.PLAN}/moving/{index}", lines_2d([_outline(shape)], look.MOVING_DIM, 1.5, 10))
     rec.log(f"{look.WORLD}/moving/{index}", _rims([_outline(shape)], scene.obstacle_top_m, look.MOVING_DIM))
+
+
+def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
+    """Marks where a flight ended that did not reach its goal, with how it ended."""
+    last = np.array([[track.east_m[-1], track.north_m[-1], track.up_m[-1]]])
+    label = [outcome.replace("_", " ")]
+    rec.log(
+        f"{look.PLAN}/{look.END}",
+        rr.Points2D(
+            last[:, :2],
+            colors=[look.HIT],
+            radii=rr.Radius.ui_points(7.0),
+            labels=label,
+            show_labels=True,
+            draw_order=70,
+        ),
+        static=True,
+    )
+    rec.log(
+        f"{look.WORLD}/{look.END}",
+        rr.Points3D(last, colors=[look.HIT], radii=rr.Radius.ui_points(7.0), labels=label, show_labels=True),
+        static=True,
+    )
 
 
 def log_solids(
@@ -146,6 +171,12 @@ def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any
         rr.TextDocument(summary(scene, metrics), media_type=rr.MediaType.MARKDOWN),
         static=True,
     )
+
+
+def log_colours_page(rec: rr.RecordingStream, scene: Scene) -> None:
+    """Logs what the colours mean."""
+    page = rr.TextDocument(colours(scene), media_type=rr.MediaType.MARKDOWN)
+    rec.log(look.COLOURS, page, static=True)
 
 
 def lines_2d(

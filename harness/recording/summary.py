@@ -47,11 +47,15 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
         f"{scene.altitude_m:g} m above sea level; smallest turn radius {mission.turn_radius_m:.0f} m; sensing "
         f"range {mission.sensor_range_m:g} m.",
         "",
-        LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:g}"),
     ]
     if scene.scenario_yaml:
         lines += ["### Scenario", "", "```yaml", scene.scenario_yaml.rstrip(), "```", ""]
     return "\n".join(lines)
+
+
+def colours(scene: Scene) -> str:
+    """What the colours of the views mean, as Markdown."""
+    return LEGEND.format(error=f"{scene.limits.cross_track_threshold_m:g}")
 
 
 def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
@@ -62,8 +66,7 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
     return {
         "outcome": f"{metrics['outcome']}: {metrics['reason']}",
         "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
-        "least clearance": f"{number(metrics['min_clearance_m']) or 'none'} m of {scene.mission.clearance_m:g} m; "
-        f"{_text(metrics['clearance_violation_s'], 1)} s below",
+        "least clearance": _clearance(scene, metrics),
         "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
         "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
         "trackable": "yes"
@@ -76,6 +79,14 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
         "search p50, p99, max": ", ".join(_text(compute[name], 1) for name in ("p50", "p99", "max")) + " ms",
         "digest": metrics["digest"][:16],
     }
+
+
+def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
+    least = number(metrics["min_clearance_m"])
+    if not least:
+        return "no obstacle"
+    below = _text(metrics["clearance_violation_s"], 1)
+    return f"{least} m of {scene.mission.clearance_m:g} m; {below} s below"
 
 
 def _text(value: float | None, digits: int) -> str:

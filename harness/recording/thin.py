@@ -20,9 +20,10 @@ from harness.flight.polylines import polylines
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
+from harness.recording.layout import thin_blueprint
 from harness.recording.plans import log_plan_style
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import lines_2d, log_scene, log_summary, quaternions
+from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, quaternions
 from harness.recording.strips import strips_2d
 
 if TYPE_CHECKING:
@@ -49,11 +50,12 @@ class ThinLog:
             raise FileNotFoundError(f"no folder {path.parent} for the recording")
         self._scene = scene
         self._rec = recording_stream(recording_id)
-        self._file = RecordingFile(self._rec, path, look.thin_blueprint(scene.frame))
+        self._file = RecordingFile(self._rec, path, thin_blueprint(scene.frame))
         self._rec.send_recording_name(recording_id)
         self._plans: list[AcceptedPlan] = []
         self._events: list[tuple[float, str]] = []
         self._whole: list[FloatArray] = []
+        self._last: Track | None = None
         log_scene(self._rec, scene, thin=True)
         log_plan_style(self._rec, thin=True)
 
@@ -71,6 +73,7 @@ class ThinLog:
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and the plans meanwhile."""
         self._send_plans()
+        self._last = block
         rows = np.unique(np.append(np.arange(0, len(block), ROWS), len(block) - 1))
         times = [look.time_column(block.time_s[rows])]
         position = np.column_stack((block.east_m, block.north_m, block.up_m))[rows]
@@ -130,6 +133,8 @@ class ThinLog:
                 rr.TextLog.columns(text=text, level=[rr.TextLogLevel.INFO] * len(texts)),
             )
         log_summary(self._rec, replace(self._scene, scenario_yaml=""), metrics)
+        if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):
+            log_end(self._rec, self._last, metrics["outcome"])
         send_properties(self._rec, RUN, run or {})
         send_properties(self._rec, VARIED, varied or {})
         self._file.flush()

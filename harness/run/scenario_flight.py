@@ -207,11 +207,7 @@ def fly_to_folder(
             told = [command or shlex.join(sys.argv)]
             folder = stack.enter_context(RunFolder.create(out, text, told, _sources(scenario)))
             observers = [*watching]
-            log = (
-                _recording(scenario, text, loop, folder, pilot or scenario.planner.kind, identity, thin)
-                if recording
-                else None
-            )
+            log = _recording(scenario, text, loop, folder, pilot, identity, thin) if recording else None
             if log is not None:
                 stack.callback(log.end)
                 observers.append(log)
@@ -231,13 +227,21 @@ def _sources(scenario: Scenario) -> list[dict[str, str]]:
 
 
 def _recording(
-    scenario: Scenario, text: str, loop: Loop, folder: RunFolder, pilot: str, identity: str | None, thin: bool
+    scenario: Scenario,
+    text: str,
+    loop: Loop,
+    folder: RunFolder,
+    pilot: str | None,
+    identity: str | None,
+    thin: bool,
 ) -> Any:
     from harness.recording.blueprint import Scene
     from harness.recording.log import RerunLog
     from harness.recording.thin import ThinLog
 
-    title = f"{scenario.name}, {pilot}, {scenario.aircraft.model}, seed {scenario.seed}"
+    title = (
+        f"{scenario.name}, {pilot or scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}"
+    )
     scene = Scene(
         title,
         loop.mission,
@@ -245,6 +249,7 @@ def _recording(
         flight_limits(scenario),
         tuple(loop.world.obstacles),
         text,
+        searches=pilot is None,
     )
     if thin:
         return ThinLog(folder.recording_path, scene, identity or title)

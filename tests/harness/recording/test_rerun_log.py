@@ -386,7 +386,7 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
     assert len(reader.blueprints()) == 1
     assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
     layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
-    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 12
+    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 13
 
 
 def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight]) -> None:
@@ -400,10 +400,10 @@ def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight
 def test_killed_process_leaves_a_readable_recording(tmp_path: Path) -> None:
     script = f"""
 import os, sys
-sys.path[:0] = {[str(Path(__file__).parents[1]), str(Path(__file__).parents[3])]!r}
+sys.path[:0] = {[str(Path(__file__).parents[3])]!r}
 from pathlib import Path
-from conftest import track
-from test_rerun_log import SCENE
+from tests.harness.conftest import track
+from tests.harness.recording.test_rerun_log import SCENE
 from harness.recording.log import RerunLog
 log = RerunLog(Path({str(tmp_path / "a.rrd")!r}), SCENE, "a")
 log.on_block(track(600, plan_index=-1))
@@ -425,10 +425,10 @@ os._exit(9)
 def test_the_fork_of_a_process_that_records_can_record(tmp_path: Path, ended: bool) -> None:
     script = f"""
 import os, signal, sys
-sys.path[:0] = {[str(Path(__file__).parents[1]), str(Path(__file__).parents[3])]!r}
+sys.path[:0] = {[str(Path(__file__).parents[3])]!r}
 from pathlib import Path
-from conftest import track
-from test_rerun_log import SCENE
+from tests.harness.conftest import track
+from tests.harness.recording.test_rerun_log import SCENE
 from harness.recording.log import RerunLog
 def log(name):
     log = RerunLog(Path({str(tmp_path)!r}, name), SCENE, "a")

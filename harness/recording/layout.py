@@ -1,0 +1,238 @@
+"""The layouts of recordings: views and panels, whole, thin and overlaid. Nothing here depends on a flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from harness.recording.blueprint import (
+    ATTITUDE,
+    BACKGROUND,
+    COLOURS,
+    EVENTS,
+    FLOWN,
+    PLAN,
+    SENSED,
+    SERIES,
+    STATES,
+    SUMMARY,
+    TIMELINE,
+    TRUE,
+    WORLD,
+    Frame,
+)
+
+
+class Layout(rrb.Blueprint):
+    """A blueprint that can be let go of.
+
+    rerun 0.41 keeps what it writes one to for as long as the process lives: two threads and 3 MB each
+    (rerun-io/rerun#2116).
+    """
+
+    _stream: rr.RecordingStream | None = None
+
+    def _log_to_stream(self, stream: rr.RecordingStream) -> None:
+        self._stream = stream
+        super()._log_to_stream(stream)
+
+    def let_go(self) -> None:
+        """Once it has been sent."""
+        if self._stream is not None:
+            self._stream.disconnect()
+            self._stream = None
+
+
+def blueprint(frame: Frame, runs: Sequence[str] = ("",), without: Sequence[str] = ()) -> Layout:
+    """The layout: plan view and 3-D flight, states, events and summary, time series.
+
+    Args:
+        frame: what to frame the views on.
+        runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording the empty
+            string.
+        without: names of time series that have nothing to show.
+    """
+    events = rrb.TextLogView(
+        origin=EVENTS,
+        name="Events",
+        columns=rrb.TextLogColumns(
+            timeline_columns=[rrb.encodings.TimelineColumn(TIMELINE, visible=False)],
+            text_log_columns=["Body"],
+        ),
+    )
+    about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
+    colours = rrb.TextDocumentView(origin=COLOURS, name="Colours")
+    states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
+    below: list[rrb.Container | rrb.View] = [
+        events,
+        about,
+        *([rrb.Tabs(colours, attitude_view(), active_tab=0)] if len(runs) == 1 else []),
+    ]
+    lanes = 3 if len(runs) == 1 else 2 * len(runs)
+    # Shares of a window 768 pixels high: 700 of them are for rows, a lane takes 36 and the rest of the states 52.
+    states_share = min((52 + 36 * lanes) / 700, 0.45)
+    series = series_views(frame, runs, without=without)
+    return Layout(
+        rrb.Horizontal(
+            rrb.Vertical(
+                rrb.Horizontal(plan_view(frame, runs), flight_view(frame, runs), column_shares=[1, 1]),
+                states,
+                rrb.Horizontal(*below, column_shares=[5, 4, 4][: len(below)]),
+                row_shares=[0.77 - states_share, states_share, 0.23],
+            ),
+            # Few plots at a time, so that each is high enough for its axis to have numbers.
+            rrb.Vertical(*series[:3], rrb.Tabs(*series[3:], active_tab=0))
+            if len(series) > 4
+            else rrb.Vertical(*series),
+            column_shares=[13, 6],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+THIN_SERIES: Final = ("cross_track", "clearance", "bank")
+"""Time series of a thin recording."""
+
+
+def thin_blueprint(frame: Frame) -> Layout:
+    """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series."""
+    events = rrb.TextLogView(origin=EVENTS, name="Events")
+    about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
+    return Layout(
+        rrb.Horizontal(
+            rrb.Vertical(
+                rrb.Horizontal(plan_view(frame, ("",)), flight_view(frame, ("",))),
+                rrb.Horizontal(events, about),
+                row_shares=[12, 5],
+            ),
+            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES)),
+            column_shares=[13, 6],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def plan_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial2DView:
+    """The plan view, north up, framed on the area.
+
+    A 2-D view counts its second axis downwards; the transform at PLAN turns it round.
+    """
+    xmin, ymin, xmax, ymax = frame.bounds_m
+    margin = 0.03 * frame.span_m
+    return rrb.Spatial2DView(
+        origin="/",
+        contents=[f"/{PLAN}/**"],
+        name="Plan view (north up)",
+        background=list(BACKGROUND),
+        visual_bounds=rrb.VisualBounds2D(
+            x_range=[xmin - margin, xmax + margin], y_range=[-ymax - margin, -ymin + margin]
+        ),
+        overrides={f"{PLAN}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, SENSED)},
+    )
+
+
+def flight_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial3DView:
+    """The 3-D view: the whole area, seen from the south-west and above."""
+    xmin, ymin, xmax, ymax = frame.bounds_m
+    middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), frame.altitude_m)
+    away = 1.25 * frame.span_m
+    azimuth, elevation = math.radians(-97.0), math.radians(45.0)
+    eye = (
+        middle[0] + away * math.cos(elevation) * math.cos(azimuth),
+        middle[1] + away * math.cos(elevation) * math.sin(azimuth),
+        middle[2] + away * math.sin(elevation),
+    )
+    contents = [f"/{WORLD}/**"]
+    if len(runs) == 1:
+        contents.append(f"- /{WORLD}/{TRUE}/**")
+    return rrb.Spatial3DView(
+        origin=WORLD,
+        contents=contents,
+        name="3-D flight",
+        background=list(BACKGROUND),
+        line_grid=rrb.LineGrid3D(visible=False),
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)
+        ),
+        overrides={f"{WORLD}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, SENSED)},
+    )
+
+
+def attitude_view() -> rrb.Spatial3DView:
+    """Bank and pitch of the aircraft, seen from behind."""
+    return rrb.Spatial3DView(
+        origin=ATTITUDE,
+        name="Attitude, from behind",
+        background=list(BACKGROUND),
+        line_grid=rrb.LineGrid3D(visible=False),
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital,
+            position=(0.0, -2.9, 1.1),
+            look_target=(0.0, 0.0, 0.1),
+            eye_up=(0.0, 0.0, 1.0),
+        ),
+    )
+
+
+def series_views(
+    frame: Frame, runs: Sequence[str], only: Sequence[str] | None = None, without: Sequence[str] = ()
+) -> list[rrb.TimeSeriesView]:
+    """The time series, one a question, each over the whole flight.
+
+    What the colours of a single flight's lines are stands in the title: a legend would cover the end of the curves.
+
+    Args:
+        frame: what to frame the views on.
+        runs: as in `blueprint`.
+        only: names of the series shown; default: all.
+        without: names of series that are not shown.
+    """
+    wanted = max(frame.clearance_m, 1.0)
+    one = len(runs) == 1
+    rows: list[tuple[str, str, tuple[float, float] | None]] = [
+        ("cross_track", "Cross-track error, m (right +)", None),
+        ("clearance", "Clearance, m; red: wanted" if one else "Clearance, m", (-0.5 * wanted, 6.0 * wanted)),
+        ("bank", "Bank, deg; blue: commanded, red: limit" if one else "Bank, deg (right +)", (-60.0, 60.0)),
+        ("altitude_error", "Altitude error, m", None),
+        ("speed", "Speed, m/s; blue: over ground" if one else "Airspeed, m/s", None),
+        ("search", "Search time, ms", None),
+    ]
+    return [
+        rrb.TimeSeriesView(
+            origin=f"{SERIES}/{entity}",
+            name=title,
+            background=rrb.archetypes.PlotBackground(color=list(BACKGROUND), show_grid=True),
+            axis_x=_whole_flight(),
+            axis_y=rrb.ScalarAxis(range=limits) if limits else None,
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=not one and entity == "cross_track"),
+        )
+        for entity, title, limits in rows
+        if (only is None or entity in only) and entity not in without
+    ]
+
+
+def _whole_flight() -> rrb.TimeAxis:
+    return rrb.TimeAxis(
+        view_range=rr.TimeRange(
+            start=rr.TimeRangeBoundary.absolute(seconds=0.0), end=rr.TimeRangeBoundary.infinite()
+        )
+    )
+
+
+def _up_to_cursor() -> rrb.VisibleTimeRanges:
+    """Shows all there was of an entity up to the time cursor, not only the latest."""
+    return rrb.VisibleTimeRanges(
+        timeline=TIMELINE, start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.cursor_relative()
+    )
