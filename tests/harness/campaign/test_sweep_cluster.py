@@ -138,7 +138,7 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """192.0.2.1 is an address for documentation (RFC 5737): nobody's, so not of this machine."""
-    out = place / "out"
+    out = place / "beyond"
 
     def knocked(address: str) -> None:
         raise OSError
