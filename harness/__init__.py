@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from harness.files.errors import WriteError
     from harness.files.input_file import InputError
     from harness.scenario.scenario import Scenario, dump_scenario, load_scenario
-    from planner.interface import Mission, Path, Plan, Planner, PlanRequest, PlanStatus
+    from planner.interface import MapView, Mission, Path, Plan, Planner, PlanRequest, PlanStatus
     from planner.registry import PlannerKind
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "ComparisonResult",
     "FlightResult",
     "InputError",
+    "MapView",
     "Metrics",
     "Mission",
     "Path",
@@ -62,7 +63,7 @@ _HOMES = {
     "harness.files.errors": ("WriteError",),
     "harness.files.input_file": ("InputError",),
     "harness.scenario.scenario": ("Scenario", "dump_scenario", "load_scenario"),
-    "planner.interface": ("Mission", "Path", "Plan", "PlanRequest", "PlanStatus", "Planner"),
+    "planner.interface": ("MapView", "Mission", "Path", "Plan", "PlanRequest", "PlanStatus", "Planner"),
     "planner.registry": ("PlannerKind",),
 }
 """The names of the front door, by the module in which each is made."""
@@ -72,5 +73,6 @@ def __getattr__(name: str) -> Any:
     """A name of the front door, imported now."""
     for home, names in _HOMES.items():
         if name in names:
-            return getattr(import_module(home), name)
+            globals()[name] = found = getattr(import_module(home), name)
+            return found
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -98,8 +98,9 @@ def _plans(given: object) -> bool:
 
 
 def _name(given: Any) -> str:
-    name = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
-    return f"{getattr(given, '__module__', '__main__')}:{name}"
+    name: str = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
+    module = getattr(given, "__module__", "__main__")
+    return name if module == "__main__" else f"{module}:{name}"
 
 
 def _summary(given: object) -> str:

@@ -27,6 +27,7 @@ READMES = {
         *(each for room in ROOMS for each in sorted((ROOT / room).rglob("README.md"))),
     )
 }
+FRONT_DOOR = ROOT / "harness" / "front_door"
 README = READMES["README.md"]
 CAMPAIGNS, HARNESS = READMES["harness/campaign/README.md"], READMES["harness/README.md"]
 SET_UP = "python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt "
@@ -55,10 +56,24 @@ def wayproof(
     return subprocess.run(
         [sys.executable, "-m", "harness", *shlex.split(arguments)],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, dict.fromkeys((path, ROOT))))},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, dict.fromkeys((path, ROOT, FRONT_DOOR))))},
         capture_output=True,
         text=True,
         timeout=timeout_s,
+        check=False,
+    )
+
+
+def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Runs code in a folder as a person would."""
+    path = (str(ROOT), str(FRONT_DOOR))
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(path)},
+        capture_output=True,
+        text=True,
+        timeout=600,
         check=False,
     )
 
@@ -173,9 +188,34 @@ def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
     assert json.loads(flown.stdout)["digest"] == found["digest"]
 
 
-def test_ones_own_planner_is_found_and_flown(tmp_path: Path) -> None:
-    (planner,), (project,), (scenario,) = blocks("python"), blocks("toml"), blocks("yaml")
-    assert len([line for line in planner.splitlines() if line.strip()]) < 30
+def test_ones_own_planner_in_a_file_is_flown_on_the_command_line_and_in_python(tmp_path: Path) -> None:
+    planner, script = blocks("python")
+    (scenario,) = blocks("yaml")
+    (tmp_path / "my_planner.py").write_text(planner)
+    (tmp_path / "my_world.yaml").write_text(scenario)
+    command = "fly my_world.yaml --planner my_planner.py:Beeline"
+    assert f"`wayproof {command}`" in README
+    flown = wayproof(f"{command} --no-recording --json", tmp_path)
+    assert (flown.returncode, flown.stderr) == (1, "")
+    first = json.loads(flown.stdout)
+    assert first["outcome"] == "collision"
+    ran = python(script, tmp_path)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert ran.stdout.splitlines()[0] == f"collision {first['reason']}"
+    (again,) = load_run(tmp_path / "runs" / "windy").manifest["command"]
+    assert again.startswith("wayproof.fly('my_world', planner='rolling_window')")
+
+
+@pytest.mark.parametrize("name", READMES)
+def test_python_shown_runs(name: str, tmp_path: Path) -> None:
+    for block in blocks("python", READMES[name]) if name not in ("README.md", "planner/README.md") else ():
+        ran = python(block, tmp_path)
+        assert (ran.returncode, ran.stderr) == (0, "")
+
+
+def test_ones_own_planner_as_a_distribution_is_found_and_flown(tmp_path: Path) -> None:
+    text = READMES["planner/README.md"]
+    (planner,), (project,), (scenario,) = blocks("python", text), blocks("toml", text), blocks("yaml")
     (tmp_path / "my_planner.py").write_text(planner)
     (tmp_path / "pyproject.toml").write_text(project)
     (tmp_path / "my_world.yaml").write_text(scenario)

@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from typing import Any, Final, Protocol
 
 from harness.campaign.flight import Answer, Job, fly_job
+from harness.files.spawning import without_main
 from harness.files.strict_yaml import InputError
 from harness.files.versions import versions
 from planner.compiled import own_this_process
@@ -95,12 +96,13 @@ class _Lane:
         flown.add_done_callback(lambda flown: self._over(flown, job, answer, tries - 1))
 
     def _submitted(self, job: Job) -> Future[Answer]:
-        try:
-            return self._process().submit(fly_job, job)
-        except BrokenProcessPool:
-            # It died while it had nothing to do.
-            self._pool = None
-            return self._process().submit(fly_job, job)
+        with without_main():
+            try:
+                return self._process().submit(fly_job, job)
+            except BrokenProcessPool:
+                # It died while it had nothing to do.
+                self._pool = None
+                return self._process().submit(fly_job, job)
 
     def _process(self) -> ProcessPoolExecutor:
         if self._pool is None:

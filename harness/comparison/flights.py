@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
 from harness.files.crash import sentence
+from harness.files.spawning import without_main
 
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
@@ -76,7 +77,8 @@ def fly_all(jobs: Sequence[Job], workers: int, progress: Progress | None = None)
                 index = waiting.popleft()
                 ours, theirs = context.Pipe(duplex=False)
                 process = context.Process(target=_fly, args=(jobs[index], theirs), daemon=True)
-                process.start()
+                with without_main():
+                    process.start()
                 # Only the child may hold this end: then its death is the end of the stream.
                 theirs.close()
                 flying[ours] = index, process

@@ -25,7 +25,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'wayproof' has no attribute {name!r}")
     harness = own_packages()
     if name in harness.__all__ or name == "__all__":
-        return getattr(harness, name)
+        globals()[name] = found = getattr(harness, name)
+        return found
     raise AttributeError(f"module 'wayproof' has no attribute {name!r}")
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -58,6 +60,28 @@ def test_planners_are_compared_and_one_of_them_comes_from_a_file(
     assert len(repr(compared)) < 200
     index = json.loads((tmp_path / "out" / "comparison.json").read_text())
     assert index["command"].startswith("wayproof.compare(['short'], ['vfh_plus', 'planner.py:Beeline'])")
+
+
+def test_a_script_needs_no_guard(tmp_path: Path) -> None:
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    (tmp_path / "two.yaml").write_text(CAMPAIGN)
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import wayproof\nprint('begun')\n"
+        "print(wayproof.sweep('two.yaml', out='swept', workers=2).outcomes)\n"
+        "print(wayproof.compare('short.yaml', ['bug2'], out='compared').all_reached)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, script],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == ["begun", "{'reached': 2}", "True"]
 
 
 def test_objects_are_not_compared() -> None:
