@@ -124,16 +124,16 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
 
     try:
         recordings = recordings_of(folder)
-        typer.echo(f"{len(recordings)} recordings", err=True)
+        say(f"{len(recordings)} recordings", err=True)
         open_table(
             folder.resolve().name,
             recordings,
             web,
-            lambda address: typer.echo(f"{address} (Ctrl-C ends it)", err=True),
+            lambda address: say(f"{address} (Ctrl-C ends it)", err=True),
         )
     except RunFolderError as error:
         raise bad_input(error) from error
     except ViewerError as error:
-        typer.echo(f"wayproof: {error}", err=True)
+        say(f"wayproof: {error}", err=True)
         return False
     return True
