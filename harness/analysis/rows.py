@@ -139,32 +139,65 @@ class Figure:
         label: what it is, with its unit.
         short: the same in a few letters, for a terminal.
         text: its value in a row.
+        hint: what it means, where the label does not say it; empty else.
     """
 
     label: str
     short: str
     text: Callable[[Row], str]
+    hint: str = ""
 
 
 FIGURES = (
     Figure("outcome", "outcome", lambda row: row.outcome),
     Figure("flown length, km", "km", lambda row: number(row.flown_length_m, 1e-3)),
-    Figure("ratio to the clairvoyant optimum", "ratio", lambda row: _fixed(row.ratio, 4)),
+    Figure(
+        "ratio to the clairvoyant optimum",
+        "ratio",
+        lambda row: _fixed(row.ratio, 4),
+        hint="flown length over the shortest path of a point that knows the world and keeps the clearance",
+    ),
     Figure("least clearance, m", "clear m", lambda row: number(row.min_clearance_m)),
     Figure("below the wanted clearance, s", "below s", lambda row: number(row.clearance_violation_s)),
-    Figure("tightest planned turn, curvature · turn radius", "κ·R", lambda row: _fixed(row.tightest_turn, 2)),
+    Figure(
+        "tightest planned turn, curvature · turn radius",
+        "κ·R",
+        lambda row: _fixed(row.tightest_turn, 2),
+        hint="largest planned curvature times the smallest turn radius; above 1 the aircraft cannot follow",
+    ),
     Figure(
         "tightest flown turn, curvature · turn radius",
         "κ·R fl.",
         lambda row: _fixed(row.tightest_flown_turn, 2),
+        hint="largest curvature of the track times the smallest turn radius that a plan may ask for",
     ),
-    Figure("trackable", "tracks", lambda row: {None: "", True: "yes", False: "no"}[row.trackable]),
+    Figure(
+        "trackable",
+        "tracks",
+        lambda row: {None: "", True: "yes", False: "no"}[row.trackable],
+        hint="every leg was flown within the limits for cross-track error, altitude, airspeed and load",
+    ),
     Figure("cross-track error p95, m", "xt p95", lambda row: number(row.cross_track_p95_m)),
     Figure("cross-track error max, m", "xt max", lambda row: number(row.cross_track_max_m)),
-    Figure("heading change planned, °", "turn °", lambda row: number(row.planned_heading_change_deg)),
+    Figure(
+        "heading change planned, °",
+        "turn °",
+        lambda row: number(row.planned_heading_change_deg),
+        hint="sum of all changes of direction of the plans in effect",
+    ),
     Figure("heading change flown, °", "flown °", lambda row: number(row.flown_heading_change_deg)),
-    Figure("bending energy planned, 1/km", "bend", lambda row: number(row.planned_bending_energy_1pm, 1e3)),
-    Figure("bending energy flown, 1/km", "bend fl.", lambda row: number(row.flown_bending_energy_1pm, 1e3)),
+    Figure(
+        "bending energy planned, 1/km",
+        "bend",
+        lambda row: number(row.planned_bending_energy_1pm, 1e3),
+        hint="integral of the squared curvature along the plans in effect",
+    ),
+    Figure(
+        "bending energy flown, 1/km",
+        "bend fl.",
+        lambda row: number(row.flown_bending_energy_1pm, 1e3),
+        hint="integral of the squared curvature along the track",
+    ),
     Figure("planner time p50, ms", "p50 ms", lambda row: number(row.planner_p50_ms)),
     Figure("planner time p99, ms", "p99 ms", lambda row: number(row.planner_p99_ms)),
     Figure("planner time max, ms", "max ms", lambda row: number(row.planner_max_ms)),

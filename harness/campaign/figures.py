@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from harness.campaign.points import RunPoints
 from harness.campaign.summary import CURVE_POINTS, Table
 from harness.report.figure_style import DASHES, colour, styled
 
@@ -18,6 +19,8 @@ LEGEND_ROWS, ROW_IN = 3, 0.17
 """Rows of the legend that a figure has room for, and how much higher each other one makes it."""
 ROTATED_FROM = 5
 """From so many groups on, their labels stand slanted."""
+PANEL_IN = 1.5
+"""Height of a panel of small multiples."""
 LABEL_LETTERS = 32
 """A longer label of a group loses its middle, for it takes room from what is drawn."""
 
@@ -69,6 +72,32 @@ def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
         axes.set(xlabel="flown length over the clairvoyant optimum", ylabel="share of goals reached, %")
         axes.grid(color="0.9", lw=0.6)
         _legend(figure, tuple(curves))
+    return figure
+
+
+def scatter(points: RunPoints) -> Figure | None:
+    """Every figure against every number that was varied, a point a run; None where no number was varied.
+
+    Runs that did not reach the goal are crosses.
+    """
+    if not points.varied or not points.figures:
+        return None
+    rows, columns = len(points.figures), len(points.varied)
+    with styled(0.5 + PANEL_IN * rows) as figure:
+        grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
+        for row, (label, values) in enumerate(points.figures.items()):
+            for column, (key, numbers) in enumerate(points.varied.items()):
+                axes = grid[row][column]
+                for among, marker, shade in (
+                    (points.reached, ".", colour(0)),
+                    (~points.reached, "x", colour(1)),
+                ):
+                    axes.plot(numbers[among], values[among], marker, ms=3.5, color=shade, alpha=0.7)
+                axes.grid(color="0.9", lw=0.6)
+                if column == 0:
+                    axes.set_ylabel(label)
+                if row == rows - 1:
+                    axes.set_xlabel(_short(key))
     return figure
 
 

@@ -41,7 +41,7 @@ class Axis:
     numeric: bool = False
 
 
-def grouped(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
+def grouped(key: str, values: Sequence[Any], drawn: bool = False) -> tuple[Axis, IntArray]:
     """The groups of a key's values, and each value's group.
 
     Numbers stand in rising order, names as they first appear; values that are missing come last.
@@ -49,13 +49,14 @@ def grouped(key: str, values: Sequence[Any]) -> tuple[Axis, IntArray]:
     Args:
         key: its path.
         values: one a run; None where there is none.
+        drawn: they were drawn at random: numbers are grouped by quantiles where there are more than of these.
     """
     given = [value for value in values if value is not None]
     numeric = bool(given) and all(
         isinstance(value, int | float) and not isinstance(value, bool) for value in given
     )
     if numeric:
-        if len(set(given)) > MOST_NUMBERS:
+        if len(set(given)) > (BINS if drawn else MOST_NUMBERS):
             return _binned(key, values)
         labels = dict(zip(sorted(set(given)), _numbers(sorted(set(given))), strict=True))
     else:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.analysis.rows import number
+from harness.campaign.points import run_points
 from harness.campaign.questions import QUESTIONS, difference, ratio, shade
 from harness.campaign.summary import Summary
 from harness.files.errors import WriteError
@@ -30,7 +31,7 @@ def write_summary(summary: Summary, folder: Path) -> Path:
     page = folder / PAGE
     try:
         replace_text(folder / PLAIN, json.dumps(plain(summary), indent=2, allow_nan=False) + "\n")
-        replace_text(page, summary_html(summary))
+        replace_text(page, summary_html(summary, folder))
     except OSError as error:
         raise WriteError(
             f"cannot write the summary in {folder}: {error.strerror or error}; the results are whole, and "
@@ -44,13 +45,18 @@ def plain(summary: Summary) -> dict[str, Any]:
     return {"schema": SCHEMA, **asdict(summary)}
 
 
-def summary_html(summary: Summary) -> str:
-    """The text of `summary.html`."""
+def summary_html(summary: Summary, folder: Path) -> str:
+    """The text of `summary.html`.
+
+    Args:
+        summary: the answers.
+        folder: the campaign's, for what is drawn run by run.
+    """
     return rendered(
         "campaign.html",
         summary=summary,
         questions=QUESTIONS,
-        pictures=list(_pictures(summary)) if summary.total.runs else [],
+        pictures=list(_pictures(summary, folder)) if summary.total.runs else [],
         difference=difference,
         ratio=ratio,
         number=number,
@@ -58,7 +64,7 @@ def summary_html(summary: Summary) -> str:
     )
 
 
-def _pictures(summary: Summary) -> Iterator[Picture]:
+def _pictures(summary: Summary, folder: Path) -> Iterator[Picture]:
     from harness.campaign import figures as campaign_figures
     from harness.report.figure_style import svg
 
@@ -73,4 +79,12 @@ def _pictures(summary: Summary) -> Iterator[Picture]:
             svg(campaign_figures.lengths(summary.lengths)),
             "Distribution of the flown length over the clairvoyant optimum",
             "How long the ways were: the share of the goals reached with at most this length over the optimum.",
+        )
+    scattered = campaign_figures.scatter(run_points(folder))
+    if scattered is not None:
+        yield Picture(
+            svg(scattered),
+            "Figures of every run against each number that was varied",
+            "Every run: clearance over the wanted one, largest cross-track error and length over the optimum, against "
+            "each number that was varied. Crosses: the goal was not reached.",
         )

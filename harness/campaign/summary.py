@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -20,12 +20,14 @@ from numpy.typing import NDArray
 from harness.campaign.groups import Axis, grouped
 from harness.campaign.paired import CONFIDENCE, Duel, duels
 from harness.campaign.results import ERROR, RESULTS
-from harness.campaign.table import NAMED, Runs, load_tables, planned_runs, runs_of, varied_keys
+from harness.campaign.table import NAMED, Runs, drawn_keys, load_tables, planned_runs, runs_of, varied_keys
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
 from harness.run_files.run_folder import RECORDING
 
 WORST: Final = 10
+CLOSEST: Final = 3
+"""Runs shown where none failed: those that came closest to an obstacle."""
 BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of so many varied keys, the first ones."""
 
@@ -131,7 +133,7 @@ class Summary:
         tables: one for each choice of keys.
         curves: one for each key that a table has, by planner.
         lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
-        worst: collisions first, then other failures, then what came closest to an obstacle.
+        worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
         duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
     """
@@ -171,13 +173,14 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
     runs = runs_of(results, timings, list(dict.fromkeys([*keys, *itertools.chain(*(by or ())), *NAMED])))
     chosen = [list(each) for each in (by if by is not None else _default_choice(keys, runs))]
     singles = dict.fromkeys(itertools.chain(*chosen))
+    drawn = drawn_keys(results)
     return Summary(
         name=folder.resolve().name,
         varied=tuple(keys),
         outcomes=dict(Counter(runs.names["outcome"]).most_common()),
         total=cell(runs, np.ones(len(runs), dtype=bool)),
-        tables=tuple(table(runs, each) for each in chosen),
-        curves=tuple(table(runs, [key, "planner"]) for key in singles if key != "planner"),
+        tables=tuple(table(runs, each, drawn) for each in chosen),
+        curves=tuple(table(runs, [key, "planner"], drawn) for key in singles if key != "planner"),
         lengths=_lengths(runs),
         worst=_worst(runs, folder, keys),
         duels=duels(runs),
@@ -197,13 +200,13 @@ def _default_choice(keys: Sequence[str], runs: Runs) -> list[tuple[str, ...]]:
     return [tuple(first)] if len(first) == 1 else list(itertools.combinations(first, 2))
 
 
-def table(runs: Runs, keys: Sequence[str]) -> Table:
-    """The runs by one key or two."""
-    rows, of_row = grouped(keys[0], runs.varied[keys[0]])
+def table(runs: Runs, keys: Sequence[str], drawn: Collection[str] = ()) -> Table:
+    """The runs by one key or two; of these `drawn` were drawn at random."""
+    rows, of_row = grouped(keys[0], runs.varied[keys[0]], keys[0] in drawn)
     if len(keys) == 1:
         cells = tuple((cell(runs, of_row == place),) for place in range(len(rows.labels)))
         return Table(rows, None, cells)
-    columns, of_column = grouped(keys[1], runs.varied[keys[1]])
+    columns, of_column = grouped(keys[1], runs.varied[keys[1]], keys[1] in drawn)
     return Table(
         rows,
         columns,
@@ -266,7 +269,10 @@ def _lengths(runs: Runs) -> dict[str, tuple[float, ...]]:
 
 
 def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...]:
-    """Failures by severity, then all runs by clearance over the wanted one, or by clearance where that is unknown."""
+    """Failures by severity, then by clearance over the wanted one, or by clearance where that is unknown.
+
+    Where nothing failed, the few that came closest.
+    """
     ratio = runs.min_clearance_m / np.where(runs.wanted_clearance_m > 0.0, runs.wanted_clearance_m, np.nan)
     near = ratio if np.isfinite(ratio).any() else runs.min_clearance_m
     severity = {outcome: place for place, outcome in enumerate((*SEVERITY, "reached"))}
@@ -279,7 +285,9 @@ def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...
             runs.run[row],
         ),
     )
-    return tuple(_worst_run(runs, row, float(ratio[row]), folder, keys) for row in order[:WORST])
+    failed = int((~runs.reached).sum())
+    shown = order[: min(failed, WORST)] if failed else order[:CLOSEST]
+    return tuple(_worst_run(runs, row, float(ratio[row]), folder, keys) for row in shown)
 
 
 def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[str]) -> WorstRun:

@@ -38,6 +38,7 @@ class Runs:
         varied: values of each varied key, by key path; None where a run has none.
         flown_length_m: length of the flown track.
         length_ratio: the same over the clairvoyant optimum.
+        cross_track_max_m: largest cross-track error.
         min_clearance_m: least distance to an obstacle edge.
         wanted_clearance_m: what the planner was to keep.
         clearance_violation_s: time below that.
@@ -52,6 +53,7 @@ class Runs:
     varied: Mapping[str, tuple[Any, ...]]
     flown_length_m: FloatArray
     length_ratio: FloatArray
+    cross_track_max_m: FloatArray
     min_clearance_m: FloatArray
     wanted_clearance_m: FloatArray
     clearance_violation_s: FloatArray
@@ -103,6 +105,12 @@ def _about(results: pa.Table) -> Mapping[str, Any]:
     """What the table says of its campaign, as `harness.campaign.results.campaign_of` has it; empty if nothing."""
     about: Mapping[str, Any] = json.loads((results.schema.metadata or {}).get(b"wayproof", b"{}"))
     return about
+
+
+def drawn_keys(results: pa.Table) -> frozenset[str]:
+    """The varied keys that were drawn at random."""
+    drawn = _campaign(results).get("random", {})
+    return frozenset(drawn) if isinstance(drawn, Mapping) else frozenset()
 
 
 def _campaign(results: pa.Table) -> Mapping[str, Any]:
@@ -162,6 +170,7 @@ def runs_of(results: pa.Table, timings: pa.Table | None, keys: Sequence[str]) ->
         varied={key: _values(results, key) for key in keys},
         flown_length_m=_column(results, "flown_length_m"),
         length_ratio=_column(results, "length_ratio"),
+        cross_track_max_m=_column(results, "cross_track_m.max"),
         min_clearance_m=_column(results, "min_clearance_m"),
         wanted_clearance_m=_column(results, "wanted_clearance_m"),
         clearance_violation_s=_column(results, "clearance_violation_s"),

@@ -339,7 +339,7 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     (folder / "runs" / "6" / "flight.rrd").touch()
     (folder / "runs" / "5").mkdir()
     worst = summarise(folder).worst
-    assert [run.run for run in worst] == [6, 5, 4, 3, 0, 7, 2, 1, 9, 10]
+    assert [run.run for run in worst] == [6, 5, 4, 3, 0, 7]
     assert [(run.folder, run.recording, run.view) for run in worst[:3]] == [
         ("runs/6", True, f"wayproof view '{folder}/runs/6'"),
         ("runs/5", False, ""),
@@ -488,6 +488,22 @@ def test_a_run_folder_has_no_keys_and_damage_is_told(
         summarise(tmp_path / "none")
 
 
+def test_where_nothing_failed_the_three_closest_are_shown(tmp_path: Path) -> None:
+    rows = [row(run, min_clearance_m=100.0 - run, wanted_clearance_m=50.0) for run in range(6)]
+    folder = campaign(tmp_path / "fine", rows)
+    summary = summarise(folder)
+    assert [run.run for run in summary.worst] == [5, 4, 3]
+    assert "No run failed" in write_summary(summary, folder).read_text()
+
+
+def test_a_key_drawn_at_random_is_always_grouped() -> None:
+    values = [277.182, 12.5, 3.25, 90.125, 41.0, 5.5]
+    assert len(grouped("key", values)[0].labels) == 6
+    axis, _ = grouped("key", values, drawn=True)
+    assert len(axis.labels) == 4
+    assert axis.edges
+
+
 def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: Any) -> None:
     folder = by_two(tmp_path / "c")
     summary: Summary = summarise(folder)
@@ -496,7 +512,7 @@ def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: 
     for width_px in (400, 1280):
         seen = shown(chromium, page, width_px)
         assert (seen.said, seen.asked_for, seen.overflow_px) == ((), (), 0)
-        assert (seen.figures, seen.missing) == (len(summary.curves) + 1, 0)
+        assert (seen.figures, seen.missing) == (len(summary.curves) + 2, 0)
 
 
 def test_an_inner_edge_belongs_to_the_group_above() -> None:
