@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+
+import numpy as np
 
 from aircraft.airframe import Airframe
 from aircraft.interface import GRAVITY_MPS2, Performance
@@ -24,8 +27,50 @@ ROLL_IN_LIMIT_S = 1.5
 """A turn takes no more time than this to roll into: what rolls slowly turns wide, or it would be off the path
 where curvature steps."""
 
+STRONGEST_SHARE = 0.9
+"""Wind over airspeed; nobody plans in a stronger one."""
+
 LEAST_BANK_DEG = 5.0
 """An aircraft that can bank less at an airspeed is not planned for there."""
+
+
+@dataclass(frozen=True)
+class WindPoint:
+    """How a guidance law tracks a weave in one wind.
+
+    Attributes:
+        wind_share: speed of the wind over the airspeed.
+        radius_factor: turns this much wider than the aircraft needs are tracked well.
+        error_m: largest cross-track error on them.
+    """
+
+    wind_share: float
+    radius_factor: float
+    error_m: float
+
+
+@dataclass(frozen=True)
+class LawCard:
+    """How a guidance law tracks with one aircraft, see `aircraft.law_cards`.
+
+    Attributes:
+        kind: the law.
+        points: in calm air first, then in ever stronger wind.
+    """
+
+    kind: str
+    points: tuple[WindPoint, ...]
+
+    def at(self, wind_share: float) -> tuple[float, float]:
+        """Radius factor and cross-track error (m) in a wind: between what was flown linear.
+
+        Beyond the strongest wind that was flown the error is taken to double until `STRONGEST_SHARE`.
+        """
+        shares = [point.wind_share for point in self.points]
+        factor = float(np.interp(wind_share, shares, [point.radius_factor for point in self.points]))
+        error_m = float(np.interp(wind_share, shares, [point.error_m for point in self.points]))
+        beyond = max(wind_share - shares[-1], 0.0) / (STRONGEST_SHARE - shares[-1])
+        return factor, error_m * (1.0 + beyond)
 
 
 def performance(
@@ -34,6 +79,7 @@ def performance(
     wind_mps: float = 0.0,
     turbulence: str | None = None,
     gust_mps: float = 0.0,
+    law: LawCard | None = None,
 ) -> Performance:
     """Planning figures at one airspeed.
 
@@ -47,6 +93,7 @@ def performance(
         wind_mps: speed of the steady wind.
         turbulence: None, "light", "moderate" or "severe".
         gust_mps: speed of a gust front on top of the wind; it may be faster than the aircraft.
+        law: card of the guidance law; default: of `preview`, which the aircraft's survey was flown with.
 
     Raises:
         AircraftError: if the airframe cannot hold the airspeed or cannot make way against the wind.
@@ -73,10 +120,11 @@ def performance(
     bank = math.radians(min(airframe.bank_limit_deg - BANK_RESERVE_DEG[turbulence], level_deg, rolled_deg))
     fastest = airspeed_mps + wind_mps + gust_mps
     acceleration = GRAVITY_MPS2 * math.tan(bank)
-    return Performance(
-        airspeed_mps=airspeed_mps,
-        turn_radius_m=fastest * fastest / acceleration,
-        roll_in_s=airframe.roll_in_s,
-        tracking_error_m=TRACKING_FACTOR[turbulence]
-        * max(acceleration * airframe.roll_lag_s**2, WEAVE_FACTOR * airframe.weave_error_m),
+    radius_m = fastest * fastest / acceleration
+    error_m = TRACKING_FACTOR[turbulence] * max(
+        acceleration * airframe.roll_lag_s**2, WEAVE_FACTOR * airframe.weave_error_m
     )
+    if law is not None:
+        factor, weave_error_m = law.at(wind_mps / airspeed_mps)
+        radius_m, error_m = factor * radius_m, error_m + WEAVE_FACTOR * weave_error_m
+    return Performance(airspeed_mps, radius_m, airframe.roll_in_s, error_m)

@@ -236,18 +236,22 @@ def not_held(frame: Airframe, speed: float, banks_deg: Sequence[float] = DOUBLET
     return None
 
 
-def weaving_error_m(frame: Airframe, speed: float) -> float:
-    """Largest cross-track error on a weave of lines and arcs at the radius of planning; infinite if lost."""
-    radius = performance(frame, speed).turn_radius_m
+def weave(radius_m: float) -> Route:
+    """Lines of one radius and arcs of some angles, left and right, from (0, 0) northwards."""
     point, rows = (0.0, 0.0, 0.0, 1.0), []
     for turn_deg in WEAVE_DEG:
-        for curvature, length in ((0.0, radius), (1.0 / radius, math.radians(turn_deg) * radius)):
+        for curvature, length in ((0.0, radius_m), (1.0 / radius_m, math.radians(turn_deg) * radius_m)):
             bend = math.copysign(curvature, turn_deg)
             rows.append((*point, bend, abs(length)))
             point = arc_point(rows[-1], abs(length))
+    return Route(np.array(rows))
+
+
+def weaving_error_m(frame: Airframe, speed: float) -> float:
+    """Largest cross-track error on a weave of lines and arcs at the radius of planning; infinite if lost."""
     limits = frame.guidance_limits(speed)
     law = PreviewLaw(PreviewConfig().resolved(limits), limits)
-    law.follow(Route(np.array(rows)))
+    law.follow(weave(performance(frame, speed).turn_radius_m))
     model, worst = in_flight(frame, speed), 0.0
     while True:
         output = law.update(model.state())

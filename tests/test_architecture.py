@@ -76,7 +76,7 @@ ONLY_IN = {
     "datafusion": ("harness/recording/catalog.py",),
     "mcap_protobuf": ("harness/run_files/exports/recordings.py",),
     "foxglove_schemas_protobuf": ("harness/run_files/exports/recordings.py",),
-    "numba": ("planner/compiled.py", "aircraft/kernels.py"),
+    "numba": ("planner/compiled.py", "aircraft/kernels.py", "aircraft/guidance/machine_code.py"),
     "ompl": ("planner/baselines/dubins_tree.py",),
     "harness.cli.app": ("harness/__main__.py", "harness/front_door/wayproof/__main__.py"),
     "wayproof": ("harness/front_door/wayproof/*.py",),
@@ -84,8 +84,9 @@ ONLY_IN = {
 # Slow to import: inside the function that needs them, but for files that are imported late themselves.
 LATE = {
     "jsbsim": ("aircraft/jsbsim_loading.py",),
-    "numba": ("aircraft/kernels.py",),
-    "aircraft.kernels": (),
+    "numba": ("aircraft/kernels.py", "aircraft/guidance/machine_code.py"),
+    "aircraft.kernels": ("aircraft/guidance/machine_code.py",),
+    "aircraft.guidance.machine_code": (),
     "rerun": ("harness/recording/*.py",),
     "pyarrow": (),
     "scipy": (),
@@ -108,7 +109,7 @@ LATE = {
 
 LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
     "aircraft": (
-        ("airframes",),
+        ("airframes", "law_cards"),
         ("card_cache", "survey"),
         ("jsbsim_model", "kinematic_point"),
         ("envelope", "jsbsim_loading", "plane_patch"),

@@ -15,9 +15,11 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from aircraft.guidance.compiled_law import CompiledLaw
+from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
+from aircraft.interface import GRAVITY_MPS2
 
-GRAVITY_MPS2 = 9.80665
 ONE_OVER_PI = 0.3183099
 """1/pi to the digits that the autopilot uses."""
 TWO_PI = 6.2832
@@ -66,23 +68,14 @@ class L1Config:
         minimum=0.0,
         maximum=0.1,
     )
-    loiter_bank_limit_deg: float = key(
-        0.0,
-        "bank at sea level above which a circle grows with altitude (NAVL1_LIM_BANK); 0: every circle does",
-        "deg",
-        minimum=0.0,
-        maximum=89.0,
-    )
 
-    def parameters(self, target_airspeed_mps: float = 0.0) -> L1Parameters:
-        """What the law needs: these keys and the airspeed that is held, 0 where nobody says it."""
-        return L1Parameters(
-            self.period_s,
-            self.damping,
-            self.integrator_gain,
-            math.radians(self.loiter_bank_limit_deg),
-            target_airspeed_mps,
-        )
+    def resolved(self, limits: GuidanceLimits) -> L1Config:
+        """The config with every default filled in; no key of it depends on the aircraft."""
+        return self
+
+    def parameters(self) -> L1Parameters:
+        """What the law needs: these keys. Circles do not grow with altitude, so no bank limit bounds their growth."""
+        return L1Parameters(self.period_s, self.damping, self.integrator_gain, 0.0, 0.0)
 
 
 class L1Parameters(NamedTuple):
@@ -117,6 +110,15 @@ class L1Memory(NamedTuple):
     integrator_rad: float = 0.0
     last_gain: float = 0.0
     """The integrator begins at 0 when its gain has changed."""
+
+
+class L1FlightMemory(NamedTuple):
+    """`L1Memory`, and when a leg was flown last."""
+
+    last_nu_rad: float = 0.0
+    integrator_rad: float = 0.0
+    last_gain: float = 0.0
+    leg_time_s: float = -math.inf
 
 
 class L1Leg(NamedTuple):
@@ -347,9 +349,19 @@ def roll_of(acceleration_mps2: float) -> int:
 
 def wrapped(angle_rad: float) -> float:
     """The same direction within half a turn of 0, rad."""
-    inside = math.fmod(angle_rad, 2.0 * math.pi)
+    inside = angle_rad - 2.0 * math.pi * int(angle_rad / (2.0 * math.pi))
     if inside > math.pi:
         return inside - 2.0 * math.pi
     if inside < -math.pi:
         return inside + 2.0 * math.pi
     return inside
+
+
+def l1_law(config: L1Config, limits: GuidanceLimits) -> CompiledLaw:
+    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
+
+    Args:
+        config: resolved.
+        limits: what may be asked of the aircraft.
+    """
+    return CompiledLaw("l1", config.parameters(), limits, L1FlightMemory())

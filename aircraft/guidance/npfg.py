@@ -12,12 +12,14 @@ and the floors of small speeds as PX4 1.15 has them. Right is positive: roll, ac
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from aircraft.guidance.compiled_law import CompiledLaw
+from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
+from aircraft.interface import GRAVITY_MPS2
 
-GRAVITY_MPS2 = 9.80665
 FEASIBILITY_BUFFER_MPS = 1.5
 """A bearing is feasible in full if the airspeed exceeds the wind that must be beaten by this much."""
 SLOW_MPS = 1.0
@@ -59,7 +61,9 @@ class NpfgConfig:
     max_track_keeping_speed_mps: float = key(
         5.0, "largest ground speed that track keeping asks for (NPFG_GSP_MAX_TK)", "m/s", minimum=0.0
     )
-    roll_time_constant_s: float = key(0.5, "time constant of roll (NPFG_ROLL_TC)", "s", minimum=0.0)
+    roll_time_constant_s: float | None = key(
+        None, "time constant of roll (NPFG_ROLL_TC); default: the aircraft's", "s", minimum=0.0
+    )
     switch_distance_multiplier: float = key(
         0.32,
         "share of the track error bound at which the next leg begins (NPFG_SW_DST_MLT)",
@@ -75,26 +79,22 @@ class NpfgConfig:
         maximum=10.0,
     )
 
+    def resolved(self, limits: GuidanceLimits) -> NpfgConfig:
+        """The config with every default filled in."""
+        lag_s = limits.roll_lag_s + limits.roll_delay_s
+        return self if self.roll_time_constant_s is not None else replace(self, roll_time_constant_s=lag_s)
+
     def parameters(
         self, nominal_airspeed_mps: float, max_airspeed_mps: float, roll_limit_rad: float
     ) -> NpfgParameters:
-        """What the law needs: these keys and the aircraft's speeds and roll limit."""
+        """What the law needs: these keys, resolved, and the aircraft's speeds and roll limit."""
+        assert self.roll_time_constant_s is not None
+        keys = {name: value for name, value in vars(self).items() if name in NpfgParameters._fields}
         return NpfgParameters(
-            self.period_s,
-            self.damping,
-            self.lower_period_bound,
-            self.upper_period_bound,
-            self.min_ground_speed_on,
-            self.track_keeping,
-            self.wind_regulation,
-            self.min_ground_speed_mps,
-            self.max_track_keeping_speed_mps,
-            self.roll_time_constant_s,
-            self.switch_distance_multiplier,
-            self.period_safety_factor,
-            roll_limit_rad,
-            nominal_airspeed_mps,
-            max_airspeed_mps,
+            **keys,
+            roll_limit_rad=roll_limit_rad,
+            nominal_airspeed_mps=nominal_airspeed_mps,
+            max_airspeed_mps=max_airspeed_mps,
         )
 
 
@@ -385,3 +385,15 @@ def turning(
         return gain_1ps * airspeed_mps * (-1.0 if across < 0.0 else 1.0)
     length = math.sqrt(wanted_east * wanted_east + wanted_north * wanted_north)
     return gain_1ps * across / length if length > 0.0 else 0.0
+
+
+def npfg_law(config: NpfgConfig, limits: GuidanceLimits) -> CompiledLaw:
+    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
+
+    Args:
+        config: resolved.
+        limits: what may be asked of the aircraft.
+    """
+    return CompiledLaw(
+        "npfg", config.parameters(limits.airspeed_mps, limits.airspeed_mps, limits.bank_limit_rad), limits
+    )

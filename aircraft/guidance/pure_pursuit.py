@@ -9,12 +9,17 @@ positive: roll, acceleration, curvature.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from aircraft.guidance.compiled_law import CompiledLaw
+from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
+from aircraft.interface import GRAVITY_MPS2
 
-GRAVITY_MPS2 = 9.80665
+LOOK_AHEAD = 2.0 * math.sqrt(2.0)
+"""Look-ahead time times the aircraft's guidance bandwidth. On a line the law is an oscillator of the natural frequency
+sqrt(2) / time and the damping 0.7: with this it is half as fast as the bandwidth."""
 LEAST_CRAB_COSINE = 0.2
 """Least cosine of the angle between course and heading with which bank is worked out."""
 SLOW_MPS = 1.0
@@ -33,10 +38,15 @@ class PurePursuitConfig:
     )
     min_look_ahead_m: float = key(1.0, "least look-ahead distance", "m", above=0.0)
 
-    def parameters(self, bandwidth_radps: float) -> PurePursuitParameters:
-        """What the law needs: these keys and the aircraft's bandwidth."""
-        ahead = 2.0 * math.sqrt(2.0) / bandwidth_radps if self.look_ahead_s is None else self.look_ahead_s
-        return PurePursuitParameters(ahead, self.min_look_ahead_m)
+    def resolved(self, limits: GuidanceLimits) -> PurePursuitConfig:
+        """The config with every default filled in."""
+        ahead = LOOK_AHEAD / limits.bandwidth_radps if self.look_ahead_s is None else self.look_ahead_s
+        return replace(self, look_ahead_s=ahead)
+
+    def parameters(self) -> PurePursuitParameters:
+        """What the law needs: the keys, resolved."""
+        assert self.look_ahead_s is not None
+        return PurePursuitParameters(self.look_ahead_s, self.min_look_ahead_m)
 
 
 class PurePursuitParameters(NamedTuple):
@@ -100,3 +110,13 @@ def pure_pursuit(
     ahead = (east * math.sin(heading_rad) + north * math.cos(heading_rad)) / speed
     roll = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead, LEAST_CRAB_COSINE)))
     return PurePursuitOutput(acceleration, curvature, roll)
+
+
+def pure_pursuit_law(config: PurePursuitConfig, limits: GuidanceLimits) -> CompiledLaw:
+    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
+
+    Args:
+        config: resolved.
+        limits: what may be asked of the aircraft.
+    """
+    return CompiledLaw("pure_pursuit", config.parameters(), limits)

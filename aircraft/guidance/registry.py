@@ -13,7 +13,11 @@ from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
 from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
+from aircraft.guidance.l1 import L1Config, l1_law
+from aircraft.guidance.npfg import NpfgConfig, npfg_law
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.guidance.pure_pursuit import PurePursuitConfig, pure_pursuit_law
+from aircraft.guidance.vector_field import VectorFieldConfig, vector_field_law
 
 GROUP = "wayproof.guidance"
 DEFAULT_KIND = "preview"
@@ -57,6 +61,30 @@ BUILT_IN = (
         summary="path curvature ahead of the roll lag, and a second-order correction of the cross-track error",
         config=PreviewConfig,
         make=PreviewLaw,
+    ),
+    GuidanceKind(
+        kind="npfg",
+        summary="PX4's (Stastny, Siegwart): a look-ahead angle to the path, the wind triangle, curvature fed forward",
+        config=NpfgConfig,
+        make=npfg_law,
+    ),
+    GuidanceKind(
+        kind="l1",
+        summary="ArduPilot's (Park, Deyst, How): a point on the leg ahead; lines as legs, arcs as loiter circles",
+        config=L1Config,
+        make=l1_law,
+    ),
+    GuidanceKind(
+        kind="vector_field",
+        summary="Beard and McLain: a field of courses about lines and orbits, and course hold",
+        config=VectorFieldConfig,
+        make=vector_field_law,
+    ),
+    GuidanceKind(
+        kind="pure_pursuit",
+        summary="Coulter: the arc to the point of the path at a look-ahead distance",
+        config=PurePursuitConfig,
+        make=pure_pursuit_law,
     ),
 )
 

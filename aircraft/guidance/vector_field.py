@@ -12,14 +12,21 @@ is positive: roll, course clockwise from north, cross-track error.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+from aircraft.guidance.compiled_law import CompiledLaw
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits
 from aircraft.guidance.key import key
+from aircraft.interface import GRAVITY_MPS2
 
-GRAVITY_MPS2 = 9.80665
 CONVERGENCE_S = 7.2
 """Time constant of the approach to a line, s: that of the authors' k_path 0.01 1/m and 50 degrees at 25 m/s."""
+COURSE_SHARE = 0.55
+"""Bandwidth of course hold over that of the aircraft's guidance: a fifth of the bandwidth of roll (chapter 6 asks for a
+separation of five at least)."""
+FIELD_SHARE = 3.5
+"""The field converges no faster than with this time constant, in units of that of course hold."""
 LEAST_CRAB_COSINE = 0.2
 """Least cosine of the angle between course and heading with which bank is worked out."""
 SLOW_MPS = 1.0
@@ -43,37 +50,51 @@ class VectorFieldConfig:
         "1/m",
         above=0.0,
     )
-    orbit_gain: float | None = key(
-        None,
-        "k_orbit, how soon the field turns to an orbit; default: what approaches it as soon as a line",
+    orbit_gain: float = key(
+        0.0,
+        "k_orbit, how soon the field turns to an orbit; 0: an orbit is approached as soon as a line",
         "1",
-        above=0.0,
+        minimum=0.0,
     )
     course_bandwidth_radps: float | None = key(
         None,
-        "natural frequency of course hold; default: the aircraft's, a third of that of its roll",
+        "natural frequency of course hold; default: a fifth of the bandwidth of the aircraft's roll",
         "rad/s",
         above=0.0,
     )
     course_damping: float = key(1.0, "damping ratio of course hold", "1", minimum=0.1, maximum=5.0)
 
-    def parameters(
-        self, airspeed_mps: float, bandwidth_radps: float, roll_limit_rad: float, update_s: float
-    ) -> VectorFieldParameters:
-        """What the law needs: these keys and figures of the aircraft."""
-        angle = math.radians(self.approach_angle_deg)
-        gain = self.path_gain_1pm
+    def resolved(self, limits: GuidanceLimits) -> VectorFieldConfig:
+        """The config with every default filled in."""
+        gain, bandwidth = self.path_gain_1pm, self.course_bandwidth_radps
+        if bandwidth is None:
+            bandwidth = COURSE_SHARE * limits.bandwidth_radps
         if gain is None:
-            gain = 0.5 * math.pi / (angle * airspeed_mps * CONVERGENCE_S)
-        return VectorFieldParameters(
-            angle,
-            gain,
-            0.0 if self.orbit_gain is None else self.orbit_gain,
-            bandwidth_radps if self.course_bandwidth_radps is None else self.course_bandwidth_radps,
-            self.course_damping,
-            roll_limit_rad,
-            update_s,
-        )
+            convergence_s = max(CONVERGENCE_S, FIELD_SHARE / bandwidth)
+            angle = math.radians(self.approach_angle_deg)
+            gain = 0.5 * math.pi / (angle * limits.airspeed_mps * convergence_s)
+        return replace(self, path_gain_1pm=gain, course_bandwidth_radps=bandwidth)
+
+
+def parameters(config: VectorFieldConfig, limits: GuidanceLimits) -> VectorFieldParameters:
+    """What the law needs: the keys, resolved, and figures of the aircraft."""
+    assert config.path_gain_1pm is not None
+    assert config.course_bandwidth_radps is not None
+    return VectorFieldParameters(
+        math.radians(config.approach_angle_deg),
+        config.path_gain_1pm,
+        config.orbit_gain,
+        config.course_bandwidth_radps,
+        config.course_damping,
+        limits.bank_limit_rad,
+        1.0 / UPDATE_RATE_HZ,
+    )
+
+
+class VectorFieldMemory(NamedTuple):
+    """What the law keeps from one call to the next."""
+
+    integral_rad: float = 0.0
 
 
 class VectorFieldParameters(NamedTuple):
@@ -231,3 +252,13 @@ def crab_cosine(at: Motion) -> float:
         return 1.0
     ahead = east * math.sin(at.heading_rad) + north * math.cos(at.heading_rad)
     return max(ahead / speed, LEAST_CRAB_COSINE)
+
+
+def vector_field_law(config: VectorFieldConfig, limits: GuidanceLimits) -> CompiledLaw:
+    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
+
+    Args:
+        config: resolved.
+        limits: what may be asked of the aircraft.
+    """
+    return CompiledLaw("vector_field", parameters(config, limits), limits, VectorFieldMemory())

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from harness.cli.options import FAILED, bad_input, flag, print_json, setting, tell_interrupted, told_apart
+from harness.cli.options import (
+    FAILED,
+    GuidanceOption,
+    bad_input,
+    chosen,
+    flag,
+    print_json,
+    setting,
+    tell_interrupted,
+    told_apart,
+)
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -20,6 +30,7 @@ def check(
         Path, typer.Argument(metavar="PATH", help=".csv (x_m,y_m), .geojson, .plan or .waypoints.")
     ],
     aircraft: Annotated[str, typer.Option(metavar="NAME", help="What `wayproof list aircraft` prints.")],
+    guidance: GuidanceOption = None,
     airspeed_mps: Annotated[
         float | None, typer.Option(metavar="V", help="True airspeed. Default: the aircraft's cruise.")
     ] = None,
@@ -102,7 +113,7 @@ def check(
         "trackability": _given(cross_track_m=tolerance_m),
         "environment": _given(wind=_wind(wind), turbulence=_turbulence(turbulence)),
     }
-    overrides = [] if seed is None else [("seed", str(seed))]
+    overrides = chosen(seed=seed, guidance=guidance)
     check = asked(
         given,
         sections,
@@ -119,7 +130,13 @@ def check(
         "seed": seed,
     }
     numbers |= {"tolerance_m": tolerance_m, "corner_m": corner_m}
-    words = {"scenario": scenario, "wind": wind, "turbulence": turbulence, "polygons": polygons}
+    words = {
+        "scenario": scenario,
+        "guidance": guidance,
+        "wind": wind,
+        "turbulence": turbulence,
+        "polygons": polygons,
+    }
     differs = [(name, str(value)) for name, value in {**numbers, **words}.items() if value is not None]
     apart = told_apart([*differs, *map(setting, settings or ())], named=())
     folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}{apart}"

@@ -11,6 +11,7 @@ import typer
 from harness.cli.options import (
     FAILED,
     AircraftOption,
+    GuidanceOption,
     JsonOption,
     OptionalScenario,
     PlannerOption,
@@ -41,6 +42,7 @@ def fly(
     scenario: OptionalScenario = None,
     planner: PlannerOption = None,
     aircraft: AircraftOption = None,
+    guidance: GuidanceOption = None,
     seed: SeedOption = None,
     settings: SettingsOption = None,
     results: Annotated[
@@ -72,7 +74,7 @@ def fly(
     """
     if view and no_recording:
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
-    replaced = list(map(setting, settings or ()))
+    replaced = [*chosen(guidance=guidance), *map(setting, settings or ())]
     given = [*chosen(planner, aircraft, seed), *replaced]
     loaded, digest = _asked(scenario, results, run, given)
     if results is not None:
@@ -91,13 +93,20 @@ def fly(
     elif not quiet:
         from harness.cli.terminal import flight_rows, print_table
 
-        print_table(f"{loaded.name}: {loaded.planner.kind}, {loaded.aircraft.model}", flight_rows(metrics))
+        title = f"{loaded.name}: {loaded.planner.kind}, {loaded.aircraft.model}{_law(loaded)}"
+        print_table(title, flight_rows(metrics))
         if digest and not given and not otherwise:
             say("digest: as the campaign flew it")
         say(f"run folder: {folder}")
     if view:
         open_viewer([folder])
     return FAILED if otherwise else FLY_STATUS.get(metrics["outcome"], FAILED)
+
+
+def _law(scenario: Scenario) -> str:
+    """What a title adds of the guidance law."""
+    usual = type(scenario.guidance)().kind
+    return "" if scenario.guidance.kind == usual else f", {scenario.guidance.kind}"
 
 
 def _asked(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -71,7 +72,9 @@ def schema(
 
 
 def list_names(
-    what: Annotated[Literal["planners", "aircraft", "scenarios"], typer.Argument(help="Of what.")],
+    what: Annotated[
+        Literal["planners", "aircraft", "guidance", "scenarios"], typer.Argument(help="Of what.")
+    ],
 ) -> int:
     """Prints the names that a scenario or a command can use.
 
@@ -83,6 +86,8 @@ def list_names(
 
     if what == "aircraft":
         _print_aircraft()
+    elif what == "guidance":
+        _print_guidance()
     else:
         print_columns(_summaries(what))
     return 0
@@ -105,6 +110,27 @@ def _print_aircraft() -> None:
         verified = "yes" if frame.verified else "no"
         cells = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
         say(_AIRCRAFT_ROW.format(name, *cells, verified, frame.summary))
+
+
+def _print_guidance() -> None:
+    """Every law with its own keys: default, unit, what it is."""
+    import textwrap
+
+    from aircraft.guidance.registry import guidance_kinds
+
+    for name, kind in guidance_kinds().items():
+        say(textwrap.fill(f"{name}: {kind.summary}", 80, subsequent_indent="  "))
+        for own in fields(kind.config):
+            unit = own.metadata.get("unit") or "1"
+            text = f"{own.name} = {_default(own.default)}{'' if unit == '1' else f' {unit}'}: {own.metadata['doc']}"
+            say(textwrap.fill(text, 80, initial_indent="  ", subsequent_indent="      "))
+
+
+def _default(value: object) -> str:
+    """A default as it stands in a scenario."""
+    if value is None:
+        return "derived"
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()
 
 
 _AIRCRAFT_ROW = "{:10} {:>7} {:>11} {:>6} {:>6}  {:8}  {}"

@@ -63,6 +63,13 @@ def planners(incomplete: str) -> list[str]:
     return [kind for kind in planner_kinds() if kind.startswith(incomplete)]
 
 
+def laws(incomplete: str) -> list[str]:
+    """Kinds for the shell to complete a guidance law with."""
+    from aircraft.guidance.registry import guidance_kinds
+
+    return [kind for kind in guidance_kinds() if kind.startswith(incomplete)]
+
+
 def aircraft(incomplete: str) -> list[str]:
     """Names for the shell to complete an aircraft with."""
     from aircraft.airframes import aircraft_names
@@ -88,6 +95,9 @@ PlannerOption = Annotated[
 AircraftOption = Annotated[
     str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=aircraft)
 ]
+GuidanceOption = Annotated[
+    str | None, typer.Option(metavar="KIND", help="Replaces guidance.kind.", autocompletion=laws)
+]
 SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]
 SettingsOption = Annotated[
     list[str] | None,
@@ -105,12 +115,20 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
 
 
 def chosen(
-    planner: str | None, aircraft: str | None = None, seed: int | None = None
+    planner: str | None = None,
+    aircraft: str | None = None,
+    seed: int | None = None,
+    guidance: str | None = None,
 ) -> list[tuple[str, str]]:
-    """What --planner, --aircraft and --seed replace; a name is text, whatever YAML takes it for."""
+    """What --planner, --aircraft, --seed and --guidance replace; a name is text, whatever YAML takes it for."""
     import json
 
-    given = {"planner.kind": planner and planner_kind(planner), "aircraft.model": aircraft, "seed": seed}
+    given = {
+        "planner.kind": planner and planner_kind(planner),
+        "aircraft.model": aircraft,
+        "seed": seed,
+        "guidance.kind": guidance,
+    }
     return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
 
 

@@ -16,7 +16,6 @@ import numpy as np
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import GuidanceLaw
-from aircraft.guidance.registry import DEFAULT_KIND, guidance_kinds
 from aircraft.interface import GRAVITY_MPS2, FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions
@@ -28,6 +27,7 @@ from harness.flight.record import Flight
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
+from harness.scenario.guidance_keys import law_of
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.scenario.sections import Environment
@@ -84,8 +84,7 @@ def kinematic_loop(scenario: Scenario) -> Loop:
 
 def guidance_law(scenario: Scenario) -> GuidanceLaw:
     """The guidance of a scenario's flight."""
-    limits = airframe(scenario.aircraft.model).guidance_limits(scenario.aircraft.airspeed_mps)
-    return guidance_kinds()[DEFAULT_KIND].law(limits)
+    return law_of(scenario.guidance, scenario.aircraft)
 
 
 def start_conditions(scenario: Scenario) -> StartConditions:

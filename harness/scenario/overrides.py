@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, IN_PYTHON, InputError, Loc, Node, loc_of, node_of
-from harness.scenario.sections import PlannerSpec, Section
+from harness.scenario.sections import GuidanceSpec, PlannerSpec, Section
+
+OWN_KEYS: Final[Mapping[Loc, type[Section]]] = {
+    ("planner", "kind"): PlannerSpec,
+    ("guidance", "kind"): GuidanceSpec,
+}
+"""Kinds whose own keys stand in a section, and the section's type, which has the keys of all kinds."""
 
 
 def overridden(root: Node, overrides: Sequence[tuple[str, str]]) -> Node:
@@ -35,23 +41,23 @@ def _overridden(root: Node, name: str, text: str) -> Node:
 
 
 def with_key(root: Node, loc: Loc, new: Node) -> Node:
-    """A scenario's keys with one replaced; a new `planner.kind` drops the own keys of the planner before.
+    """A scenario's keys with one replaced; a new kind of planner or guidance drops the own keys of the one before.
 
     Raises:
         InputError: there is no such key, as far as it can be told without the scenario's types.
     """
-    if loc == ("planner", "kind"):
-        root = _without_own_keys(root, new)
+    if loc in OWN_KEYS:
+        root = _without_own_keys(root, str(loc[0]), OWN_KEYS[loc], new)
     return strict_yaml.replaced(root, loc, new)
 
 
-def _without_own_keys(root: Node, kind: Node) -> Node:
-    """`root` without the keys that only the planner it names knows, unless `kind` is that planner."""
-    planner = root.value.get("planner") if isinstance(root.value, dict) else None
-    if planner is None or not isinstance(planner.value, dict) or planner.plain().get("kind") == kind.value:
+def _without_own_keys(root: Node, name: str, shared: type[Section], kind: Node) -> Node:
+    """`root` without the keys that only the kind which a section names knows, unless that is `kind`."""
+    section = root.value.get(name) if isinstance(root.value, dict) else None
+    if section is None or not isinstance(section.value, dict) or section.plain().get("kind") == kind.value:
         return root
-    common = {name: node for name, node in planner.value.items() if name in PlannerSpec.model_fields}
-    return strict_yaml.replaced(root, ("planner",), Node(common, planner.line))
+    common = {each: node for each, node in section.value.items() if each in shared.model_fields}
+    return strict_yaml.replaced(root, (name,), Node(common, section.line))
 
 
 class Given(NamedTuple):

@@ -18,7 +18,7 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, Node
 from harness.files.wording import counted
 from harness.files.yaml_pieces import dump_in_pieces
-from harness.scenario import planner_keys
+from harness.scenario import guidance_keys, planner_keys
 from harness.scenario.checks import check_local_plane, check_start_and_goal
 from harness.scenario.files_resolved import plane_point, resolved
 from harness.scenario.ground import GroundSpec, SourceSpec
@@ -28,6 +28,7 @@ from harness.scenario.sections import (
     AircraftSpec,
     Area,
     Environment,
+    GuidanceSpec,
     MissionSpec,
     PlannerSpec,
     Section,
@@ -73,6 +74,7 @@ class Scenario(Section):
     aircraft: AircraftSpec = key("What flies.", default_factory=AircraftSpec)
     sensor: Sensor = key("What it senses with.", default_factory=Sensor)
     planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
+    guidance: GuidanceSpec = key("What steers along the plan.", default_factory=GuidanceSpec)
     environment: Environment = key("The air.", default_factory=Environment)
     trackability: TrackabilitySpec = key(
         "What a leg may be off before it counts as not trackable.", default_factory=TrackabilitySpec
@@ -88,6 +90,7 @@ class Scenario(Section):
         found = model_or_folder(self.aircraft.model, folder)
         object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))
         self._set("aircraft", airspeed_mps=_cruise_mps(self.aircraft))
+        object.__setattr__(self, "guidance", guidance_keys.resolved(self.guidance, self.aircraft))
         performance = performance_of(self)
         radius_m = performance.turn_radius_m
         (x0, y0), (x1, y1) = self.mission.start_m, self.mission.goal_m
@@ -264,10 +267,11 @@ def mission_of(scenario: Scenario) -> Mission:
 
 
 def performance_of(scenario: Scenario) -> Performance:
-    """What the scenario's aircraft can do at its airspeed, in its wind, gust and turbulence.
+    """What the scenario's aircraft can do at its airspeed under its guidance, in its wind, gust and turbulence.
 
     Raises:
-        KeyFault: there is no such aircraft, it cannot hold the airspeed, or the wind is too strong for it.
+        KeyFault: there is no such aircraft, it cannot hold the airspeed, the wind is too strong for it, or the guidance
+            law does not track with it.
     """
     from aircraft.airframes import AircraftError, airframe
     from aircraft.envelope import performance
@@ -282,7 +286,10 @@ def performance_of(scenario: Scenario) -> Performance:
     try:
         gusts = air.turbulence.intensity if air.turbulence else None
         front_mps = air.gust.speed_mps if air.gust else 0.0
-        return performance(airframe(spec.model), spec.airspeed_mps, wind_mps, gusts, front_mps)
+        frame = airframe(spec.model)
+        frame.check_airspeed(spec.airspeed_mps)
+        law = guidance_keys.card_of(scenario.guidance, spec)
+        return performance(frame, spec.airspeed_mps, wind_mps, gusts, front_mps, law)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
 
@@ -295,6 +302,7 @@ def scenario_schema() -> dict[str, Any]:
     """JSON Schema of the format, the own keys of every known planner included."""
     schema = Scenario.model_json_schema()
     schema["properties"]["planner"] = planner_keys.json_schema(schema["$defs"].pop("PlannerSpec"))
+    schema["properties"]["guidance"] = guidance_keys.json_schema(schema["$defs"].pop("GuidanceSpec"))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

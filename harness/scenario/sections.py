@@ -234,6 +234,20 @@ class PlannerSpec(Section):
         return dict(self.__pydantic_extra__ or {})
 
 
+class GuidanceSpec(Section):
+    """Which guidance law flies the plan; the law's own keys stand beside these."""
+
+    # The own keys depend on the kind: `Scenario` holds them against the law's config.
+    model_config = ConfigDict(extra="allow")
+
+    kind: str = key("A name that `wayproof list guidance` prints.", default="preview")
+
+    @property
+    def own(self) -> dict[str, Any]:
+        """The law's own keys."""
+        return dict(self.__pydantic_extra__ or {})
+
+
 class TrackabilitySpec(Section):
     """What a leg of the flight may be off before it counts as not trackable."""
 

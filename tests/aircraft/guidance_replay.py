@@ -83,7 +83,9 @@ class Npfg:
 
     def __init__(self, run: Row) -> None:
         self.run = run
-        self.has = NpfgConfig().parameters(run["va_nom"], run["va_max"], ROLL_LIMIT_RAD)
+        self.has = NpfgConfig(roll_time_constant_s=0.5).parameters(
+            run["va_nom"], run["va_max"], ROLL_LIMIT_RAD
+        )
 
     def decide(self, at: Place, tick: int) -> tuple[float, float, float]:
         """Lateral acceleration, track error, airspeed reference."""

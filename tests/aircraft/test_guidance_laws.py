@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.npfg import NpfgConfig, NpfgInput, npfg
 from aircraft.guidance.pure_pursuit import (
     PurePursuitConfig,
@@ -16,10 +17,12 @@ from aircraft.guidance.vector_field import (
     follow_line,
     follow_orbit,
     line_course,
+    parameters,
 )
+from aircraft.interface import GRAVITY_MPS2
 
-GRAVITY_MPS2 = 9.80665
-FIELD = VectorFieldConfig().parameters(25.0, 0.6, math.radians(45.0), 0.1)
+LIMITS = GuidanceLimits(25.0, 30.0, math.radians(45.0), 1.0, 0.25, 0.03, 1.44)
+FIELD = parameters(VectorFieldConfig().resolved(LIMITS), LIMITS)
 
 
 def test_the_field_of_a_line_is_that_of_the_book() -> None:
@@ -62,13 +65,13 @@ def test_pure_pursuit_turns_on_the_arc_through_the_goal() -> None:
 
 
 def test_pure_pursuit_looks_ahead_by_time() -> None:
-    has = PurePursuitConfig().parameters(0.5)
-    assert look_ahead_distance(12.0, 16.0, has) == pytest.approx(20.0 * 4.0 * math.sqrt(2.0))
+    has = PurePursuitConfig().resolved(LIMITS).parameters()
+    assert look_ahead_distance(12.0, 16.0, has) == pytest.approx(20.0 * 2.0 * math.sqrt(2.0) / 1.44)
 
 
 def test_npfg_on_its_path_in_calm_air_asks_for_the_curvature() -> None:
     at = NpfgInput(0.0, 0.0, 0.0, 25.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0 / 150.0)
-    output = npfg(at, NpfgConfig().parameters(25.0, 30.0, math.radians(50.0)))
+    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5).parameters(25.0, 30.0, math.radians(50.0)))
     assert output.lateral_acceleration_mps2 == pytest.approx(625.0 / 150.0)
     assert output.track_proximity == 1.0
 
@@ -76,7 +79,7 @@ def test_npfg_on_its_path_in_calm_air_asks_for_the_curvature() -> None:
 def test_npfg_flies_nowhere_slower_than_the_wind_allows() -> None:
     # A wind of twice the airspeed, against the path: the nose stays in the wind.
     at = NpfgInput(0.0, 0.0, 0.0, -25.0, 0.0, -50.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-    output = npfg(at, NpfgConfig().parameters(25.0, 25.0, math.radians(50.0)))
+    output = npfg(at, NpfgConfig(roll_time_constant_s=0.5).parameters(25.0, 25.0, math.radians(50.0)))
     assert output.feasibility == 0.0
     assert output.heading_rad == pytest.approx(0.0, abs=1e-9)
     assert output.airspeed_mps == pytest.approx(25.0)

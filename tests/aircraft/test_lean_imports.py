@@ -15,7 +15,8 @@ LEAN = sorted(
         for path in (ROOT / "aircraft").rglob("*.py")
         if path.stem != "__init__"
     }
-    - {"aircraft.jsbsim_loading", "aircraft.jsbsim_model", "aircraft.kernels", "aircraft.survey"}
+    - {"aircraft.jsbsim_loading", "aircraft.jsbsim_model", "aircraft.survey", "aircraft.law_cards.law_survey"}
+    - {"aircraft.kernels", "aircraft.guidance.machine_code"}
 )
 
 

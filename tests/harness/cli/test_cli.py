@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from aircraft import airframes
+from aircraft.guidance.registry import guidance_kinds
 from harness.cli import app as cli
 from harness.cli import flights
 from harness.cli.app import main
@@ -315,6 +316,14 @@ def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
         lines = capsys.readouterr().out.splitlines()
         assert tuple(line.split()[0] for line in lines) == names
         assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_list_of_guidance_has_keys_and_defaults(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "guidance"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in lines if line[0] != " "] == list(guidance_kinds())
+    assert "  period_s = 17 s: period of the track error's decay (NAVL1_PERIOD)" in lines
+    assert all(len(line) <= 80 for line in lines)
 
 
 def test_list_of_aircraft_has_their_figures(

@@ -325,6 +325,15 @@ def test_overrides_replace_keys_before_defaults_follow(tmp_path: Path) -> None:
         (("name.first", "1"), "command line: name.first: no such key"),
         (("mission.start_m[7]", "1"), "command line: mission.start_m[7]: does not exist; there are 2"),
         (("planner.kind", "other"), "command line: planner.kind: is 'other'; must be one of rolling_window"),
+        (
+            ("guidance.kind", "other"),
+            "command line: guidance.kind: is 'other'; must be one of preview, npfg, l1",
+        ),
+        (
+            ("guidance.rate", "1"),
+            "command line: guidance.rate: unknown key; known here: kind, bandwidth_radps",
+        ),
+        (("guidance.damping", "0"), "command line: guidance.damping: is 0; must be greater than 0"),
         (("planner.kind", 2000 * "x"), f"command line: planner.kind: is '{40 * 'x'}'; must be one of"),
     ],
 )
@@ -341,6 +350,25 @@ def test_the_same_planner_keeps_its_keys_and_another_drops_them(tmp_path: Path) 
     other = overridden(("planner.kind", "rolling_window"), text=elsewhere, folder=tmp_path)
     assert other.planner.clearance_m == 70.0
     assert "whatever" not in other.planner.own
+
+
+def test_the_keys_of_a_guidance_law_are_checked_as_those_of_a_planner(tmp_path: Path) -> None:
+    text = LEAST + "guidance: {kind: l1, period_s: 20}\n"
+    given = overridden(("guidance.kind", "l1"), text=text, folder=tmp_path)
+    assert given.guidance.own == {"period_s": 20, "damping": 0.75, "integrator_gain": 0.02}
+    other = overridden(("guidance.kind", "npfg"), text=text, folder=tmp_path)
+    assert other.guidance.own["period_s"] == 10.0
+    again = parse_scenario(dump_scenario(given))
+    assert again == given
+    assert performance_of(again) == performance_of(given)
+
+
+def test_a_law_that_tracks_worse_is_planned_for_with_more_room(tmp_path: Path) -> None:
+    preview = overridden(("guidance.kind", "preview"), text=LEAST, folder=tmp_path)
+    l1 = overridden(("guidance.kind", "l1"), text=LEAST, folder=tmp_path)
+    assert overridden(("seed", "1"), text=LEAST, folder=tmp_path).guidance.kind == "preview"
+    assert mission_of(l1).tracking_error_m > mission_of(preview).tracking_error_m + 4.0
+    assert l1.planner.own["margin_m"] > preview.planner.own["margin_m"]
 
 
 def described_keys(schema: dict[str, Any], defs: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
@@ -392,7 +420,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
     schema = scenario_schema()
     keys = described_keys(schema, schema["$defs"])
     holders = {"area", "origin", "obstacles", "circle", "polygon", "mission", "aircraft", "sensor", "planner"}
-    holders |= {"file", "ground", "sources", "start", "goal"}
+    holders |= {"guidance", "file", "ground", "sources", "start", "goal"}
     values = [
         (name, key)
         for name, key in keys
@@ -429,8 +457,9 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
     words |= {"heights", "sha256", "notes"}
     assert len(values) > 40
     for name, key in values:
-        assert bounded(key), name
-        assert name in words or key.get("unit"), name
+        switch = key.get("type") == "boolean"
+        assert switch or bounded(key), name
+        assert switch or name in words or key.get("unit"), name
         told = key.get("default") is not None or "default:" in key["description"].lower()
         assert told or name in required, name
 

@@ -1,0 +1,1 @@
+"""How well each guidance law tracks with each aircraft, which planning then allows for."""

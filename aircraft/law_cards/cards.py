@@ -1,0 +1,78 @@
+"""How each guidance law tracks with an aircraft: cards, flown by `aircraft.law_cards.law_survey` and kept.
+
+What `preview` does at its defaults is in the aircraft's survey.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from hashlib import sha256
+from inspect import getsourcefile
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from aircraft.airframe import Airframe
+from aircraft.card_cache import cached, figure
+from aircraft.envelope import LawCard, WindPoint
+from aircraft.guidance.preview import PreviewConfig
+from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind
+
+
+def law_card(
+    frame: Airframe, kind: GuidanceKind, config: Any, airspeed_mps: float | None = None
+) -> LawCard | None:
+    """The card of a law with its keys, flown unless that has been done before.
+
+    Args:
+        frame: the aircraft.
+        kind: the law.
+        config: its keys, resolved or not.
+        airspeed_mps: true airspeed; default: cruise.
+
+    Returns:
+        The card; None for `preview` at its defaults, which the survey of the aircraft has.
+
+    Raises:
+        AircraftError: the law does not track with this aircraft.
+    """
+    limits = frame.guidance_limits(airspeed_mps)
+    resolved = config.resolved(limits)
+    if kind.kind == DEFAULT_KIND and resolved == PreviewConfig().resolved(limits):
+        return None
+    keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
+    known = (frame.name, frame.files.model, kind.kind, keys, limits.airspeed_mps)
+    if known not in _kept:
+        what = (frame.files.digest(), kind.kind, keys, repr(limits.airspeed_mps), _source(kind))
+        digest = sha256("\0".join(what).encode()).hexdigest()
+
+        def measured() -> dict[str, Any]:
+            from aircraft.law_cards.law_survey import LawSurvey  # loads JSBSim
+
+            survey = LawSurvey(frame, kind.kind, limits.airspeed_mps, lambda: kind.make(resolved, limits))
+            return survey.measured()
+
+        _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, measured, _card)
+    return _kept[known]
+
+
+_kept: dict[tuple[str, Path, str, str, float], LawCard] = {}
+
+
+def _source(kind: GuidanceKind) -> str:
+    """The text of the file that makes a law: one of another distribution is not in the digest of this package."""
+    file = getsourcefile(kind.make)
+    return Path(file).read_text("utf-8") if file else ""
+
+
+def _card(measured: dict[str, Any]) -> LawCard:
+    """What `LawSurvey.measured` returned, as a card."""
+    points = [
+        WindPoint(figure(point["wind_share"]), figure(point["radius_factor"], 1.0), figure(point["error_m"]))
+        for point in measured["points"]
+    ]
+    shares = [point.wind_share for point in points]
+    if shares[0] != 0.0 or any(after <= before for before, after in pairwise(shares)):
+        raise ValueError("its winds are not in order")
+    return LawCard(str(measured["kind"]), tuple(points))

@@ -1,0 +1,107 @@
+"""Flies a guidance law along lines and arcs, in calm air and in wind, to find out how well it tracks with an aircraft.
+
+It is flown at ever wider turns until it stays near them: planning then gives it turns of that radius, and keeps its
+error from obstacles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from aircraft.airframe import Airframe
+from aircraft.envelope import performance
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
+from aircraft.interface import Route
+from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
+from aircraft.model_files import AircraftError
+from aircraft.start import Atmosphere
+from aircraft.survey import in_flight, weave
+
+WIND_SHARES = (0.0, 0.3, 0.6)
+"""Winds that are flown, along the weave and against it, over the airspeed."""
+
+RADIUS_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
+"""Turns are widened by these until the law tracks them."""
+
+TRACKED_SHARE = 0.1
+"""Cross-track error over turn radius up to which a law counts as tracking the turns."""
+
+CUT_SHARE = 0.05
+"""Share of the time for which the bank may be cut meanwhile."""
+
+SLOWEST_SHARE = 4.0
+"""A weave is given up after this many times the time it takes."""
+
+
+@dataclass(frozen=True)
+class LawSurvey:
+    """One law, one aircraft, one airspeed.
+
+    Attributes:
+        frame: the aircraft.
+        kind: the law's name.
+        airspeed_mps: true airspeed.
+        make: makes the law for one flight.
+    """
+
+    frame: Airframe
+    kind: str
+    airspeed_mps: float
+    make: Callable[[], GuidanceLaw]
+
+    def measured(self) -> dict[str, Any]:
+        """The law's name, and `points`: the attributes of a `WindPoint` in every wind.
+
+        Raises:
+            AircraftError: the law does not track.
+        """
+        points: list[dict[str, float]] = []
+        for share in WIND_SHARES:
+            least = points[-1]["radius_factor"] if points else RADIUS_FACTORS[0]
+            points.append(self._point(share, [factor for factor in RADIUS_FACTORS if factor >= least]))
+        return {"kind": self.kind, "points": points}
+
+    def _point(self, share: float, factors: Sequence[float]) -> dict[str, float]:
+        for factor in factors:
+            error_m = self._error_m(share * self.airspeed_mps, factor)
+            if error_m is not None:
+                return {"wind_share": share, "radius_factor": factor, "error_m": float(f"{error_m:.3g}")}
+        wind = f" in a wind of {share:.0%} of the airspeed" if share else ""
+        raise AircraftError(
+            f"the guidance law {self.kind} does not track with {self.frame.name}{wind}: on turns of "
+            f"{RADIUS_FACTORS[-1]:g} times the radius that the aircraft needs it is off by more than "
+            f"{TRACKED_SHARE:.0%} of the radius, or its bank is cut"
+        )
+
+    def _error_m(self, wind_mps: float, factor: float) -> float | None:
+        """Largest cross-track error (m) on the weave, along and against a wind; None if it is not tracked."""
+        radius_m = factor * performance(self.frame, self.airspeed_mps, wind_mps).turn_radius_m
+        worst_m = 0.0
+        for north_mps in (wind_mps, -wind_mps) if wind_mps else (0.0,):
+            error_m, cut = self._flown(weave(radius_m), north_mps)
+            if not error_m <= TRACKED_SHARE * radius_m or cut > CUT_SHARE:
+                return None
+            worst_m = max(worst_m, error_m)
+        return worst_m
+
+    def _flown(self, route: Route, north_mps: float) -> tuple[float, float]:
+        """Largest cross-track error (m), infinite if lost, and the share of the time for which the bank was cut."""
+        law, speed = self.make(), self.airspeed_mps
+        law.follow(route)
+        model = in_flight(self.frame, speed, Atmosphere(wind_north_mps=north_mps))
+        most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed - abs(north_mps))
+        worst_m, cut, updates = 0.0, 0, 0
+        while True:
+            state = model.state()
+            output = law.update(state)
+            if model.fault() or state.time_s > most_s:
+                return math.inf, 1.0
+            if output.past_end:
+                return worst_m, cut / max(updates, 1)
+            worst_m = max(worst_m, abs(output.cross_track_m))
+            cut, updates = cut + output.bank_saturated, updates + 1
+            model.command(output.roll_command_rad, REFERENCE_ALTITUDE_M, speed)
+            model.advance(model.step_rate_hz // UPDATE_RATE_HZ)

@@ -1,0 +1,88 @@
+"""The guidance section of a scenario: its law's own keys, the law for a flight, and how well it tracks."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+from aircraft.guidance.registry import GuidanceKind, guidance_kinds
+from harness.files.crash import sentence
+from harness.files.printing import PrintingAside
+from harness.scenario import own_keys
+from harness.scenario.sections import AircraftSpec, GuidanceSpec
+from harness.scenario.validation import KeyFault
+
+if TYPE_CHECKING:
+    from aircraft.envelope import LawCard
+    from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
+
+
+def resolved(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceSpec:
+    """The guidance section with its own keys checked and every default filled in.
+
+    Args:
+        spec: the section.
+        aircraft: what flies, its airspeed filled in.
+
+    Raises:
+        KeyFault: there is no such law or key, or the keys contradict each other.
+    """
+    with PrintingAside():
+        kind = own_keys.named_kind("guidance", spec, guidance_kinds())
+        config = own_keys.resolved_config(
+            "guidance", spec, kind, GuidanceSpec.model_fields, limits_of(aircraft)
+        )
+        return spec.model_copy(update={each.name: getattr(config, each.name) for each in fields(kind.config)})
+
+
+def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
+    """What guidance may ask of an aircraft that flies at its airspeed."""
+    from aircraft.airframes import airframe
+
+    return airframe(aircraft.model).guidance_limits(aircraft.airspeed_mps)
+
+
+def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
+    """The law for one flight, from a section that `resolved` returned."""
+    kind, config = _made_of(spec)
+    with PrintingAside():
+        return kind.make(config, limits_of(aircraft))
+
+
+def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
+    """How the law tracks with the aircraft, flown unless that is known; None: as the aircraft's survey says.
+
+    Args:
+        spec: a section that `resolved` returned.
+        aircraft: what flies, its airspeed filled in.
+
+    Raises:
+        KeyFault: the law does not track with this aircraft, or raised an exception.
+    """
+    from aircraft.airframes import AircraftError, airframe
+    from aircraft.law_cards.cards import law_card
+
+    kind, config = _made_of(spec)
+    try:
+        with PrintingAside():
+            return law_card(airframe(aircraft.model), kind, config, aircraft.airspeed_mps)
+    except AircraftError as error:
+        raise KeyFault(("guidance", "kind"), str(error)) from error
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise KeyFault(("guidance", "kind"), f"{spec.kind}: it cannot be flown: {sentence(error)}") from error
+
+
+def _made_of(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
+    kind = guidance_kinds()[spec.kind]
+    return kind, kind.config(**spec.own)
+
+
+def json_schema(common: dict[str, Any]) -> dict[str, Any]:
+    """JSON Schema of the section: one choice for each law.
+
+    Args:
+        common: the schema of `GuidanceSpec`.
+    """
+    return own_keys.json_schema(common, guidance_kinds())
