@@ -12,12 +12,14 @@ if TYPE_CHECKING:
     from harness.analysis.trackability import FlightLimits
     from harness.flight.record import FloatArray
     from harness.world.obstacle import Obstacle
+    from harness.world_files.height_field import HeightField
     from planner.interface import Mission
 
 TIMELINE = "sim_time"
 
 WORLD = "world"
 PLAN = "plan"
+MAP = "map"
 SERIES = "series"
 STATES = "states"
 ATTITUDE = "attitude"
@@ -152,6 +154,8 @@ class Scene:
         obstacles: the true obstacles.
         scenario_yaml: the scenario as flown, for the summary.
         searches: whether a planner searches; not where a given path is flown.
+        ground: heights of the true ground, where they are known.
+        origin_deg: latitude and longitude of the plane's origin, where it was given.
     """
 
     name: str
@@ -161,6 +165,13 @@ class Scene:
     obstacles: tuple[Obstacle, ...]
     scenario_yaml: str = ""
     searches: bool = True
+    ground: HeightField | None = None
+    origin_deg: tuple[float, float] | None = None
+
+    @property
+    def base_m(self) -> float:
+        """From where drawings stand: the lowest ground, mean sea level where it is not known."""
+        return 0.0 if self.ground is None else float(np.floor(np.nanmin(self.ground.heights_m)))
 
     @property
     def altitude_m(self) -> float:
@@ -181,7 +192,8 @@ class Scene:
     @property
     def obstacle_top_m(self) -> float:
         """How high obstacles are drawn: above the flight altitude, and high enough to be seen from afar."""
-        return max(1.3 * self.altitude_m, self.altitude_m + 0.012 * self.frame.span_m)
+        above_m = self.altitude_m - self.base_m
+        return self.altitude_m + max(0.3 * above_m, 0.012 * self.frame.span_m)
 
 
 def time_column(time_s: FloatArray) -> rr.TimeColumn:

@@ -15,6 +15,7 @@ from harness.recording.blueprint import (
     COLOURS,
     EVENTS,
     FLOWN,
+    MAP,
     PLAN,
     SENSED,
     SERIES,
@@ -47,7 +48,9 @@ class Layout(rrb.Blueprint):
             self._stream = None
 
 
-def blueprint(frame: Frame, runs: Sequence[str] = ("",), without: Sequence[str] = ()) -> Layout:
+def blueprint(
+    frame: Frame, runs: Sequence[str] = ("",), without: Sequence[str] = (), on_earth: bool = False
+) -> Layout:
     """The layout: plan view and 3-D flight, states, events and summary, time series.
 
     Args:
@@ -55,7 +58,11 @@ def blueprint(frame: Frame, runs: Sequence[str] = ("",), without: Sequence[str] 
         runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording the empty
             string.
         without: names of time series that have nothing to show.
+        on_earth: whether there is a map of the earth, a tab behind the plan view.
     """
+    plan: rrb.Container | rrb.View = plan_view(frame, runs)
+    if on_earth:
+        plan = rrb.Tabs(plan, rrb.MapView(origin=MAP, name="Map"), active_tab=0)
     events = rrb.TextLogView(
         origin=EVENTS,
         name="Events",
@@ -79,7 +86,7 @@ def blueprint(frame: Frame, runs: Sequence[str] = ("",), without: Sequence[str] 
     return Layout(
         rrb.Horizontal(
             rrb.Vertical(
-                rrb.Horizontal(plan_view(frame, runs), flight_view(frame, runs), column_shares=[1, 1]),
+                rrb.Horizontal(plan, flight_view(frame, runs), column_shares=[1, 1]),
                 states,
                 rrb.Horizontal(*below, column_shares=[5, 4, 4][: len(below)]),
                 row_shares=[0.77 - states_share, states_share, 0.23],

@@ -20,6 +20,7 @@ from aircraft.interface import AircraftState
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
+from harness.recording.geographic import globe
 from harness.recording.layout import blueprint
 from harness.recording.moving import Tracked, log_tracked_style
 from harness.recording.plans import log_plan_style, send_plans
@@ -85,7 +86,8 @@ class RerunLog:
             raise FileNotFoundError(f"no folder {path.parent} for the recording")
         self._scene = scene
         self._rec = recording_stream(recording_id)
-        self._file = RecordingFile(self._rec, path, blueprint(scene.frame, without=scene.empty_series))
+        layout = blueprint(scene.frame, without=scene.empty_series, on_earth=scene.origin_deg is not None)
+        self._file = RecordingFile(self._rec, path, layout)
         self._rec.send_recording_name(scene.name)
         span_m = scene.frame.span_m
         self._chord_error_m = 1e-5 * span_m
@@ -105,6 +107,7 @@ class RerunLog:
         self._known_to_move, self._tracked = moving, Tracked()
         self._moving = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
         log_scene(self._rec, scene)
+        self._globe = globe(self._rec, scene)
         log_plan_style(self._rec)
         log_tracked_style(self._rec)
         self._log_style()
@@ -180,6 +183,8 @@ class RerunLog:
         self._send_happened()
         if self._whole:
             whole = np.concatenate(self._whole)
+            if self._globe is not None:
+                self._globe.log_track(whole)
             track = lines_2d([whole], look.WHOLE_TRACK, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
             style: dict[str, Any] = {"colors": [look.WHOLE_TRACK], "radii": rr.Radius.ui_points(0.75)}
@@ -274,7 +279,7 @@ class RerunLog:
             times,
             rr.Points2D.columns(positions=news.points_m).partition(counts),
         )
-        posts = np.zeros((len(news.points_m), 2, 3))
+        posts = np.full((len(news.points_m), 2, 3), self._scene.base_m)
         posts[:, :, :2] = news.points_m[:, None]
         posts[:, 1, 2] = self._scene.obstacle_top_m
         self._rec.send_columns(

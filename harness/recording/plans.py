@@ -10,7 +10,8 @@ import rerun as rr
 from harness.flight.polylines import polylines
 from harness.flight.record import AcceptedPlan, FloatArray
 from harness.recording import blueprint as look
-from harness.recording.scene import circle, fan
+from harness.recording.scene import fan
+from harness.recording.solids import circle
 from harness.recording.strips import strips_2d, strips_3d
 
 MET = "met"

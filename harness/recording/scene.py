@@ -1,7 +1,6 @@
 """What stays the same in a recording: area, standing obstacles, shape of the aircraft, summary.
 
-Frame: local ENU plane, metres. Shapes here are drawings: an obstacle is a column without end in the simulated
-world and is cut off somewhat above the flight altitude.
+Frame: local ENU plane, metres.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
 from harness.recording.layout import THIN_SERIES
-from harness.recording.strips import strips_2d, strips_3d
+from harness.recording.solids import CIRCLE_POINTS, circle, log_solids, outlines, rims
+from harness.recording.strips import strips_2d
 from harness.recording.summary import colours, summary
-from harness.world.obstacle import Circle, Polygon
+from harness.recording.terrain import log_ground
 
-CIRCLE_POINTS = 72
 LEAST_CIRCLE_POINTS, POINTS_OF_ALL = 12, 400_000
 """Thousands of circles are drawn with fewer points each, so that their recording fits into memory."""
 AIRCRAFT_SHARE = 0.022
@@ -55,21 +54,23 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
     rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
     _log_area(rec, scene)
-    standing = [obstacle.shape for obstacle in scene.obstacles if obstacle.stands_for_ever]
+    if scene.ground is not None:
+        log_ground(rec, scene.ground)
+    standing = [obstacle for obstacle in scene.obstacles if obstacle.stands_for_ever]
     if standing:
         points = (
             LEAST_CIRCLE_POINTS
             if thin
             else max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
         )
-        rings = [_outline(shape, points) for shape in standing]
+        rings = [ring for each in standing for ring in outlines(each.shape, points)]
         # Of many obstacles each of these is large: none is kept while the next is made.
         rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
-        if not thin:
-            rec.log(f"{look.WORLD}/outlines", _rims(rings, scene.obstacle_top_m, look.OUTLINE), static=True)
         del rings
+        if not thin:
+            rec.log(f"{look.WORLD}/outlines", rims(scene, standing, look.OUTLINE, points), static=True)
         solid = "obstacles" if thin else look.TRUE
-        log_solids(rec, f"{look.WORLD}/{solid}", standing, scene.obstacle_top_m, look.OBSTACLE)
+        log_solids(rec, f"{look.WORLD}/{solid}", scene, standing, look.OBSTACLE)
     _log_aircraft(rec, scene, thin)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
         if thin and entity.partition("/")[0] not in THIN_SERIES:
@@ -84,22 +85,19 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
 def log_obstacle(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     """Shows an obstacle that has come into view: a solid from the current time on."""
     obstacle = scene.obstacles[index]
-    top_m = scene.obstacle_top_m
     if obstacle.stands_for_ever:
-        log_solids(
-            rec, f"{look.WORLD}/obstacles/{index}", [obstacle.shape], top_m, look.OBSTACLE, static=False
-        )
+        log_solids(rec, f"{look.WORLD}/obstacles/{index}", scene, [obstacle], look.OBSTACLE, static=False)
         return
     place = f"moving/{index}/{look.SENSED}"
-    rec.log(f"{look.PLAN}/{place}", lines_2d([_outline(obstacle.shape)], look.MOVING, 2.5, 11))
-    log_solids(rec, f"{look.WORLD}/{place}", [obstacle.shape], top_m, look.MOVING, static=False)
+    rec.log(f"{look.PLAN}/{place}", lines_2d(outlines(obstacle.shape), look.MOVING, 2.5, 11))
+    log_solids(rec, f"{look.WORLD}/{place}", scene, [obstacle], look.MOVING, static=False)
 
 
 def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     """Outlines a moving or timed obstacle from the current time on, where it is at its epoch."""
-    shape = scene.obstacles[index].shape
-    rec.log(f"{look.PLAN}/moving/{index}", lines_2d([_outline(shape)], look.MOVING_DIM, 1.5, 10))
-    rec.log(f"{look.WORLD}/moving/{index}", _rims([_outline(shape)], scene.obstacle_top_m, look.MOVING_DIM))
+    obstacle = scene.obstacles[index]
+    rec.log(f"{look.PLAN}/moving/{index}", lines_2d(outlines(obstacle.shape), look.MOVING_DIM, 1.5, 10))
+    rec.log(f"{look.WORLD}/moving/{index}", rims(scene, [obstacle], look.MOVING_DIM))
 
 
 def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
@@ -123,45 +121,6 @@ def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
         rr.Points3D(last, colors=[look.HIT], radii=rr.Radius.ui_points(7.0), labels=label, show_labels=True),
         static=True,
     )
-
-
-def log_solids(
-    rec: rr.RecordingStream,
-    entity: str,
-    shapes: Sequence[Circle | Polygon],
-    top_m: float,
-    colour: Colour,
-    static: bool = True,
-) -> None:
-    """Logs shapes as solids up to `top_m`: circles as cylinders, polygons as one mesh of prisms."""
-    circles = [shape for shape in shapes if isinstance(shape, Circle)]
-    if circles:
-        rec.log(
-            f"{entity}/circles",
-            rr.Cylinders3D(
-                lengths=[top_m] * len(circles),
-                radii=[circle.radius_m for circle in circles],
-                centers=[(*circle.center_m, 0.5 * top_m) for circle in circles],
-                colors=[colour],
-                fill_mode="solid",
-            ),
-            static=static,
-        )
-    prisms = [_prism(shape, top_m) for shape in shapes if isinstance(shape, Polygon)]
-    if prisms:
-        counts = np.cumsum([0, *(len(vertices) for vertices, _, _ in prisms)])
-        rec.log(
-            f"{entity}/polygons",
-            rr.Mesh3D(
-                vertex_positions=np.concatenate([vertices for vertices, _, _ in prisms]),
-                vertex_normals=np.concatenate([normals for _, normals, _ in prisms]),
-                triangle_indices=np.concatenate(
-                    [faces + first for (_, _, faces), first in zip(prisms, counts[:-1], strict=True)]
-                ),
-                albedo_factor=colour,
-            ),
-            static=static,
-        )
 
 
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
@@ -190,14 +149,6 @@ def lines_2d(
         radii=rr.Radius.ui_points(0.5 * width),
         draw_order=order,
     )
-
-
-def circle(
-    center_m: Sequence[float] | FloatArray, radius_m: float, points: int = CIRCLE_POINTS
-) -> FloatArray:
-    """(points + 1, 2) closed polygon on a circle."""
-    angle = np.linspace(0.0, 2.0 * np.pi, points + 1)
-    return np.asarray(center_m) + radius_m * np.column_stack((np.cos(angle), np.sin(angle)))
 
 
 def fan(center_m: FloatArray, edges: FloatArray, radius_m: float) -> FloatArray:
@@ -234,47 +185,6 @@ def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatA
     )
 
 
-def _rims(outlines: Sequence[FloatArray], top_m: float, colour: Colour) -> rr.LineStrips3D:
-    """Outlines on the ground and at the top."""
-    rims = [
-        np.column_stack((ring, np.full(len(ring), height))) for ring in outlines for height in (0.0, top_m)
-    ]
-    return rr.LineStrips3D(strips_3d(rims), colors=[colour], radii=rr.Radius.ui_points(0.5))
-
-
-def _outline(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> FloatArray:
-    if isinstance(shape, Circle):
-        return circle(shape.center_m, shape.radius_m, points)
-    return np.array([*shape.vertices_m, shape.vertices_m[0]], dtype=np.float64)
-
-
-def _prism(
-    polygon: Polygon, top_m: float
-) -> tuple[FloatArray, FloatArray, np.ndarray[Any, np.dtype[np.int64]]]:
-    """Vertices, normals and triangles of an upright prism without a floor, with sharp edges."""
-    import shapely
-
-    ring = np.array(shapely.geometry.polygon.orient(shapely.Polygon(polygon.vertices_m)).exterior.coords)
-    begin, along = ring[:-1], np.diff(ring, axis=0)
-    outward = np.column_stack((along[:, 1], -along[:, 0])) / np.hypot(*along.T)[:, None]
-    vertices: list[tuple[float, ...]] = []
-    normals: list[tuple[float, ...]] = []
-    faces: list[tuple[int, int, int]] = []
-    for corner, edge, normal in zip(begin, along, outward, strict=True):
-        first = len(vertices)
-        end = corner + edge
-        vertices += [(*corner, 0.0), (*end, 0.0), (*end, top_m), (*corner, top_m)]
-        normals += [(*normal, 0.0)] * 4
-        faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
-    for triangle in shapely.constrained_delaunay_triangles(shapely.Polygon(ring)).geoms:
-        first = len(vertices)
-        corners = shapely.geometry.polygon.orient(triangle).exterior.coords[:3]
-        vertices += [(*corner, top_m) for corner in corners]
-        normals += [(0.0, 0.0, 1.0)] * 3
-        faces.append((first, first + 1, first + 2))
-    return np.array(vertices), np.array(normals), np.array(faces, dtype=np.int64)
-
-
 def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
     xmin, ymin, xmax, ymax = scene.mission.bounds_m
     bounds = np.array([(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax), (xmin, ymin)])
@@ -293,14 +203,14 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
         ),
         static=True,
     )
-    ground = [np.column_stack((points, np.zeros(len(points)))) for points in (bounds, goal)]
+    ground = [np.column_stack((points, np.full(len(points), scene.base_m))) for points in (bounds, goal)]
     rec.log(
         f"{look.WORLD}/area",
         rr.LineStrips3D(ground, colors=[look.BOUNDS, look.GOAL], radii=rr.Radius.ui_points(0.75)),
         static=True,
     )
     poles = [
-        [(*point, 0.0), (*point, 1.5 * scene.obstacle_top_m)]
+        [(*point, scene.base_m), (*point, 1.5 * scene.obstacle_top_m - 0.5 * scene.base_m)]
         for point in (scene.start_m, scene.mission.goal_m)
     ]
     rec.log(

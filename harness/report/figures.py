@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib import patches
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 
 from harness.analysis.planned import PlannedRows
 from harness.analysis.smoothness import flown_lengths, flown_profile
@@ -199,12 +200,13 @@ def outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
         return patches.Circle(
             (shape.center_m[0] / 1e3, shape.center_m[1] / 1e3), (shape.radius_m + grown_m) / 1e3, **style
         )
-    vertices = np.array(shape.vertices_m)
-    if grown_m > 0:
-        import shapely
+    import shapely
 
-        vertices = np.array(shapely.Polygon(vertices).buffer(grown_m).exterior.coords)
-    return patches.Polygon(vertices / 1e3, **style)
+    solid = shapely.Polygon(shape.vertices_m, shape.holes_m)
+    # Rings of holes run the other way round, which is how they stay empty.
+    solid = shapely.orient_polygons(solid.buffer(grown_m) if grown_m > 0 else solid)
+    rings = [Path(np.array(ring.coords) / 1e3, closed=True) for ring in (solid.exterior, *solid.interiors)]
+    return patches.PathPatch(Path.make_compound_path(*rings), **style)
 
 
 def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:

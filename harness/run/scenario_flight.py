@@ -30,7 +30,7 @@ from harness.run_files.run_folder import RunFolder
 from harness.scenario.guidance_keys import law_of
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario, mission_of, performance_of
-from harness.scenario.sections import Environment
+from harness.scenario.sections import Environment, Origin
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
 
@@ -220,6 +220,12 @@ def fly_to_folder(
     return figures
 
 
+def _origin_deg(scenario: Scenario) -> tuple[float, float] | None:
+    """Latitude and longitude of the plane's origin; None where it was left at its default, which is nowhere meant."""
+    origin = scenario.area.origin
+    return None if origin == Origin() else (origin.latitude_deg, origin.longitude_deg)
+
+
 def _sources(scenario: Scenario) -> list[dict[str, str]]:
     """Files that obstacles and ground were made of, for the manifest."""
     return [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
@@ -249,6 +255,8 @@ def _recording(
         tuple(loop.world.obstacles),
         text,
         searches=pilot is None,
+        ground=loop.world.ground.field if loop.world.ground else None,
+        origin_deg=_origin_deg(scenario),
     )
     if thin:
         return ThinLog(folder.recording_path, scene, identity or title)

@@ -94,7 +94,7 @@ def _joined(obstacles: Sequence[Obstacle], found: Expanded, ground: GroundSpec |
             names.append(f"obstacles[{index}]")
             continue
         source = next(sources)
-        parts = [obstacle_of(shape, each) for shape in source.polygons]
+        parts = [obstacle_of(*part, each) for part in zip(source.polygons, source.heights_m, strict=True)]
         every += parts
         names += [f"what obstacles[{index}] has of {source.spec.path.name}"] * len(parts)
         told.append(
@@ -111,8 +111,8 @@ def _joined(obstacles: Sequence[Obstacle], found: Expanded, ground: GroundSpec |
     )
 
 
-def obstacle_of(shape: object, like: Obstacle) -> Obstacle:
-    """A polygon of shapely, valid already, as an obstacle."""
+def obstacle_of(shape: object, heights_m: tuple[float, float], like: Obstacle) -> Obstacle:
+    """A polygon of shapely, valid already, between two heights, as an obstacle."""
     import shapely
 
     def ring(line: object) -> tuple[Point, ...]:
@@ -121,7 +121,12 @@ def obstacle_of(shape: object, like: Obstacle) -> Obstacle:
     holes = tuple(ring(each) for each in shape.interiors) or None  # type: ignore[attr-defined]
     polygon = Polygon.model_construct(vertices_m=ring(shape.exterior), holes_m=holes)  # type: ignore[attr-defined]
     return Obstacle.model_construct(
-        circle=None, polygon=polygon, file=None, velocity_mps=None, active_s=like.active_s
+        circle=None,
+        polygon=polygon,
+        file=None,
+        velocity_mps=None,
+        active_s=like.active_s,
+        heights_m=heights_m,
     )
 
 

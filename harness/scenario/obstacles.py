@@ -9,6 +9,7 @@ from pydantic import ConfigDict, FailFast, Field, Strict, field_validator, model
 
 from harness.scenario.sections import MAX_COORDINATE_M, Interval, Point, Section, Velocity, key
 
+Height = Annotated[float, Field(ge=-1000, le=30_000)]
 Shift = Annotated[float, Field(ge=-1e9, le=1e9)]
 
 
@@ -174,6 +175,13 @@ class Obstacle(Section):
         default=None,
     )
 
+    heights_m: Annotated[tuple[Height, Height], Strict(False)] | None = key(
+        "Bottom and top above mean sea level, for drawings; the aircraft flies at one altitude, at which it is there. "
+        "Twice the same: terrain, cut at that height. Default: a column without end.",
+        unit="m",
+        default=None,
+    )
+
     @model_validator(mode="after")
     def _has_one_shape(self) -> Obstacle:
         have = [name for name in ("circle", "polygon", "file") if getattr(self, name) is not None]
@@ -183,6 +191,13 @@ class Obstacle(Section):
         if self.file and self.velocity_mps:
             raise ValueError("is a file with velocity_mps; what a file holds stands still")
         return self
+
+    @field_validator("heights_m")
+    @classmethod
+    def _has_its_bottom_below(cls, heights_m: tuple[float, float] | None) -> tuple[float, float] | None:
+        if heights_m and not heights_m[0] <= heights_m[1]:
+            raise ValueError(f"is {list(heights_m)}; must be [bottom, top] with bottom <= top")
+        return heights_m
 
     @field_validator("active_s")
     @classmethod

@@ -129,6 +129,8 @@ class Obstacle:
         shape: where it is at `epoch_s`.
         velocity_mps: (east, north).
         active_s: first and last time at which it is there, both included; None: always.
+        heights_m: bottom and top above mean sea level, where they are known: for drawings, and for flights that
+            climb; at the altitude of the mission it is there. Twice the same: terrain, cut at that height.
 
     Raises:
         ValueError: a velocity or a first time is not finite.
@@ -137,6 +139,7 @@ class Obstacle:
     shape: Circle | Polygon
     velocity_mps: tuple[float, float] = (0.0, 0.0)
     active_s: tuple[float, float] | None = None
+    heights_m: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not all(map(math.isfinite, (*self.velocity_mps, self.epoch_s))):

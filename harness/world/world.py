@@ -135,7 +135,7 @@ class World:
                 shape = Polygon(each.polygon.vertices_m, each.polygon.holes_m or ())
             else:
                 raise ValueError(f"an obstacle needs a circle or a polygon; got {each}")
-            obstacles.append(Obstacle(shape, each.velocity_mps or (0.0, 0.0), each.active_s))
+            obstacles.append(Obstacle(shape, each.velocity_mps or (0.0, 0.0), each.active_s, each.heights_m))
         ground = None if scenario.ground is None else Ground(scenario.ground.field())
         return cls(obstacles, scenario.area.bounds_m, ground)
 

@@ -17,7 +17,7 @@ from harness.world_files.growing import simplified
 from harness.world_files.height_field import HeightField
 from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError, counted
 from harness.world_files.plane import Mapping, Place
-from harness.world_files.slicing import Band, Box, Ground, sliced_cells, sliced_parts
+from harness.world_files.slicing import Band, Box, Ground, Solid, sliced_cells, sliced_parts
 from harness.world_files.terrain import height_field
 
 MARGIN: Final = 0.02
@@ -27,6 +27,8 @@ GRID_M: Final = 0.001
 MAX_CORNERS: Final = 600_000
 """Of all files together: a scenario with more could not be read again."""
 MAX_POLYGONS: Final = 150_000
+HEIGHTS_M: Final = (-1000.0, 30_000.0)
+"""Bottom and top of what has none."""
 
 Progress = Callable[[str], None]
 
@@ -63,6 +65,7 @@ class Source:
         kind: its format.
         sha256: of its bytes.
         polygons: shapely polygons in the plane, cut to the area and valid.
+        heights_m: bottom and top of each, above mean sea level; of terrain the height of the cut, twice.
         notes: what was assumed or passed over.
     """
 
@@ -70,6 +73,7 @@ class Source:
     kind: str
     sha256: str
     polygons: tuple[Any, ...]
+    heights_m: tuple[tuple[float, float], ...]
     notes: tuple[str, ...]
 
 
@@ -264,7 +268,8 @@ def _cut(
             "no terrain: the ground is taken as flat at 0 m, so altitude_m counts from it (ground_m)"
         )
     parts = contents.parts
-    polygons = sliced_parts(parts, mapping, band, Ground(field, flat_m, bounds_m), box)
+    solids = sliced_parts(parts, mapping, band, Ground(field, flat_m, bounds_m), box)
+    polygons = [each.shape for each in solids]
     tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
     for raster, solid in _solid_cells(contents, spec, band, notes):
         found, factor = sliced_cells(raster, solid, mapping, box)
@@ -282,13 +287,33 @@ def _cut(
     final = [_with_holes(each, spec.holes, turn_room_m) for each in _rounded(grown)]
     if final:
         notes.append(f"outlines simplified by at most {tolerance_m:.3g} m, outwards only")
-    return Source(
-        spec,
-        contents.kind,
-        _digest(spec.path.absolute(), (stamp.st_size, stamp.st_mtime_ns)),
-        tuple(final),
-        tuple(notes),
-    )
+    heights = _heights(final, solids, None if contents.terrain is None else band.low_m)
+    digest = _digest(spec.path.absolute(), (stamp.st_size, stamp.st_mtime_ns))
+    return Source(spec, contents.kind, digest, tuple(final), tuple(heights), tuple(notes))
+
+
+def _heights(
+    polygons: Sequence[Any], solids: Sequence[Solid], cut_m: float | None
+) -> list[tuple[float, float]]:
+    """Bottom and top of each polygon: the lowest and the highest of the solids that it was made of.
+
+    Args:
+        polygons: united solids, or cells.
+        solids: parts with their heights.
+        cut_m: of what is of no solid, terrain, the height it was cut at; None: there is no end to it.
+    """
+    import shapely
+
+    lowest, highest = HEIGHTS_M
+    if not solids:
+        return [HEIGHTS_M if cut_m is None else (cut_m, cut_m)] * len(polygons)
+    tree = shapely.STRtree([shapely.point_on_surface(each.shape) for each in solids])
+    low, high = (np.clip([each[k] for each in solids], lowest, highest) for k in (1, 2))
+    found = []
+    for polygon in polygons:
+        inside = tree.query(polygon, predicate="intersects")
+        found.append((float(low[inside].min()), float(high[inside].max())) if len(inside) else HEIGHTS_M)
+    return found
 
 
 def _solid_cells(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,14 @@ PROBES: Final = 5
 
 Box = tuple[float, float, float, float]
 """xmin, ymin, xmax, ymax."""
+
+
+class Solid(NamedTuple):
+    """A polygon in the plane, and the heights between which it is solid somewhere."""
+
+    shape: Any
+    low_m: float
+    high_m: float
 
 
 @dataclass(frozen=True)
@@ -64,8 +72,10 @@ class Ground:
     known_in: Box = (-1e9, -1e9, 1e9, 1e9)
 
 
-def sliced_parts(parts: Sequence[Part], mapping: Mapping, band: Band, ground: Ground, box: Box) -> list[Any]:
-    """Footprints, in the plane and cut to a box, of what is solid in a band.
+def sliced_parts(
+    parts: Sequence[Part], mapping: Mapping, band: Band, ground: Ground, box: Box
+) -> list[Solid]:
+    """Pieces, in the plane and cut to a box, of what is solid in a band.
 
     Args:
         parts: of one file.
@@ -86,7 +96,7 @@ def sliced_parts(parts: Sequence[Part], mapping: Mapping, band: Band, ground: Gr
     finite = np.isfinite(shapely.bounds(shapes)).all(axis=1)
     keep_in = np.array([part.keep_in for part in parts])
     near = finite & (keep_in | shapely.intersects(shapes, window))
-    solid: list[Any] = []
+    solid: list[Solid] = []
     unknown: list[str] = []
     for index in np.flatnonzero(near).tolist():
         part, shape = parts[index], shapes[index]
@@ -109,26 +119,32 @@ class _GroundUnknown(Exception):
     """A limit above ground where no ground is known."""
 
 
-def _clipped(shapes: list[Any], window: Any) -> list[Any]:
-    """Valid polygons of what lies in a window."""
+def _clipped(solids: Sequence[Solid], window: Any) -> list[Solid]:
+    """Valid polygons of what lies in a window, each with the heights of what it is a piece of."""
     import shapely
 
-    if not shapes:
+    if not solids:
         return []
-    valid = np.array(shapes, dtype=object)
+    valid = np.array([each.shape for each in solids], dtype=object)
     bad = ~shapely.is_valid(valid)
     valid[bad] = shapely.make_valid(valid[bad], method="structure", keep_collapsed=False)
     across = ~shapely.contains_properly(window, valid)
     valid[across] = shapely.intersection(valid[across], window)
-    return [each for each in shapely.get_parts(valid) if each.geom_type == "Polygon" and each.area > 0]
+    pieces, of = shapely.get_parts(valid, return_index=True)
+    return [
+        Solid(piece, *solids[index][1:])
+        for piece, index in zip(pieces, of.tolist(), strict=True)
+        if piece.geom_type == "Polygon" and piece.area > 0
+    ]
 
 
-def _solid(part: Part, shape: Any, band: Band, ground: Ground) -> list[Any]:
+def _solid(part: Part, shape: Any, band: Band, ground: Ground) -> list[Solid]:
     """A part as far as it reaches into the band."""
     low, high = part.bottom, part.top
     above_ground = [limit for limit in (low, high) if limit.datum is Datum.GROUND]
     if not above_ground:
-        return [shape] if low.height_m <= band.high_m and high.height_m >= band.low_m else []
+        inside = low.height_m <= band.high_m and high.height_m >= band.low_m
+        return [Solid(shape, low.height_m, high.height_m)] if inside else []
     # What the other limit rules out needs no ground.
     if (low.datum is Datum.SEA and low.height_m > band.high_m) or (
         high.datum is Datum.SEA and high.height_m < band.low_m
@@ -137,8 +153,8 @@ def _solid(part: Part, shape: Any, band: Band, ground: Ground) -> list[Any]:
     if ground.field is None:
         if ground.flat_m is None:
             raise _GroundUnknown
-        flat = ground.flat_m
-        return [shape] if _height(low, flat) <= band.high_m and _height(high, flat) >= band.low_m else []
+        low_m, high_m = _height(low, ground.flat_m), _height(high, ground.flat_m)
+        return [Solid(shape, low_m, high_m)] if low_m <= band.high_m and high_m >= band.low_m else []
     return _on_terrain(part, shape, band, ground, ground.field)
 
 
@@ -146,7 +162,7 @@ def _height(limit: Limit, ground_m: float) -> float:
     return limit.height_m + (ground_m if limit.datum is Datum.GROUND else 0.0)
 
 
-def _on_terrain(part: Part, shape: Any, band: Band, ground: Ground, field: HeightField) -> list[Any]:
+def _on_terrain(part: Part, shape: Any, band: Band, ground: Ground, field: HeightField) -> list[Solid]:
     """A part that stands on, or follows, terrain; limits are taken where they make it largest."""
     import shapely
 
@@ -166,15 +182,16 @@ def _on_terrain(part: Part, shape: Any, band: Band, ground: Ground, field: Heigh
         limit.height_m + (heights if limit.datum is Datum.GROUND else 0.0 * heights)
         for limit in (part.bottom, part.top)
     )
-    if part.rigid:
-        return [shape] if lows.min() <= band.high_m and tops.max() >= band.low_m else []
+    solid = Solid(shape, float(lows.min()), float(tops.max()))
     mask = (lows <= band.high_m) & (tops >= band.low_m)
-    if mask.all() or not mask.any():
-        return [shape] if mask.all() else []
+    if part.rigid or mask.all():
+        return [solid] if solid.low_m <= band.high_m and solid.high_m >= band.low_m else []
+    if not mask.any():
+        return []
     cells, _ = outlines(mask)
     (west, south), (right, up) = corner, field.spacing_m
     placed = shapely.transform(cells, lambda p: p * (right, up) + (west, south))
-    return [shapely.intersection(shape, shapely.union_all(placed))]
+    return [solid._replace(shape=shapely.intersection(shape, shapely.union_all(placed)))]
 
 
 def _nodes_under(field: HeightField, bounds: list[float]) -> tuple[FloatArray, tuple[float, float]]:
@@ -230,7 +247,8 @@ def sliced_cells(raster: Raster, solid: BoolArray, mapping: Mapping, box: Box) -
     dense = (
         shapely.segmentize(np.array(polygons, dtype=object), LONGEST_EDGE_CELLS) if mapping.crs else polygons
     )
-    return _clipped(list(shapely.transform(np.array(dense, dtype=object), place)), shapely.box(*box)), factor
+    placed = shapely.transform(np.array(dense, dtype=object), place)
+    return [each.shape for each in _clipped([Solid(s, 0.0, 0.0) for s in placed], shapely.box(*box))], factor
 
 
 def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]:

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from harness.files.strict_yaml import dump
 from harness.files.yaml_pieces import PIECE, dump_in_pieces
 from harness.mapping.scan import RangeScan
-from harness.recording.scene import circle, lines_2d
+from harness.recording.scene import lines_2d
 from harness.recording.sensed import NEAR_CELLS, Sensed, returns_m
+from harness.recording.solids import circle
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from planner.interface import FloatArray
 

@@ -1,0 +1,138 @@
+"""Obstacles as drawings: solids and rims between their heights, and outlines seen from above.
+
+Frame: local ENU plane, metres. An obstacle without heights is a column without end in the simulated world; it is cut
+off somewhat above the flight altitude. Terrain is drawn as the height it was cut at, a rim without a body: its body is
+the ground.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from harness.flight.record import FloatArray
+from harness.recording.blueprint import Colour, Scene
+from harness.recording.strips import strips_3d
+from harness.world.obstacle import Circle, Obstacle, Polygon
+
+CIRCLE_POINTS = 72
+
+
+def circle(
+    center_m: Sequence[float] | FloatArray, radius_m: float, points: int = CIRCLE_POINTS
+) -> FloatArray:
+    """(points + 1, 2) closed polygon on a circle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, points + 1)
+    return np.asarray(center_m) + radius_m * np.column_stack((np.cos(angle), np.sin(angle)))
+
+
+def outlines(shape: Circle | Polygon, points: int = CIRCLE_POINTS) -> list[FloatArray]:
+    """Closed rings round a shape, those of holes included; circles with so many points."""
+    if isinstance(shape, Circle):
+        return [circle(shape.center_m, shape.radius_m, points)]
+    return [np.array([*ring, ring[0]], dtype=np.float64) for ring in shape.rings_m]
+
+
+def drawn_heights(scene: Scene, obstacle: Obstacle) -> tuple[float, float]:
+    """Bottom and top at which an obstacle is drawn, m."""
+    if obstacle.heights_m is None:
+        return scene.base_m, scene.obstacle_top_m
+    low, high = obstacle.heights_m
+    return max(low, scene.base_m), max(min(high, scene.obstacle_top_m), scene.base_m)
+
+
+def rims(
+    scene: Scene, obstacles: Sequence[Obstacle], colour: Colour, points: int = CIRCLE_POINTS
+) -> rr.LineStrips3D:
+    """Outlines at the bottom and at the top of obstacles."""
+    lines = [
+        np.column_stack((ring, np.full(len(ring), height)))
+        for obstacle in obstacles
+        for ring in outlines(obstacle.shape, points)
+        for height in dict.fromkeys(drawn_heights(scene, obstacle))
+    ]
+    return rr.LineStrips3D(strips_3d(lines), colors=[colour], radii=rr.Radius.ui_points(0.5))
+
+
+def log_solids(
+    rec: rr.RecordingStream,
+    entity: str,
+    scene: Scene,
+    obstacles: Sequence[Obstacle],
+    colour: Colour,
+    static: bool = True,
+) -> None:
+    """Logs obstacles as solids: circles as cylinders, polygons as one mesh of prisms, terrain as its rim."""
+    heights = [drawn_heights(scene, each) for each in obstacles]
+    round_ = [
+        (each.shape, *at)
+        for each, at in zip(obstacles, heights, strict=True)
+        if isinstance(each.shape, Circle)
+    ]
+    if round_:
+        rec.log(
+            f"{entity}/circles",
+            rr.Cylinders3D(
+                lengths=[high - low for _, low, high in round_],
+                radii=[shape.radius_m for shape, _, _ in round_],
+                centers=[(*shape.center_m, 0.5 * (low + high)) for shape, low, high in round_],
+                colors=[colour],
+                fill_mode="solid",
+            ),
+            static=static,
+        )
+    polygons = [
+        (each, *at) for each, at in zip(obstacles, heights, strict=True) if isinstance(each.shape, Polygon)
+    ]
+    prisms = [prism(each.shape, low, high) for each, low, high in polygons if high > low]  # type: ignore[arg-type]
+    if prisms:
+        counts = np.cumsum([0, *(len(vertices) for vertices, _, _ in prisms)])
+        rec.log(
+            f"{entity}/polygons",
+            rr.Mesh3D(
+                vertex_positions=np.concatenate([vertices for vertices, _, _ in prisms]),
+                vertex_normals=np.concatenate([normals for _, normals, _ in prisms]),
+                triangle_indices=np.concatenate(
+                    [faces + first for (_, _, faces), first in zip(prisms, counts[:-1], strict=True)]
+                ),
+                albedo_factor=colour,
+            ),
+            static=static,
+        )
+    terrain = [each for each, low, high in polygons if high <= low]
+    if terrain:
+        rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
+
+
+def prism(
+    polygon: Polygon, low_m: float, high_m: float
+) -> tuple[FloatArray, FloatArray, np.ndarray[Any, np.dtype[np.int64]]]:
+    """Vertices, normals and triangles of an upright prism without a floor, with sharp edges; its holes are open."""
+    import shapely
+
+    shape = shapely.orient_polygons(shapely.Polygon(polygon.vertices_m, polygon.holes_m))
+    rings = [np.array(ring.coords) for ring in (shape.exterior, *shape.interiors)]
+    begin, end = np.concatenate([ring[:-1] for ring in rings]), np.concatenate([ring[1:] for ring in rings])
+    along = end - begin
+    outward = np.column_stack((along[:, 1], -along[:, 0])) / np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    count = len(begin)
+    walls = np.empty((count, 4, 3))
+    walls[:, 0, :2] = walls[:, 3, :2] = begin
+    walls[:, 1, :2] = walls[:, 2, :2] = end
+    walls[:, :2, 2], walls[:, 2:, 2] = low_m, high_m
+    wall_normals = np.repeat(np.column_stack((outward, np.zeros(count))), 4, axis=0)
+    first = 4 * np.arange(count)[:, None]
+    faces = np.concatenate((first + np.array((0, 1, 2)), first + np.array((0, 2, 3))))
+    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(shape))
+    corners = shapely.get_coordinates(shapely.orient_polygons(triangles)).reshape(-1, 4, 2)[:, :3]
+    roof = np.concatenate((corners, np.full((*corners.shape[:2], 1), high_m)), axis=2).reshape(-1, 3)
+    roof_normals = np.tile((0.0, 0.0, 1.0), (len(roof), 1))
+    roof_faces = 4 * count + np.arange(len(roof)).reshape(-1, 3)
+    return (
+        np.concatenate((walls.reshape(-1, 3), roof)),
+        np.concatenate((wall_normals, roof_normals)),
+        np.concatenate((faces, roof_faces)).astype(np.int64),
+    )
