@@ -53,7 +53,7 @@ class CompiledLaw:
         """Decides the roll command for the next update interval."""
         if self._rows is None:
             raise RuntimeError("follow() a route before update()")
-        roll_command_rad, cross_track_m, arc_length_m, bank_saturated, past_end, _ = self._update(
+        roll_command_rad, cross_track_m, arc_length_m, bank_saturated, past_end, airspeed_mps = self._update(
             self._rows,
             self._parameters,
             self._flight,
@@ -66,7 +66,9 @@ class CompiledLaw:
             state.heading_rad,
             state.airspeed_mps,
         )
-        return GuidanceOutput(roll_command_rad, cross_track_m, arc_length_m, bank_saturated, past_end)
+        return GuidanceOutput(
+            roll_command_rad, cross_track_m, arc_length_m, bank_saturated, past_end, airspeed_mps
+        )
 
 
 def _record(values: NamedTuple) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -48,6 +49,12 @@ class GuidanceOutput(NamedTuple):
     """The bank limit cut the command."""
     past_end: bool
     """The route is flown out; straight on along its last tangent."""
+    airspeed_mps: float = math.nan
+    """True airspeed that the law asks for; NaN: the one that the mission holds."""
+
+    def airspeed_or(self, held_mps: float) -> float:
+        """The airspeed to be commanded (m/s): what the law asks for, else what the mission holds."""
+        return held_mps if math.isnan(self.airspeed_mps) else self.airspeed_mps
 
 
 class GuidanceLaw(Protocol):

@@ -395,5 +395,5 @@ def npfg_law(config: NpfgConfig, limits: GuidanceLimits) -> CompiledLaw:
         limits: what may be asked of the aircraft.
     """
     return CompiledLaw(
-        "npfg", config.parameters(limits.airspeed_mps, limits.airspeed_mps, limits.bank_limit_rad), limits
+        "npfg", config.parameters(limits.airspeed_mps, limits.max_airspeed_mps, limits.bank_limit_rad), limits
     )

@@ -89,8 +89,29 @@ BUILT_IN = (
 )
 
 
+_registered: dict[str, GuidanceKind] = {}
+
+
+def register(kind: GuidanceKind) -> None:
+    """Lets this process, and no other, know a law by its name, as an entry point does for every process.
+
+    One that was registered under the same name before is replaced.
+
+    Raises:
+        ValueError: a built-in law, or one of another distribution, has the name.
+    """
+    if kind.kind in installed_kinds():
+        raise ValueError(f"there is a guidance law called {kind.kind} already; give this one another name")
+    _registered[kind.kind] = kind
+
+
 def guidance_kinds() -> dict[str, GuidanceKind]:
-    """All guidance laws by name, built-in ones first.
+    """All guidance laws by name: the installed ones, and those that this process has registered."""
+    return {**installed_kinds(), **_registered}
+
+
+def installed_kinds() -> dict[str, GuidanceKind]:
+    """The guidance laws that every process finds, by name, built-in ones first.
 
     Raises:
         TypeError: an entry point names something else.

@@ -6,6 +6,7 @@ What `preview` does at its defaults is in the aircraft's survey.
 from __future__ import annotations
 
 import json
+from copy import deepcopy
 from dataclasses import asdict
 from hashlib import sha256
 from inspect import getsourcefile
@@ -17,7 +18,7 @@ from aircraft.airframe import Airframe
 from aircraft.card_cache import cached, figure
 from aircraft.envelope import LawCard, WindPoint
 from aircraft.guidance.preview import PreviewConfig
-from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind
+from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind, installed_kinds
 
 
 def law_card(
@@ -42,22 +43,27 @@ def law_card(
     if kind.kind == DEFAULT_KIND and resolved == PreviewConfig().resolved(limits):
         return None
     keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
-    known = (frame.name, frame.files.model, kind.kind, keys, limits.airspeed_mps)
+
+    def measured() -> dict[str, Any]:
+        from aircraft.law_cards.law_survey import LawSurvey  # loads JSBSim
+
+        # A copy: a law that was given as an object is flown as it was given.
+        survey = LawSurvey(
+            frame, kind.kind, limits.airspeed_mps, lambda: deepcopy(kind.make(resolved, limits))
+        )
+        return survey.measured()
+
+    known = (frame.name, frame.files.model, kind, keys, limits.airspeed_mps)
+    if known not in _kept and installed_kinds().get(kind.kind) != kind:
+        _kept[known] = _card(measured())  # nothing tells what it depends on
     if known not in _kept:
         what = (frame.files.digest(), kind.kind, keys, repr(limits.airspeed_mps), _source(kind))
         digest = sha256("\0".join(what).encode()).hexdigest()
-
-        def measured() -> dict[str, Any]:
-            from aircraft.law_cards.law_survey import LawSurvey  # loads JSBSim
-
-            survey = LawSurvey(frame, kind.kind, limits.airspeed_mps, lambda: kind.make(resolved, limits))
-            return survey.measured()
-
         _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, measured, _card)
     return _kept[known]
 
 
-_kept: dict[tuple[str, Path, str, str, float], LawCard] = {}
+_kept: dict[tuple[str, Path, GuidanceKind, str, float], LawCard] = {}
 
 
 def _source(kind: GuidanceKind) -> str:

@@ -19,7 +19,7 @@ DASH = "\N{EN DASH}"
 
 @dataclass(frozen=True)
 class Row:
-    """One planner on one scenario. A figure that does not exist is None.
+    """One planner, under one guidance law, on one scenario. A figure that does not exist is None.
 
     Attributes:
         scenario: its name.
@@ -48,6 +48,9 @@ class Row:
         planner_max_ms: the same, largest.
         replans: plans accepted after the first.
         digest: SHA-256 of the track.
+        guidance: the guidance law; empty where all flew under the same one.
+        bank_saturation_fraction: share of the time at the bank limit.
+        cause: why the first leg that was not tracked was not; empty where all were.
     """
 
     scenario: str
@@ -74,6 +77,14 @@ class Row:
     planner_max_ms: float | None = None
     replans: int | None = None
     digest: str = ""
+    guidance: str = ""
+    bank_saturation_fraction: float | None = None
+    cause: str = ""
+
+    @property
+    def label(self) -> str:
+        """What people are shown as its name."""
+        return f"{self.planner}, {self.guidance}" if self.guidance else self.planner
 
 
 def row_of(
@@ -85,6 +96,7 @@ def row_of(
     turn_radius_m: float,
     tightest_1pm: float,
     kinematic: bool,
+    guidance: str = "",
 ) -> Row:
     """The row of a flight that came to an end.
 
@@ -96,6 +108,7 @@ def row_of(
         turn_radius_m: smallest radius of the aircraft.
         tightest_1pm: largest planned curvature.
         kinematic: a point flew.
+        guidance: the law, where several are compared.
     """
     planned, flown = metrics["smoothness"]["planned"], metrics["smoothness"]["flown"]
     length, compute, reached = (
@@ -128,6 +141,11 @@ def row_of(
         planner_max_ms=compute["max"],
         replans=metrics["replans"],
         digest=metrics["digest"],
+        guidance=guidance,
+        bank_saturation_fraction=metrics["bank_saturation_fraction"],
+        cause=""
+        if kinematic
+        else next((leg["cause"] for leg in metrics["trackability"] if leg["cause"]), ""),
     )
 
 
@@ -177,6 +195,8 @@ FIGURES = (
         lambda row: {None: "", True: "yes", False: "no"}[row.trackable],
         hint="every leg was flown within the limits for cross-track error, altitude, airspeed and load",
     ),
+    Figure("why a leg was not tracked", "cause", lambda row: row.cause),
+    Figure("time at the bank limit, %", "bank %", lambda row: number(row.bank_saturation_fraction, 100.0)),
     Figure("cross-track error p95, m", "xt p95", lambda row: number(row.cross_track_p95_m)),
     Figure("cross-track error max, m", "xt max", lambda row: number(row.cross_track_max_m)),
     Figure(
@@ -241,10 +261,10 @@ def to_markdown(rows: Sequence[Row]) -> str:
     parts = []
     for name in dict.fromkeys(row.scenario for row in rows):
         own = [row for row in rows if row.scenario == name]
-        lines = [f"## {escaped(name)}", "", _line(["", *(row.planner for row in own)])]
+        lines = [f"## {escaped(name)}", "", _line(["", *(row.label for row in own)])]
         lines.append(_line(["---", *("---:" for _ in own)]))
         lines += [_line([figure.label, *(figure.text(row) or DASH for row in own)]) for figure in FIGURES]
-        lines += ["", *(f"- {escaped(row.planner)}: {escaped(row.reason)}" for row in own), ""]
+        lines += ["", *(f"- {escaped(row.label)}: {escaped(row.reason)}" for row in own), ""]
         parts.append("\n".join(lines))
     return "\n".join(parts)
 

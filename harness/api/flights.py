@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from aircraft.guidance import given as given_guidance
 from harness.api.errors import as_input_errors
 from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
@@ -36,7 +37,9 @@ def fly(
         planner: what plans in place of the scenario's planner: a kind that `wayproof list planners` prints,
             `FILE.py:NAME` or `MODULE:NAME`, a class or function that takes the mission or nothing and makes the
             planner, or an object with the method `plan(request)`. None: as the scenario says.
-        guidance: what steers in place of the scenario's guidance law, in the same ways.
+        guidance: what steers in place of the scenario's guidance law: a kind that `wayproof list guidance` prints, a
+            `GuidanceKind`, a class or function that takes the `GuidanceLimits` or nothing and makes the law, or an
+            object with the methods `follow(route, arc_length_m)` and `update(state)`. None: as the scenario says.
         out: the run folder, made or written anew; None: none is kept.
         recording: whether to record the flight for rerun (`run.show()`).
         progress: called every few simulated seconds with simulated time (s), distance to go (m) and a word.
@@ -49,7 +52,7 @@ def fly(
         PlannerError: the planner cannot be made.
         WriteError: the run could not be written to its end.
     """
-    flown = _with_planner(_scenario(scenario), planner)
+    flown = _with_guidance(_with_planner(_scenario(scenario), planner), guidance)
     return _flown(flown, Path(out) if out is not None else None, recording, progress)
 
 
@@ -97,6 +100,17 @@ def _with_planner(scenario: Scenario, planner: object) -> Scenario:
     except ValueError as error:
         raise InputError(f"wayproof: planner: {error}") from error
     return scenario if kind == scenario.planner.kind else scenario.with_({"planner.kind": kind})
+
+
+def _with_guidance(scenario: Scenario, guidance: object) -> Scenario:
+    """The scenario flown under a guidance law, which is known by its name from here on."""
+    if guidance is None:
+        return scenario
+    try:
+        kind = given_guidance.registered(guidance)
+    except ValueError as error:
+        raise InputError(f"wayproof: guidance: {error}") from error
+    return scenario if kind == scenario.guidance.kind else scenario.with_({"guidance.kind": kind})
 
 
 def _flown(scenario: Scenario, out: Path | None, recording: bool, progress: Progress | None) -> FlightResult:

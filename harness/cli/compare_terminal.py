@@ -45,7 +45,7 @@ def comparison_bar(scenarios: Sequence[Scenario]) -> Iterator[Report | None]:
             each = scenarios[index]
             over = state not in ("waiting", "following", "holding")
             flown[index] = 1.0 if over else min(max(1.0 - to_go_m / straight_m[index], 0.0), 0.99)
-            text = f"{each.name}, {each.planner.kind}: {time_s:.0f} s, {state}"
+            text = f"{each.name}, {each.planner.kind}, {each.guidance.kind}: {time_s:.0f} s, {state}"
             bar.update(task, completed=sum(flown.values()), description=plain(text))
 
         yield report
@@ -69,10 +69,10 @@ def print_comparison(rows: Sequence[Row]) -> None:
             style = _STYLE.get(row.outcome, "bold red")
             cells = [plain(figure.text(row)) or DASH for figure in shown]
             cells[0] = f"[{style}]{cells[0]}[/]"
-            table.add_row(plain(row.planner), *cells)
+            table.add_row(plain(row.label), *cells)
         console.print(table, width=min(WIDTH, console.width))
         for row in own:
             if row.outcome == CRASHED:
                 console.print(
-                    f"{plain(row.planner)} crashed: {plain(row.reason)}", highlight=False, soft_wrap=True
+                    f"{plain(row.label)} crashed: {plain(row.reason)}", highlight=False, soft_wrap=True
                 )

@@ -129,6 +129,9 @@ def _asked(
 def compare(
     scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Files or shipped names.")],
     planners: Annotated[str, typer.Option(metavar="A,B,...", help="Kinds of planners, in order.")],
+    guidance: Annotated[
+        str | None, typer.Option(metavar="X,Y,...", help="Kinds of guidance laws. Default: the scenario's.")
+    ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="The comparison's folder.")] = Path(
         "runs/comparison"
     ),
@@ -141,7 +144,7 @@ def compare(
     no_recording: Annotated[bool, flag("--no-recording", "Write no recordings and no overlay.")] = False,
     as_json: Annotated[bool, flag("--json", "Print comparison.json, and nothing else.")] = False,
 ) -> int:
-    """Every planner on every scenario, side by side: table, figures, report, overlay recordings.
+    """Every planner (under every guidance law) on every scenario, side by side: table, figures, report, overlays.
 
     For example: wayproof compare paper_circles --planners rolling_window,bug2
 
@@ -155,7 +158,10 @@ def compare(
     """
     named = [kind.strip() for kind in planners.split(",")]
     kinds = [planner_kind(kind) for kind in named]
-    loaded = [load(scenario, chosen(kind)) for scenario in scenarios for kind in kinds]
+    laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
+    loaded = [
+        load(scenario, chosen(kind, guidance=law)) for scenario in scenarios for kind in kinds for law in laws
+    ]
 
     from aircraft.airframes import AircraftError
     from harness.cli.compare_terminal import comparison_bar, print_comparison

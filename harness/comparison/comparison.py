@@ -88,11 +88,12 @@ def fly_and_compare(
         sources: planners among them that are given as FILE.py:NAME or MODULE:NAME.
 
     Raises:
-        InputError: a scenario is there twice with the same planner, or has the name of a file of the comparison.
+        InputError: a scenario is there twice with the same planner and guidance, or is called as a file of the
+            comparison is.
         RunFolderError: the folder holds something else or cannot be written.
     """
     jobs = [
-        Job(each, out / each.name / each.planner.kind, recording, kinematic, tuple(sources))
+        Job(each, out / each.name / _folder_of(each, scenarios), recording, kinematic, tuple(sources))
         for each in _distinct(scenarios)
     ]
     called = command or shlex.join(["wayproof", *sys.argv[1:]])
@@ -117,7 +118,8 @@ def _compared(
     answers = fly_all(jobs, workers, progress)
     by_name = _by_name(scenarios)
     optima = {name: optimum_of(own[0]) for name, own in by_name.items()}
-    entries = [_entry(*each, optima) for each in zip(jobs, answers, strict=True)]
+    laws = _laws(scenarios)
+    entries = [_entry(job, answer, optima, law) for job, answer, law in zip(jobs, answers, laws, strict=True)]
     runs = [each.run for each in entries if each.run]
     named = runs[0].manifest["versions"] if runs else {}
     versions = {name: version for name, version in named.items() if version}
@@ -142,12 +144,27 @@ def _by_name(scenarios: Sequence[Scenario]) -> dict[str, list[Scenario]]:
     return groups
 
 
+def _laws(scenarios: Sequence[Scenario]) -> list[str]:
+    """The guidance law of every flight; empty where all fly under the same one."""
+    kinds = [each.guidance.kind for each in scenarios]
+    return kinds if len(set(kinds)) > 1 else ["" for _ in kinds]
+
+
+def _folder_of(scenario: Scenario, scenarios: Sequence[Scenario]) -> str:
+    """Name of a flight's run folder among those of its scenario."""
+    law = scenario.guidance.kind if any(_laws(scenarios)) else ""
+    return f"{scenario.planner.kind}-{law}" if law else scenario.planner.kind
+
+
 def _distinct(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
     seen = set()
     for each in scenarios:
-        name, kind = flight = each.name, each.planner.kind
+        name, kind, law = flight = each.name, each.planner.kind, each.guidance.kind
         if flight in seen:
-            raise InputError(f"wayproof: {kind} is to fly {name} twice; leave one out or rename the scenario")
+            under = f" under {law}" if any(_laws(scenarios)) else ""
+            raise InputError(
+                f"wayproof: {kind} is to fly {name} twice{under}; leave one out or rename the scenario"
+            )
         if name in (INDEX, CSV, MARKDOWN, REPORT):
             raise InputError(f"wayproof: a scenario is called {name}, as a file of the comparison; rename it")
         seen.add(flight)
@@ -178,11 +195,12 @@ def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
     replace_text(out / INDEX, json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n")
 
 
-def _entry(job: Job, answer: Answer, optima: Mapping[str, Optimum]) -> Entry:
+def _entry(job: Job, answer: Answer, optima: Mapping[str, Optimum], law: str) -> Entry:
     name, planner = job.scenario.name, job.scenario.planner.kind
     if answer.crash:
-        return Entry(Row(name, planner, CRASHED, answer.crash, optimum_m=optima[name].length_m))
-    return entry(job.scenario, load_run(job.folder), optima[name], job.kinematic)
+        row = Row(name, planner, CRASHED, answer.crash, optimum_m=optima[name].length_m, guidance=law)
+        return Entry(row)
+    return entry(job.scenario, load_run(job.folder), optima[name], job.kinematic, law)
 
 
 def _overlay(folder: Path, entries: Sequence[Entry]) -> None:
@@ -193,7 +211,7 @@ def _overlay(folder: Path, entries: Sequence[Entry]) -> None:
 
         write_overlay(
             [each.run.folder / RECORDING for each in recorded if each.run],
-            [each.row.planner for each in recorded],
+            [each.row.label for each in recorded],
             folder / OVERLAY,
         )
 

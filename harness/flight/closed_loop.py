@@ -13,7 +13,7 @@ from typing import Protocol
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
 from aircraft.interface import AircraftState, FlightModel, Route
 from aircraft.route import route_length
-from harness.files.crash import in_a_line
+from harness.files.crash import in_a_line, sentence, trace
 from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, TrackLog
 from harness.flight.signals import held_back
@@ -112,7 +112,8 @@ def _flown(
     judge = Termination(loop.world, mission, loop.time_limit_s, model.fault)
     late: deque[RangeScan] = deque()
     station, next_report = math.nan, math.inf if progress is None else 0.0
-    model.command(0.0, loop.altitude_m, mission.speed_mps)  # the last two for all of the flight
+    airspeed_mps = mission.speed_mps
+    model.command(0.0, loop.altitude_m, airspeed_mps)
     while True:
         interrupt()
         scan_due, tick, steps = strides[at % len(strides)]
@@ -136,10 +137,16 @@ def _flown(
             if plans.due_s <= state.time_s:
                 plans.take_effect(state, station)
             if plans.index >= 0:
-                output = guidance.update(state)
+                try:
+                    output = guidance.update(state)
+                except Exception as error:  # a law of somebody else's may raise anything
+                    plans.error = trace(error)
+                    verdict = Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}"
+                    break
                 log.commanded = output.roll_command_rad, output.cross_track_m, output.arc_length_m
+                airspeed_mps = output.airspeed_or(mission.speed_mps)
             roll_command, cross_track, station = log.commanded
-            model.command(roll_command, loop.altitude_m, mission.speed_mps)
+            model.command(roll_command, loop.altitude_m, airspeed_mps)
             log.add(state, roll_command, cross_track, station, plans.index)
             if progress is not None and state.time_s >= next_report:
                 progress(state.time_s, judge.to_go_m(state), plans.state)

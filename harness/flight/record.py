@@ -276,7 +276,7 @@ class Flight:
         compute_ms: wall-clock time of every call in which the planner searched, also where it found nothing new.
         sim_s: simulated time flown.
         wall_s: wall-clock time that took.
-        error: the traceback of what the planner raised; None where it did not.
+        error: the traceback of what the planner or the guidance law raised; None where neither did.
         contact_m: clearance at a contact between the last two rows; +inf without.
     """
 

@@ -35,7 +35,9 @@ class Entry:
     planned: PlannedRows | None = None
 
 
-def entry(scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = False) -> Entry:
+def entry(
+    scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = False, guidance: str = ""
+) -> Entry:
     """A flight that came to an end.
 
     Args:
@@ -43,6 +45,7 @@ def entry(scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = Fals
         run: the run folder, read back.
         optimum: the scenario's.
         kinematic: a point flew instead of the aircraft.
+        guidance: the law, where several are compared.
     """
     planned = planned_rows(run.track, run.plans)
     row = row_of(
@@ -53,6 +56,7 @@ def entry(scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = Fals
         turn_radius_m=performance_of(scenario).turn_radius_m,
         tightest_1pm=planned.tightest_1pm,
         kinematic=kinematic,
+        guidance=guidance,
     )
     return Entry(row, run, planned)
 
@@ -88,7 +92,11 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[Entry], optimum:
         for place, drawn in numbered:
             path = figures.planner_figure(scene, drawn, place)
             pictures.append(
-                _picture(folder / f"path-{drawn.planner}", path, f"{drawn.planner} on {scene.name}, alone.")
+                _picture(
+                    folder / f"path-{drawn.planner.replace(', ', '-')}",
+                    path,
+                    f"{drawn.planner} on {scene.name}, alone.",
+                )
             )
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
     rows = [each.row for each in entries]
@@ -147,7 +155,7 @@ def _drawn(flight: Entry) -> DrawnRun | None:
 
     if flight.run is None or flight.planned is None:
         return None
-    return DrawnRun(flight.row.planner, flight.row.outcome, flight.run.track, flight.planned)
+    return DrawnRun(flight.row.label, flight.row.outcome, flight.run.track, flight.planned)
 
 
 def _picture(stem: Path, figure: Any, caption: str) -> Picture:

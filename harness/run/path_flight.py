@@ -57,7 +57,7 @@ def _flown(
         interrupt()
         state = model.state()
         guided = guidance.update(state)
-        model.command(guided.roll_command_rad, loop.altitude_m, loop.mission.speed_mps)
+        model.command(guided.roll_command_rad, loop.altitude_m, guided.airspeed_or(loop.mission.speed_mps))
         off_m = abs(guided.cross_track_m) if guided.past_end else None
         outcome = _outcome(model.fault(), off_m, loop.mission.goal_radius_m, state.time_s, limit_s)
         log.add(state, guided.roll_command_rad, guided.cross_track_m, guided.arc_length_m, 0)

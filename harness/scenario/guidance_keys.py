@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from aircraft.guidance.registry import GuidanceKind, guidance_kinds
+from aircraft.guidance.registry import GuidanceKind, guidance_kinds, installed_kinds
 from harness.files.crash import sentence
 from harness.files.printing import PrintingAside
 from harness.scenario import own_keys
@@ -85,4 +85,4 @@ def json_schema(common: dict[str, Any]) -> dict[str, Any]:
     Args:
         common: the schema of `GuidanceSpec`.
     """
-    return own_keys.json_schema(common, guidance_kinds())
+    return own_keys.json_schema(common, installed_kinds())

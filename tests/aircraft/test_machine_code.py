@@ -53,7 +53,7 @@ def npfg_roll(at: AircraftState, line: bool) -> float:
         away = math.hypot(at.east_m - 200.0, at.north_m)
         out = (at.east_m - 200.0) / away, at.north_m / away
         path = (200.0 + 200.0 * out[0], 200.0 * out[1], out[1], -out[0], 0.005)
-    has = NpfgConfig().resolved(LIMITS).parameters(25.0, 25.0, LIMITS.bank_limit_rad)
+    has = NpfgConfig().resolved(LIMITS).parameters(25.0, 32.0, LIMITS.bank_limit_rad)
     given = (at.east_m, at.north_m, at.velocity_east_mps, at.velocity_north_mps, *WIND)
     return limited(npfg(NpfgInput(*given, *path), has).lateral_acceleration_mps2)
 

@@ -404,6 +404,17 @@ def test_markdown_is_a_table_whatever_the_names_are() -> None:
     assert "- a: a \\| b &lt;i&gt;" in text
 
 
+def test_under_several_guidance_laws_a_row_is_called_after_both() -> None:
+    rows = [
+        Row("s", "a", "reached", "x", guidance=law, bank_saturation_fraction=0.25, cause=cause)
+        for law, cause in (("preview", ""), ("l1", "tracking error"))
+    ]
+    text = to_markdown(rows)
+    assert "|  | a, preview | a, l1 |" in text
+    assert "| why a leg was not tracked | \N{EN DASH} | tracking error |" in text
+    assert "| time at the bank limit, % | 25 | 25 |" in text
+
+
 def test_csv_of_a_crash_has_empty_cells() -> None:
     head, line = to_csv([Row("s", "p", "crashed", "a, b")]).splitlines()
     assert head.startswith("scenario,planner,outcome,reason,flown_length_m,")
