@@ -22,6 +22,7 @@ from harness.scenario import guidance_keys, planner_keys
 from harness.scenario.checks import check_local_plane, check_start_and_goal
 from harness.scenario.files_resolved import plane_point, resolved
 from harness.scenario.ground import GroundSpec, SourceSpec
+from harness.scenario.navigation import Navigation
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.overrides import Given, changed, overridden
 from harness.scenario.sections import (
@@ -75,6 +76,7 @@ class Scenario(Section):
     sensor: Sensor = key("What it senses with.", default_factory=Sensor)
     planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
     guidance: GuidanceSpec = key("What steers along the plan.", default_factory=GuidanceSpec)
+    navigation: Navigation = key("What it believes of its state.", default_factory=Navigation)
     environment: Environment = key("The air.", default_factory=Environment)
     trackability: TrackabilitySpec = key(
         "What a leg may be off before it counts as not trackable.", default_factory=TrackabilitySpec
@@ -86,6 +88,11 @@ class Scenario(Section):
         folder = (info.context or {}).get("folder")
         given = Given({name: getattr(self, name) for name in self.model_fields_set}, folder)
         object.__setattr__(self, "_given", given)
+        if self.navigation.kind != "perfect":  # never flown as if it had not been asked for
+            raise KeyFault(
+                ("navigation", "kind"),
+                f"is {self.navigation.kind}, which no flight takes yet (all use the true state); must be perfect",
+            )
         self._place_ends()
         found = model_or_folder(self.aircraft.model, folder)
         object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))

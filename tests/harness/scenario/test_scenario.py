@@ -420,7 +420,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
     schema = scenario_schema()
     keys = described_keys(schema, schema["$defs"])
     holders = {"area", "origin", "obstacles", "circle", "polygon", "mission", "aircraft", "sensor", "planner"}
-    holders |= {"guidance", "file", "ground", "sources", "start", "goal"}
+    holders |= {"guidance", "navigation", "file", "ground", "sources", "start", "goal"}
     values = [
         (name, key)
         for name, key in keys

@@ -1,0 +1,143 @@
+"""What the aircraft believes of its state: truth and error, seeded."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from aircraft.interface import AircraftState, FloatArray
+from harness.scenario.navigation import Navigation
+
+VELOCITY_CORRELATION_S: Final = 1.0
+"""Correlation time of the velocity errors. Chosen: a filter between the fixes of a receiver of some hertz."""
+
+HEADING_CORRELATION_S: Final = 60.0
+"""Correlation time of the heading error. Chosen: a compass error stays on one heading and differs on the next."""
+
+AIRSPEED_CORRELATION_S: Final = 300.0
+"""Correlation time of the airspeed error. Chosen: a pressure sensor drifts with its temperature, over minutes."""
+
+_POSITION, _VELOCITY, _HEADING, _AIRSPEED, _ALTITUDE = slice(0, 2), slice(2, 5), 5, 6, 7
+
+
+class Navigator:
+    """Believed states of one flight.
+
+    Position (east, north), velocity (three components), heading, airspeed and altitude have errors that are
+    independent first-order Gauss-Markov processes, stationary from the first call on. Over an interval dt a process
+    of size sigma and correlation time tau goes on exactly, x' = exp(-dt / tau) x + sigma sqrt(1 - exp(-2 dt / tau)) n
+    with n standard normal (Gelb, Applied Optimal Estimation, 1974, section 3.8; Beard and McLain, Small Unmanned
+    Aircraft, 2012, chapter 7, have the same for position), so that any interval between calls is right.
+
+    In an outage the position error stays that of the last fix and drifts in one direction, drawn for that outage, by
+    a share of the distance flown; the believed velocity has the error that this drift is the integral of. At the end
+    of the outage the error is again that of a fix: the believed position jumps.
+
+    Roll, pitch, load factor, throttle and time are true.
+
+    Args:
+        navigation: sizes and outages.
+        seed_sequence: root of two streams, of the errors and of the directions of drift; it is not changed.
+    """
+
+    def __init__(self, navigation: Navigation, seed_sequence: np.random.SeedSequence) -> None:
+        self._navigation = navigation
+        self._rng, directions = (_stream(seed_sequence, number) for number in range(2))
+        turns = directions.uniform(0.0, math.tau, len(navigation.outages_s))
+        self._directions = np.column_stack([np.sin(turns), np.cos(turns)])
+        position_s, position_m = navigation.position_correlation_s, navigation.position_sigma_m
+        self._correlation_s = np.array(
+            [position_s] * 2
+            + [VELOCITY_CORRELATION_S] * 3
+            + [HEADING_CORRELATION_S, AIRSPEED_CORRELATION_S, position_s]
+        )
+        self._sigmas = np.array(
+            [position_m] * 2
+            + [navigation.velocity_sigma_mps] * 3
+            + [
+                math.radians(navigation.heading_sigma_deg),
+                navigation.airspeed_sigma_mps,
+                navigation.altitude_sigma_m,
+            ]
+        )
+        self._perfect = navigation.kind == "perfect"
+        self._unit = np.zeros(8)  # the processes, over their sigmas
+        self._time_s, self._place = math.nan, np.zeros(2)
+        self._outage = -1
+        self._fix_error, self._drift = np.zeros(2), np.zeros(2)
+
+    def believed(self, state: AircraftState) -> AircraftState:
+        """What the aircraft believes where this is its true state.
+
+        Args:
+            state: the truth; its time is no earlier than that of the call before. At the same time the errors are
+                the same.
+
+        Returns:
+            The believed state; the very object given where navigation is perfect.
+
+        Raises:
+            ValueError: time goes back.
+        """
+        if self._perfect:
+            return state
+        if state.time_s < self._time_s:
+            raise ValueError(f"time goes back from {self._time_s:g} s to {state.time_s:g} s")
+        place = np.array([state.east_m, state.north_m])
+        if state.time_s != self._time_s:
+            self._go_on(state.time_s, place)
+        east_m, north_m = (place + self._fix_error + self._drift).tolist()
+        errors = self._unit * self._sigmas
+        velocity = errors[_VELOCITY]
+        if self._outage >= 0:
+            drift_mps = self._navigation.drift_share * state.groundspeed_mps
+            velocity[:2] += drift_mps * self._directions[self._outage]
+        v_east, v_north, v_up = velocity.tolist()
+        return state._replace(
+            east_m=east_m,
+            north_m=north_m,
+            up_m=state.up_m + float(errors[_ALTITUDE]),
+            velocity_east_mps=state.velocity_east_mps + v_east,
+            velocity_north_mps=state.velocity_north_mps + v_north,
+            velocity_up_mps=state.velocity_up_mps + v_up,
+            heading_rad=(state.heading_rad + float(errors[_HEADING])) % math.tau,
+            airspeed_mps=max(0.0, state.airspeed_mps + float(errors[_AIRSPEED])),
+        )
+
+    def _go_on(self, time_s: float, place: FloatArray) -> None:
+        """Takes the errors from the call before to this time."""
+        first, before_s = math.isnan(self._time_s), self._time_s
+        noise = self._rng.standard_normal(8)
+        if first:
+            self._unit = noise
+        else:
+            steps = (time_s - before_s) / self._correlation_s
+            self._unit = np.exp(-steps) * self._unit + np.sqrt(-np.expm1(-2.0 * steps)) * noise
+        outage = self._outage_at(time_s)
+        if outage < 0 or first:
+            fix = (self._unit * self._sigmas)[_POSITION]
+            self._fix_error = fix + np.array(self._navigation.position_bias_m)
+        if outage != self._outage:
+            self._drift = np.zeros(2)
+        if outage >= 0 and not first:
+            begin_s = self._navigation.outages_s[outage][0]
+            flown_m = math.dist(place, self._place) * (time_s - max(begin_s, before_s)) / (time_s - before_s)
+            self._drift = self._drift + self._navigation.drift_share * flown_m * self._directions[outage]
+        self._outage, self._time_s, self._place = outage, time_s, place
+
+    def _outage_at(self, time_s: float) -> int:
+        """Index of the outage at a time, -1 if there is a fix."""
+        for index, (begin_s, end_s) in enumerate(self._navigation.outages_s):
+            if begin_s <= time_s < end_s:
+                return index
+        return -1
+
+
+def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:
+    """The numbered child stream of a root, whatever was spawned from the root before."""
+    child = np.random.SeedSequence(
+        root.entropy, spawn_key=(*root.spawn_key, number), pool_size=root.pool_size
+    )
+    return np.random.default_rng(child)

@@ -1,0 +1,143 @@
+"""What an aircraft believes: sizes of the errors, outages, and that a seed says it all."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.interface import AircraftState
+from harness.flight.navigation import Navigator
+from harness.scenario.navigation import Navigation
+
+SPEED_MPS = 20.0
+SEED = np.random.SeedSequence(5, spawn_key=(3,))
+
+
+def at(time_s: float) -> AircraftState:
+    """An aircraft that flies east."""
+    return AircraftState(
+        time_s, SPEED_MPS * time_s, 500.0, 300.0, SPEED_MPS, 0.0, 0.0, math.pi / 2, 0.1, 0.02, 25.0, 1.0, 0.5
+    )
+
+
+def navigator(**keys: Any) -> Navigator:
+    return Navigator(Navigation(**{"kind": "gnss", **keys}), SEED)
+
+
+def position_error(navigation: Navigator, time_s: float) -> tuple[float, float]:
+    believed, true = navigation.believed(at(time_s)), at(time_s)
+    return believed.east_m - true.east_m, believed.north_m - true.north_m
+
+
+def test_perfect_navigation_is_the_truth_itself() -> None:
+    exact = navigator(kind="perfect")
+    for time_s in (0.0, 1.0, 1.0, 50.0):
+        state = at(time_s)
+        assert exact.believed(state) is state
+
+
+def test_the_same_seed_has_the_same_errors_and_is_not_used_up() -> None:
+    times = [0.0, 0.25, 1 / 3, 2.0, 30.0]
+    one, again = navigator(outages_s=[[1, 5]]), navigator(outages_s=[[1, 5]])
+    assert [one.believed(at(t)) for t in times] == [again.believed(at(t)) for t in times]
+    other = Navigator(Navigation(kind="gnss"), np.random.SeedSequence(6, spawn_key=(3,)))
+    assert other.believed(at(0.0)).east_m != navigator().believed(at(0.0)).east_m
+
+
+def test_twice_at_one_time_is_believed_the_same_and_time_does_not_go_back() -> None:
+    gnss = navigator()
+    gnss.believed(at(1.0))
+    assert gnss.believed(at(2.0)) == gnss.believed(at(2.0))
+    with pytest.raises(ValueError, match="goes back"):
+        gnss.believed(at(1.5))
+
+
+def test_attitude_load_and_time_stay_true() -> None:
+    believed, true = navigator().believed(at(3.0)), at(3.0)
+    for name in ("time_s", "roll_rad", "pitch_rad", "load_factor", "throttle"):
+        assert getattr(believed, name) == getattr(true, name)
+    for name in ("east_m", "north_m", "up_m", "heading_rad", "airspeed_mps", "velocity_up_mps"):
+        assert getattr(believed, name) != getattr(true, name)
+
+
+@pytest.mark.parametrize("interval_s", [1.0, 7.0])
+def test_errors_have_the_sizes_and_the_memory_that_were_asked_for(interval_s: float) -> None:
+    keys = {
+        "position_sigma_m": 4.0,
+        "position_correlation_s": 10.0,
+        "position_bias_m": [30.0, -20.0],
+        "velocity_sigma_mps": 0.2,
+        "heading_sigma_deg": 2.0,
+        "airspeed_sigma_mps": 0.5,
+        "altitude_sigma_m": 3.0,
+    }
+    gnss, count = navigator(**keys), 20_000
+    rows = []
+    for index in range(count):
+        true = at(index * interval_s)
+        rows.append(np.subtract(gnss.believed(true), true))
+    errors = np.array(rows)
+    # Neighbours are alike: some hundred independent heading and airspeed errors are left, so that their bound is wide.
+    east, north = errors[:, 1], errors[:, 2]
+    assert (east.mean(), north.mean()) == pytest.approx((30.0, -20.0), abs=0.6)
+    assert (east.std(), north.std()) == pytest.approx((4.0, 4.0), rel=0.06)
+    assert errors[:, 4:7].std(axis=0) == pytest.approx([0.2] * 3, rel=0.06)
+    assert errors[:, 3].std() == pytest.approx(3.0, rel=0.06)
+    assert np.degrees(errors[:, 7].std()) == pytest.approx(2.0, rel=0.2)
+    assert errors[:, 10].std() == pytest.approx(0.5, rel=0.3)
+    assert abs(np.corrcoef(east, north)[0, 1]) < 0.06
+    after = np.corrcoef(east[:-1], east[1:])[0, 1]
+    assert after == pytest.approx(math.exp(-interval_s / 10.0), abs=0.03)
+
+
+def test_one_long_interval_is_as_many_short_ones() -> None:
+    """The spread over many seeds of what an error becomes in 5 s, in one call and in fifty."""
+    changes: dict[int, list[float]] = {1: [], 50: []}
+    for steps, found in changes.items():
+        for seed in range(300):
+            gnss = Navigator(
+                Navigation(kind="gnss", position_sigma_m=4.0, position_correlation_s=10.0),
+                np.random.SeedSequence(seed),
+            )
+            before = position_error(gnss, 0.0)
+            for step in range(1, steps):
+                gnss.believed(at(5.0 * step / steps))
+            after = position_error(gnss, 5.0)
+            found.extend(np.subtract(after, before))
+    expected = 4.0 * math.sqrt(2.0 - 2.0 * math.exp(-0.5))
+    for found in changes.values():
+        assert float(np.std(found)) == pytest.approx(expected, rel=0.1)
+
+
+def test_in_an_outage_the_position_drifts_with_the_distance_and_then_jumps_back() -> None:
+    keys: dict[str, Any] = {"position_sigma_m": 0.5, "drift_share": 0.05, "outages_s": [[10, 70], [100, 130]]}
+    gnss = navigator(**keys)
+    last_fix = position_error(gnss, 9.0)
+    drifts = {t: np.subtract(position_error(gnss, t), last_fix) for t in (11.0, 12.5, 40.0, 69.5)}
+    for time_s, drift in drifts.items():
+        assert math.hypot(*drift) == pytest.approx(0.05 * SPEED_MPS * (time_s - 10.0))
+    ways = [drift / math.hypot(*drift) for drift in drifts.values()]
+    assert np.allclose(ways, ways[0])
+    back = position_error(gnss, 70.0)
+    assert math.hypot(*back) < 3.0 < 50.0 < math.dist(np.add(drifts[69.5], last_fix), back)
+    before = position_error(gnss, 100.0 - 1e-9)
+    second = np.subtract(position_error(gnss, 120.0), before)
+    assert math.hypot(*second) == pytest.approx(0.05 * SPEED_MPS * 20.0)
+    assert not np.allclose(second / math.hypot(*second), ways[0], atol=1e-3)
+
+
+def test_drift_is_what_the_believed_velocity_adds_up_to() -> None:
+    gone = navigator(velocity_sigma_mps=0.0, drift_share=0.02, outages_s=[[0, 100]])
+    start = gone.believed(at(0.0))
+    end = gone.believed(at(50.0))
+    assert end.east_m - start.east_m == pytest.approx(50.0 * end.velocity_east_mps)
+    assert end.north_m - start.north_m == pytest.approx(50.0 * end.velocity_north_mps)
+
+
+def test_dead_reckoning_knows_its_start_and_drifts_ever_after() -> None:
+    blind = navigator(kind="dead_reckoning")
+    assert position_error(blind, 0.0) == (0.0, 0.0)
+    assert math.hypot(*position_error(blind, 1000.0)) == pytest.approx(0.01 * SPEED_MPS * 1000.0)

@@ -1,0 +1,107 @@
+"""The navigation section: presets, what is refused, and the margin that a plan needs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from harness.files.strict_yaml import InputError
+from harness.scenario.navigation import PRESETS, Navigation, planning_margin_m
+from harness.scenario.scenario import dump_scenario, parse_scenario
+
+LEAST = """\
+schema: wayproof/scenario/1
+name: least
+area: {bounds_m: [0, 0, 40000, 40000]}
+mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
+"""
+
+
+@pytest.mark.parametrize("kind", PRESETS)
+def test_a_kind_fills_in_every_key(kind: str) -> None:
+    found = Navigation.model_validate({"kind": kind})
+    assert {name: getattr(found, name) for name in PRESETS[kind]} == PRESETS[kind]
+    assert set(PRESETS[kind]) == set(Navigation.model_fields) - {"kind"}
+
+
+def test_what_is_given_goes_before_the_preset_and_only_that_counts_as_given() -> None:
+    found = Navigation.model_validate(
+        {"kind": "gnss", "position_sigma_m": 2, "outages_s": [[5, 9], [10, 20]]}
+    )
+    assert (found.position_sigma_m, found.position_correlation_s) == (2.0, 1100.0)
+    assert found.outages_s == ((5.0, 9.0), (10.0, 20.0))
+    assert found.model_fields_set == {"kind", "position_sigma_m", "outages_s"}
+
+
+def test_gps_is_as_large_as_what_drives_it_makes_it() -> None:
+    """Beard and McLain drive the error by 0.21 m (0.40 m in altitude) once a second."""
+    grown = 1.0 / math.sqrt(1.0 - math.exp(-2.0 / 1100.0))
+    gnss = Navigation(kind="gnss")
+    assert gnss.position_sigma_m == pytest.approx(0.21 * grown, rel=0.06)
+    assert gnss.altitude_sigma_m == pytest.approx(0.40 * grown, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        (
+            "kind: gps",
+            "navigation.kind: is the text 'gps'; must be 'perfect', 'gnss', 'rtk' or 'dead_reckoning'",
+        ),
+        ("kind: gnss, position_sigma_m: -1", "navigation.position_sigma_m: is -1; must be at least 0"),
+        (
+            "kind: gnss, position_correlation_s: 0",
+            "navigation.position_correlation_s: is 0; must be at least 0.001",
+        ),
+        ("kind: gnss, drift_share: 1.5", "navigation.drift_share: is 1.5; must be at most 1"),
+        (
+            "kind: gnss, heading_sigma_deg: .inf",
+            "navigation.heading_sigma_deg: is inf; must be a finite number",
+        ),
+        (
+            "kind: gnss, outages_s: [[5, 5]]",
+            "navigation.outages_s[0]: is [5, 5]; must be [from, to] with from < to",
+        ),
+        (
+            "kind: gnss, outages_s: [[5, 9], [8, 20]]",
+            "navigation.outages_s[1]: is [8, 20]; must be [from, to] with from < to, after the one before ends at 9 s",
+        ),
+        ("position_sigma_m: 3", "navigation.position_sigma_m: is 3, but kind perfect has no error"),
+        ("outages_s: [[5, 9]]", "navigation.outages_s: is given, but kind perfect has no error"),
+        ("sigma_m: 3", "navigation.sigma_m: unknown key"),
+        ("kind: rtk", "navigation.kind: is rtk, which no flight takes yet"),
+    ],
+)
+def test_faults_name_line_key_and_what_would_be_right(keys: str, sentence: str) -> None:
+    with pytest.raises(InputError) as refused:
+        parse_scenario(f"{LEAST}navigation: {{{keys}}}\n")
+    assert str(refused.value).startswith(f"scenario:5: {sentence}")
+
+
+def test_perfect_is_the_default_and_comes_back_from_a_dump() -> None:
+    scenario = parse_scenario(LEAST)
+    assert scenario == parse_scenario(
+        LEAST + "navigation: {kind: perfect, position_sigma_m: 0, outages_s: []}\n"
+    )
+    assert parse_scenario(dump_scenario(scenario)) == scenario
+
+
+@pytest.mark.parametrize(
+    ("keys", "k", "margin_m"),
+    [
+        ({"kind": "perfect"}, 3.0, 0.0),
+        ({"kind": "gnss"}, 3.0, 14.1),
+        ({"kind": "gnss", "position_bias_m": [3, -4]}, 2.0, 9.4 + 5.0),
+        # The longest of the outages, and no longer than the flight: 0.03 x 25 m/s x 60 s, and x 40 s.
+        ({"kind": "gnss", "outages_s": [[0, 60], [70, 100]]}, 3.0, 14.1 + 45.0),
+        ({"kind": "gnss", "outages_s": [[960, 1060]]}, 3.0, 14.1 + 30.0),
+        ({"kind": "dead_reckoning"}, 3.0, 0.01 * 25.0 * 1000.0),
+    ],
+)
+def test_the_margin_is_sigmas_bias_and_the_longest_outage(
+    keys: dict[str, Any], k: float, margin_m: float
+) -> None:
+    navigation = Navigation.model_validate(keys)
+    assert planning_margin_m(navigation, 25.0, 1000.0, k) == pytest.approx(margin_m)
