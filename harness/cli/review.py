@@ -17,7 +17,8 @@ def view(
         list[Path],
         typer.Argument(
             metavar="RUN_DIR...",
-            help="Run folders, several are overlaid; or a campaign's folder, as a table of runs.",
+            help="Run folders, several are overlaid, and flight logs of other tools after them (.ulg, .bin, .igc, "
+            ".mcap, .csv); or a campaign's folder, as a table of runs.",
         ),
     ],
     web: Annotated[bool, flag("--web", "In a browser, served on 127.0.0.1, instead of a window.")] = False,

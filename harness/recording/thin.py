@@ -1,4 +1,4 @@
-"""A thin recording: track, plans and obstacles of a flight, for campaigns that keep thousands.
+"""Thin recordings: track, plans and obstacles of a flight, for campaigns that keep thousands; tracks of other tools.
 
 It has the entities and the layout of a whole recording (`harness.recording.log`), without scans, sensed edges, search
 and most of the time series' rows.
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import rerun as rr
 
+from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState
 from harness.flight.polylines import polylines
 from harness.flight.record import AcceptedPlan, FloatArray, Track
@@ -24,7 +25,11 @@ from harness.recording.layout import thin_blueprint
 from harness.recording.plans import log_plan_style
 from harness.recording.properties import RUN, VARIED, Value, send_properties
 from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, quaternions
-from harness.recording.strips import strips_2d
+from harness.recording.strips import strips_2d, strips_3d
+from harness.run_files.flight_logs import LogTrack, read_log
+from harness.run_files.plans_table import PlanRow
+from harness.run_files.run_folder import Run, load_run
+from harness.scenario.scenario import parse_scenario
 
 if TYPE_CHECKING:
     from harness.mapping.scan import RangeScan
@@ -153,3 +158,84 @@ class ThinLog:
             times,
             rr.Points2D.columns(positions=np.concatenate(points)).partition([len(each) for each in points]),
         )
+
+
+def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
+    """Writes the recording of a flight log beside a run's.
+
+    Its track, altitude error, speed and cross-track error against the plans of the run are drawn; both begin at t = 0.
+
+    Args:
+        log: the log (`harness.run_files.flight_logs`).
+        run_dir: the run's folder: its plane, its altitude, its plans.
+        out: the file to write.
+
+    Raises:
+        InputError: the log cannot be read.
+        RunFolderError: the folder holds no complete run.
+    """
+    run = load_run(run_dir)
+    scenario = parse_scenario(run.scenario_yaml, str(run_dir / "scenario.yaml"), ends_checked=False)
+    origin = scenario.area.origin
+    track = read_log(log, LocalPlane(origin.latitude_deg, origin.longitude_deg))
+    frame = look.Frame(
+        scenario.area.bounds_m, scenario.mission.altitude_m, scenario.planner.clearance_m or 0.0
+    )
+    rec = recording_stream(log.name)
+    file = RecordingFile(rec, out, thin_blueprint(frame))
+    try:
+        rec.send_recording_name(log.name)
+        rec.send_property(
+            look.FRAME,
+            rr.AnyValues(bounds_m=frame.bounds_m, altitude_m=frame.altitude_m, clearance_m=frame.clearance_m),
+        )
+        _send_track(rec, track, run, frame.altitude_m)
+    finally:
+        file.end()
+
+
+def _send_track(rec: rr.RecordingStream, track: LogTrack, run: Run, altitude_m: float) -> None:
+    position = np.column_stack((track.east_m, track.north_m, track.up_m))
+    times = [look.time_column(track.time_s)]
+    level = np.zeros(len(position))
+    turned = quaternions(track.course_deg, level, level)
+    flat = position * (1.0, 1.0, 0.0)
+    for top, place in ((look.WORLD, position), (look.PLAN, flat)):
+        moved = rr.Transform3D.columns(translation=place, quaternion=turned)
+        rec.send_columns(f"{top}/aircraft", times, moved)
+    pieces = [position[max(row - 1, 0) : row + 1] for row in range(len(position))]
+    rec.send_columns(
+        f"{look.PLAN}/{look.FLOWN}",
+        times,
+        rr.LineStrips2D.columns(strips=strips_2d([p[:, :2] for p in pieces])),
+    )
+    rec.send_columns(f"{look.WORLD}/{look.FLOWN}", times, rr.LineStrips3D.columns(strips=strips_3d(pieces)))
+    whole = rr.LineStrips2D(strips_2d([position[:, :2]]), colors=[look.WHOLE_TRACK])
+    rec.log(f"{look.PLAN}/{look.WHOLE}", whole, static=True)
+    series = {"altitude_error/flown": track.up_m - altitude_m, "speed/flown": track.groundspeed_mps}
+    cross = cross_track_m(np.column_stack((track.east_m, track.north_m)), run.plans)
+    if cross is not None:
+        series["cross_track/flown"] = cross
+    for name, values in series.items():
+        rec.send_columns(f"{look.SERIES}/{name}", times, rr.Scalars.columns(scalars=values))
+
+
+def cross_track_m(points_m: FloatArray, plans: tuple[PlanRow, ...]) -> FloatArray | None:
+    """(n,) distance of (n, 2) points from the nearest part of any plan, positive right of it; None without a plan."""
+    import shapely
+
+    if not plans:
+        return None
+    lines = [shapely.LineString(plan.path_m) for plan in plans if len(plan.path_m) > 1]
+    tree = shapely.STRtree(lines)
+    found = []
+    for place in shapely.points(points_m):
+        line = lines[int(tree.nearest(place))]
+        along = line.project(place)
+        near, ahead = line.interpolate(along), line.interpolate(along + 1.0)
+        if ahead.equals(near):
+            ahead, near = near, line.interpolate(line.length - 1.0)
+        east, north = ahead.x - near.x, ahead.y - near.y
+        right = (place.x - near.x) * north - (place.y - near.y) * east
+        found.append(float(np.copysign(line.distance(place), right)))
+    return np.array(found)

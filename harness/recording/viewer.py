@@ -22,8 +22,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import quote
 
+from harness.files.errors import RunFolderError
 from harness.recording.blueprint import TIMELINE
 from harness.recording.overlay import send_recording, write_overlay
+from harness.recording.thin import write_log_recording
 from harness.run_files.run_folder import RECORDING, recording_of
 
 LOCALHOST = "127.0.0.1"
@@ -53,18 +55,23 @@ def open_viewer(
     """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
 
     Args:
-        run_dirs: run folders; incomplete ones may be looked at too.
+        run_dirs: run folders, incomplete ones too; after the first also flight logs of other tools, which are shown in
+            its plane.
         web: in a browser instead of a window; served until interrupted.
         tell: is told the address for the browser.
 
     Raises:
         RunFolderError: a folder has no recording.
+        InputError: a flight log cannot be read.
         ViewerError: there is no screen, or the viewer does not start.
     """
-    recordings = [recording_of(folder) for folder in run_dirs]
+    for folder in run_dirs:
+        if not folder.is_file():
+            recording_of(folder)
     if not web:
         need_screen()
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
+        recordings = _recordings(run_dirs, Path(scratch))
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
@@ -82,6 +89,20 @@ def open_viewer(
         with _viewer(command, Path(scratch)) as viewer:
             if viewer.wait() != 0:
                 raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_words(scratch)}")
+
+
+def _recordings(run_dirs: Sequence[Path], scratch: Path) -> list[Path]:
+    """The recordings of runs, and those made of flight logs."""
+    recordings = []
+    for number, each in enumerate(run_dirs):
+        if not each.is_file():
+            recordings.append(recording_of(each))
+            continue
+        if run_dirs[0].is_file():
+            raise RunFolderError(f"{each} is a flight log; name the run beside which it is to be shown first")
+        recordings.append(scratch / f"log-{number}.rrd")
+        write_log_recording(each, run_dirs[0], recordings[-1])
+    return recordings
 
 
 def need_screen() -> None:

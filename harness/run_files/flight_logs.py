@@ -1,0 +1,223 @@
+"""Flight logs of other tools as tracks in the plane of a run: ULog, DataFlash, IGC, MCAP, CSV."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from aircraft.frames import LocalPlane
+from harness.files.input_file import InputError
+from harness.flight.record import FloatArray
+
+NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
+MAX_BYTES: Final = 1_000_000_000
+LEAST_ROWS: Final = 2
+
+
+@dataclass(frozen=True, eq=False)
+class LogTrack:
+    """A flown track out of a log. All arrays are equally long; time begins with 0.
+
+    Attributes:
+        time_s: (n,) since the first row.
+        east_m: (n,) in the plane of the run beside which it is shown.
+        north_m: (n,).
+        up_m: (n,) altitude as the log has it, above mean sea level where it says so.
+    """
+
+    time_s: FloatArray
+    east_m: FloatArray
+    north_m: FloatArray
+    up_m: FloatArray
+
+    @property
+    def groundspeed_mps(self) -> FloatArray:
+        """(n,) from the positions."""
+        if len(self.time_s) < LEAST_ROWS:
+            return np.zeros(len(self.time_s))
+        speed: FloatArray = np.hypot(
+            np.gradient(self.east_m, self.time_s), np.gradient(self.north_m, self.time_s)
+        )
+        return speed
+
+    @property
+    def course_deg(self) -> FloatArray:
+        """(n,) clockwise from north, from the positions."""
+        course: FloatArray = (
+            np.degrees(np.arctan2(np.gradient(self.east_m), np.gradient(self.north_m))) % 360.0
+        )
+        return course
+
+
+Rows = list[tuple[float, float, float, float]]
+"""Time in s, latitude and longitude in degrees, altitude in m."""
+
+
+def read_log(path: Path, plane: LocalPlane) -> LogTrack:
+    """Reads a flight log; the name's ending says which kind it is.
+
+    Args:
+        path: .ulg (PX4), .bin (ArduPilot DataFlash), .igc, .mcap (positions as foxglove.LocationFix), .csv (time_s, and
+            x_m,y_m or latitude_deg,longitude_deg, and altitude_m where there is one).
+        plane: positions in degrees are put into it.
+
+    Raises:
+        InputError: the file is none of these, cannot be read, or holds no track; or a package is missing.
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(f"{path}: is no flight log that can be shown; must end in {', '.join(READERS)}")
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(
+            f"{path}: has {path.stat().st_size / 1e9:.1f} GB; at most {MAX_BYTES / 1e9:g} GB are read"
+        )
+    try:
+        rows = reader(path)
+    except ImportError as error:
+        raise InputError(f"{path}: {NEEDS_LOGS} ({error.name})") from error
+    except InputError:
+        raise
+    except Exception as error:  # whatever a library says of a damaged file
+        text = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InputError(f"{path}: cannot be read as {path.suffix} ({text})") from error
+    return _track(rows, plane, path)
+
+
+def _track(rows: Rows | LogTrack, plane: LocalPlane, path: Path) -> LogTrack:
+    if isinstance(rows, LogTrack):
+        found = rows
+    else:
+        finite = [row for row in rows if all(map(math.isfinite, row)) and (row[1], row[2]) != (0.0, 0.0)]
+        places = np.array([plane.plane(row[1], row[2]) for row in finite]).reshape(-1, 2)
+        times, heights = np.array([row[0] for row in finite]), np.array([row[3] for row in finite])
+        found = LogTrack(times, places[:, 0], places[:, 1], heights)
+    order = np.unique(found.time_s, return_index=True)[1]
+    if len(order) < LEAST_ROWS:
+        raise InputError(f"{path}: has {len(order)} rows with a position; a track has at least {LEAST_ROWS}")
+    time_s = found.time_s[order]
+    return LogTrack(time_s - time_s[0], found.east_m[order], found.north_m[order], found.up_m[order])
+
+
+def _ulog(path: Path) -> Rows:
+    """PX4: the estimator's global position, https://docs.px4.io (ULog file format)."""
+    from pyulog import ULog
+
+    with path.open("rb") as file:
+        log = ULog(file, ["vehicle_global_position"])
+    if not log.data_list:
+        raise InputError(f"{path}: has no topic vehicle_global_position")
+    data = log.data_list[0].data
+    degrees = 1e-7 if np.issubdtype(np.asarray(data["lat"]).dtype, np.integer) else 1.0
+    return list(
+        zip(
+            (np.asarray(data["timestamp"]) / 1e6).tolist(),
+            (np.asarray(data["lat"]) * degrees).tolist(),
+            (np.asarray(data["lon"]) * degrees).tolist(),
+            np.asarray(data["alt"], dtype=np.float64).tolist(),
+            strict=True,
+        )
+    )
+
+
+def _dataflash(path: Path) -> Rows:
+    """ArduPilot: the estimator's position (POS), or the receiver's (GPS) where there is none."""
+    from pymavlink.DFReader import DFReader_binary
+
+    found: dict[str, Rows] = {"POS": [], "GPS": []}
+    log: Any = DFReader_binary(str(path), zero_time_base=True)
+    try:
+        while (message := log.recv_match(type=list(found))) is not None:
+            row = (message._timestamp, message.Lat, message.Lng, message.Alt)
+            found[message.get_type()].append(tuple(map(float, row)))  # type: ignore[arg-type]
+    finally:
+        log.data_map.close()
+        log.filehandle.close()
+    return found["POS"] or found["GPS"]
+
+
+def _igc(path: Path) -> Rows:
+    """Gliders: fixes with the receiver's altitude, or the pressure altitude where that is 0."""
+    from aerofiles.igc import Reader
+
+    with path.open(encoding="latin-1") as file:
+        parsed = Reader(skip_duplicates=True).read(file)
+    rows: Rows = []
+    days = 0.0
+    for fix in parsed["fix_records"][1]:
+        clock = fix["time"]
+        time_s = days + 3600.0 * clock.hour + 60.0 * clock.minute + clock.second
+        if rows and time_s < rows[-1][0] - 43_200.0:
+            days += 86_400.0
+            time_s += 86_400.0
+        rows.append((time_s, fix["lat"], fix["lon"], float(fix["gps_alt"] or fix["pressure_alt"] or 0.0)))
+    return rows
+
+
+def _mcap(path: Path) -> Rows:
+    """Messages of the schema foxglove.LocationFix, as protobuf or JSON."""
+    import json
+
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    rows: Rows = []
+    factory = DecoderFactory()
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if schema is None or schema.name != "foxglove.LocationFix":
+                continue
+            decode = factory.decoder_for(channel.message_encoding, schema)
+            if decode is not None:
+                fix = decode(message.data)
+                place = (fix.latitude, fix.longitude, fix.altitude)
+            else:
+                plain = json.loads(message.data)
+                place = (plain["latitude"], plain["longitude"], plain.get("altitude", 0.0))
+            rows.append((message.log_time / 1e9, *map(float, place)))  # type: ignore[arg-type]
+    return rows
+
+
+def _csv(path: Path) -> Rows | LogTrack:
+    """A table with a header: time_s, a position, and altitude_m where there is one."""
+    with path.open(encoding="utf-8", newline="") as file:
+        table = list(csv.DictReader(file))
+    names = set(table[0]) if table else set()
+    local = {"x_m", "y_m"} <= names
+    if "time_s" not in names or not (local or {"latitude_deg", "longitude_deg"} <= names):
+        raise InputError(f"{path}:1: must have the columns time_s and x_m,y_m or latitude_deg,longitude_deg")
+    first, second = ("x_m", "y_m") if local else ("latitude_deg", "longitude_deg")
+    rows: Rows = []
+    for line, row in enumerate(table, start=2):
+        try:
+            rows.append(
+                (
+                    float(row["time_s"]),
+                    float(row[first]),
+                    float(row[second]),
+                    float(row.get("altitude_m") or 0),
+                )
+            )
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{path}:{line}: has no number in time_s, {first} or {second}") from error
+    if not local:
+        return rows
+    columns = np.array(rows, dtype=np.float64).T
+    return LogTrack(*columns)
+
+
+READERS: Final[dict[str, Callable[[Path], Rows | LogTrack]]] = {
+    ".ulg": _ulog,
+    ".bin": _dataflash,
+    ".igc": _igc,
+    ".mcap": _mcap,
+    ".csv": _csv,
+}
+"""Reader by the ending of a file's name."""
