@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from aircraft.airframes import AircraftError
+    from aircraft.guidance.interface import GuidanceLimits, GuidanceOutput
+    from aircraft.interface import AircraftState, Route
     from harness.api.campaigns import compare, load_campaign, sweep
     from harness.api.flights import fly, load_run
     from harness.api.metrics import Metrics
@@ -26,9 +28,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AircraftError",
+    "AircraftState",
     "CampaignResult",
     "ComparisonResult",
     "FlightResult",
+    "GuidanceLimits",
+    "GuidanceOutput",
     "InputError",
     "MapView",
     "Metrics",
@@ -40,6 +45,7 @@ __all__ = [
     "Planner",
     "PlannerError",
     "PlannerKind",
+    "Route",
     "Scenario",
     "WriteError",
     "check",
@@ -54,6 +60,8 @@ __all__ = [
 
 _HOMES = {
     "aircraft.airframes": ("AircraftError",),
+    "aircraft.guidance.interface": ("GuidanceLimits", "GuidanceOutput"),
+    "aircraft.interface": ("AircraftState", "Route"),
     "harness.api.campaigns": ("compare", "load_campaign", "sweep"),
     "harness.api.flights": ("fly", "load_run"),
     "harness.api.metrics": ("Metrics",),

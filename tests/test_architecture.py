@@ -143,7 +143,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("files",),
     ),
     "planner": (
-        ("contract", "given"),
+        ("contract",),
         ("registry",),
         ("baselines",),
         ("rolling_window",),

@@ -203,7 +203,7 @@ def test_ones_own_planner_in_a_file_is_flown_on_the_command_line_and_in_python(t
     assert (ran.returncode, ran.stderr) == (0, "")
     assert ran.stdout.splitlines()[0] == f"collision {first['reason']}"
     (again,) = load_run(tmp_path / "runs" / "windy").manifest["command"]
-    assert again.startswith("wayproof.fly('my_world', planner='rolling_window')")
+    assert again.startswith("wayproof.fly('my_world', planner='rolling_window', ")
 
 
 @pytest.mark.parametrize("name", READMES)

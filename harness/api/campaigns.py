@@ -43,7 +43,7 @@ def compare(
     import pyarrow as pa
 
     from harness.comparison.comparison import fly_and_compare
-    from planner.given import registered
+    from harness.scenario.given import registered
 
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in given]

@@ -7,13 +7,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from aircraft.guidance import given as given_guidance
 from harness.api.errors import as_input_errors
 from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
 from harness.files.input_file import InputError
+from harness.scenario.given import GUIDANCE, PLANNER, Part, registered
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
-from planner.given import registered
 
 if TYPE_CHECKING:
     from harness.flight.closed_loop import Progress
@@ -52,7 +51,10 @@ def fly(
         PlannerError: the planner cannot be made.
         WriteError: the run could not be written to its end.
     """
-    flown = _with_guidance(_with_planner(_scenario(scenario), planner), guidance)
+    given = {"planner.kind": (planner, PLANNER), "guidance.kind": (guidance, GUIDANCE)}
+    kinds = {key: _name_of(*each) for key, each in given.items() if each[0] is not None}
+    loaded = _scenario(scenario)
+    flown = loaded.with_(kinds) if kinds else loaded
     return _flown(flown, Path(out) if out is not None else None, recording, progress)
 
 
@@ -91,26 +93,11 @@ def _scenario(given: Scenario | str | Path) -> Scenario:
     return given if isinstance(given, Scenario) else load_scenario(given)
 
 
-def _with_planner(scenario: Scenario, planner: object) -> Scenario:
-    """The scenario flown by a planner, which is known by its name from here on."""
-    if planner is None:
-        return scenario
+def _name_of(given: object, part: Part) -> str:
     try:
-        kind = registered(planner)
+        return registered(given, part)
     except ValueError as error:
-        raise InputError(f"wayproof: planner: {error}") from error
-    return scenario if kind == scenario.planner.kind else scenario.with_({"planner.kind": kind})
-
-
-def _with_guidance(scenario: Scenario, guidance: object) -> Scenario:
-    """The scenario flown under a guidance law, which is known by its name from here on."""
-    if guidance is None:
-        return scenario
-    try:
-        kind = given_guidance.registered(guidance)
-    except ValueError as error:
-        raise InputError(f"wayproof: guidance: {error}") from error
-    return scenario if kind == scenario.guidance.kind else scenario.with_({"guidance.kind": kind})
+        raise InputError(f"wayproof: {part.noun.partition(' ')[2]}: {error}") from error
 
 
 def _flown(scenario: Scenario, out: Path | None, recording: bool, progress: Progress | None) -> FlightResult:
@@ -120,9 +107,9 @@ def _flown(scenario: Scenario, out: Path | None, recording: bool, progress: Prog
         return _in_memory(scenario, progress)
     scratch = TemporaryDirectory(prefix="wayproof-run-") if out is None else None
     folder = Path(scratch.name) if scratch else Path(out or "")
-    command = in_python(f"wayproof.fly({scenario.name!r}, planner={scenario.planner.kind!r})")
+    named = f"{scenario.name!r}, planner={scenario.planner.kind!r}, guidance={scenario.guidance.kind!r}"
     with as_input_errors():
-        fly_to_folder(scenario, folder, recording, progress, command=command)
+        fly_to_folder(scenario, folder, recording, progress, command=in_python(f"wayproof.fly({named})"))
     read: dict[str, Any] = dict(vars(load_run(folder)))
     return FlightResult(**{**read, "scenario": scenario, "_scratch": scratch})
 

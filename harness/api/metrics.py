@@ -62,12 +62,20 @@ class PathFigures(Figures):
         bending_energy_1pm: integral of the squared curvature over the length, 1/m.
         max_curvature_1pm: largest absolute curvature, 1/m.
         max_curvature_rate_1pm2: largest change of curvature per length, 1/m^2.
+        angle_over_length_radpm: total absolute change of direction over the length.
+        bending_energy_normalised: bending energy times the length.
+        max_curvature_normalised: largest absolute curvature times the length.
+        max_curvature_rate_normalised: largest rate of curvature times the length squared.
     """
 
     heading_change_deg: float | None = None
     bending_energy_1pm: float | None = None
     max_curvature_1pm: float | None = None
     max_curvature_rate_1pm2: float | None = None
+    angle_over_length_radpm: float | None = None
+    bending_energy_normalised: float | None = None
+    max_curvature_normalised: float | None = None
+    max_curvature_rate_normalised: float | None = None
 
 
 class PlannedAndFlown(Figures):
@@ -90,6 +98,11 @@ class LegVerdict(Figures):
         end_s: simulated time of its last row.
         max_cross_track_m: largest absolute cross-track error.
         threshold_m: what it may be.
+        max_altitude_error_m: largest absolute altitude error.
+        max_airspeed_error_mps: largest absolute error of the airspeed, averaged; None where it is not judged.
+        max_load_factor: largest load factor, averaged.
+        corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
+        max_deviation_m: largest distance from the path as given; None where a planner made the path.
         trackable: whether it stayed within all that it may be.
         cause: why not; None where trackable.
     """
@@ -98,6 +111,11 @@ class LegVerdict(Figures):
     end_s: float
     max_cross_track_m: float | None = None
     threshold_m: float | None = None
+    max_altitude_error_m: float | None = None
+    max_airspeed_error_mps: float | None = None
+    max_load_factor: float | None = None
+    corner_cut_m: float | None = None
+    max_deviation_m: float | None = None
     trackable: bool
     cause: str | None = None
 
@@ -146,6 +164,7 @@ class Metrics(Figures):
         planned_length_m: length of those parts of the plans that were in effect.
         flight_time_s: simulated time from start to end.
         min_clearance_m: least true distance to an obstacle edge; None without obstacles.
+        min_altitude_above_ground_m: least height above the true ground; None where that is not known.
         clearance_violation_s: time below the wanted clearance.
         cross_track_m: distance from the plan being flown.
         altitude_error_m: distance from the mission's altitude.
@@ -172,6 +191,7 @@ class Metrics(Figures):
     planned_length_m: float
     flight_time_s: float
     min_clearance_m: float | None = None
+    min_altitude_above_ground_m: float | None = None
     clearance_violation_s: float
     cross_track_m: Spread
     altitude_error_m: Spread

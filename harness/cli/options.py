@@ -13,6 +13,7 @@ from harness.cli.standard_output import say
 from harness.files.wording import printable
 
 if TYPE_CHECKING:
+    from harness.scenario.given import Part
     from harness.scenario.scenario import Scenario
 
 FAILED: Final = 1
@@ -96,7 +97,10 @@ AircraftOption = Annotated[
     str | None, typer.Option(metavar="NAME", help="Replaces aircraft.model.", autocompletion=aircraft)
 ]
 GuidanceOption = Annotated[
-    str | None, typer.Option(metavar="KIND", help="Replaces guidance.kind.", autocompletion=laws)
+    str | None,
+    typer.Option(
+        metavar="KIND", help="Replaces guidance.kind; FILE.py:NAME or MODULE:NAME too.", autocompletion=laws
+    ),
 ]
 SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]
 SettingsOption = Annotated[
@@ -127,19 +131,32 @@ def chosen(
         "planner.kind": planner and planner_kind(planner),
         "aircraft.model": aircraft,
         "seed": seed,
-        "guidance.kind": guidance,
+        "guidance.kind": guidance and law_kind(guidance),
     }
     return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
 
 
 def planner_kind(text: str) -> str:
     """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
-    from planner.given import registered
+    from harness.scenario.given import PLANNER
+
+    return _kind(text, PLANNER, "--planner")
+
+
+def law_kind(text: str) -> str:
+    """The kind that --guidance means, likewise."""
+    from harness.scenario.given import GUIDANCE
+
+    return _kind(text, GUIDANCE, "--guidance")
+
+
+def _kind(text: str, part: Part, option: str) -> str:
+    from harness.scenario.given import registered
 
     try:
-        return registered(text)
+        return registered(text, part)
     except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--planner") from error
+        raise typer.BadParameter(str(error), param_hint=option) from error
 
 
 def setting(text: str) -> tuple[str, str]:

@@ -133,8 +133,8 @@ def _fly(job: Job, theirs: Connection) -> None:
 
 def _write(job: Job, theirs: Connection) -> None:
     from harness.run.scenario_flight import fly_to_folder, kinematic_loop, make_loop
+    from harness.scenario.given import registered_source
     from planner.compiled import own_this_process
-    from planner.given import registered_source
 
     own_this_process()
     for source in job.sources:

@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeVar, get_type_hints
 from pydantic import ValidationError, create_model
 
 from harness.files.crash import sentence
+from harness.scenario.given import is_source
 from harness.scenario.sections import Section, key
 from harness.scenario.validation import KeyFault, first_fault, unknown_key
 
@@ -55,6 +56,12 @@ def named_kind(section: str, spec: OwnKeys, kinds: Mapping[str, AnyKind]) -> Any
     Raises:
         KeyFault: there is none of that name.
     """
+    if spec.kind not in kinds and is_source(spec.kind):
+        name = spec.kind[:80]
+        raise KeyFault(
+            (section, "kind"),
+            f"is {name!r}, which no file may name: code is only run for --{section} {name}, or in Python",
+        )
     if spec.kind not in kinds:
         raise KeyFault((section, "kind"), f"is {spec.kind[:40]!r}; must be one of {', '.join(kinds)}")
     return kinds[spec.kind]

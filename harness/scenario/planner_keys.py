@@ -9,9 +9,7 @@ from harness.files.crash import PlannerError, sentence
 from harness.files.printing import PrintingAside
 from harness.scenario import own_keys
 from harness.scenario.sections import PlannerSpec
-from harness.scenario.validation import KeyFault
 from planner.compiled import compile_all
-from planner.given import is_source
 from planner.registry import installed_kinds, planner_kinds
 
 if TYPE_CHECKING:
@@ -25,14 +23,7 @@ def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
         KeyFault: there is no such planner or key, or the keys contradict each other or the mission.
     """
     with PrintingAside():
-        kinds = planner_kinds()
-        if spec.kind not in kinds and is_source(spec.kind):
-            name = spec.kind[:80]
-            raise KeyFault(
-                ("planner", "kind"),
-                f"is {name!r}, which no file may name: code is only run for --planner {name}, or in Python",
-            )
-        kind = own_keys.named_kind("planner", spec, kinds)
+        kind = own_keys.named_kind("planner", spec, planner_kinds())
         config = own_keys.resolved_config("planner", spec, kind, PlannerSpec.model_fields, mission)
         return spec.model_copy(update={each.name: getattr(config, each.name) for each in fields(kind.config)})
 

@@ -2,9 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from planner import registry
+import aircraft.guidance.registry
+import planner.registry
 
 
 @pytest.fixture(autouse=True)
 def nothing_stays_registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_registered", {})
+    monkeypatch.setattr(planner.registry, "_registered", {})
+    monkeypatch.setattr(aircraft.guidance.registry, "_registered", {})

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from aircraft.guidance.interface import GuidanceLimits
+from aircraft.guidance.preview import PreviewLaw
+from harness.scenario.given import GUIDANCE, NoKeys, kind_of, registered
 from planner import registry
-from planner.given import NoKeys, kind_of, registered
 from planner.interface import Mission, Plan, PlanRequest, PlanStatus
 from planner.registry import BUILT_IN, PlannerKind, planner_kinds, register
 
@@ -97,6 +99,16 @@ def test_what_cannot_be_imported_is_told_in_a_sentence(source: str, said: str, t
     (tmp_path / "leaves.py").write_text("import sys\nsys.exit(0)\n")
     with pytest.raises(ValueError, match=said):
         registered(source.format(folder=tmp_path))
+
+
+def test_a_guidance_law_is_given_in_the_same_ways() -> None:
+    def law(limits: GuidanceLimits) -> PreviewLaw:
+        raise AssertionError(limits)
+
+    assert kind_of(law, GUIDANCE).kind.endswith(":test_a_guidance_law_is_given_in_the_same_ways.law")
+    assert registered("preview", GUIDANCE) == "preview"
+    with pytest.raises(ValueError, match="update\\(state\\) and follow"):
+        kind_of(3, GUIDANCE)
 
 
 def test_what_needs_more_than_the_mission_is_refused() -> None:

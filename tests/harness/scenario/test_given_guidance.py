@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from aircraft.airframes import airframe
 from aircraft.guidance import registry
-from aircraft.guidance.given import kind_of, registered
 from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits, GuidanceOutput
-from aircraft.guidance.registry import guidance_kinds
+from aircraft.guidance.registry import GuidanceKind, guidance_kinds
 from aircraft.interface import AircraftState, Route
 from harness.api.flights import fly
 from harness.flight.record import Outcome
+from harness.scenario.given import GUIDANCE
+from harness.scenario.given import kind_of as kind_of_part
+from harness.scenario.given import registered as registered_part
 from harness.scenario.scenario import load_scenario
 
 LIMITS = airframe("aerosonde").guidance_limits()
+kind_of, registered = partial(kind_of_part, part=GUIDANCE), partial(registered_part, part=GUIDANCE)
 
 
 @pytest.fixture(autouse=True)
@@ -47,6 +51,7 @@ class Failing:
 @pytest.mark.parametrize("given", [preview, Failing, Failing()])
 def test_functions_classes_and_objects_make_a_law(given: object) -> None:
     kind = kind_of(given)
+    assert isinstance(kind, GuidanceKind)
     assert callable(kind.law(LIMITS).update)
     assert registered(given) == registered(kind) == kind.kind
     assert kind.kind in guidance_kinds()

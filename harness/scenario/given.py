@@ -1,0 +1,232 @@
+"""Planners and guidance laws that are handed over in Python or by the name of a source file, not by an entry point.
+
+What may be given: a kind (`PlannerKind`, `GuidanceKind`); a class or function that makes the part for one flight, from
+what it may know (a planner from the mission, a law from the limits of the aircraft) or from nothing; or the part
+itself, an object with the part's methods.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import aircraft.guidance.registry
+import planner.registry
+from aircraft.guidance.registry import GuidanceKind
+from planner.registry import PlannerKind
+
+Kind = PlannerKind | GuidanceKind
+
+
+class Part(NamedTuple):
+    """A part of the loop that may be given.
+
+    Attributes:
+        noun: what it is called, with its article.
+        methods: what an object has to have, the one that tells it first.
+        told: name of what a factory may take.
+        kind: type of its kinds.
+        kinds: those that this process knows, by name.
+        register: makes one more known.
+    """
+
+    noun: str
+    methods: tuple[str, ...]
+    told: str
+    kind: Callable[..., Any]
+    kinds: Callable[[], Mapping[str, Any]]
+    register: Callable[[Any], None]
+
+
+PLANNER = Part(
+    "a planner",
+    ("plan(request)",),
+    "mission",
+    PlannerKind,
+    planner.registry.planner_kinds,
+    planner.registry.register,
+)
+GUIDANCE = Part(
+    "a guidance law",
+    ("update(state)", "follow(route, arc_length_m)"),
+    "limits",
+    GuidanceKind,
+    aircraft.guidance.registry.guidance_kinds,
+    aircraft.guidance.registry.register,
+)
+
+
+@dataclass(frozen=True)
+class NoKeys:
+    """The own keys of a part that has none."""
+
+    def resolved(self, told: object) -> NoKeys:
+        """Itself."""
+        return self
+
+
+def is_source(name: str) -> bool:
+    """Whether a name is FILE.py:NAME or MODULE:NAME, and not a kind."""
+    return ":" in name
+
+
+def registered(given: object, part: Part = PLANNER) -> str:
+    """Registers what was given, unless it has been; returns the name by which scenarios of this process know it.
+
+    Args:
+        given: what the module says; or a kind, or FILE.py:NAME or MODULE:NAME, as text.
+        part: which part it is.
+
+    Raises:
+        ValueError: it is none of these, or what it names cannot be imported; one sentence.
+    """
+    if isinstance(given, str):
+        return registered_source(given, part) if is_source(given) else given
+    try:
+        kind = _same_kind_of(given, part)
+    except TypeError:  # it cannot be hashed
+        kind = kind_of(given, part)
+    if part.kinds().get(kind.kind) != kind:
+        part.register(kind)
+    return kind.kind
+
+
+def registered_source(source: str, part: Part = PLANNER) -> str:
+    """Imports what FILE.py:NAME or MODULE:NAME names and registers it under that name, without the file's folder.
+
+    Raises:
+        ValueError: there is no such file, module or object, it cannot be imported, or it is no such part.
+    """
+    place, _, name = source.rpartition(":")
+    module = _file(Path(place)) if place.endswith(".py") else _module(place, source)
+    if not name.isidentifier() or not hasattr(module, name):
+        there = [each for each, value in vars(module).items() if _is_own(value, module)]
+        raise ValueError(
+            f"{place} has no {name or 'name'}; it has {', '.join(there) or 'no class or function'}"
+        )
+    kind = replace(kind_of(getattr(module, name), part), kind=f"{Path(place).name}:{name}")
+    part.register(kind)
+    return kind.kind
+
+
+@functools.lru_cache(maxsize=64)
+def _same_kind_of(given: object, part: Part) -> Kind:
+    """The same kind for the same object: what was measured of it holds on."""
+    return kind_of(given, part)
+
+
+def kind_of(given: object, part: Part = PLANNER) -> Kind:
+    """What was given, as the registry of its part has it.
+
+    Raises:
+        ValueError: it is not what this module says.
+    """
+    kind: Kind
+    if isinstance(given, PlannerKind | GuidanceKind) and type(given) is part.kind:
+        return given
+    if isinstance(given, type) or (callable(given) and not _is_part(given, part)):
+        kind = part.kind(_name(given), _summary(given, part), NoKeys, _maker(given, part))
+        return kind
+    if _is_part(given, part):
+        kind = part.kind(_name(type(given)), _summary(given, part), NoKeys, lambda _keys, _told: given)
+        return kind
+    raise ValueError(
+        f"{part.noun} must be a kind, a class, a function or an object with the method "
+        f"{' and '.join(part.methods)}; this is a {type(given).__name__}"
+    )
+
+
+def _is_part(given: object, part: Part) -> bool:
+    return all(callable(getattr(given, each.partition("(")[0], None)) for each in part.methods)
+
+
+def _name(given: Any) -> str:
+    name: str = getattr(given, "__qualname__", type(given).__qualname__).replace("<locals>.", "")
+    module = getattr(given, "__module__", "__main__")
+    return name if module == "__main__" else f"{module}:{name}"
+
+
+def _summary(given: object, part: Part) -> str:
+    return (inspect.getdoc(given) or f"{part.noun} given in Python").splitlines()[0]
+
+
+def _maker(given: Callable[..., Any], part: Part) -> Callable[[Any, Any], Any]:
+    """Calls what was given with what it may know, where it takes that; else with nothing."""
+    try:
+        parameters = inspect.signature(given).parameters
+    except (TypeError, ValueError):  # made in C: it does not say
+        parameters = inspect.signature(lambda told: told).parameters
+    needed = [
+        each.name
+        for each in parameters.values()
+        if each.default is each.empty and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
+    ]
+    if len(needed) > 1:
+        raise ValueError(
+            f"{_name(given)} needs {', '.join(needed)}; must need the {part.told} alone, or nothing"
+        )
+
+    def make(_keys: Any, told: Any) -> Any:
+        keys = {part.told: told} if part.told in parameters and not needed else {}
+        made = given(told) if needed else given(**keys)
+        if not _is_part(made, part):
+            raise TypeError(
+                f"{_name(given)} makes a {type(made).__name__}, which has no method {' and '.join(part.methods)}"
+            )
+        return made
+
+    return make
+
+
+def _file(path: Path) -> Any:
+    """The module of a source file; what lies beside the file can be imported by it."""
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; give FILE.py:NAME")
+    # A name of its own: the file may be called planner.py.
+    name = f"given_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path.resolve())
+    assert spec is not None
+    assert spec.loader is not None
+    folder = str(path.resolve().parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        with redirect_stdout(sys.stderr):
+            spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
+        del sys.modules[name]
+        raise ValueError(_not_imported(str(path), error)) from error
+    return module
+
+
+def _module(name: str, source: str) -> Any:
+    try:
+        with redirect_stdout(sys.stderr):
+            return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name != name.partition(".")[0] and error.name != name:
+            raise ValueError(_not_imported(name, error)) from error
+        raise ValueError(f"{source}: there is no module {name}; give FILE.py:NAME or MODULE:NAME") from error
+    except (Exception, SystemExit) as error:
+        raise ValueError(_not_imported(name, error)) from error
+
+
+def _not_imported(what: str, error: BaseException) -> str:
+    return f"{what} cannot be imported: {type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _is_own(value: object, module: Any) -> bool:
+    """Whether a module's class or function was made there."""
+    return isinstance(value, PlannerKind | GuidanceKind) or (
+        callable(value) and getattr(value, "__module__", None) == module.__name__
+    )
