@@ -538,3 +538,23 @@ def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
 def test_a_wrong_key_of_a_changed_scenario_is_told(keys: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError, match=f"^{re.escape(said)}"):
         load_scenario("aerosonde_forest").with_(keys)
+
+
+def test_obstacles_from_a_file_are_cut_anew_at_another_altitude(tmp_path: Path) -> None:
+    corners = [[8.05, 47.05], [8.06, 47.05], [8.06, 47.06], [8.05, 47.06], [8.05, 47.05]]
+    tower = {
+        "type": "Feature",
+        "properties": {"building": "yes", "height": 100},
+        "geometry": {"type": "Polygon", "coordinates": [corners]},
+    }
+    (tmp_path / "town.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [tower]}))
+    (tmp_path / "town.yaml").write_text(
+        "{schema: wayproof/scenario/1, name: town, area: {bounds_m: [0, 0, 9000, 9000],"
+        " origin: {latitude_deg: 47, longitude_deg: 8}}, obstacles: [file: {path: town.geojson}],"
+        " mission: {start_m: [500, 500], goal_m: [8500, 1500], altitude_m: 80}}"
+    )
+    low = load_scenario(tmp_path / "town.yaml")
+    assert len(low.obstacles) == 1
+    high = low.with_({"mission.altitude_m": 900})
+    assert (len(high.obstacles), high.mission.altitude_m) == (0, 900)
+    assert high.with_({"mission.altitude_m": 80}) == low
