@@ -160,6 +160,10 @@ def _flown(
             steps -= steps // 2
         model.advance(steps)
         at += 1
+    if state.time_s == 0.0:  # a track begins before it ends
+        log.add(state, *log.commanded, plans.index)
+        model.advance(steps)
+        state = model.state()
     log.add(state, *log.commanded, plans.index)
     outcome, reason = verdict
     reason += plans.last_word(outcome)

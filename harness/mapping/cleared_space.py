@@ -1,6 +1,6 @@
 """What a scan looked through: places, and cells of a grid. Compiled: see `planner.compiled`.
 
-Most places that are asked were seen to be edges, or are hidden by them: what meets the ray towards one, or a
+Most places that are asked were seen to be edges, or are hidden by them: what meets the beam towards one, or a
 neighbour of that, is told by a bearing that need not be exact.
 """
 
@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from planner.compiled import BOOL, BOOLS_OUT, COUNT, FLOAT, FLOATS, PLACES, compiled
 from planner.interface import BoolArray, ComplexArray, FloatArray
 
-CELLS, CELLS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]"
+CELLS, CELLS_OUT, LOOKS_OUT = "Array(boolean, 2, 'A', readonly=True)", "boolean[:, :]", "uint8[:, :]"
 """Parts of grids."""
 NEARLY_RAD = 1e-5
 """Bearings by which `nearly_towards` finds a ray err by no more."""
@@ -47,9 +50,39 @@ def nearly_towards(east: float, north: float, start_rad: float, spacing_rad: flo
     return int(clockwise / spacing_rad + 0.5)
 
 
-@compiled(CELLS_OUT, CELLS, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT)
+@compiled(FLOAT, FLOAT, FLOAT, COUNT)
+def first_over(bearing_rad: float, spacing_rad: float, beam_rad: float, aside: int) -> int:
+    """The last beam that begins before a bearing, counted from the first; where beams do not touch it may end before.
+
+    Args:
+        bearing_rad: clockwise from the axis of the first beam.
+        spacing_rad: of the axes.
+        beam_rad: width of the beams.
+        aside: so many beams before it are told instead.
+    """
+    return math.floor((bearing_rad + 0.5 * min(beam_rad, spacing_rad)) / spacing_rad) - aside
+
+
+@compiled(
+    CELLS_OUT,
+    LOOKS_OUT,
+    CELLS,
+    FLOATS,
+    FLOAT,
+    FLOAT,
+    FLOAT,
+    FLOAT,
+    FLOAT,
+    FLOAT,
+    BOOL,
+    FLOAT,
+    FLOAT,
+    COUNT,
+    COUNT,
+)
 def through_cells(
     seen: BoolArray,
+    looks: NDArray[np.uint8],
     disc: BoolArray,
     ranges: FloatArray,
     x_first: float,
@@ -57,27 +90,34 @@ def through_cells(
     cell: float,
     start_rad: float,
     spacing_rad: float,
+    beam_rad: float,
     closed: bool,
     reach: float,
     noise: float,
+    aside: int,
+    needed: int,
 ) -> None:
-    """Marks the cells of a disc about the sensor that all rays which meet them went beyond, and one to either side.
+    """Marks the cells of a disc about the sensor that all beams which meet them went beyond.
 
-    So many rays to either side of the one towards its middle, or up to twice as many: 2^k - 1. The ends of the fan
-    are joined.
+    Beams that touch cover all of a cell. Where they do not, one more to either side has to go beyond it, and what is
+    too narrow to be missed between them is up to who chooses `reach`.
 
     Args:
         seen: cells seen to be free.
+        looks: how often each was looked through; not read where once is enough.
         disc: of these, those to be asked.
-        ranges: of all rays.
+        ranges: of all beams.
         x_first: corner of the first cell, from the sensor.
         y_first: corner of the first cell, from the sensor.
         cell: width of a cell.
-        start_rad: bearing of the first ray.
-        spacing_rad: of the rays.
-        closed: the last ray is the neighbour of the first.
+        start_rad: bearing of the axis of the first beam.
+        spacing_rad: of the axes.
+        beam_rad: width of the beams.
+        closed: the last beam is the neighbour of the first.
         reach: ranges count up to this one.
-        noise: so much further than a cell the rays have to go.
+        noise: so much further than a cell the beams have to go.
+        aside: so many beams more to either side have to go beyond it.
+        needed: looks through that make a cell free; one that returns something begins anew.
     """
     rays, half, coarse = len(ranges), 0.75 * cell, spacing_rad > 2.0 * NEARLY_RAD
     for column in range(seen.shape[0]):
@@ -91,28 +131,39 @@ def through_cells(
             beyond = distance + half + noise
             if beyond >= reach:
                 continue
-            if coarse:
+            if coarse and needed == 1:
                 ray = nearly_towards(x, y, start_rad, spacing_rad)
                 if 0 <= ray < rays and ranges[ray] <= beyond:
                     continue
             clockwise = math.atan2(x, y) - start_rad
             while clockwise < 0.0:
                 clockwise += math.tau
-            ray = round(clockwise / spacing_rad)
-            level = math.ceil(half / spacing_rad / max(distance, half)) + 1
-            if not closed and not level <= ray < rays - level:
+            wide = math.asin(half / distance) if distance > half else math.pi
+            first = first_over(clockwise - wide, spacing_rad, beam_rad, aside)
+            # Seen from the other side, the last is the first.
+            last = -first_over(-clockwise - wide, spacing_rad, beam_rad, aside)
+            if last - first + 1 >= rays:
+                first, last = 0, rays - 1
+                if not closed:
+                    continue
+            elif not closed and not 0 <= first <= last < rays:
                 continue
-            wide = 1
-            while wide <= level:
-                wide *= 2
-            beside, left = (ray - wide + 1) % rays, 2 * wide - 1
+            beside, left = first % rays, last - first + 1
             while left and ranges[beside] > beyond:
                 beside = beside + 1 if beside + 1 < rays else 0
                 left -= 1
-            seen[column, row] = not left
+            if needed == 1:
+                seen[column, row] = not left
+            elif not left:
+                looks[column, row] += 1
+                seen[column, row] = looks[column, row] >= needed
+            elif ranges[beside] > distance - half - noise:
+                looks[column, row] = 0
 
 
-@compiled(BOOLS_OUT, PLACES, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT, COUNT, FLOAT, COUNT)
+@compiled(
+    BOOLS_OUT, PLACES, FLOATS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, BOOL, FLOAT, FLOAT, COUNT, FLOAT, COUNT
+)
 def through_places(
     through: BoolArray,
     places: ComplexArray,
@@ -121,6 +172,7 @@ def through_places(
     north: float,
     start_rad: float,
     spacing_rad: float,
+    beam_rad: float,
     closed: bool,
     within_m: float,
     sure_m: float,
@@ -128,21 +180,22 @@ def through_places(
     aimed_m: float,
     every: int,
 ) -> int:
-    """How many places all rays to either side went beyond; `through` becomes true for these.
+    """How many places all beams to either side went beyond; `through` becomes true for these.
 
     Args:
         through: (k,) all false.
         places: (k,) east + i north.
-        ranges: of all rays.
+        ranges: of all beams.
         east: of the sensor.
         north: of the sensor.
-        start_rad: bearing of the first ray.
-        spacing_rad: of the rays.
-        closed: the last ray is the neighbour of the first.
+        start_rad: bearing of the axis of the first beam.
+        spacing_rad: of the axes.
+        beam_rad: width of the beams.
+        closed: the last beam is the neighbour of the first.
         within_m: only nearer places are asked.
-        sure_m: so much further than a place the rays have to go.
-        abreast: so many rays to either side of the one towards it, one at least.
-        aimed_m: how near that one passes by.
+        sure_m: so much further than a place the beams have to go.
+        abreast: so many beams to either side of the one towards it, one at least.
+        aimed_m: how near that one passes by, but for half its width.
         every: only so many places on is one asked.
     """
     many, rays, coarse = 0, len(ranges), spacing_rad > 2.0 * NEARLY_RAD
@@ -160,7 +213,7 @@ def through_places(
             clockwise += math.tau
         towards = clockwise / spacing_rad
         ray = round(towards)
-        if abs(towards - ray) * spacing_rad * distance >= aimed_m:
+        if (abs(towards - ray) * spacing_rad - 0.5 * beam_rad) * distance >= aimed_m:
             continue
         if not closed and not abreast <= ray < rays - abreast:
             continue

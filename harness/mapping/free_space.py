@@ -1,4 +1,10 @@
-"""Space that scans have looked through, on a grid."""
+"""Space that scans have looked through, on a grid.
+
+A beam from which nothing came back says that all of it is free, to the range of the sensor, and one that returned
+something that all of it is free up to there. So a cell is free where every beam that meets it went beyond it. Beams
+that touch leave nothing out. Where they do not, what is between two of them is not seen: there cells are free only as
+far as the narrowest obstacle that there is cannot hide between two.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +20,29 @@ from planner.interface import BoolArray, FloatArray
 
 NARROWEST_RAD = 1e-3
 """What something hides is told by bearings no finer than this."""
+MISSED = 1e-2
+"""Where returns get lost, a cell is free when so many scans looked through it that all of them missed what is in it no
+more often than this."""
+MOST_LOOKS = 255
+"""Where more would be needed, nothing is ever seen to be free."""
+BESIDE = 3
+"""Where returns get lost or err, so many beams more to either side of a cell have to go beyond it: all returns of
+what is as wide as these have to be missed."""
+TOUCHING = 1e-6
+"""Beams touch where this share of their spacing, or less, lies between two."""
 
 
 class FreeSpace:
-    """Cells of space that a scan has looked through: half a clearance wide, or wider where they would be too many."""
+    """Cells of space that a scan has looked through: half a clearance wide, or wider where they would be too many.
+
+    Args:
+        bounds_m: xmin, ymin, xmax, ymax of the area.
+        clearance_m: wanted distance from obstacles.
+        range_m: sensing range.
+        noise_m: standard deviation of ranges, as the sensor's maker states it.
+        lost: share of the returns that get lost or are false, likewise.
+        least_width_m: the narrowest obstacle that there is; it counts where beams do not touch. Default: the clearance.
+    """
 
     def __init__(
         self,
@@ -25,6 +50,8 @@ class FreeSpace:
         clearance_m: float,
         range_m: float,
         noise_m: float = 0.0,
+        lost: float = 0.0,
+        least_width_m: float | None = None,
     ) -> None:
         xmin, ymin, xmax, ymax = bounds_m
         span = max(xmax - xmin, ymax - ymin)
@@ -32,7 +59,11 @@ class FreeSpace:
         self._x0, self._y0 = xmin, ymin
         self._nx, self._ny = math.ceil((xmax - xmin) / self._cell), math.ceil((ymax - ymin) / self._cell)
         self._seen = np.zeros((self._nx, self._ny), dtype=np.bool_)
-        self._clearance, self._every, self._noise = clearance_m, range_m / 32.0, noise_m
+        self._every, self._noise = range_m / 32.0, noise_m
+        self._least_width = clearance_m if least_width_m is None else least_width_m
+        self._needed = looks_needed(lost)
+        self._looks = np.zeros(self._seen.shape if self._needed > 1 else (1, 1), dtype=np.uint8)
+        self._aside = BESIDE if lost > 0.0 or noise_m > 0.0 else 0
         self._last = (math.inf, math.inf)
         self._reach = 0.0
         self._disc = _disc(0)  # cells in reach, about the one that the sensor is in
@@ -40,19 +71,22 @@ class FreeSpace:
     def update(self, scan: RangeScan) -> None:
         """Marks what a scan looked through, if the sensor has moved on far enough since the last time."""
         moved = math.hypot(scan.east_m - self._last[0], scan.north_m - self._last[1])
-        if moved < self._every or (moved < 1.5 * self._every and not scan.followed):
+        # Where looks are counted, each counts.
+        known = moved < self._every or (moved < 1.5 * self._every and not scan.followed)
+        if self._needed > MOST_LOOKS or (known and self._needed == 1):
             return
         self._last = (scan.east_m, scan.north_m)
-        # Beyond this range the rays are further apart than what must not be missed between them.
-        reach = min(scan.max_range_m, self._clearance / scan.spacing_rad)
+        reach = self._reach_m(scan)
         if self._reach != reach:
             self._reach, self._disc = reach, _disc(math.ceil(reach / self._cell) + 1)
         # The disc's corner lies at this cell; some of it may lie outside the area.
         x_first, y_first, x_low, x_high, y_low, y_high = self._window(scan, len(self._disc) // 2)
         if x_low >= x_high or y_low >= y_high:
             return
+        cells = slice(x_low, x_high), slice(y_low, y_high)
         through_cells(
-            self._seen[x_low:x_high, y_low:y_high],
+            self._seen[cells],
+            self._looks[cells] if self._needed > 1 else self._looks,
             self._disc[x_low - x_first : x_high - x_first, y_low - y_first : y_high - y_first],
             scan.ranges_m,
             self._x0 + x_low * self._cell - scan.east_m,
@@ -60,10 +94,20 @@ class FreeSpace:
             self._cell,
             scan.start_rad,
             scan.spacing_rad,
+            scan.beam_rad,
             all_round(scan),
             reach,
             self._noise,
+            self._aside,
+            self._needed,
         )
+
+    def _reach_m(self, scan: RangeScan) -> float:
+        """Range up to which nothing as wide as the narrowest obstacle can hide between two beams."""
+        between_rad = scan.spacing_rad - scan.beam_rad
+        if between_rad <= TOUCHING * scan.spacing_rad:
+            return scan.max_range_m
+        return min(scan.max_range_m, self._least_width / between_rad)
 
     def take_back(self, scan: RangeScan, edges_m: FloatArray) -> bool:
         """Something stands where space was seen to be free: it, and what it hides, is not known to be free any more.
@@ -92,6 +136,8 @@ class FreeSpace:
         mine = np.floor(np.arctan2(x, y) / width).astype(np.int64) % len(hidden_from)
         hidden = np.hypot(x, y) > hidden_from[mine] - self._cell
         seen[column[hidden], row[hidden]] = False
+        if self._needed > 1:
+            self._looks[x_low:x_high, y_low:y_high][column[hidden], row[hidden]] = 0
         self._last = (math.inf, math.inf)  # what the next scan looks through is free at once
         return True
 
@@ -133,6 +179,13 @@ class FreeSpace:
     def _count_free(self, free: BoolArray, points_m: FloatArray) -> int:
         """How many of (k, 2) points lie in free cells; (k,) `free` becomes true for these."""
         return _count_free(free, self._seen, np.ascontiguousarray(points_m), self._x0, self._y0, self._cell)
+
+
+def looks_needed(missed: float) -> int:
+    """How many scans have to look through a cell to make it free, if each misses what is in it with a probability."""
+    if missed <= 0.0:
+        return 1
+    return MOST_LOOKS + 1 if missed >= 1.0 else max(math.ceil(math.log(MISSED) / math.log(missed)), 1)
 
 
 @compiled(BOOLS_OUT, GRID, ROWS, FLOAT, FLOAT, FLOAT)

@@ -261,6 +261,8 @@ class ObstacleMap:
             if (self._score[weaker] == CONFIRMED - 1).any():
                 self.revision += 1
                 self.last_removal_revision = self.revision
+                # What was seen from afar to be somewhere in a beam is elsewhere: the next scan tells where.
+                self._taken_at = complex(math.inf, math.inf)
         return len(weaker) > 0
 
 

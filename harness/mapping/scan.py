@@ -1,4 +1,9 @@
-"""One scan of a range sensor: what came back along each ray, and where the sensor was.
+"""One scan of a range sensor: what came back within each beam, and where the sensor was.
+
+A beam tells that something is at its range somewhere within its width, and that nothing within it is nearer. Where:
+what reaches into the beam from a neighbour that returned less is nearest where the two meet, and its place is exact;
+anything else is taken to be on the axis, and may be half a width to either side. A beam without a width is a ray,
+all of which lies on its axis.
 
 Frame: local ENU plane, x = east, y = north, metres. Bearings are radians clockwise from north.
 """
@@ -12,8 +17,25 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.compiled import COUNTS_OUT, FLOAT, FLOATS, PLACES, PLACES_OUT, compiled, fused
+from planner.compiled import (
+    BOOL,
+    COUNT,
+    COUNTS_OUT,
+    FLOAT,
+    FLOATS,
+    FLOATS_OUT,
+    PLACES,
+    PLACES_OUT,
+    compiled,
+    fused,
+)
 from planner.interface import ComplexArray, FloatArray, IntArray
+
+GRAZING, NEARER = 30.0, 0.5
+"""Neighbouring beams show one face where the range of one is less by no more than this times the width of a beam there,
+as where it is seen at 2 degrees, nor by more than this share."""
+SURELY = 3.0
+"""In standard deviations of ranges: what returned so much less is nearer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,11 +48,14 @@ class RangeScan:
         east_m: sensor position.
         north_m: sensor position.
         heading_rad: bearing of the nose, clockwise from north.
-        start_rad: bearing of ray 0, clockwise from north, in [0, 2 pi).
-        spacing_rad: bearing of each ray less that of the one before; positive, clockwise.
-        fan: (n,) unit vectors of the rays as the nose sees them, to its right + i ahead.
+        start_rad: bearing of the axis of beam 0, clockwise from north, in [0, 2 pi).
+        spacing_rad: bearing of each axis less that of the one before; positive, clockwise.
+        fan: (n,) unit vectors of the axes as the nose sees them, to its right + i ahead.
         ranges_m: (n,) measured ranges, +inf where nothing came back.
         max_range_m: no return is longer.
+        beam_rad: width of each beam; 0: rays.
+        noise_m: standard deviation of ranges, as the sensor's maker states it.
+        lossy: returns get lost, likewise: a beam without one may have met something.
         nearest_m: no return is shorter; +inf if surely nothing came back. It may be of a face out of view.
     """
 
@@ -44,6 +69,9 @@ class RangeScan:
     fan: ComplexArray
     ranges_m: FloatArray
     max_range_m: float
+    beam_rad: float = 0.0
+    noise_m: float = 0.0
+    lossy: bool = False
     nearest_m: float = field(init=False)
 
     def __post_init__(self) -> None:
@@ -56,20 +84,36 @@ class RangeScan:
                 object.__setattr__(self, name, array)
 
     def returned(self, origin_m: complex = 0j) -> tuple[IntArray, ComplexArray]:
-        """(k,) rays that returned something, and where they ended, east + i north from an origin."""
+        """(k,) beams that returned something, and from where, east + i north from an origin."""
         most, sensor = len(self.ranges_m), complex(self.east_m, self.north_m) - origin_m
         rays, places = np.empty(most, dtype=np.intp), np.empty(most, dtype=np.complex128)
-        many = _returned(rays, places, self.fan, self.ranges_m, -self.heading_rad, sensor.real, sensor.imag)
+        many = _returned(
+            rays,
+            places,
+            self.fan,
+            self.ranges_m,
+            -self.heading_rad,
+            sensor.real,
+            sensor.imag,
+            self.beam_rad,
+            self.noise_m,
+            all_round(self),
+            self.lossy,
+        )
         return rays[:many], places[:many]
 
     def from_sensor_m(self, rays: IntArray) -> ComplexArray:
-        """(k,) where some rays ended, east + i north of the sensor."""
+        """(k,) from where some beams returned something, east + i north of the sensor."""
         turned: ComplexArray = self.fan.take(rays) * self.ranges_m.take(rays)
+        if self.beam_rad:
+            sides = np.empty(len(self.ranges_m))
+            _sides(sides, self.ranges_m, self.beam_rad, self.noise_m, all_round(self), self.lossy)
+            turned *= np.exp((-0.5j * self.beam_rad) * sides.take(rays))
         turned *= cmath.rect(1.0, -self.heading_rad)
         return turned
 
     def ends_m(self, rays: IntArray) -> ComplexArray:
-        """(k,) where some rays ended, east + i north."""
+        """(k,) from where some beams returned something, east + i north."""
         return self.from_sensor_m(rays) + complex(self.east_m, self.north_m)
 
     def kept(self) -> RangeScan:
@@ -84,13 +128,55 @@ class RangeScan:
 
     @property
     def directions(self) -> FloatArray:
-        """(n, 2) unit vectors (east, north) of the rays."""
+        """(n, 2) unit vectors (east, north) of the axes."""
         turned: ComplexArray = self.fan * cmath.rect(1.0, -self.heading_rad)
         turned.setflags(write=False)
         return turned.view(np.float64).reshape(-1, 2)
 
 
-@compiled(COUNTS_OUT, PLACES_OUT, PLACES, FLOATS, FLOAT, FLOAT, FLOAT)
+@compiled(FLOATS, COUNT, COUNT, BOOL, BOOL)
+def _beside(ranges: FloatArray, ray: int, step: int, closed: bool, lossy: bool) -> float:
+    """What the next beam to one side returned; where that may have been lost, the one after it."""
+    rays, beside = len(ranges), math.inf
+    for steps in range(1, 3 if lossy else 2):
+        other = ray + steps * step
+        if math.isinf(beside) and (closed or 0 <= other < rays):
+            beside = ranges[other % rays]
+    return beside
+
+
+@compiled(FLOATS, COUNT, FLOAT, FLOAT, BOOL, BOOL)
+def _side(ranges: FloatArray, ray: int, beam_rad: float, noise_m: float, closed: bool, lossy: bool) -> float:
+    """Where within a beam its return comes from: 1 its right side, -1 its left side, 0 the axis.
+
+    Args:
+        ranges: of all beams.
+        ray: one that returned something.
+        beam_rad: its width.
+        noise_m: standard deviation of ranges.
+        closed: the last beam is the neighbour of the first.
+        lossy: returns get lost.
+    """
+    own = ranges[ray]
+    before, after = _beside(ranges, ray, -1, closed, lossy), _beside(ranges, ray, 1, closed, lossy)
+    least, most = own - min(GRAZING * beam_rad, NEARER) * own, own - SURELY * noise_m
+    from_left, from_right = least <= before <= most, least <= after <= most
+    if (
+        from_left == from_right
+    ):  # a corner that points away, or all as far: neither side is nearer than the axis
+        return 0.0
+    return 1.0 if from_right else -1.0
+
+
+@compiled(FLOATS_OUT, FLOATS, FLOAT, FLOAT, BOOL, BOOL)
+def _sides(
+    sides: FloatArray, ranges: FloatArray, beam_rad: float, noise_m: float, closed: bool, lossy: bool
+) -> None:
+    for ray in range(len(ranges)):
+        sides[ray] = _side(ranges, ray, beam_rad, noise_m, closed, lossy) if ranges[ray] < math.inf else 0.0
+
+
+@compiled(COUNTS_OUT, PLACES_OUT, PLACES, FLOATS, *[FLOAT] * 5, BOOL, BOOL)
 def _returned(
     rays: IntArray,
     places: ComplexArray,
@@ -99,11 +185,21 @@ def _returned(
     turned_rad: float,
     east: float,
     north: float,
+    beam_rad: float,
+    noise_m: float,
+    closed: bool,
+    lossy: bool,
 ) -> int:
     many, cos, sin = 0, math.cos(turned_rad), math.sin(turned_rad)
+    half_cos, half_sin = math.cos(0.5 * beam_rad), math.sin(0.5 * beam_rad)
     for ray in range(len(ranges)):
         if ranges[ray] < math.inf:
             right, ahead = fan[ray].real * ranges[ray], fan[ray].imag * ranges[ray]
+            if beam_rad > 0.0:
+                side = _side(ranges, ray, beam_rad, noise_m, closed, lossy)
+                if side != 0.0:
+                    aside = side * half_sin
+                    right, ahead = right * half_cos + ahead * aside, ahead * half_cos - right * aside
             x, y = fused(right, cos, -(ahead * sin)), fused(right, sin, ahead * cos)
             rays[many], places[many] = ray, complex(x + east, y + north)
             many += 1
@@ -111,7 +207,7 @@ def _returned(
 
 
 def all_round(scan: RangeScan) -> bool:
-    """Whether the first ray is the neighbour of the last."""
+    """Whether the first beam is the neighbour of the last."""
     return len(scan.ranges_m) * scan.spacing_rad > math.tau - 1e-9
 
 
@@ -123,7 +219,7 @@ def clockwise_from(start_rad: float, east: FloatArray, north: FloatArray) -> Flo
 
 
 def supported(scan: RangeScan, apart_m: float) -> NDArray[np.bool_]:
-    """(n,) which rays returned something that one of the two to either side returned, too: no false return."""
+    """(n,) which beams returned something that one of the two to either side returned, too: no false return."""
     ranges = scan.ranges_m if all_round(scan) else np.concatenate((scan.ranges_m, np.full(2, math.inf)))
     supported = np.zeros(len(ranges), dtype=np.bool_)
     for side in (1, 2):

@@ -104,6 +104,7 @@ def count_looked_through(
         scan.north_m,
         scan.start_rad,
         scan.spacing_rad,
+        scan.beam_rad,
         all_round(scan),
         min(within_m, scan.max_range_m - sure_m),
         sure_m,

@@ -51,6 +51,8 @@ class SensedMap:
         range_m: sensing range.
         noise_m: standard deviation of ranges, as the sensor's maker states it.
         false_returns: the sensor is known to return ranges where nothing is.
+        lost: share of the returns that get lost or are false, likewise.
+        least_width_m: as `harness.mapping.free_space.FreeSpace` has it.
     """
 
     def __init__(
@@ -61,11 +63,13 @@ class SensedMap:
         *,
         noise_m: float = 0.0,
         false_returns: bool = False,
+        lost: float = 0.0,
+        least_width_m: float | None = None,
     ) -> None:
         noisy = noise_m > NOISY * clearance_m
         self._clearance = clearance_m
         self._edges: Edges
-        self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m)
+        self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m, lost, least_width_m)
         self._noisy = noisy
         if noisy:
             self._edges = edges = ReflectionMap(bounds_m, clearance_m, range_m, noise_m)

@@ -37,6 +37,9 @@ from harness.world.world import World
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
 
+INSIDE_M = 1e-3
+"""A flight begins no nearer to the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
+
 
 Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
 
@@ -66,6 +69,8 @@ def make_loop(
             mission.sensor_range_m,
             noise_m=scenario.sensor.range_noise_m,
             false_returns=scenario.sensor.false_return > 0.0,
+            lost=1.0 - (1.0 - scenario.sensor.dropout) * (1.0 - scenario.sensor.false_return),
+            least_width_m=scenario.sensor.least_width_m,
         ),
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
@@ -89,8 +94,12 @@ def guidance_law(scenario: Scenario) -> GuidanceLaw:
 
 
 def start_conditions(scenario: Scenario) -> StartConditions:
-    """Where and how a scenario's flight begins."""
+    """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary."""
+    xmin, ymin, xmax, ymax = scenario.area.bounds_m
     east, north = scenario.mission.start_m
+    inside_m = min(INSIDE_M, 0.5 * (xmax - xmin), 0.5 * (ymax - ymin))
+    east = min(max(east, xmin + inside_m), xmax - inside_m)
+    north = min(max(north, ymin + inside_m), ymax - inside_m)
     course = math.radians(_given(scenario.mission.course_deg))
     return StartConditions(
         east, north, scenario.mission.altitude_m, course, _given(scenario.aircraft.airspeed_mps)

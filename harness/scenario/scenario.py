@@ -103,7 +103,8 @@ class Scenario(Section):
         (x0, y0), (x1, y1) = self.mission.start_m, self.mission.goal_m
         wind_mps = self.environment.wind.speed_mps if self.environment.wind else 0.0
         slowest_s = math.hypot(x1 - x0, y1 - y0) / (self.aircraft.airspeed_mps - wind_mps)
-        self._set("sensor", range_m=_rounded_up(10 * radius_m, 100))
+        field_deg, rays = self.sensor.field_of_view_deg, self.sensor.rays
+        self._set("sensor", range_m=_rounded_up(10 * radius_m, 100), beam_deg=field_deg / rays)
         self._set(
             "mission",
             course_deg=math.degrees(math.atan2(x1 - x0, y1 - y0)) % 360,
@@ -111,6 +112,7 @@ class Scenario(Section):
             time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
         )
         self._set("planner", clearance_m=_rounded_up(radius_m, 10))
+        self._set("sensor", least_width_m=max(self.planner.clearance_m, LEAST_CLEARANCE * radius_m))
         self._set("trackability", cross_track_m=self._cross_track_m(performance.tracking_error_m))
         self._set(
             "trackability",

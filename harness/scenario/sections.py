@@ -163,10 +163,25 @@ class AircraftSpec(Section):
 
 
 class Sensor(Section):
-    """A planar range sensor: rays from the aircraft to the nearest obstacle edges."""
+    """A planar range sensor: each of its beams returns the distance to the nearest obstacle edge within it."""
 
+    beam_deg: float = key(
+        "Width of each beam. Beams that touch leave no room for anything between two; 0: pencil rays.",
+        unit="deg",
+        derived="field_of_view_deg / rays, so that beams touch",
+        ge=0,
+        le=120,
+    )
+    least_width_m: float = key(
+        "Width of the narrowest obstacle that there is. It counts where beams do not touch: space is taken to be seen "
+        "free only as far as nothing so wide can hide between two of them.",
+        unit="m",
+        derived="planner.clearance_m",
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
     range_m: float = key(
-        "Largest distance a ray sees.",
+        "Largest distance a beam sees.",
         unit="m",
         derived="ten times the planned turn radius, rounded up to 100 m",
         gt=0,
@@ -174,8 +189,7 @@ class Sensor(Section):
     )
     field_of_view_deg: float = key("Centred on the nose.", unit="deg", default=360.0, gt=0, le=360)
     rays: int = key(
-        "Rays, spread evenly over the field of view. Where they are further apart than planner.clearance_m, nothing is "
-        "taken to be seen free: with few rays, no turn may be.",
+        "Beams, their axes spread evenly over the field of view.",
         unit="1",
         default=720,
         ge=3,
@@ -191,9 +205,9 @@ class Sensor(Section):
     range_noise_m: float = key(
         "1 sigma of additive Gaussian noise on every range.", unit="m", default=0.0, ge=0, le=MAX_COORDINATE_M
     )
-    dropout: float = key("Probability that a ray returns nothing.", unit="1", default=0.0, ge=0, le=1)
+    dropout: float = key("Probability that a beam returns nothing.", unit="1", default=0.0, ge=0, le=1)
     false_return: float = key(
-        "Probability that a ray returns a random range.", unit="1", default=0.0, ge=0, le=1
+        "Probability that a beam returns a random range.", unit="1", default=0.0, ge=0, le=1
     )
     latency_s: float = key("A scan becomes available this much later.", unit="s", default=0.0, ge=0, le=60)
 

@@ -1,7 +1,7 @@
-"""Simulated scanning range sensor: rays against the true world, with its imperfections.
+"""Simulated scanning range sensor: beams against the true world, with its imperfections.
 
-Frame: local ENU plane, x = east, y = north, metres. Bearings are radians clockwise from north. Rays are followed
-in `harness.world.ray_casting`: a face that is not hit cannot change any bit of a scan.
+Frame: local ENU plane, x = east, y = north, metres. Bearings are radians clockwise from north. What a beam meets is
+found in `harness.world.ray_casting`: a face that is not met cannot change any bit of a scan.
 """
 
 from __future__ import annotations
@@ -52,16 +52,16 @@ class _Unread(RangeScan):
 
 
 class RangeSensor:
-    """A fan of rays, centred on the nose of the aircraft.
+    """A fan of beams, centred on the nose of the aircraft.
 
-    A ray returns the nearest crossing of an obstacle edge not further than the range; inside an obstacle that
-    is the way out. Then, in this order:
+    A beam returns the distance to the nearest obstacle edge within its width, if that is not further than the range;
+    inside an obstacle that is the nearest way out. Then, in this order:
 
     1. Noise: a Gaussian error is added to each range; a negative one becomes 0, one beyond the range is lost.
-    2. Dropout: the ray returns nothing.
-    3. False return: the ray returns a range uniform in (0, range], whatever there was.
+    2. Dropout: the beam returns nothing.
+    3. False return: the beam returns a range uniform in (0, range], whatever there was.
 
-    Each imperfection draws from a stream of its own, for every ray of every scan, so that neither what is
+    Each imperfection draws from a stream of its own, for every beam of every scan, so that neither what is
     seen nor another imperfection shifts its draws; one that is off draws nothing.
 
     Args:
@@ -73,11 +73,15 @@ class RangeSensor:
     def __init__(self, world: World, config: Sensor, seed_sequence: np.random.SeedSequence) -> None:
         self._world = world
         self._config = config
-        self._fan = Fan(math.radians(config.field_of_view_deg), config.rays, config.range_m)
+        beam_rad = None if config.beam_deg is None else math.radians(config.beam_deg)
+        self._fan = Fan(math.radians(config.field_of_view_deg), config.rays, config.range_m, beam_rad)
         self._always: dict[str, Any] = {
             "spacing_rad": self._fan.spacing_rad,
+            "beam_rad": self._fan.beam_rad,
             "fan": self._fan.rays,
             "max_range_m": config.range_m,
+            "noise_m": config.range_noise_m,
+            "lossy": config.dropout > 0.0,
         }
         self._noise, self._dropout, self._false_return = (
             _stream(seed_sequence, number) for number in range(3)

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Segment, onward
+from planner.geometry.curves import Point, Segment, onward
+from planner.geometry.stations import places_along
 from planner.interface import MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import CertificateBroken, Certifier
@@ -32,6 +33,18 @@ EVADING_S = 60.0
 
 GOES_ON = "the plan in effect goes on to its end, nearer to something than wanted"
 IN_THE_WAY = "something is in the way; turning away"
+
+
+BLIND = 0.9
+"""Share of the clearance: so far the aircraft flies straight on from the start before anything ahead of it was seen to
+be free. A sensor that loses returns takes several scans for that; the start is clear of obstacles by the clearance."""
+
+NO_ROOM = "there is no room for a turn at the start"
+NOT_SEEN = "nothing ahead of the aircraft has been seen to be free"
+
+
+class NoWayToBegin(RuntimeError):
+    """There is no plan, and there will be none: what is known leaves no room for one, or nothing is seen."""
 
 
 class _Option(NamedTuple):
@@ -70,6 +83,7 @@ class Escapes:
     def __init__(self, mission: Mission, memory: ObstacleMemory, local: LocalPlanning) -> None:
         self._mission, self._memory, self._local = mission, memory, local
         self._certifier = Certifier(local.limits, mission.clearance_m, math.inf, step_along_m(mission))
+        self._began_m: Point | None = None  # where the aircraft was when it had no plan for the first time
 
     def threats(self, request: PlanRequest) -> Threats | None:
         """What is near, while something moves or has just appeared: then what was certified may be met all the same."""
@@ -79,14 +93,27 @@ class Escapes:
         return self._near(request) if lately else None
 
     def at_start(self, request: PlanRequest, threats: Threats | None, lead_m: float) -> Escape:
-        """A turn before the first plan."""
-        straight = Path(np.array([(*request.position_m, *request.direction, 0.0, lead_m)]))
+        """A turn before the first plan, where what is ahead was seen to be free at all.
+
+        Raises:
+            NoWayToBegin: none will be found: straight on there is no room for any, or the sensor has shown nothing.
+        """
+        self._began_m = self._began_m or request.position_m
+        onward_m = self._mission.sensor_range_m
+        ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))
+        if hold(ahead, 0.0, onward_m, self._local.limits, self._standing(HOLD_SHARES[-1])) is None:
+            raise NoWayToBegin(NO_ROOM)
+        pieces = math.ceil(onward_m / (0.25 * self._local.limits.radius_m))
+        if not request.seen.seen_free(places_along(ahead, onward_m, pieces)).any():
+            if math.dist(self._began_m, request.position_m) > BLIND * self._mission.clearance_m:
+                raise NoWayToBegin(NOT_SEEN)
+            return Escape(Plan(PlanStatus.NO_PATH, NOT_SEEN))
         for share in HOLD_SHARES:
             standing = self._standing(share)
-            turn = hold(straight, 0.0, lead_m, self._local.limits, standing)
+            turn = hold(ahead, 0.0, lead_m, self._local.limits, standing)
             if turn is not None and self._best([_Option(turn)], standing, None, threats, share)[0]:
                 return self._away(request, turn, "no way on can be seen to be safe; turning away")
-        return Escape(Plan(PlanStatus.NO_PATH, "there is no room for a turn at the start"))
+        return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
 
     def from_plan(
         self,

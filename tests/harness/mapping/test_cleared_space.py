@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from harness.mapping.cleared_space import NEARLY_RAD, nearly_towards, through_cells, through_places
+from planner.interface import BoolArray, FloatArray
 
 RAYS = 48
 SEED = st.integers(0, 2**32 - 1)
@@ -34,31 +36,95 @@ def test_a_place_where_the_sensor_is_has_some_ray() -> None:
     assert nearly_towards(0.0, 0.0, 1.0, 0.1) >= 0
 
 
+def through(
+    ranges: FloatArray,
+    spacing: float,
+    beam: float,
+    at: tuple[float, float],
+    start: float,
+    *,
+    cell: float = 50.0,
+    reach: float = 450.0,
+    closed: bool = True,
+    disc: BoolArray | None = None,
+    seen: BoolArray | None = None,
+    looks: NDArray[np.uint8] | None = None,
+    aside: int = 0,
+    needed: int = 1,
+) -> BoolArray:
+    """(16, 16) which of the cells from a corner on are seen to be free."""
+    seen = np.zeros((16, 16), dtype=np.bool_) if seen is None else seen.copy()
+    looks = np.zeros((16, 16), dtype=np.uint8) if looks is None else looks
+    disc = np.ones((16, 16), dtype=np.bool_) if disc is None else disc
+    grid = (ranges, *at, cell, start, spacing, beam, closed, reach, 5.0, aside, needed)
+    through_cells(seen, looks, disc, *grid)
+    return seen
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.7])
 @pytest.mark.parametrize(("field_rad", "rays"), [(math.tau, RAYS), (2.0, RAYS), (0.02, 2_000)])
 @settings(max_examples=20)
 @given(seed=SEED)
-def test_cells_are_looked_through_where_all_rays_about_them_went_beyond(
-    field_rad: float, rays: int, seed: int
+def test_cells_are_looked_through_where_all_beams_that_meet_them_went_beyond(
+    field_rad: float, rays: int, share: float, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
-    spacing, closed, cell, reach = field_rad / rays, field_rad == math.tau, 50.0, 450.0
-    start, x_first, y_first = rng.uniform(0.0, math.tau), *rng.uniform(-420.0, -380.0, 2)
+    spacing, closed, half = field_rad / rays, field_rad == math.tau, 0.75 * 50.0
+    start, at = rng.uniform(0.0, math.tau), tuple(rng.uniform(-420.0, -380.0, 2).tolist())
     ranges = rng.choice([150.0, 300.0, math.inf], rays, p=[0.1, 0.1, 0.8])
-    disc = rng.random((16, 16)) < 0.9
-    before = rng.random((16, 16)) < 0.1
-    seen = before.copy()
-    through_cells(seen, disc, ranges, x_first, y_first, cell, start, spacing, closed, reach, 5.0)
-    half = 0.75 * cell
+    disc, before = rng.random((16, 16)) < 0.9, rng.random((16, 16)) < 0.1
+    seen = through(ranges, spacing, share * spacing, at, start, closed=closed, disc=disc, seen=before)
     for column, row in np.ndindex(seen.shape):
-        x, y = (column + 0.5) * cell + x_first, (row + 0.5) * cell + y_first
+        x, y = (column + 0.5) * 50.0 + at[0], (row + 0.5) * 50.0 + at[1]
         away = math.hypot(x, y)
-        ray = round((math.atan2(x, y) - start) % math.tau / spacing)
-        level = math.ceil(half / spacing / max(away, half)) + 1
-        wide = 2 ** (level.bit_length())
-        about = np.arange(ray - wide + 1, ray + wide)
-        free = away + half + 5.0 < reach and (closed or level <= ray < rays - level)
-        free = free and bool((ranges[about % rays] > away + half + 5.0).all())
-        assert seen[column, row] == (before[column, row] or (disc[column, row] and free))
+        if before[column, row] or not disc[column, row] or away + half + 5.0 >= 450.0:
+            assert seen[column, row] == before[column, row]
+            continue
+        wide = math.asin(min(half / away, 1.0)) if away > half else math.pi
+        axes = np.arange(-rays, 2 * rays) if closed else np.arange(rays)
+        off = (axes * spacing - (math.atan2(x, y) - start) % math.tau + math.pi) % math.tau - math.pi
+        meets = np.abs(off) <= wide + 0.5 * share * spacing - 1e-9
+        blocked = bool((ranges[axes[meets] % rays] <= away + half + 5.0).any())
+        assert not (seen[column, row] and blocked and share <= 1.0)
+        if not blocked and share == 1.0 and closed:
+            assert seen[column, row]
+
+
+def test_a_beam_that_returns_hides_all_cells_that_it_meets_and_no_others() -> None:
+    spacing = math.tau / 12
+    ranges = np.full(12, math.inf)
+    ranges[3] = 100.0  # from 75 to 105 degrees: east
+    seen = through(ranges, spacing, spacing, (-400.0, -400.0), 0.0)
+    east, north = np.meshgrid(*[np.arange(16) * 50.0 - 375.0] * 2, indexing="ij")
+    away, bearing = np.hypot(east, north), np.arctan2(east, north)
+    near = away + 42.5 < 450.0
+    sure = near & (away > 150.0) & (np.abs(bearing - math.pi / 2) < math.radians(15.0))
+    other = near & (
+        np.abs(bearing - math.pi / 2) > math.radians(15.0) + np.arcsin(37.5 / np.maximum(away, 37.5))
+    )
+    assert sure.sum() > 5
+    assert other.sum() > 50
+    assert not seen[sure].any()
+    assert seen[other].all()
+
+
+def test_where_returns_get_lost_several_looks_in_a_row_are_needed() -> None:
+    spacing = math.tau / 12
+    nothing, something = np.full(12, math.inf), np.full(12, math.inf)
+    something[3] = 200.0
+    looks = np.zeros((16, 16), dtype=np.uint8)
+    at = (-400.0, -400.0)
+    for ranges, free in (
+        (nothing, 0),
+        (nothing, 0),
+        (something, 1),
+        (nothing, 1),
+        (nothing, 1),
+        (nothing, 2),
+    ):
+        seen = through(ranges, spacing, spacing, at, 0.0, aside=1, needed=3, looks=looks)
+        # 200 m to the east something was met: there it begins anew.
+        assert [seen[4, 8], seen[11, 8]] == [free > 0, free > 1]
 
 
 @given(seed=SEED)
@@ -73,7 +139,7 @@ def test_rays_that_are_finer_than_bearings_that_err_are_told_apart(seed: int) ->
     places = 100.0 * np.exp(1j * (math.pi / 2 - start - spacing * asked))
     through = np.zeros(len(places), dtype=np.bool_)
     many = through_places(
-        through, places, ranges, 0.0, 0.0, start, spacing, False, 900.0, 1.0, 2, math.inf, 1
+        through, places, ranges, 0.0, 0.0, start, spacing, 0.0, False, 900.0, 1.0, 2, math.inf, 1
     )
     expected = [bool((ranges[ray - 2 : ray + 3] == math.inf).all()) for ray in asked.tolist()]
     assert through.tolist() == expected

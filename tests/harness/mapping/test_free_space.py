@@ -104,13 +104,58 @@ def test_nothing_is_known_before_the_first_scan_nor_outside_the_area() -> None:
     assert seen.contains(np.zeros((0, 2))).shape == (0,)
 
 
-def test_beyond_where_rays_are_as_far_apart_as_the_clearance_nothing_is_known() -> None:
-    # 40 rays: 0.157 rad apart, 200 m at a distance of 1273 m.
-    seen = fed(scans(sensor(world_of(), rays=40), [MIDDLE]))
+@pytest.mark.parametrize("beam_deg", [0.0, 4.0])
+@pytest.mark.parametrize("width_m", [40.0, CLEARANCE])
+def test_beyond_where_what_is_least_wide_could_hide_between_two_beams_nothing_is_known(
+    beam_deg: float, width_m: float
+) -> None:
+    # 40 axes: 9 degrees apart, 200 m at a distance of 1273 m.
+    (scan,) = scans(sensor(world_of(), rays=40, beam_deg=beam_deg), [MIDDLE])
+    seen = FreeSpace(BOUNDS, CLEARANCE, RANGE, least_width_m=width_m)
+    seen.update(scan)
     points = np.random.default_rng(3).uniform(0.0, 10_000.0, (20_000, 2))
     free = seen.contains(points)
+    reach_m = min(width_m / math.radians(9.0 - beam_deg), RANGE)
     assert free.any()
-    assert np.hypot(*(points - MIDDLE).T)[free].max() <= CLEARANCE / (math.tau / 40) + 1e-6
+    assert 0.8 * reach_m - FREE_CELL < np.hypot(*(points - MIDDLE).T)[free].max() <= reach_m + 1e-6
+
+
+def test_beams_that_touch_show_all_to_the_range_to_be_free_however_few() -> None:
+    seen = fed(scans(sensor(world_of(), rays=40), [MIDDLE]))
+    points = np.random.default_rng(3).uniform(0.0, 10_000.0, (20_000, 2))
+    away = np.hypot(*(points - MIDDLE).T)
+    assert seen.contains(points)[away < RANGE - 2.0 * FREE_CELL].all()
+
+
+@settings(max_examples=30)
+@given(seed=SEEDS, rays=st.sampled_from([12, 90, 720]), heading=st.floats(0.0, 7.0))
+def test_no_pole_stands_in_free_space_however_thin(seed: int, rays: int, heading: float) -> None:
+    poles = np.random.default_rng(seed).uniform(2000.0, 8000.0, (12, 2))
+    world = world_of(*(Circle(tuple(place), 0.01) for place in poles.tolist()))
+    seen = fed(scans(sensor(world, rays=rays), [MIDDLE], heading_rad=heading))
+    assert not seen.contains(poles).any()
+
+
+@pytest.mark.parametrize(("lost", "looks"), [(0.0, 1), (0.01, 1), (0.1, 2), (0.5, 7), (0.95, 90)])
+def test_where_returns_get_lost_space_is_free_after_as_many_looks_as_make_a_miss_unlikely(
+    lost: float, looks: int
+) -> None:
+    (scan,) = scans(sensor(world_of()), [MIDDLE])
+    seen, place = FreeSpace(BOUNDS, CLEARANCE, RANGE, lost=lost), np.array([(5000.0, 6000.0)])
+    for _ in range(looks - 1):
+        seen.update(scan)
+        assert not seen.contains(place).any()
+    seen.update(scan)
+    assert seen.contains(place).all()
+
+
+@pytest.mark.parametrize("lost", [0.99, 1.0])
+def test_a_sensor_that_returns_hardly_anything_shows_nothing_to_be_free(lost: float) -> None:
+    (scan,) = scans(sensor(world_of()), [MIDDLE])
+    seen = FreeSpace(BOUNDS, CLEARANCE, RANGE, lost=lost)
+    for _ in range(300):
+        seen.update(scan)
+    assert not seen.contains(np.random.default_rng(1).uniform(0.0, 10_000.0, (1000, 2))).any()
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 77.0, 200.0, 350.0])
@@ -155,25 +200,28 @@ def test_what_hides_just_beside_the_field_of_view_is_not_in_free_space(side: flo
     east=st.floats(BOUNDS[0], BOUNDS[2]),
     noise=st.sampled_from([0.0, 20.0]),
 )
-def test_a_cell_is_free_where_the_rays_about_it_went_beyond(
+def test_a_cell_is_free_where_the_beams_that_meet_it_went_beyond(
     seed: int, field: float, east: float, noise: float
 ) -> None:
-    eye = sensor(random_world(seed), rays=90, field_of_view_deg=field)
-    (scan,) = scans(eye, [(east, MIDDLE[1])])
+    (scan,) = scans(sensor(random_world(seed), rays=90, field_of_view_deg=field), [(east, MIDDLE[1])])
     seen = FreeSpace(BOUNDS, CLEARANCE, RANGE, noise)
     seen.update(scan)
-    rng, rays = np.random.default_rng(seed), len(scan.ranges_m)
-    reach, half = min(RANGE, CLEARANCE / scan.spacing_rad), 0.75 * FREE_CELL
+    # Where ranges err, three beams more to either side have to go beyond.
+    beside = 3.0 * scan.spacing_rad if noise else 0.0
+    rng, half = np.random.default_rng(seed), 0.75 * FREE_CELL
+    axes = scan.start_rad + scan.spacing_rad * np.arange(90)
     columns, rows = (math.ceil((BOUNDS[2 + axis] - BOUNDS[axis]) / FREE_CELL) for axis in (0, 1))
     for column, row in zip(rng.integers(0, columns, 500), rng.integers(0, rows, 500), strict=True):
         middle = np.array((BOUNDS[0], BOUNDS[1])) + (np.array((column, row)) + 0.5) * FREE_CELL
         x, y = middle - (scan.east_m, scan.north_m)
         away = math.hypot(x, y)
-        ray = round((math.atan2(x, y) - scan.start_rad) % math.tau / scan.spacing_rad)
-        aside = math.ceil(half / scan.spacing_rad / max(away, half)) + 1
-        inside = field == 360.0 or (aside <= ray < rays - aside)
-        about = np.arange(1 - 2 ** aside.bit_length(), 2 ** aside.bit_length())
-        beyond = min(reach, scan.ranges_m[(ray + about) % rays].min())
+        wide = math.asin(half / away) if away > half else math.pi
+        off = np.abs((axes - math.atan2(x, y) + math.pi) % math.tau - math.pi)
+        meets = off <= wide + 0.5 * scan.beam_rad + beside
+        # All of it is in view: its outermost bearings are, too.
+        off_nose = abs((scan.heading_rad - math.atan2(x, y) + math.pi) % math.tau - math.pi)
+        inside = field == 360.0 or off_nose + wide + beside <= math.radians(field) / 2
+        beyond = min(RANGE, scan.ranges_m[meets].min(initial=math.inf))
         assert seen.contains(middle[None])[0] == (inside and beyond - half - noise > away)
 
 

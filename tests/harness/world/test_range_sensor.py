@@ -28,7 +28,7 @@ def sensor(world: World, seed: int = 1, **keys: Any) -> RangeSensor:
 
 def ahead(world: World, heading_rad: float = 0.0) -> float:
     """What a ray along the heading returns."""
-    scan = sensor(world, field_of_view_deg=1.0, rays=3).scan(0.0, 0.0, heading_rad, 0.0)
+    scan = sensor(world, field_of_view_deg=1.0, rays=3, beam_deg=0.0).scan(0.0, 0.0, heading_rad, 0.0)
     return float(scan.ranges_m[1])
 
 
@@ -89,7 +89,8 @@ def test_ranges_lie_between_those_of_slightly_larger_and_smaller_shapes(
     seed: int, count: int, field: float, heading: float
 ) -> None:
     obstacles = random_obstacles(np.random.default_rng(seed), count, 0.0, 1200.0)
-    scan = sensor(World(obstacles, BOUNDS), field_of_view_deg=field, rays=60).scan(0.0, 0.0, heading, 0.0)
+    eye = sensor(World(obstacles, BOUNDS), field_of_view_deg=field, rays=60, beam_deg=0.0)
+    scan = eye.scan(0.0, 0.0, heading, 0.0)
     low, high = np.full(60, math.inf), np.full(60, math.inf)
     for obstacle in obstacles:
         if isinstance(obstacle.shape, Circle):
@@ -114,11 +115,12 @@ def test_ranges_lie_between_those_of_slightly_larger_and_smaller_shapes(
     share=st.floats(0.01, 0.99),
     heading=st.floats(0.0, math.tau),
 )
-def test_hits_on_a_circle_lie_exactly_on_it_and_fill_its_width(
+def test_hits_of_rays_on_a_circle_lie_exactly_on_it_and_fill_its_width(
     bearing: float, away: float, share: float, heading: float
 ) -> None:
     center, radius = np.array([away * math.sin(bearing), away * math.cos(bearing)]), share * away
-    scan = sensor(World([Obstacle(Circle(tuple(center), radius))], BOUNDS)).scan(0.0, 0.0, heading, 0.0)
+    eye = sensor(World([Obstacle(Circle(tuple(center), radius))], BOUNDS), beam_deg=0.0)
+    scan = eye.scan(0.0, 0.0, heading, 0.0)
     hit = np.isfinite(scan.ranges_m)
     points = scan.directions[hit] * scan.ranges_m[hit, None]
     np.testing.assert_allclose(np.hypot(*(points - center).T), radius, rtol=0, atol=1e-9)
@@ -157,7 +159,7 @@ def test_inside_an_obstacle_a_ray_returns_the_way_out() -> None:
 def test_an_edge_shorter_than_places_are_told_apart_hides_nothing(edge_m: float) -> None:
     house = Polygon(((-100.0, 300.0), (0.0, 200.0), (edge_m, 200.0), (100.0, 300.0)))
     world = World([Obstacle(house), Obstacle(square(0.0, -500.0, 100.0))], BOUNDS)
-    scan = sensor(world, rays=4).scan(30.0, 0.0, math.pi / 4, 0.0)
+    scan = sensor(world, rays=4, beam_deg=0.0).scan(30.0, 0.0, math.pi / 4, 0.0)
     assert scan.nearest_m == pytest.approx(math.hypot(30.0, 200.0))
     np.testing.assert_allclose(scan.ranges_m, [math.inf, 230.0, math.inf, 400.0])
 
@@ -211,7 +213,7 @@ def test_rays_are_spread_evenly_about_the_nose(field: float, rays: int) -> None:
 
 def test_what_lies_outside_the_field_of_view_is_not_seen() -> None:
     world = World([Obstacle(Circle((500.0, 0.0), 100.0)), Obstacle(square(0.0, -500.0, 100.0))], BOUNDS)
-    source = sensor(world, field_of_view_deg=90.0, rays=90)
+    source = sensor(world, field_of_view_deg=90.0, rays=90, beam_deg=0.0)
     seen = [
         np.isfinite(source.scan(0.0, 0.0, heading * math.pi / 2, 0.0).ranges_m).sum() for heading in range(4)
     ]
@@ -362,7 +364,9 @@ def test_flaws_are_drawn_as_scans_are_taken_not_as_they_are_read() -> None:
 def test_what_returned_is_told_from_any_origin(seed: int, field: float) -> None:
     rng = np.random.default_rng(seed)
     world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
-    scan = sensor(world, field_of_view_deg=field).scan(40.0, -30.0, rng.uniform(0.0, math.tau), 0.0)
+    scan = sensor(world, field_of_view_deg=field, beam_deg=0.0).scan(
+        40.0, -30.0, rng.uniform(0.0, math.tau), 0.0
+    )
     expected = (scan.ranges_m < math.inf).nonzero()[0]
     directions = scan.directions.copy().view(np.complex128).ravel()
     for origin in (0j, complex(-700.0, 900.0)):
