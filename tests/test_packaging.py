@@ -65,6 +65,16 @@ def test_wheel_holds_the_rooms_their_data_and_the_scenarios(wheel: Path) -> None
     assert {"LICENSE", "entry_points.txt", "METADATA"} <= notes
 
 
+def test_an_editable_installation_copies_no_source(tmp_path: Path) -> None:
+    build = f"import hatchling.build; hatchling.build.build_editable({str(tmp_path)!r})"
+    subprocess.run([sys.executable, "-c", build], cwd=ROOT, capture_output=True, timeout=600, check=True)
+    (built,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(built) as archive:
+        assert [name for name in archive.namelist() if name.endswith(".py")] == []
+        (path,) = (name for name in archive.namelist() if name.endswith(".pth"))
+        assert archive.read(path).decode().split() == [str(ROOT), str(ROOT / "harness" / "front_door")]
+
+
 def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
