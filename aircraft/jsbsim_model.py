@@ -48,6 +48,7 @@ class JsbsimModel:
         plane: LocalPlane,
         atmosphere: Atmosphere | None = None,
         step_rate_hz: int = STEP_RATE_HZ,
+        climb_limit_mps: float | None = None,
     ) -> None:
         """Loads, trims and starts the aircraft.
 
@@ -57,6 +58,8 @@ class JsbsimModel:
             plane: the local plane that all positions refer to.
             atmosphere: steady wind, gust and turbulence; default: calm.
             step_rate_hz: integration steps per second.
+            climb_limit_mps: the fastest climb or descent that the altitude loop asks for; None: its own, for flight
+                at one altitude.
 
         Raises:
             AircraftError: if the airspeed is out of range or too low for the wind, or the model cannot be loaded,
@@ -87,7 +90,7 @@ class JsbsimModel:
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
         self._enable = node(fdm, "wayproof/enable").set_double_value
         self._read_for_fault = tuple(node(fdm, path).get_double_value for path in FAULT_PROPERTIES)
-        self._set_up_autopilot()
+        self._set_up_autopilot(climb_limit_mps)
         self.command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
         if self._windy:
             self._move_with_wind()
@@ -187,10 +190,12 @@ class JsbsimModel:
         """Switches the inner loops on, or off: the controls then stay where they are."""
         self._enable(1.0 if on else 0.0)
 
-    def _set_up_autopilot(self) -> None:
+    def _set_up_autopilot(self, climb_limit_mps: float | None) -> None:
         """Gives the autopilot its gains and the trim that they hold for."""
         fdm = self._fdm
         values = self.airframe.gains.properties()
+        if climb_limit_mps is not None:
+            values["wayproof/gain/climb-limit-fps"] = climb_limit_mps / FOOT_M
         for control in CONTROLS:
             values[f"wayproof/trim/{control}-norm"] = fdm[f"fcs/{control}-cmd-norm"]
         values["wayproof/trim/pitch-rad"] = fdm["attitude/theta-rad"]

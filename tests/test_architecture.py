@@ -79,6 +79,7 @@ ONLY_IN = {
     "distributed": ("harness/campaign/workers.py",),
     "datafusion": ("harness/recording/catalog.py",),
     "mcap_protobuf": ("harness/run_files/exports/recordings.py", "harness/run_files/flight_logs.py"),
+    "aerofiles": ("harness/run_files/flight_logs.py", "harness/run_files/igc_path.py"),
     "foxglove_schemas_protobuf": ("harness/run_files/exports/recordings.py",),
     "numba": ("planner/compiled.py", "aircraft/kernels.py", "aircraft/guidance/machine_code.py"),
     "ompl": ("planner/baselines/dubins_tree.py",),
@@ -101,6 +102,7 @@ LATE = {
     "jinja2": ("harness/report/page.py",),
     "ompl": (),
     "distributed": (),
+    "aerofiles": (),
     "fastkml": (),
     "mcap_protobuf": (),
     "pyulog": (),
@@ -116,7 +118,7 @@ LATE = {
 
 LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
     "aircraft": (
-        ("airframes", "law_cards"),
+        ("airframes", "climb", "law_cards"),
         ("card_cache", "survey"),
         ("jsbsim_model", "kinematic_point"),
         ("envelope", "jsbsim_loading", "plane_patch"),

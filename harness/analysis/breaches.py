@@ -5,6 +5,7 @@ A track is known ten times a second; between two rows it is taken to be straight
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
     from shapely import Geometry
 
 CONTACT: Final = "obstacle"
-"""The kind of a breach that is a contact; the others are crossings of lines in the air."""
+TERRAIN: Final = "terrain"
+CONTACTS: Final = (CONTACT, TERRAIN)
+"""Kinds of breaches that are contacts; the others are crossings of lines in the air."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Breach:
     """One stretch of flight where the aircraft was where it must not be.
 
     Attributes:
-        kind: `obstacle`, `exclusion`, `inclusion` or `area`.
+        kind: `obstacle`, `terrain`, `exclusion`, `inclusion` or `area`.
         name: of what it touched or crossed.
         start_s: when it began.
         end_s: when it was over, or the flight was.
@@ -59,23 +62,32 @@ class Kept:
         breaches: in order of time.
         margin_m: least distance from every edge of obstacles and fences, negative where one was crossed; +inf without
             any.
+        height_m: `min`, `mean` and where the least was: `time_s`, `east_m`, `north_m`; None where the ground is not
+            known anywhere.
     """
 
     breaches: tuple[Breach, ...]
     margin_m: float
+    height_m: dict[str, float] | None = None
 
     @property
     def contacts(self) -> tuple[Breach, ...]:
         """Those with obstacles."""
-        return tuple(each for each in self.breaches if each.kind == CONTACT)
+        return tuple(each for each in self.breaches if each.kind in CONTACTS)
 
     @property
     def crossings(self) -> tuple[Breach, ...]:
         """Those of fences and of the area's bounds."""
-        return tuple(each for each in self.breaches if each.kind != CONTACT)
+        return tuple(each for each in self.breaches if each.kind not in CONTACTS)
 
 
-def kept(track: Track, world: World, fences: Fences, bounded: bool) -> Kept:
+def kept(
+    track: Track,
+    world: World,
+    fences: Fences,
+    bounded: bool,
+    others: tuple[Sequence[Breach], float] = ((), math.inf),
+) -> Kept:
     """Compares a track with obstacles, fences and the bounds of the area.
 
     Args:
@@ -83,25 +95,45 @@ def kept(track: Track, world: World, fences: Fences, bounded: bool) -> Kept:
         world: the truth.
         fences: those of the path.
         bounded: the bounds of the area must not be crossed.
+        others: contacts that have been found otherwise, and the least distance from what they are with.
     """
     import shapely
 
+    heights = track.altitude_above_ground_m
+
     found = _contacts(track, world)
-    margins = [float(np.min(track.clearance_m, initial=np.inf))]
+    found += others[0]
+    margins = [float(np.min(track.clearance_m, initial=np.inf)), others[1]]
     for fence in fences.exclusions:
-        margin = -_inside_m(track, fence.area)
+        margin = -inside_m(track, fence.area)
         margins.append(float(margin.min()))
-        found += _crossings(track, margin, fence.kind, fence.name, outside_of=fence.area)
+        found += crossings(track, margin, fence.kind, fence.name, outside_of=fence.area)
     allowed = fences.allowed
     if allowed is not None:
-        margin = _inside_m(track, allowed)
+        margin = inside_m(track, allowed)
         margins.append(float(margin.min()))
-        found += _crossings(track, margin, "inclusion", _names(fences.inclusions), inside_of=allowed)
+        found += crossings(track, margin, "inclusion", _names(fences.inclusions), inside_of=allowed)
     margins += [-each.depth_m for each in found]
+    if heights is not None:
+        found += _stretches(track, np.nan_to_num(heights, nan=np.inf), TERRAIN, "the ground")
     if bounded:
         area = shapely.box(*world.bounds_m)
-        found += _crossings(track, _inside_m(track, area), "area", "area.bounds_m", inside_of=area)
-    return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins))
+        found += crossings(track, inside_m(track, area), "area", "area.bounds_m", inside_of=area)
+    return Kept(tuple(sorted(found, key=lambda each: each.start_s)), min(margins), _heights(track, heights))
+
+
+def _heights(track: Track, heights_m: FloatArray | None) -> dict[str, float] | None:
+    """What is told of the height above ground."""
+    if heights_m is None or not np.isfinite(heights_m).any():
+        return None
+    row = int(np.nanargmin(heights_m))
+    return {
+        "min": float(heights_m[row]),
+        "mean": float(np.nanmean(heights_m)),
+        "time_s": float(track.time_s[row]),
+        "east_m": float(track.east_m[row]),
+        "north_m": float(track.north_m[row]),
+    }
 
 
 def _names(fences: Sequence[Fence]) -> str:
@@ -137,7 +169,7 @@ def _fix(track: Track, row: int) -> tuple[float, float, float]:
     return float(track.east_m[row]), float(track.north_m[row]), float(track.time_s[row])
 
 
-def _inside_m(track: Track, area: Geometry) -> FloatArray:
+def inside_m(track: Track, area: Geometry) -> FloatArray:
     """(n,) how far inside of an area the rows of a track are; negative outside."""
     import shapely
 
@@ -149,7 +181,7 @@ def _inside_m(track: Track, area: Geometry) -> FloatArray:
     return inside
 
 
-def _crossings(
+def crossings(
     track: Track,
     margin_m: FloatArray,
     kind: str,

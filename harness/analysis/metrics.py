@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.analysis.as_given import AsGiven
 from harness.analysis.smoothness import (
     flown_lengths,
     flown_profile,
@@ -16,7 +17,7 @@ from harness.analysis.smoothness import (
     stations_in_effect,
     window_m,
 )
-from harness.analysis.trackability import AsGiven, FlightLimits, legs, saturated
+from harness.analysis.trackability import FlightLimits, legs, saturated
 from harness.flight.record import Flight, FloatArray, Outcome, digest
 
 
@@ -62,7 +63,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
         "cross_track_m": error_figures(followed),
-        "altitude_error_m": error_figures(track.up_m - limits.altitude_m),
+        "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
             "planned": dataclasses.asdict(smoothness(planned, window, planned_m)),
             "flown": dataclasses.asdict(smoothness(flown_profile(track), window)),

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
+from harness.analysis.as_given import AsGiven
 from harness.analysis.smoothness import planned_profile, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 
@@ -96,40 +96,6 @@ class FlightLimits:
         return max(0.1 * self.clearance_m, 2.0 * self.tracking_error_m)
 
 
-class Corner(Protocol):
-    """A corner of a path that was to be flown by."""
-
-    @property
-    def arc_length_m(self) -> float:
-        """Where on the plan the path turns at it."""
-        ...
-
-    @property
-    def cut_m(self) -> float:
-        """How far from it the plan passes."""
-        ...
-
-    @property
-    def half_m(self) -> float:
-        """So far before and after that the plan is off the legs that meet at it."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class AsGiven:
-    """A path that was given and how it was flown, row by row of the track.
-
-    Attributes:
-        corners: that are cut, in order; each ends a leg.
-        deviation_m: (n,) distance between the track and the path as given.
-        allowed_m: (n,) what it may be.
-    """
-
-    corners: Sequence[Corner]
-    deviation_m: FloatArray
-    allowed_m: FloatArray
-
-
 @dataclass(frozen=True)
 class Leg:
     """A stretch of flight under one plan, and the verdict on it.
@@ -143,6 +109,7 @@ class Leg:
         max_airspeed_error_mps: largest absolute error of the airspeed, averaged over `SPEED_S`; None where the
             airspeed is not judged.
         max_load_factor: largest load factor, averaged over `LOAD_S`.
+        waypoint: the number of the point of a given path that it leads to; None where it leads to none.
         corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
         max_deviation_m: largest distance from the path as given; None where a planner made the path.
         trackable: whether all of them stayed within what they may be.
@@ -152,6 +119,8 @@ class Leg:
             "sensor horizon": a turn too tight, near an obstacle that the sensor shows too late for any other;
             "turn radius too tight": the plan bends more than the bank limit allows in calm air, or is further from
             the path as given than it may be, which it is at corners;
+            "climb too steep", "descent too steep": the altitude is off, and the path asks for more than the fastest
+            climb or descent of the aircraft;
             "speed or throttle saturation": the airspeed is off by more than it may be, or the throttle at a
             stop while altitude is lost;
             "wind drift": the bank is used up in a turn that only the wind makes too tight, or the aircraft is
@@ -170,6 +139,7 @@ class Leg:
     max_altitude_error_m: float
     max_airspeed_error_mps: float | None
     max_load_factor: float
+    waypoint: int | None
     corner_cut_m: float
     max_deviation_m: float | None
     trackable: bool
@@ -203,11 +173,15 @@ def legs(
     judged, over_m = [], -math.inf
     for first, last in _stretches(track, leg):
         passed = [c for c, row in zip(corners, reached, strict=True) if first <= row <= last]
-        cut_m = max((corner.cut_m for corner in passed), default=0.0)
         lost = lost_control and last == len(track) - 1
-        verdict = _judge(track, first, last, plans, limits, lost, cut_m)
+        verdict = _judge(track, first, last, plans, limits, lost, given)
         if given is not None:
             # All of a corner belongs to the leg that it ends.
+            verdict = replace(
+                verdict,
+                waypoint=passed[-1].waypoint if passed else None,
+                corner_cut_m=max((corner.cut_m for corner in passed), default=0.0),
+            )
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if passed else math.inf
             verdict = _judged_as_given(verdict, given, (along > since_m) & (along <= over_m))
         judged.append(verdict)
@@ -246,12 +220,13 @@ def _judge(
     plans: Sequence[AcceptedPlan],
     limits: FlightLimits,
     lost_control: bool,
-    cut_m: float,
+    given: AsGiven | None,
 ) -> Leg:
-    leg = track.part(first, last + 1)
+    leg, rows = track.part(first, last + 1), slice(first, last + 1)
     off = np.nan_to_num(np.abs(leg.cross_track_m))
-    high = np.abs(leg.up_m - limits.altitude_m)
-    slow = np.abs(_averaged(leg.airspeed_mps - limits.airspeed_mps, leg, SPEED_S))
+    high = np.abs(leg.up_m - (given.altitude_m[rows] if given else limits.altitude_m))
+    asked_mps = given.airspeed_mps[rows] if given else limits.airspeed_mps
+    slow = np.abs(_averaged(leg.airspeed_mps - asked_mps, leg, SPEED_S))
     load = float(_averaged(leg.load_factor, leg, LOAD_S).max())
     threshold = limits.cross_track_threshold_m
     cause = None
@@ -264,10 +239,7 @@ def _judge(
     elif slow.max() > limits.max_airspeed_error_mps:
         cause = "speed or throttle saturation"
     elif high.max() > limits.max_altitude_error_m:
-        sinking = max(int(high.argmax()), 1)
-        before = leg.part(int(np.searchsorted(leg.time_s, leg.time_s[sinking] - LEAD_S)), sinking)
-        stopped = _at_a_stop(before).mean() >= SATURATED_SHARE
-        cause = "speed or throttle saturation" if stopped else "tracking error"
+        cause = _altitude_cause(track, first + int(high.argmax()), limits, given)
     return Leg(
         start_s=float(track.time_s[first]),
         end_s=float(track.time_s[last]),
@@ -276,10 +248,30 @@ def _judge(
         max_altitude_error_m=float(high.max()),
         max_airspeed_error_mps=float(slow.max()) if np.isfinite(slow.max()) else None,
         max_load_factor=load,
-        corner_cut_m=cut_m,
+        waypoint=None,
+        corner_cut_m=0.0,
         max_deviation_m=None,
         trackable=cause is None,
         cause=cause,
+    )
+
+
+def _altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven | None) -> str:
+    """Why the altitude is off, at the row where it is most."""
+    if given is not None:
+        # What was asked for since the altitude was last as it should be.
+        kept = np.flatnonzero(
+            np.abs(track.up_m[:peak] - given.altitude_m[:peak]) <= 0.5 * limits.max_altitude_error_m
+        )
+        since = slice(int(kept[-1]) if len(kept) else 0, peak + 1)
+        up = given.climb_mps[since] - given.fastest_mps[since, 0]
+        down = -given.climb_mps[since] - given.fastest_mps[since, 1]
+        if max(up.max(), down.max()) > 0.0:
+            return "climb too steep" if up.max() >= down.max() else "descent too steep"
+    sinking = max(peak, 1)
+    before = track.part(int(np.searchsorted(track.time_s, track.time_s[sinking] - LEAD_S)), sinking)
+    return (
+        "speed or throttle saturation" if _at_a_stop(before).mean() >= SATURATED_SHARE else "tracking error"
     )
 
 

@@ -14,6 +14,7 @@ from typing import Any, Final
 from aircraft.airframe import Airframe
 from aircraft.airframes import AircraftError, airframe
 from aircraft.card_cache import cached, figure
+from aircraft.climb import climb_rates
 from aircraft.envelope import performance
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import GRAVITY_MPS2
@@ -27,7 +28,7 @@ COURSE_SEED: Final = 1
 COURSE_TURNS: Final = 8
 RADIUS_TOLERANCE: Final = 0.02
 DEFAULT_WIND_SHARE: Final = 0.3
-FORMAT: Final = 1
+FORMAT: Final = 2
 """Goes up with what a card consists of, so that older ones are made anew."""
 
 Report = Callable[[int, int, str], None]
@@ -49,8 +50,8 @@ def envelope_card(
 
     Returns:
         `aircraft`, `mass_kg`, `airspeed_range_mps`, `cruise_mps`, `bank_limit_deg`, `roll_rate_dps`, `verified`,
-        and `at`: for each airspeed `airspeed_mps`, `roll_in_s`, `level_bank_deg`, `turns` (see `flown_turn`) and
-        `tracked` (see `tightest`).
+        and `at`: for each airspeed `airspeed_mps`, `roll_in_s`, `level_bank_deg`, `climb_mps` and `descent_mps` (see
+        `aircraft.climb`), `turns` (see `flown_turn`) and `tracked` (see `tightest`).
 
     Raises:
         AircraftError: there is no such aircraft, or it cannot fly at one of the airspeeds or in one of the winds.
@@ -80,7 +81,7 @@ def envelope_card(
     }
 
 
-_PAGE: Final = ("airspeed_mps", "roll_in_s", "level_bank_deg")
+_PAGE: Final = ("airspeed_mps", "roll_in_s", "level_bank_deg", "climb_mps", "descent_mps")
 _TURN: Final = ("bank_deg", "radius_m", "load_factor", "altitude_lost_m", "airspeed_lost_mps")
 _TRACKED: Final = ("wind_mps", "planned_radius_m", "tightest_radius_m")
 
@@ -103,10 +104,13 @@ def _page(frame: Airframe, speed: float, winds: Sequence[float]) -> dict[str, An
     from aircraft.survey import roll_in_s
 
     banks = (*(bank for bank in BANKS_DEG if bank < frame.bank_limit_deg), frame.bank_limit_deg)
+    climb, descent = climb_rates(frame).at(speed)
     return {
         "airspeed_mps": speed,
         "roll_in_s": roll_in_s(frame, speed),
         "level_bank_deg": frame.level_bank_deg(speed),
+        "climb_mps": climb,
+        "descent_mps": descent,
         "turns": [flown_turn(frame, speed, bank) for bank in banks],
         "tracked": [tightest(frame, speed, wind) for wind in winds],
     }

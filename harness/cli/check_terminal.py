@@ -8,6 +8,9 @@ from typing import Any
 from harness.cli.terminal import plain
 from harness.files.wording import counted
 
+MOST_ITEMS = 12
+"""So many items of a mission are told of one by one."""
+
 SHOWN = 6
 """So many corners, legs, contacts and breaches are listed; the others are counted."""
 
@@ -19,6 +22,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         metrics: as `harness.run.path_check.measured` returns it.
     """
     legs, check = metrics["trackability"], metrics["check"]
+    point = "item" if check["items"] else "waypoint"
     bad = [{"number": number, **leg} for number, leg in enumerate(legs, start=1) if not leg["trackable"]]
     cross, off = metrics["cross_track_m"], metrics["deviation_from_given_m"]
     style, (word, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
@@ -35,19 +39,29 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     rows["cross-track error"] = (
         f"rms {_metres(cross['rms'])} / p95 {_metres(cross['p95'])} / max {_metres(cross['max'])}"
     )
+    high = metrics["altitude_error_m"]
+    rows["altitude error"] = f"p95 {_metres(high['p95'])} / max {_metres(high['max'])}"
+    if "height_above_ground_m" in metrics:
+        height = metrics["height_above_ground_m"]
+        rows["above ground"] = (
+            f"least {_metres(height['min'])} at {height['time_s']:.0f} s, ({height['east_m']:.0f}, "
+            f"{height['north_m']:.0f}) m; mean {_metres(height['mean'])}"
+        )
     for leg in _listed(bad, "legs not trackable", rows):
-        rows[f"  leg {leg['number']}"] = (
+        to = f" to {point} {leg['waypoint']}" if check["items"] and leg["waypoint"] is not None else ""
+        rows[f"  leg {leg['number']}{to}"] = (
             f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, "
-            f"{_metres(leg['max_deviation_m'])} off"
+            f"{_metres(leg['max_deviation_m'])} off{_in_altitude(leg)}"
         )
     corners = sorted(check["corners"], key=lambda corner: corner["kept"])
     for corner in _listed(corners, "corners cut", rows):
         side = "left" if corner["turn_deg"] > 0 else "right"
-        rows[f"  waypoint {corner['waypoint']}"] = (
+        rows[f"  {point} {corner['waypoint']}"] = (
             f"{abs(corner['turn_deg']):.0f} deg {side}, {_rounded(corner)}"
         )
+    _add_items(check["items"], rows)
     for number, note in enumerate(check["notes"]):
-        rows["also in the file" if not number else " " * (number + 1)] = plain(note)
+        rows["notes" if not number else " " * (number + 1)] = plain(note)
     for name, figures in (("as given", check["given"]), ("as flown", metrics["smoothness"]["flown"])):
         rows[f"smoothness {name}"] = (
             f"turns {figures['heading_change_deg']:,.0f} deg, energy {figures['bending_energy_1pm']:.2g} /m, "
@@ -68,6 +82,31 @@ def _add_contacts(metrics: Mapping[str, Any], rows: dict[str, str]) -> None:
             )
 
 
+def _add_items(items: Sequence[Mapping[str, str]], rows: dict[str, str]) -> None:
+    """What became of the items of a mission: all are counted, those not flown are named."""
+    if not items:
+        return
+    kinds = [item["what"] for item in items]
+    rows["items"] = f"{len(items)}: " + ", ".join(
+        f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)
+    )
+    told = [
+        item for item in items if item["what"] == "not flown" or (item["what"] == "flown" and item["why"])
+    ]
+    for item in told[:MOST_ITEMS]:
+        why = f": {item['why']}" if item["why"] else ""
+        rows[f"  item {item['item']} "] = plain(f"{item['name']}, {item['what']}{why}")
+    if len(told) > MOST_ITEMS:
+        rows["  more"] = f"{len(told) - MOST_ITEMS}, in metrics.json"
+
+
+def _in_altitude(leg: Mapping[str, Any]) -> str:
+    """How far a leg is off in altitude, where that is why it is not trackable."""
+    if leg["cause"] not in ("climb too steep", "descent too steep"):
+        return ""
+    return f", {_metres(leg['max_altitude_error_m'])} in altitude"
+
+
 def _listed(entries: Sequence[Any], title: str, rows: dict[str, str]) -> Sequence[Any]:
     """The first few entries, and a row that counts them all."""
     if entries:
@@ -83,7 +122,10 @@ def _rounded(corner: dict[str, Any]) -> str:
         return f"not reached; {allowed}"
     if not corner["radius_m"]:
         return f"no arc leads straight back, passed at {corner['flown_cut_m']:.0f} m; {allowed}"
-    return f"radius {corner['radius_m']:.0f} m, cut by {corner['flown_cut_m']:.0f} m; {allowed}"
+    told = f"radius {corner['radius_m']:.0f} m, cut by {corner['flown_cut_m']:.0f} m"
+    if corner["most_off_m"] > max(1.1 * corner["flown_cut_m"], corner["allowed_cut_m"]):
+        told += f", {corner['most_off_m']:.0f} m off after it"
+    return f"{told}; {allowed}"
 
 
 def _metres(value: float | None) -> str:

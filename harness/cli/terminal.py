@@ -166,7 +166,8 @@ def envelope_tables(card: Mapping[str, Any]) -> list[tuple[str, Sequence[str], l
     for page in card["at"]:
         title = (
             f"turns at {page['airspeed_mps']:g} m/s; 90 % of 30 deg in {page['roll_in_s']:g} s; speed and altitude "
-            f"kept up to {page['level_bank_deg']:g} deg"
+            f"kept up to {page['level_bank_deg']:g} deg; climbs at up to {page['climb_mps']:.3g} m/s, sinks at up to "
+            f"{page['descent_mps']:.3g}"
         )
         tables.append((title, tuple(_TURN_COLUMNS.values()), _rows(page["turns"], _TURN_COLUMNS)))
         title = f"paths at {page['airspeed_mps']:g} m/s"

@@ -2,39 +2,28 @@
 
 from __future__ import annotations
 
-import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from harness.analysis.breaches import Kept, kept
-from harness.analysis.deviation import allowed_m, deviation
-from harness.analysis.metrics import metrics
-from harness.analysis.smoothness import polyline_profile, smoothness
-from harness.analysis.trackability import AsGiven, FlightLimits
+from harness.files.input_file import InputError
 from harness.flight.closed_loop import Loop, Progress
-from harness.flight.record import Flight, Outcome
 from harness.run.path_flight import fly_along
-from harness.run.path_scenario import has_bounds, scenario_for
-from harness.run.path_verdict import verdict
-from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
-from harness.run_files.given_path import GIVEN, CutCorner, FlyBy, fly_by
+from harness.run.path_measured import measured
+from harness.run.path_plan import PathPlan, planned
+from harness.run.path_scenario import files_of, has_bounds, scenario_for
+from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_aircraft, make_loop
+from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
 from harness.run_files.path_files import GivenPath, given_points, read_path
-from harness.scenario.scenario import Scenario, performance_of
-from harness.world.world import World
+from harness.scenario.scenario import Scenario
 
-FREE_SHARE = 0.25
-"""Share of the cross-track threshold by which a corner may be passed off only to make its arc wider."""
-
-SPACING_SHARE = 0.25
-"""Points along the given path are measured so close together, in thresholds of the cross-track error."""
-
-WINDOW_RADII = 4.0
-"""Track and path are compared where they are no further apart than this along the path, in turn radii."""
+if TYPE_CHECKING:
+    from harness.world_files.expansion import FileSpec
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,21 +33,25 @@ class PathCheck:
     Attributes:
         given: the path, with its fences.
         scenario: aircraft, air, obstacles, altitude and thresholds.
+        plan: what is flown.
         bounded: the bounds of the area were named, and must not be crossed.
         corner_m: how far off a corner may be passed; None: what `allowed_cut_m` says.
+        files: among the obstacles, for a path that is not flown at one altitude.
     """
 
     given: GivenPath
     scenario: Scenario
+    plan: PathPlan
     bounded: bool = False
     corner_m: float | None = None
+    files: tuple[FileSpec, ...] = ()
 
     @cached_property
-    def way(self) -> FlyBy:
-        """What guidance follows."""
-        threshold = self.scenario.trackability.cross_track_m
-        radius = performance_of(self.scenario).turn_radius_m
-        return fly_by(self.given.points_m, radius, FREE_SHARE * threshold)
+    def _accepted_m(self) -> dict[int, float]:
+        """How far from it an item lets the aircraft pass."""
+        if self.given.mission is None:
+            return {}
+        return {step.item: step.acceptance_m for step in self.given.mission.program.steps}
 
     def allowed_cut_m(self, waypoint: int) -> float:
         """How far off a corner may be passed.
@@ -67,9 +60,9 @@ class PathCheck:
         the scenario wants, by default one turn radius. A drawn path is to be flown as drawn: it is `corner_m`, else
         the cross-track threshold.
         """
-        accepted = self.given.acceptance_m[waypoint] if len(self.given.acceptance_m) else 0.0
+        accepted = self._accepted_m.get(waypoint, 0.0)
         if accepted > 0.0:
-            return float(accepted)
+            return accepted
         if self.corner_m is not None:
             return self.corner_m
         own = self.scenario.trackability.cross_track_m
@@ -195,14 +188,37 @@ def asked(
     Raises:
         InputError: they contradict each other; the fault names the key.
     """
-    altitude = altitude_m if altitude_m is not None else given.altitude_m
-    mission = {} if altitude is None else {"altitude_m": altitude}
-    own = {**sections, "mission": {**mission, **sections.get("mission", {})}}
+    if world is not None and given.origin_deg is not None and origin_of(world) is None:
+        raise InputError(f"{world}: area.origin: is missing; a path in degrees needs it")
+    own: dict[str, dict[str, Any]] = {key: dict(section) for key, section in sections.items()}
+    mission = own.setdefault("mission", {})
+    if altitude_m is not None:
+        mission["altitude_m"] = altitude_m
+    elif len(given.altitudes_m) and not given.above_ground:
+        mission["altitude_m"] = float(given.altitudes_m[0])
     if world is None and given.origin_deg is not None:
         latitude, longitude = given.origin_deg
         own["area"] = {"origin": {"latitude_deg": latitude, "longitude_deg": longitude}}
-    scenario = scenario_for(name, given.points_m, own, settings, world)
-    return PathCheck(given, scenario, has_bounds(own, settings, world), corner_m)
+    scenario = scenario_for(name, about(given.points_m), own, settings, world)
+    field = None if scenario.ground is None else scenario.ground.field()
+    plan = planned(given, scenario, altitude_m, None if field is None else field.at)
+    files: tuple[FileSpec, ...] = ()
+    if not given.drawn or given.above_ground or not plan.profile.level:
+        # Now it is known where and how high it begins, and how high the obstacles matter.
+        east, north = plan.way.segments[0, 2:4].tolist()
+        mission["course_deg"] = math.degrees(math.atan2(east, north)) % 360.0
+        mission["altitude_m"] = float(plan.profile.altitude_m[0])
+        level, line = plan.profile.level, plan.way.given_m[:, :2]
+        scenario = scenario_for(name, line, own, settings, world, files=level, ground=scenario.ground)
+        files = () if level else files_of(sections, settings, world)
+    return PathCheck(given, scenario, plan, has_bounds(own, settings, world), corner_m, files)
+
+
+def about(points_m: FloatArray) -> FloatArray:
+    """Points, and one more where they are all in one place, as a mission's may be."""
+    if np.ptp(points_m, axis=0).max() > SAME_PLACE_M:
+        return points_m
+    return np.concatenate((points_m, points_m[:1] + 1000.0))
 
 
 def fly_check(
@@ -225,17 +241,17 @@ def fly_check(
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
         RunFolderError: the folder holds something else or cannot be written.
     """
-    flown_by = partial(fly_along, check.way)
+    flown_by = partial(fly_along, check.plan)
+    make = partial(_loop, check.plan.climb_limit_mps)
     if out is None:
-        loop: Loop = make_loop(check.scenario)
-        return CheckedPath(
-            check, measured(check, flown_by(loop, (), progress), flight_limits(check.scenario))
-        )
+        flight = flown_by(make(check.scenario), (), progress)
+        return CheckedPath(check, measured(check, flight, flight_limits(check.scenario)))
     figures = fly_to_folder(
         check.scenario,
         out,
         recording,
         progress,
+        make=make,
         pilot=GIVEN,
         flown_by=flown_by,
         measured_by=partial(measured, check),
@@ -244,87 +260,8 @@ def fly_check(
     return CheckedPath(check, figures, out)
 
 
-@dataclass(frozen=True)
-class _Corner:
-    """A corner and what it may be cut by."""
-
-    corner: CutCorner
-    allowed_cut_m: float
-
-    @property
-    def arc_length_m(self) -> float:
-        return self.corner.arc_length_m
-
-    @property
-    def cut_m(self) -> float:
-        return self.corner.cut_m
-
-    @property
-    def half_m(self) -> float:
-        return self.corner.half_m
-
-
-def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str, Any]:
-    """The content of `metrics.json` of a path that was flown.
-
-    On top of what a flight has: `deviation_from_given_m`, `contact`, `breaches`, and under `check` the verdict, the
-    corners that had to be cut, and what was given.
-
-    Args:
-        check: what was asked.
-        flight: what was flown.
-        limits: what it is measured against.
-    """
-    track, tolerance = flight.track, limits.cross_track_threshold_m
-    corners = [_Corner(corner, check.allowed_cut_m(corner.waypoint)) for corner in check.way.corners]
-    window = WINDOW_RADII * limits.turn_radius_m
-    found = deviation(track, check.way.given_m, SPACING_SHARE * tolerance, window)
-    as_given = AsGiven(corners, found.by_row_m, allowed_m(track, tolerance, corners))
-    figures = metrics(flight, limits, as_given)
-    world = World.from_scenario(check.scenario)
-    seen = kept(track, world, check.given.fences, check.bounded)
-    if seen.contacts and flight.outcome is not Outcome.COLLISION:
-        first = seen.contacts[0]
-        figures["outcome"] = Outcome.COLLISION.value
-        figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
-    figures["trackable"] = figures["trackable"] and figures["outcome"] == Outcome.REACHED.value
-    given = polyline_profile(check.way.waypoints_m, float(track.groundspeed_mps.mean()))
-    ok, sentence = verdict(figures, seen, check.given.drawn, tolerance)
-    return {
-        **figures,
-        **_kept_figures(seen),
-        "deviation_from_given_m": found.figures(),
-        "check": {
-            "ok": ok,
-            "verdict": sentence,
-            "drawn": check.given.drawn,
-            "points": len(check.given.points_m),
-            "given": dataclasses.asdict(smoothness(given, max(float(track.groundspeed_mps.mean()), 1e-3))),
-            "corners": [_passed(corner, flight) for corner in corners],
-            "fences": [fence.plain() for fence in check.given.fences.every],
-            "notes": list(check.given.notes),
-        },
-    }
-
-
-def _kept_figures(seen: Kept) -> dict[str, Any]:
-    return {
-        "min_clearance_m": seen.margin_m if np.isfinite(seen.margin_m) else None,
-        "contact": bool(seen.contacts),
-        "contacts": [each.plain() for each in seen.contacts],
-        "breaches": [each.plain() for each in seen.crossings],
-    }
-
-
-def _passed(corner: _Corner, flight: Flight) -> dict[str, Any]:
-    """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there."""
-    track, place = flight.track, corner.corner
-    about = np.abs(track.arc_length_m - corner.arc_length_m) <= corner.half_m + corner.allowed_cut_m
-    away_m = np.hypot(track.east_m - place.east_m, track.north_m - place.north_m)[about]
-    flown = float(away_m.min()) if len(away_m) else None
-    return {
-        **dataclasses.asdict(place),
-        "flown_cut_m": flown,
-        "allowed_cut_m": corner.allowed_cut_m,
-        "kept": flown is not None and flown <= corner.allowed_cut_m,
-    }
+def _loop(climb_limit_mps: float | None, scenario: Scenario) -> Loop:
+    """The parts of a flight whose altitude loop may climb and sink by so much."""
+    if climb_limit_mps is None:
+        return make_loop(scenario)
+    return make_loop(scenario, partial(jsbsim_aircraft, scenario, climb_limit_mps=climb_limit_mps))

@@ -6,34 +6,35 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
+from aircraft.guidance.altitude import AltitudeGuidance
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import Route
 from harness.flight.closed_loop import Loop, Observer, Progress
 from harness.flight.record import AcceptedPlan, Flight, Outcome, TrackLog
 from harness.flight.signals import held_back
-from harness.run_files.given_path import FlyBy
+from harness.run.path_plan import PathPlan
 from planner.interface import Path, Plan, PlanStatus
 
 PROGRESS_EVERY_S = 5.0
 
 
 def fly_along(
-    way: FlyBy, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
+    plan: PathPlan, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
 ) -> Flight:
     """Flies a path to its end.
 
     Args:
-        way: the path.
+        plan: the path, with its altitudes and airspeeds.
         loop: the parts of the flight; world, sensor, map and planner are not asked. Used up.
         observers: look on.
         progress: told of the flight every few simulated seconds.
     """
     with held_back() as interrupt:
-        return _flown(way, loop, observers, progress, interrupt)
+        return _flown(plan, loop, observers, progress, interrupt)
 
 
 def _flown(
-    way: FlyBy,
+    plan: PathPlan,
     loop: Loop,
     observers: Sequence[Observer],
     progress: Progress | None,
@@ -41,13 +42,14 @@ def _flown(
 ) -> Flight:
     begun = time.perf_counter()
     model, guidance = loop.model, loop.guidance
-    path = Path(way.segments)
-    plan = Plan(PlanStatus.FOUND, "the path as given", way.waypoints_m, path)
-    accepted = AcceptedPlan(0, 0.0, 0.0, plan)
+    path = Path(plan.way.segments)
+    found = Plan(PlanStatus.FOUND, "the path as given", plan.way.waypoints_m, path)
+    accepted = AcceptedPlan(0, 0.0, 0.0, found)
+    vertical = AltitudeGuidance(plan.profile, plan.climb_gain_1ps, plan.climb_mps)
     log = TrackLog(
         loop.world.clearance, [observer.on_block for observer in observers], ground=loop.world.ground_heights
     )
-    limit_s = 2.0 * path.length_m / max(_slowest_mps(loop), 1.0) + 60.0
+    limit_s = 2.0 * path.length_m / max(_slowest_mps(loop, plan), 1.0) + 60.0
     guidance.follow(Route(path.segments))
     for observer in observers:
         observer.on_plan(accepted, model.state())
@@ -57,7 +59,8 @@ def _flown(
         interrupt()
         state = model.state()
         guided = guidance.update(state)
-        model.command(guided.roll_command_rad, loop.altitude_m, guided.airspeed_or(loop.mission.speed_mps))
+        altitude_m, airspeed_mps = vertical.command(state, guided.arc_length_m)
+        model.command(guided.roll_command_rad, altitude_m, guided.airspeed_or(airspeed_mps))
         off_m = abs(guided.cross_track_m) if guided.past_end else None
         outcome = _outcome(model.fault(), off_m, loop.mission.goal_radius_m, state.time_s, limit_s)
         log.add(state, guided.roll_command_rad, guided.cross_track_m, guided.arc_length_m, 0)
@@ -96,11 +99,11 @@ def _outcome(
     return None
 
 
-def _slowest_mps(loop: Loop) -> float:
-    """Speed over the ground against the wind that the aircraft starts in."""
+def _slowest_mps(loop: Loop, plan: PathPlan) -> float:
+    """Slowest speed over the ground, against the wind that the aircraft starts in."""
     state = loop.model.state()
     wind = math.hypot(
         state.velocity_east_mps - state.airspeed_mps * math.sin(state.heading_rad),
         state.velocity_north_mps - state.airspeed_mps * math.cos(state.heading_rad),
     )
-    return state.airspeed_mps - wind
+    return float(plan.profile.airspeed_mps.min()) - wind

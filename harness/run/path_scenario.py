@@ -5,20 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from harness.files import strict_yaml
-from harness.files.strict_yaml import Node
+from harness.files.strict_yaml import Node, node_of
 from harness.run_files.given_path import SAME_PLACE_M, FloatArray
+from harness.scenario.files_resolved import spec_of
+from harness.scenario.ground import GroundSpec
+from harness.scenario.obstacles import WorldFile
 from harness.scenario.overrides import overridden, with_key
 from harness.scenario.scenario import Scenario, node_of_keys, validated
+
+if TYPE_CHECKING:
+    from harness.world_files.expansion import FileSpec
 
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: so much, and so much of its span."""
 
-OF_THE_WORLD: Final = ("seed", "area", "obstacles", "environment")
+AIR_AND_OBSTACLES: Final = ("environment", "obstacles", "ground", "sources")
+
+OF_THE_WORLD: Final = ("seed", "area", "obstacles", "ground", "sources", "environment")
 """What a check takes from a scenario that it flies a path in; mission, aircraft, sensor and planner are its own."""
 
 
@@ -28,6 +36,8 @@ def scenario_for(
     sections: Mapping[str, Mapping[str, Any]],
     overrides: Sequence[tuple[str, str]] = (),
     world: FilePath | None = None,
+    files: bool = True,
+    ground: GroundSpec | None = None,
 ) -> Scenario:
     """The mission of a path as a scenario: from its start to its end.
 
@@ -42,10 +52,60 @@ def scenario_for(
         overrides: keys to replace.
         world: a scenario file with the obstacles, the area, the air, the altitude and the seed. None: nothing is
             there, and the area reaches beyond the path.
+        files: files among the obstacles are obstacles where they are solid at the altitude of the start; else they
+            are left out, for a path that is not flown at one altitude, see `files_of`.
+        ground: in place of what these files say of it.
 
     Raises:
         InputError: the sections contradict each other; the fault names the key.
     """
+    root, source = _root(name, points_m, sections, overrides, world)
+    if not files:
+        root = _without_files(root, ground)
+    return validated(root, source, _folder(world), ends_checked=False)
+
+
+def files_of(
+    sections: Mapping[str, Mapping[str, Any]],
+    overrides: Sequence[tuple[str, str]] = (),
+    world: FilePath | None = None,
+) -> tuple[FileSpec, ...]:
+    """The files among the obstacles.
+
+    Args:
+        sections: as `scenario_for` takes them.
+        overrides: likewise.
+        world: likewise.
+
+    Raises:
+        InputError: a key path leads nowhere.
+    """
+    root, _ = _root("path", np.array([(0.0, 0.0), (1.0, 0.0)]), sections, overrides, world)
+    obstacles = root.at(("obstacles",))
+    listed = obstacles.value if obstacles is not None and isinstance(obstacles.value, tuple) else ()
+    files = [each.at(("file",)) for each in listed]
+    return tuple(spec_of(WorldFile.model_validate(file.plain()), _folder(world)) for file in files if file)
+
+
+def _without_files(root: Node, ground: GroundSpec | None) -> Node:
+    """A scenario's keys with the ground in place of the files among its obstacles."""
+    obstacles = root.at(("obstacles",))
+    if obstacles is not None and isinstance(obstacles.value, tuple):
+        kept = tuple(each for each in obstacles.value if each.at(("file",)) is None)
+        root = with_key(root, ("obstacles",), Node(kept, obstacles.line))
+    if ground is None:
+        return root
+    return with_key(root, ("ground",), node_of(ground.model_dump(), strict_yaml.COMMAND_LINE))
+
+
+def _root(
+    name: str,
+    points_m: FloatArray,
+    sections: Mapping[str, Mapping[str, Any]],
+    overrides: Sequence[tuple[str, str]],
+    world: FilePath | None,
+) -> tuple[Node, str]:
+    """The keys of `scenario_for`, and what their faults name."""
     root, source = _base(world)
     for key, section in _sections(name, points_m, sections, root).items():
         before = root.at((key,))
@@ -59,7 +119,7 @@ def scenario_for(
     tolerance_m = _calm(root, overrides, source, world).trackability.cross_track_m
     if root.at(("trackability", "cross_track_m")) is None:
         root = with_key(root, ("trackability", "cross_track_m"), Node(tolerance_m, strict_yaml.COMMAND_LINE))
-    return validated(overridden(root, overrides), source, _folder(world), ends_checked=False)
+    return overridden(root, overrides), source
 
 
 def has_bounds(
@@ -119,6 +179,6 @@ def _sections(
 def _calm(root: Node, overrides: Sequence[tuple[str, str]], source: str, world: FilePath | None) -> Scenario:
     """The same in calm air, with nothing there."""
     assert isinstance(root.value, dict)
-    kept = {key: node for key, node in root.value.items() if key not in ("environment", "obstacles")}
-    own = [each for each in overrides if not each[0].strip().startswith(("environment", "obstacles"))]
+    kept = {key: node for key, node in root.value.items() if key not in AIR_AND_OBSTACLES}
+    own = [each for each in overrides if not each[0].strip().startswith(AIR_AND_OBSTACLES)]
     return validated(overridden(Node(kept, root.line), own), source, _folder(world), ends_checked=False)

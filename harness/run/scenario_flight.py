@@ -134,13 +134,15 @@ def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
     return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
 
 
-def jsbsim_aircraft(scenario: Scenario, start: StartConditions, air: Atmosphere) -> FlightModel:
-    """The scenario's aircraft, trimmed and in the air."""
+def jsbsim_aircraft(
+    scenario: Scenario, start: StartConditions, air: Atmosphere, climb_limit_mps: float | None = None
+) -> FlightModel:
+    """The scenario's aircraft, trimmed and in the air; see `aircraft.jsbsim_model` for the limit of its climb."""
     from aircraft.jsbsim_model import JsbsimModel
 
     origin = scenario.area.origin
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
-    return JsbsimModel(airframe(scenario.aircraft.model), start, plane, air)
+    return JsbsimModel(airframe(scenario.aircraft.model), start, plane, air, climb_limit_mps=climb_limit_mps)
 
 
 def flight_limits(scenario: Scenario) -> FlightLimits:

@@ -48,7 +48,8 @@ class CutCorner:
         turn_deg: the turn asked for, positive to the left.
         radius_m: of the arc that is flown instead; 0 where the path leads back and there is none.
         cut_m: how far from the corner that arc passes; 0 where there is none.
-        arc_length_m: distance along the flown path to the middle of the arc.
+        arc_length_m: distance along the flown path to the place that belongs to the corner.
+        half_m: the flown path is off the two legs for no longer than this before and after that place.
     """
 
     waypoint: int
@@ -58,11 +59,7 @@ class CutCorner:
     radius_m: float
     cut_m: float
     arc_length_m: float
-
-    @property
-    def half_m(self) -> float:
-        """Half the length of its arc."""
-        return 0.5 * self.radius_m * abs(float(np.radians(self.turn_deg)))
+    half_m: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +70,8 @@ class FlyBy:
         waypoints_m: (k, 2) those of the points given that are needed.
         segments: (n, 6) as in `planner.interface.Path`.
         corners: those that are cut by more than was left free, or have no arc, in order.
+        kept: (k,) which of the points given those are.
+        stations_m: (k,) arc length of `segments` that belongs to each.
         given_m: (m, 3) the polyline once more, with the points where arcs touch it: east, north, and the arc length of
             `segments` that belongs there. Along a leg both grow alike; an arc is shared out over what it cuts off.
     """
@@ -80,10 +79,23 @@ class FlyBy:
     waypoints_m: FloatArray
     segments: FloatArray
     corners: tuple[CutCorner, ...]
+    kept: NDArray[np.int64]
+    stations_m: FloatArray
     given_m: FloatArray
 
+    def stations_of(self, points_m: FloatArray) -> FloatArray:
+        """(m,) arc lengths of `segments` that belong to the points given, those that are not needed among them."""
+        along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points_m, axis=0).T)))
+        stations: FloatArray = np.interp(along, along[self.kept], self.stations_m)
+        return stations
 
-def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
+
+def fly_by(
+    points_m: FloatArray,
+    radius_m: float | FloatArray,
+    free_cut_m: float | FloatArray,
+    overshoot: bool = False,
+) -> FlyBy:
     """Rounds the corners of a polyline.
 
     The arc at a corner of angle `a` that touches the legs `t` before and after it has the radius
@@ -93,43 +105,44 @@ def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
 
     Args:
         points_m: (m, 2) points, not all in one place.
-        radius_m: smallest radius that the aircraft should fly, > 0.
-        free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0.
+        radius_m: smallest radius that the aircraft should fly, > 0; (m,) if it differs from point to point.
+        free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0; likewise.
+        overshoot: corners sharper than a right angle are flown as autopilots do, which begin to turn no earlier than
+            one radius before: past the next leg and back onto it.
     """
     kept = _needed(points_m)
+    least, free = (np.broadcast_to(each, len(points_m))[kept][1:-1] for each in (radius_m, free_cut_m))
     points = points_m[kept]
     place = points[:, 0] + 1j * points[:, 1]
     length = np.abs(np.diff(place))
     ahead = np.diff(place) / length
     turn = np.angle(ahead[1:] / ahead[:-1])
-    back = np.abs(turn) > SHARPEST_RAD
-    half = 0.5 * np.where(back, 0.0, np.abs(turn))
-    tangent, beyond = np.tan(half), np.maximum(1.0 / np.cos(half) - 1.0, FLATTEST)
-    room = _room(length, radius_m * tangent)
-    fits = np.divide(room, tangent, out=np.zeros_like(room), where=tangent > 0.0)
-    radius = np.minimum(fits, np.maximum(radius_m, free_cut_m / beyond))
-    trim = radius * tangent
-    cut = np.where(back, 0.0, radius * beyond)
+    shape = _shapes(turn, overshoot)
+    wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, FLATTEST)))
+    radius = np.minimum(_fitting(length, least, shape), wanted)
+    radius[shape.back] = 0.0
 
-    ends = np.concatenate(([0.0], trim, [0.0]))
+    ends = np.concatenate(([0.0], radius * shape.after)), np.concatenate((radius * shape.before, [0.0]))
     rows: list[tuple[float, float, float, float, float, float]] = []
-    middles: list[float] = []
+    begins: list[float] = []
     station = 0.0
     for leg in range(len(length)):
-        begin = place[leg] + ends[leg] * ahead[leg]
-        straight = length[leg] - ends[leg] - ends[leg + 1]
+        begin = place[leg] + ends[0][leg] * ahead[leg]
+        straight = length[leg] - ends[0][leg] - ends[1][leg]
         if straight > SHORTEST_M:
             rows.append((begin.real, begin.imag, ahead[leg].real, ahead[leg].imag, 0.0, straight))
             station += float(straight)
         if leg == len(turn):
             break
-        around = float(abs(turn[leg]) * radius[leg])
-        middles.append(station + 0.5 * around)
-        if around > SHORTEST_M:
-            touch = place[leg + 1] - trim[leg] * ahead[leg]
-            bend = np.sign(turn[leg]) / radius[leg]
-            rows.append((touch.real, touch.imag, ahead[leg].real, ahead[leg].imag, bend, around))
-            station += around
+        begins.append(station)
+        touch = place[leg + 1] - ends[1][leg] * ahead[leg]
+        for row in _arcs(touch, ahead[leg], turn[leg], radius[leg], float(shape.back_turn[leg])):
+            rows.append(row)
+            station += row[5]
+    begun = np.array(begins)
+    middles = begun + radius * shape.corner
+    spans = radius * (np.abs(turn) + 2.0 * shape.back_turn)
+    cut = np.where(shape.back, 0.0, radius * shape.cut)
     corners = tuple(
         CutCorner(
             waypoint=int(kept[i + 1]),
@@ -138,38 +151,102 @@ def fly_by(points_m: FloatArray, radius_m: float, free_cut_m: float) -> FlyBy:
             turn_deg=float(np.degrees(turn[i])),
             radius_m=float(radius[i]),
             cut_m=float(cut[i]),
-            arc_length_m=middles[i],
+            arc_length_m=float(middles[i]),
+            half_m=float(max(middles[i] - begun[i], begun[i] + spans[i] - middles[i])),
         )
-        for i in np.flatnonzero(back | (cut > free_cut_m * (1.0 + 1e-9))).tolist()
+        for i in np.flatnonzero(shape.back | (cut > free * (1.0 + 1e-9))).tolist()
     )
-    return FlyBy(
-        points, np.array(rows), corners, _as_given(points, ahead, trim, middles, turn * radius, station)
+    stations = np.concatenate(([0.0], middles, [station]))
+    along = np.stack((begun, middles, begun + spans), axis=1)
+    trims = radius * shape.before, radius * shape.after
+    given = _as_given(points, ahead, trims, along, station)
+    return FlyBy(points, np.array(rows), corners, kept, stations, given)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shapes:
+    """How corners are rounded, each (k,), lengths in radii of the turn.
+
+    Attributes:
+        back: no arc is flown: the path leads back.
+        past: flown past the next leg and back onto it.
+        before: where the turn begins before the corner.
+        after: where it ends after it.
+        cut: how far it passes the corner.
+        corner: where along it the place is that belongs to the corner.
+        back_turn: angle (rad) by which it turns too far, and back.
+    """
+
+    back: NDArray[np.bool_]
+    past: NDArray[np.bool_]
+    before: FloatArray
+    after: FloatArray
+    cut: FloatArray
+    corner: FloatArray
+    back_turn: FloatArray
+
+
+def _shapes(turn: FloatArray, overshoot: bool) -> _Shapes:
+    """The shapes of corners by their angles.
+
+    A turn that begins one radius before a corner of angle `a` has its centre at (sin a - cos a, sin a + cos a), in
+    radii, along the next leg and beside it. The turn back has its centre one radius on the other side of that leg,
+    and two radii from the first.
+    """
+    angle = np.abs(turn)
+    past = overshoot & (angle > 0.5 * np.pi)
+    back = ~past & (angle > SHARPEST_RAD)
+    half = 0.5 * np.where(back | past, 0.0, angle)
+    along, beside = np.sin(angle) - np.cos(angle), np.sin(angle) + np.cos(angle)
+    share = np.clip(0.5 * (1.0 + beside), -1.0, 1.0)
+    tangent = np.tan(half)
+    return _Shapes(
+        back=back,
+        past=past,
+        before=np.where(past, 1.0, tangent),
+        after=np.where(past, along + 2.0 * np.sqrt(1.0 - share * share), tangent),
+        cut=np.where(past, np.sqrt(2.0) - 1.0, 1.0 / np.cos(half) - 1.0),
+        corner=np.where(past, 0.25 * np.pi, half),
+        back_turn=np.where(past, np.arccos(share), 0.0),
     )
+
+
+def _arcs(
+    begin: complex, ahead: complex, turn: float, radius_m: float, back_turn: float
+) -> list[tuple[float, float, float, float, float, float]]:
+    """The turn at a corner: an arc, and where it goes too far another one back."""
+    rows = []
+    side = 1.0 if turn > 0.0 else -1.0
+    for sign, angle in ((side, abs(turn) + back_turn), (-side, back_turn)):
+        around = float(angle * radius_m)
+        if around <= SHORTEST_M:
+            continue
+        rows.append((begin.real, begin.imag, ahead.real, ahead.imag, sign / radius_m, around))
+        turned = ahead * np.exp(1j * sign * angle)
+        begin, ahead = begin + (turned - ahead) * radius_m / (1j * sign), turned
+    return rows
 
 
 def _as_given(
     points_m: FloatArray,
     ahead: NDArray[Any],
-    trim_m: FloatArray,
-    middles_m: list[float],
-    around_m: FloatArray,
+    trims_m: tuple[FloatArray, FloatArray],
+    along_m: FloatArray,
     length_m: float,
 ) -> FloatArray:
-    """`FlyBy.given_m` of (k + 2, 2) points with arcs at the k between its ends.
+    """`FlyBy.given_m` of (k + 2, 2) points with turns at the k between its ends.
 
     Args:
         points_m: the polyline.
         ahead: (k + 1,) unit vectors along its legs.
-        trim_m: (k,) how far from its corner each arc begins and ends.
-        middles_m: of the arcs, along the rounded path.
-        around_m: (k,) lengths of the arcs, with a sign.
+        trims_m: (k,) how far before its corner each turn begins, and how far behind it ends.
+        along_m: (k, 3) where along the rounded path it begins, passes the corner, ends.
         length_m: of the rounded path.
     """
     corners = points_m[1:-1, 0] + 1j * points_m[1:-1, 1]
-    middle, half = np.array(middles_m), 0.5 * np.abs(around_m)
-    places = np.stack((corners - trim_m * ahead[:-1], corners, corners + trim_m * ahead[1:]), axis=1).ravel()
-    along = np.stack((middle - half, middle, middle + half), axis=1).ravel()
-    inner = np.column_stack((places.real, places.imag, along))
+    before, after = trims_m
+    places = np.stack((corners - before * ahead[:-1], corners, corners + after * ahead[1:]), axis=1).ravel()
+    inner = np.column_stack((places.real, places.imag, along_m.ravel()))
     ends = np.column_stack((points_m[[0, -1]], (0.0, length_m)))
     return np.concatenate((ends[:1], inner, ends[1:]))
 
@@ -187,15 +264,21 @@ def _needed(points_m: FloatArray) -> NDArray[np.int64]:
     return np.concatenate(([0], *kept)).astype(np.int64)
 
 
-def _room(length_m: FloatArray, need_m: FloatArray) -> FloatArray:
-    """(k,) how far from each corner its arc may begin: its share of the shorter of the two legs.
+def _fitting(length_m: FloatArray, radius_m: FloatArray, shape: _Shapes) -> FloatArray:
+    """(k,) the widest radii that there is room for; neighbours share the leg between them by what they need.
 
     Args:
         length_m: (k + 1,) of the legs.
-        need_m: (k,) how far from its corner an arc of the smallest radius begins.
+        radius_m: (k,) that are needed.
+        shape: of the turns.
     """
-    need = np.concatenate(([0.0], need_m, [0.0]))
-    asked = np.maximum(need[:-1] + need[1:], SHORTEST_M * SHORTEST_M)
-    before, after = length_m * need[1:] / asked, length_m * need[:-1] / asked
-    room: FloatArray = np.minimum(before[:-1], after[1:])
-    return room
+    before = np.append(radius_m * shape.before, 0.0)  # at the end of each leg
+    after = np.append(0.0, radius_m * shape.after)  # at its begin
+    asked = np.maximum(before + after, SHORTEST_M * SHORTEST_M)
+    rooms = (length_m * before / asked)[:-1], (length_m * after / asked)[1:]
+    fits = [
+        np.divide(room, each, out=np.zeros_like(room), where=each > 0.0)
+        for room, each in zip(rooms, (shape.before, shape.after), strict=True)
+    ]
+    narrower: FloatArray = np.minimum(*fits)
+    return narrower

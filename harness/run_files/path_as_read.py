@@ -15,8 +15,7 @@ class PathAsRead:
         local: positions are east and north in metres; else latitude and longitude in degrees.
         positions: one a point.
         altitudes_m: above mean sea level, one a point; none where the file has none.
-        drawn: the line itself is wanted; else it is a mission, whose corners may be cut.
-        acceptance_m: how far from each point a mission lets it pass; 0 where it does not say, none for what is drawn.
+        above_ground: the altitudes are above the ground instead.
         fences: areas that come with it, their positions as those of the points.
         notes: what else is in the file and does not change the path, a line each.
     """
@@ -24,7 +23,6 @@ class PathAsRead:
     local: bool
     positions: tuple[tuple[float, float], ...]
     altitudes_m: tuple[float, ...]
-    drawn: bool = True
-    acceptance_m: tuple[float, ...] = ()
+    above_ground: bool = False
     fences: Fences = field(default_factory=Fences)
     notes: tuple[str, ...] = ()

@@ -1,6 +1,6 @@
-"""Reads a path that somebody gives: CSV, GeoJSON, QGroundControl .plan, MAVLink .waypoints.
+"""Reads a path that somebody gives: a drawn line, a recorded track, or a mission.
 
-What is read is a polyline in the local plane; positions in degrees are put into a plane about the first.
+What is read is put into the local plane; positions in degrees lie in a plane about the first.
 """
 
 from __future__ import annotations
@@ -20,15 +20,21 @@ from harness.run_files.csv_path import read_csv
 from harness.run_files.fences import Fence, Fences, checked
 from harness.run_files.geojson_path import read_geojson
 from harness.run_files.given_path import SAME_PLACE_M
-from harness.run_files.mission_files import read_plan, read_waypoints
+from harness.run_files.igc_path import read_igc
+from harness.run_files.map_paths import read_gpx, read_kml
+from harness.run_files.mission.flying import GivenMission
+from harness.run_files.mission.items import MissionAsRead
+from harness.run_files.mission.plan_file import read_plan
+from harness.run_files.mission.program import program
+from harness.run_files.mission.wpl_file import read_waypoints
 from harness.run_files.path_as_read import PathAsRead
 from harness.scenario.sections import ALTITUDES_M
 
 FloatArray = NDArray[np.float64]
+Place = tuple[float, float]
 
 MAX_BYTES: Final = 64_000_000
 MAX_SPAN_M: Final = 500e3
-SAME_ALTITUDE_M: Final = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,63 +42,97 @@ class GivenPath:
     """A path as it was given.
 
     Attributes:
-        points_m: (n, 2) east, north; every point of the file, not all in one place.
+        source: the file, for faults.
+        points_m: (n, 2) east, north; every point of the file that has a place.
         origin_deg: latitude and longitude of east = north = 0; None where the file does not say.
-        altitude_m: above mean sea level; None where the file does not say.
-        drawn: the line itself is wanted; else it is a mission, whose corners may be cut.
-        acceptance_m: (n,) how far from each point a mission lets it pass, 0 where it does not say; (0,) for what is
-            drawn.
+        altitudes_m: (n,) above mean sea level; (0,) where the file does not say, and for a mission.
+        above_ground: the altitudes are above the ground instead.
+        mission: what is flown, where it is a mission; None for a line that is wanted as drawn.
         fences: areas that come with it.
         notes: what else is in the file and does not change the path, a line each.
     """
 
+    source: str
     points_m: FloatArray
-    origin_deg: tuple[float, float] | None
-    altitude_m: float | None
-    drawn: bool = True
-    acceptance_m: FloatArray = field(default_factory=lambda: np.zeros(0))
+    origin_deg: Place | None
+    altitudes_m: FloatArray = field(default_factory=lambda: np.zeros(0))
+    above_ground: bool = False
+    mission: GivenMission | None = None
     fences: Fences = field(default_factory=Fences)
     notes: tuple[str, ...] = ()
+
+    @property
+    def drawn(self) -> bool:
+        """Whether the line itself is wanted; else it is a mission, whose corners may be cut."""
+        return self.mission is None
 
 
 def read_path(
     path: Path,
     any_altitude: bool = False,
-    origin_deg: tuple[float, float] | None = None,
+    origin_deg: Place | None = None,
     polygons: str | None = None,
 ) -> GivenPath:
     """Reads a path; the name's ending says how it is written.
 
     Args:
-        path: .csv, .geojson or .json, .plan, .waypoints.
-        any_altitude: points at different altitudes are taken, for a flight whose altitude is given otherwise.
+        path: .csv, .geojson or .json, .kml, .gpx, .igc; or a mission: .plan, .waypoints or .txt.
+        any_altitude: the altitudes of a drawn line are left out, for a flight whose altitude is given otherwise.
         origin_deg: latitude and longitude of east = north = 0; None: those of the first point of a path in degrees.
         polygons: what the polygons beside a drawn path are that do not say so themselves: `exclusion`, `inclusion` or
             `none`; None: `exclusion`.
 
     Raises:
-        InputError: the file cannot be read, is not of its format, or holds more than a path at one
-            altitude that can be flown.
+        InputError: the file cannot be read, is not of its format, or holds no path that can be flown.
     """
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(f"{path}: is none of {', '.join(READERS)}; save the path as one of them")
-    found = reader(read_text(path, MAX_BYTES, "a path"), str(path))
+    suffix = path.suffix.lower()
+    if suffix not in (*LINES, *MISSIONS):
+        raise InputError(f"{path}: is none of {', '.join((*LINES, *MISSIONS))}; save the path as one of them")
+    text = read_text(path, MAX_BYTES, "a path")
+    if suffix in MISSIONS:
+        return _mission(MISSIONS[suffix](text, str(path)), origin_deg)
+    found = LINES[suffix](text, str(path))
+    if polygons is not None:
+        found = _as_asked(found, polygons)
     if len(found.positions) < 2:
         raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
-    if found.drawn and polygons is not None:
-        found = _as_asked(found, polygons)
     origin = None if found.local else origin_deg or found.positions[0]
-    points, fences = _in_plane(found, origin, str(path))
+    _check_degrees(origin, found.positions, "point", str(path))
+    points = _in_plane(found.positions, origin)
     _check_span(points, str(path))
+    _check_places(points, str(path))
+    altitudes = () if any_altitude else found.altitudes_m
+    if not found.above_ground:
+        _check_altitudes(altitudes, str(path))
     return GivenPath(
-        points,
-        origin,
-        _altitude(found.altitudes_m, any_altitude, str(path)),
-        found.drawn,
-        np.array(found.acceptance_m),
-        _checked(fences, str(path)),
-        found.notes,
+        source=str(path),
+        points_m=points,
+        origin_deg=origin,
+        altitudes_m=np.array(altitudes),
+        above_ground=found.above_ground,
+        fences=_fences(found.fences, origin, str(path)),
+        notes=found.notes,
+    )
+
+
+def _mission(found: MissionAsRead, origin_deg: Place | None) -> GivenPath:
+    """A mission in the local plane."""
+    source, flown = found.source, program(found)
+    positions = [step.position for step in flown.steps]
+    placed = [position for position in positions if position is not None]
+    origin = None if flown.local else origin_deg or placed[0]
+    _check_degrees(origin, placed, "item", source)
+    points = _in_plane(placed, origin)
+    _check_span(points, source)
+    each = iter(points.tolist())
+    places = tuple(None if position is None else complex(*next(each)) for position in positions)
+    return GivenPath(
+        source=source,
+        points_m=points,
+        origin_deg=origin,
+        mission=GivenMission(flown, places, found.home_altitude_m),
+        fences=_fences(found.fences, origin, source),
+        notes=found.notes,
     )
 
 
@@ -113,8 +153,12 @@ def given_points(points: Any) -> GivenPath:
         raise InputError(f"path: has the shape {array.shape}; must be (n, 2), n at least 2: east, north")
     if not np.isfinite(array).all():
         raise InputError("path: holds a number that is not finite; must be metres")
-    _check_span(array[:, :2], "path")
-    return GivenPath(array[:, :2].copy(), None, _altitude(array[:, 2:].ravel().tolist(), False, "path"))
+    points = array[:, :2].copy()
+    _check_span(points, "path")
+    _check_places(points, "path")
+    altitudes = array[:, 2:].ravel()
+    _check_altitudes(altitudes.tolist(), "path")
+    return GivenPath("path", points, None, altitudes)
 
 
 def _check_span(points: FloatArray, source: str) -> None:
@@ -124,8 +168,30 @@ def _check_span(points: FloatArray, source: str) -> None:
         raise InputError(
             f"{source}: reaches {reach / 1e3:.0f} km; must stay within {MAX_SPAN_M / 1e3:.0f} km of its origin"
         )
+
+
+def _check_places(points: FloatArray, source: str) -> None:
     if np.hypot(*(points - points[0]).T).max() <= SAME_PLACE_M:
         raise InputError(f"{source}: all its points are in one place; a path has at least 2")
+
+
+def _check_altitudes(altitudes_m: Sequence[float], source: str) -> None:
+    lowest, highest = ALTITUDES_M
+    for number, altitude in enumerate(altitudes_m):
+        if not lowest <= altitude <= highest:
+            raise InputError(
+                f"{source}: point {number} is at {altitude:g} m above the sea; must be between {lowest:g} and "
+                f"{highest:g} m, or give --altitude-m"
+            )
+
+
+def _check_degrees(origin: Place | None, positions: Sequence[Place], what: str, source: str) -> None:
+    for number, (latitude, longitude) in enumerate(positions if origin is not None else ()):
+        if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0):
+            raise InputError(
+                f"{source}: {what} {number} is at latitude {latitude:g}, longitude {longitude:g}; must be degrees "
+                "within 85 and 180 (local metres can be given as CSV with the columns x_m,y_m)"
+            )
 
 
 def _as_asked(found: PathAsRead, polygons: str) -> PathAsRead:
@@ -141,36 +207,21 @@ def _as_asked(found: PathAsRead, polygons: str) -> PathAsRead:
     return replace(found, fences=replace(found.fences, every=kept), notes=notes)
 
 
-def _in_plane(
-    found: PathAsRead, origin: tuple[float, float] | None, source: str
-) -> tuple[FloatArray, Fences]:
-    """Points and fences in the local plane."""
+def _in_plane(positions: Sequence[Place], origin: Place | None) -> FloatArray:
+    """(n, 2) positions in the local plane."""
     if origin is None:
-        return np.array(found.positions), found.fences
-    for number, (latitude, longitude) in enumerate(found.positions):
-        if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0):
-            raise InputError(
-                f"{source}: point {number} is at latitude {latitude:g}, longitude {longitude:g}; must be degrees "
-                "within 85 and 180 (local metres can be given as CSV with the columns x_m,y_m)"
-            )
-    for fence in found.fences.every:
-        _check_degrees(fence, source)
+        return np.array(positions, dtype=np.float64).reshape(-1, 2)
     plane = LocalPlane(*origin)
-    points = np.array([plane.plane(latitude, longitude) for latitude, longitude in found.positions])
-    return points, found.fences.moved(lambda place: plane.plane(*place))
+    return np.array([plane.plane(latitude, longitude) for latitude, longitude in positions]).reshape(-1, 2)
 
 
-def _check_degrees(fence: Fence, source: str) -> None:
-    places = [*(place for ring in fence.rings for place in ring), *((fence.center,) if fence.center else ())]
-    for latitude, longitude in places:
-        if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0):
-            raise InputError(
-                f"{source}: {fence.name}: has latitude {latitude:g}, longitude {longitude:g}; must be degrees within "
-                "85 and 180"
-            )
-
-
-def _checked(fences: Fences, source: str) -> Fences:
+def _fences(fences: Fences, origin: Place | None, source: str) -> Fences:
+    """Fences in the local plane."""
+    if origin is not None:
+        for fence in fences.every:
+            _check_fence(fence, source)
+        plane = LocalPlane(*origin)
+        fences = fences.moved(lambda place: plane.plane(*place))
     clean = replace(fences, every=tuple(checked(fence, source) for fence in fences.every))
     if clean.allowed is not None and clean.allowed.is_empty:
         names = ", ".join(fence.name for fence in clean.inclusions)
@@ -180,30 +231,29 @@ def _checked(fences: Fences, source: str) -> Fences:
     return clean
 
 
-def _altitude(altitudes_m: Sequence[float], any_altitude: bool, source: str) -> float | None:
-    if any_altitude or not altitudes_m:
-        return None
-    first = altitudes_m[0]
-    for number, altitude in enumerate(altitudes_m):
-        if not abs(altitude - first) <= SAME_ALTITUDE_M:
+def _check_fence(fence: Fence, source: str) -> None:
+    places = [*(place for ring in fence.rings for place in ring), *((fence.center,) if fence.center else ())]
+    for latitude, longitude in places:
+        if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0):
             raise InputError(
-                f"{source}: point {number} is at {altitude:g} m, point 0 at {first:g} m; a checked path has one "
-                "altitude: level it or give --altitude-m"
+                f"{source}: {fence.name}: has latitude {latitude:g}, longitude {longitude:g}; must be degrees within "
+                "85 and 180"
             )
-    lowest, highest = ALTITUDES_M
-    if not lowest <= first <= highest:
-        raise InputError(
-            f"{source}: is at {first:g} m above the sea; must be between {lowest:g} and {highest:g} m, or give "
-            "--altitude-m"
-        )
-    return first
 
 
-READERS: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
+LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
     ".csv": read_csv,
     ".geojson": read_geojson,
     ".json": read_geojson,
+    ".kml": read_kml,
+    ".gpx": read_gpx,
+    ".igc": read_igc,
+}
+"""Readers of drawn lines and recorded tracks by the ending of a file's name."""
+
+MISSIONS: Final[dict[str, Callable[[str, str], MissionAsRead]]] = {
     ".plan": read_plan,
     ".waypoints": read_waypoints,
+    ".txt": read_waypoints,
 }
-"""Reader by the ending of a file's name."""
+"""Readers of missions, likewise."""

@@ -23,8 +23,7 @@ from harness.cli.falsify import range_of
 from harness.falsify.keys import vary_of
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.run.path_scenario import scenario_for
-from harness.run_files.given_path import fly_by
+from harness.run.path_check import asked
 from harness.run_files.path_files import read_path
 from harness.scenario.scenario import Scenario, dump_scenario, load_scenario, parse_scenario
 from harness.scenario.world_generators import GENERATORS, WorldSpec
@@ -97,6 +96,61 @@ PLAN = {
         ],
     },
 }
+MISSION = {
+    "fileType": "Plan",
+    "geoFence": {
+        "polygons": [{"inclusion": True, "polygon": [[46.9, 7.9], [46.9, 8.2], [47.2, 8.0]]}],
+        "circles": [{"inclusion": False, "circle": {"center": [47.1, 8.1], "radius": 100}}],
+    },
+    "rallyPoints": {"points": [[47.0, 8.0, 50]]},
+    "mission": {
+        "firmwareType": 3,
+        "plannedHomePosition": [47.0, 8.0, 400],
+        "items": [
+            *(
+                {
+                    "type": "SimpleItem",
+                    "command": command,
+                    "frame": 3,
+                    "params": [*params, 47.0 + north, 8.0, 120],
+                }
+                for command, north, params in (
+                    (22, 0.0, [15, 0, 0, None]),
+                    (16, 0.01, [0, 30, 0, None]),
+                    (18, 0.02, [2, 0, 150, None]),
+                    (178, 0.0, [0, 22, 0, 0]),
+                    (31, 0.03, [1, -150, 0, 1]),
+                    (19, 0.04, [30, 0, 0, 0]),
+                    (177, 0.0, [2, 1, 0, 0]),
+                    (30, 0.0, [0, 0, 0, 0]),
+                )
+            ),
+            {
+                "type": "ComplexItem",
+                "complexItemType": "survey",
+                "TransectStyleComplexItem": {
+                    "Items": [
+                        {
+                            "type": "SimpleItem",
+                            "command": 16,
+                            "frame": 3,
+                            "params": [0, 0, 0, None, 47.05, 8.01, 90],
+                        }
+                    ]
+                },
+            },
+            {
+                "type": "ComplexItem",
+                "complexItemType": "fwLandingPattern",
+                "altitudesAreRelative": True,
+                "landCoordinate": [47.0, 8.0, 0],
+                "landingApproachCoordinate": [47.02, 8.0, 60],
+                "loiterRadius": 120,
+                "loiterClockwise": False,
+            },
+        ],
+    },
+}
 CSV = [["x_m", "y_m"], ["0", "0"], ["500", "0"], ["900", "700"]]
 WAYPOINTS = [
     ["QGC WPL 110"],
@@ -126,9 +180,8 @@ def read_campaign(path: Path) -> None:
 def read_given_path(path: Path) -> None:
     """Reads a path and makes of it what `check` flies."""
     given = read_path(path, any_altitude=True)
-    scenario_for("path", given.points_m, {})
-    way = fly_by(given.points_m, 100.0, 5.0)
-    assert len(way.segments) >= 1
+    check = asked(given, {})
+    assert len(check.plan.way.segments) >= 1
 
 
 @dataclass(frozen=True)
@@ -172,6 +225,7 @@ READERS = {
     "short campaign": Reader("c.yaml", read_campaign, SHORT_CAMPAIGN, as_yaml, CAMPAIGN_SNIPPETS),
     "geojson": Reader("p.geojson", read_given_path, GEOJSON, as_json, JSON_SNIPPETS),
     "plan": Reader("p.plan", read_given_path, PLAN, as_json, JSON_SNIPPETS),
+    "mission": Reader("p.plan", read_given_path, MISSION, as_json, JSON_SNIPPETS),
     "csv": Reader("p.csv", read_given_path, CSV, rows(","), CELLS),
     "waypoints": Reader("p.waypoints", read_given_path, WAYPOINTS, rows("\t"), CELLS),
 }

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.analysis.trackability import AsGiven, FlightLimits, legs
-from harness.flight.record import AcceptedPlan, Track
+from harness.analysis.as_given import AsGiven
+from harness.analysis.trackability import FlightLimits, legs
+from harness.flight.record import AcceptedPlan, FloatArray, Track
 
 LIMITS = FlightLimits(
     altitude_m=300.0,
@@ -141,22 +142,58 @@ def test_thresholds_can_be_given() -> None:
 class Passed:
     arc_length_m: float
     cut_m: float
+    waypoint: int
     half_m: float = 30.0
+
+
+def as_given(track: Track, corners: list[Passed], off_m: FloatArray, allowed_m: float) -> AsGiven:
+    """A level path for an aircraft that climbs at 5 m/s and sinks at 8."""
+    rows = len(track)
+    return AsGiven(
+        corners,
+        off_m,
+        np.full(rows, allowed_m),
+        altitude_m=track.up_m,
+        climb_mps=np.zeros(rows),
+        fastest_mps=np.tile((5.0, 8.0), (rows, 1)),
+        airspeed_mps=np.full(rows, 25.0),
+    )
 
 
 def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
     make_track: Callable[..., Track], straight_plan: AcceptedPlan
 ) -> None:
-    corners = [Passed(500.0, 49.0), Passed(1000.0, 51.0)]
+    corners = [Passed(500.0, 49.0, 1), Passed(1000.0, 51.0, 2)]
     track = make_track(601)
     off = np.where(np.abs(track.arc_length_m - 1000.0) < 30.0, 51.0, 3.0)
-    given = AsGiven(corners, off, np.full(601, 50.0))
+    given = as_given(track, corners, off, 50.0)
     judged = legs(track, [straight_plan], LIMITS, given=given)
-    assert [(leg.end_s, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged] == [
-        (20.0, 49.0, 3.0, None),
-        (40.0, 51.0, 51.0, "turn radius too tight"),
-        (60.0, 0.0, 3.0, None),
+    assert [
+        (leg.end_s, leg.waypoint, leg.corner_cut_m, leg.max_deviation_m, leg.cause) for leg in judged
+    ] == [
+        (20.0, 1, 49.0, 3.0, None),
+        (40.0, 2, 51.0, 51.0, "turn radius too tight"),
+        (60.0, None, 0.0, 3.0, None),
     ]
+
+
+@pytest.mark.parametrize(
+    ("asked_mps", "side", "cause"),
+    [(6.0, 1.0, "climb too steep"), (-9.0, -1.0, "descent too steep"), (4.0, 1.0, "tracking error")],
+)
+def test_an_altitude_that_is_off_because_more_was_asked_for_than_the_aircraft_climbs(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan, asked_mps: float, side: float, cause: str
+) -> None:
+    """For 10 s the path climbs or sinks; the aircraft, which can climb at 5 and sink at 8 m/s, falls behind by 20 m."""
+    track = make_track(601)
+    climbing = (track.time_s >= 20.0) & (track.time_s < 30.0)
+    wanted = 300.0 + side * np.clip(2.0 * (track.time_s - 20.0), 0.0, 20.0)
+    limits = replace(LIMITS, max_altitude_error_m=10.0)
+    given = as_given(track, [], np.zeros(601), 50.0)
+    given = replace(given, altitude_m=wanted, climb_mps=np.where(climbing, asked_mps, 0.0))
+    (leg,) = legs(track, [straight_plan], limits, given=given)
+    assert (leg.cause, leg.max_altitude_error_m) == (cause, 20.0)
+    assert legs(track, [straight_plan], limits, given=replace(given, altitude_m=track.up_m))[0].trackable
 
 
 @pytest.mark.parametrize(("calm_m", "cause"), [(100.0, "wind drift"), (140.0, "bank limit")])

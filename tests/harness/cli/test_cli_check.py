@@ -123,7 +123,7 @@ def test_the_same_check_gives_the_same_digest(strip: Path, tmp_path: Path) -> No
             "environment.wind.speed_mps: is 24; must be below 0.9",
         ),
         (["--aircraft", "aerosonde", "--turbulence", "mild"], "'light', 'moderate' or 'severe'"),
-        (["--aircraft", "aerosonde", "--altitude-m", "5"], "mission.altitude_m: is 5; must be at least 50"),
+        (["--aircraft", "aerosonde", "--altitude-m", "4"], "mission.altitude_m: is 4; must be at least 5"),
         (
             ["--aircraft", "aerosonde", "--tolerance-m", "0"],
             "trackability.cross_track_m: is 0; must be greater",

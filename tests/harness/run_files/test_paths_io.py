@@ -12,6 +12,7 @@ import pytest
 from pyproj import Geod
 
 from harness.files.strict_yaml import InputError
+from harness.run_files.mission.program import altitude_m
 from harness.run_files.path_files import read_path
 
 WGS84 = Geod(ellps="WGS84")
@@ -90,7 +91,10 @@ def test_every_format_gives_the_same_path(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text(text)
     given = read_path(tmp_path / name)
     assert given.origin_deg == POINTS[0]
-    assert given.altitude_m == altitude
+    if given.mission is None:
+        assert given.altitudes_m.tolist() == ([] if altitude is None else [altitude] * len(POINTS))
+    else:
+        assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.program.steps] == [altitude] * 3
     for (latitude, longitude), (east, north) in zip(POINTS, given.points_m, strict=True):
         azimuth, _, distance = WGS84.inv(8.0, 47.0, longitude, latitude)
         assert east == pytest.approx(distance * math.sin(math.radians(azimuth)), abs=0.1)
@@ -104,7 +108,7 @@ def test_csv_in_metres(columns: str, tmp_path: Path) -> None:
     given = read_path(path)
     assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 500.0], [100.0, 500.0], [-3.5, 700.0]]
     assert given.origin_deg is None
-    assert given.altitude_m is None
+    assert given.altitudes_m.tolist() == []
 
 
 @pytest.mark.parametrize(("frame", "place"), [(4, (100.0, 200.0, 50.0)), (1, (200.0, 100.0, -50.0))])
@@ -115,7 +119,9 @@ def test_mission_in_local_metres(frame: int, place: tuple[float, float, float], 
     path.write_text(wpl(*rows, line(2, 0, frame, 16, 0, 0, 0, 0, *place, 1)))
     given = read_path(path)
     assert given.points_m.tolist() == [[0.0, 0.0], [100.0, 200.0]]
-    assert (given.origin_deg, given.altitude_m) == (None, 450.0)
+    assert given.origin_deg is None
+    assert given.mission is not None
+    assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.program.steps] == [450.0, 450.0]
 
 
 @pytest.mark.parametrize("column", ["altitude_m", "z_m", "up_m"])
@@ -123,38 +129,25 @@ def test_mission_in_local_metres(frame: int, place: tuple[float, float, float], 
 def test_csv_with_altitudes(names: str, column: str, tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text(f"{names},{column}\n1,2,300\n2,3,300.5\n")
-    assert read_path(path).altitude_m == 300.0
-    path.write_text(f"{names},{column}\n1,2,300\n2,3,500\n")
-    with pytest.raises(
-        InputError, match="point 1 is at 500 m, point 0 at 300 m; a checked path has one altitude"
-    ):
-        read_path(path)
+    assert read_path(path).altitudes_m.tolist() == [300.0, 300.5]
+    assert read_path(path, any_altitude=True).altitudes_m.tolist() == []
 
 
-@pytest.mark.parametrize("altitude", [20.0, 30_000.0])
+@pytest.mark.parametrize("altitude", [2.0, 30_000.0])
 def test_an_altitude_that_cannot_be_flown_is_told_of_the_file(altitude: float, tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text(f"x_m,y_m,z_m\n1,2,{altitude}\n2,3,{altitude}\n")
     told = (
-        f"path.csv: is at {altitude:g} m above the sea; must be between 50 and 20000 m, or give --altitude-m"
+        f"path.csv: point 0 is at {altitude:g} m above the sea; must be between 5 and 20000 m, or give "
+        "--altitude-m"
     )
     with pytest.raises(InputError, match=told):
         read_path(path)
-    assert read_path(path, any_altitude=True).altitude_m is None
+    assert len(read_path(path, any_altitude=True).altitudes_m) == 0
 
 
-def test_different_altitudes_can_be_overridden(tmp_path: Path) -> None:
-    path = tmp_path / "stairs.plan"
-    path.write_text(plan(item(47.0, 8.0, 100.0), item(47.1, 8.0, 150.0)))
-    with pytest.raises(InputError, match="point 1 is at 550 m, point 0 at 500 m"):
-        read_path(path)
-    given = read_path(path, any_altitude=True)
-    assert (len(given.points_m), given.altitude_m) == (2, None)
-
-
-SURVEY = {"type": "ComplexItem", "complexItemType": "survey"}
 BROKEN = {
-    "ending": ("path.gpx", "<gpx/>", ": is none of .csv, .geojson"),
+    "ending": ("path.dxf", "0", ": is none of .csv, .geojson"),
     "empty csv": ("a.csv", "", ":1: has the columns none; must have x_m,y_m"),
     "no header": ("a.csv", "0,0\n1,1\n", ":1: has the columns 0, 0; must have x_m,y_m"),
     "text in csv": ("a.csv", "x_m,y_m\n0,0\n1,far\n", ":3: y_m: is 'far'; must be a finite number"),
@@ -180,22 +173,6 @@ BROKEN = {
     ),
     "no plan": ("a.plan", '{"fileType": "Fence"}', ": is not a plan of QGroundControl"),
     "no items": ("a.plan", '{"fileType": "Plan", "mission": {}}', ": mission.items: is missing"),
-    "takeoff": (
-        "a.plan",
-        plan(item(47.0, 8.0, command=22, doJumpId=1), item(47.1, 8.0)),
-        ": mission.items[0]: item 1 is MAV_CMD_NAV_TAKEOFF (22); a path to be checked may only have",
-    ),
-    "unknown command": (
-        "a.plan",
-        plan(item(47.0, 8.0), item(47.1, 8.0, command=31999, doJumpId=2)),
-        ": mission.items[1]: item 2 is command 31999",
-    ),
-    "survey": (
-        "a.plan",
-        plan(item(47.0, 8.0), SURVEY),
-        ": mission.items[1]: item 2 is a complex item, survey",
-    ),
-    "terrain": ("a.plan", plan(item(47.0, 8.0, frame=10)), "item 1 has the frame 10 GLOBAL_TERRAIN_ALT"),
     "few params": (
         "a.plan",
         plan(item(47.0, 8.0, params=[0])),
@@ -204,7 +181,7 @@ BROKEN = {
     "no place": (
         "a.plan",
         plan(item(47.0, 8.0, params=[0, 0, 0, None, 47.0, 8.0, None]), item(47.1, 8.0)),
-        ": mission.items[0].params[6]: is 'None'; must be a finite number",
+        ": mission.items[0].params[6]: is null; a waypoint must have an altitude",
     ),
     "text as command": (
         "a.plan",
@@ -213,18 +190,66 @@ BROKEN = {
     ),
     "no header line": ("a.waypoints", "0 1 0 16\n", ':1: must begin with "QGC WPL 110"'),
     "fields": ("a.waypoints", wpl("1\t0\t3"), ":3: has 3 fields; a mission item has 12"),
-    "loiter": (
+    "unknown frame": (
         "a.waypoints",
-        wpl(*wpl_items(command=18)),
-        ":3: item 1 is MAV_CMD_NAV_LOITER_TURNS (18); a path to be checked may only have MAV_CMD_NAV_WAYPOINT",
+        wpl(*wpl_items(frame=9)),
+        ":3: item 1 has the frame 9; must be one of 0, 1, 3",
     ),
-    "hold": ("a.waypoints", wpl(*wpl_items(hold=30.0)), ":3: item 1 holds for 30 s"),
     "mixed frames": (
         "a.waypoints",
         wpl(wpl_items()[0], *wpl_items(frame=4)[1:]),
-        ":3: item 1 has the frame 3, must be one of 4, 1; local and global waypoints cannot be mixed",
+        ": mixes local and global frames; must have one of both",
     ),
-    "only home": ("a.waypoints", wpl(), ": has 0 points"),
+    "a jump to nowhere": (
+        "a.waypoints",
+        wpl(*wpl_items(), line(4, 0, 3, 177, 9, 2, 0, 0, 0, 0, 0, 1)),
+        ":6: item 4 jumps to item 9, which does not exist",
+    ),
+    "a jump to itself": (
+        "a.waypoints",
+        wpl(*wpl_items(), line(4, 0, 3, 177, 4, -1, 0, 0, 0, 0, 0, 1)),
+        ":6: item 4 jumps in a circle with nothing to fly in it",
+    ),
+    "jumps without number": (
+        "a.waypoints",
+        wpl(*wpl_items(), line(4, 0, 3, 177, 1, 30000, 0, 0, 0, 0, 0, 1)),
+        "jumps make it more than 20,000 legs",
+    ),
+    "one number twice": ("a.waypoints", wpl(*wpl_items(), wpl_items()[0]), ": item 1 is there twice"),
+    "nothing to fly": (
+        "a.plan",
+        plan(item(0, 0, command=183), item(0, 0, command=2000, doJumpId=2)),
+        ": has 0 items to fly to; a path has at least 2",
+    ),
+    "a landing pattern": (
+        "a.plan",
+        plan(item(47.0, 8.0), {"type": "ComplexItem", "complexItemType": "fwLandingPattern"}),
+        ": mission.items[1].landingApproachCoordinate: must be [latitude, longitude, altitude]",
+    ),
+    "a fence of two corners": (
+        "a.plan",
+        json.dumps(
+            {
+                **json.loads(plan(item(47.0, 8.0), item(47.1, 8.0, doJumpId=2))),
+                "geoFence": {"polygons": [{"inclusion": False, "polygon": [[47.0, 8.0], [47.1, 8.0]]}]},
+            }
+        ),
+        ": geoFence.polygons[0]: has fewer than 3 distinct corners",
+    ),
+    "a fence that crosses itself": (
+        "a.geojson",
+        json.dumps(
+            {
+                "type": "GeometryCollection",
+                "geometries": [
+                    {"type": "LineString", "coordinates": LINE},
+                    {"type": "Polygon", "coordinates": [[[8, 47], [9, 48], [9, 47], [8, 48], [8, 47]]]},
+                ],
+            }
+        ),
+        ": geometries[1]: self-intersection at (",
+    ),
+    "only home": ("a.waypoints", wpl(), ": has no mission items; there is nothing to fly"),
 }
 
 

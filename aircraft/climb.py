@@ -1,0 +1,126 @@
+"""How fast an aircraft climbs and sinks at a speed it holds, measured by flying it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from aircraft.airframe import Airframe
+from aircraft.card_cache import cached, figure
+from aircraft.frames import LocalPlane
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.interface import STEP_RATE_HZ
+from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
+from aircraft.jsbsim_model import JsbsimModel
+from aircraft.model_files import AircraftError
+from aircraft.start import StartConditions
+
+STEEPEST = 0.4
+"""Rates beyond this share of the airspeed (24 degrees) are not looked at."""
+
+SETTLING_S, JUDGED_S = 15.0, 10.0
+"""A rate is flown for both together and judged over the second."""
+
+KEPT_SPEED_SHARE = 0.03
+KEPT_RATE_SHARE = 0.05
+TOLERANCE = 0.02
+"""A rate is found to this share of the airspeed's steepest."""
+
+FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
+SPEEDS = 5
+FORMAT = 1
+"""Goes up with what is measured and how, so that older figures are made anew."""
+
+
+@dataclass(frozen=True)
+class ClimbRates:
+    """What an aircraft can climb and sink by, between the speeds that were flown linear.
+
+    Attributes:
+        airspeeds_mps: true airspeeds that were flown, rising.
+        climb_mps: the fastest climb at each, airspeed held and the throttle not quite full.
+        descent_mps: the fastest descent at each, likewise with the throttle not quite idle; positive.
+    """
+
+    airspeeds_mps: tuple[float, ...]
+    climb_mps: tuple[float, ...]
+    descent_mps: tuple[float, ...]
+
+    def at(self, airspeed_mps: float) -> tuple[float, float]:
+        """Fastest climb and fastest descent at an airspeed, both positive."""
+        climb, descent = (
+            float(np.interp(airspeed_mps, self.airspeeds_mps, rates))
+            for rates in (self.climb_mps, self.descent_mps)
+        )
+        return climb, descent
+
+
+def climb_rates(frame: Airframe) -> ClimbRates:
+    """The rates of an airframe, flown unless that has been done before.
+
+    They are those near sea level with wings level; in a turn and high up there is less.
+
+    Raises:
+        AircraftError: it cannot be flown at one of the speeds.
+    """
+    return cached(f"{frame.name}-climb-{FORMAT}", frame.files.digest(), lambda: _measured(frame), _read)
+
+
+def _read(result: dict[str, Any]) -> ClimbRates:
+    columns = [
+        tuple(figure(value) for value in result[name])
+        for name in ("airspeeds_mps", "climb_mps", "descent_mps")
+    ]
+    if len({len(column) for column in columns}) != 1 or not columns[0]:
+        raise ValueError("columns of different lengths")
+    return ClimbRates(*columns)
+
+
+def _measured(frame: Airframe) -> dict[str, Any]:
+    low, high = frame.airspeed_range_mps
+    speeds = np.linspace(low, high, SPEEDS).round(1).clip(low, high).tolist()
+    return {
+        "airspeeds_mps": speeds,
+        "climb_mps": [steepest_mps(frame, speed, 1.0) for speed in speeds],
+        "descent_mps": [steepest_mps(frame, speed, -1.0) for speed in speeds],
+    }
+
+
+def steepest_mps(frame: Airframe, airspeed_mps: float, side: float) -> float:
+    """The fastest climb (side 1) or descent (side -1) at which an airspeed is held; positive, 0 where none is."""
+    good, bad = 0.0, STEEPEST * airspeed_mps
+    if keeps(frame, airspeed_mps, side * bad):
+        return round(bad, 3)
+    while bad - good > TOLERANCE * STEEPEST * airspeed_mps:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if keeps(frame, airspeed_mps, side * middle) else (good, middle)
+    return round(good, 3)
+
+
+def keeps(frame: Airframe, airspeed_mps: float, rate_mps: float) -> bool:
+    """Whether an aircraft climbs at a rate (sinks where it is negative) and keeps its airspeed."""
+    altitude = REFERENCE_ALTITUDE_M + max(-rate_mps, 0.0) * (SETTLING_S + JUDGED_S)
+    start = StartConditions(0.0, 0.0, altitude, 0.0, airspeed_mps)
+    try:
+        model = JsbsimModel(frame, start, LocalPlane(45.0, 0.0), climb_limit_mps=abs(rate_mps))
+    except AircraftError:
+        return False
+    model.command(0.0, altitude + math.copysign(1e5, rate_mps), airspeed_mps)
+    steps = STEP_RATE_HZ // UPDATE_RATE_HZ
+    flown = []
+    for _ in range(round((SETTLING_S + JUDGED_S) * UPDATE_RATE_HZ)):
+        model.advance(steps)
+        state = model.state()
+        if model.fault():
+            return False
+        if state.time_s > SETTLING_S:
+            flown.append((state.velocity_up_mps, state.airspeed_mps, state.throttle))
+    climb, speed, throttle = np.array(flown).T
+    return bool(
+        abs(climb.mean() - rate_mps) <= KEPT_RATE_SHARE * abs(rate_mps)
+        and abs(speed - airspeed_mps).max() <= KEPT_SPEED_SHARE * airspeed_mps
+        and (throttle.max() < FULL_THROTTLE if rate_mps > 0.0 else throttle.min() > IDLE_THROTTLE)
+    )

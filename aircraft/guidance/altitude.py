@@ -1,0 +1,143 @@
+"""Guidance up and down: a profile of altitude and airspeed along a route, and what is commanded to fly it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.interface import AircraftState, FloatArray
+
+LEAD_S = 1.0
+"""The slope is taken from so far ahead: what the climb takes to follow its command."""
+
+SPEED_CHANGE_PER_S = 0.02
+"""A commanded airspeed changes by no more than this share of itself a second."""
+
+
+@dataclass(frozen=True, eq=False)
+class VerticalProfile:
+    """Altitude and airspeed along a route.
+
+    Attributes:
+        arc_length_m: (k,) along the route, not falling.
+        altitude_m: (k,) above mean sea level there; linear in between, level beyond the ends.
+        speed_from_m: (j,) along the route, not falling; the first is 0.
+        airspeed_mps: (j,) true airspeed from there on.
+    """
+
+    arc_length_m: FloatArray
+    altitude_m: FloatArray
+    speed_from_m: FloatArray
+    airspeed_mps: FloatArray
+
+    @property
+    def level(self) -> bool:
+        """Whether altitude and airspeed are the same all along."""
+        return bool(np.ptp(self.altitude_m) == 0.0 and np.ptp(self.airspeed_mps) == 0.0)
+
+    def altitudes(self, arc_length_m: FloatArray) -> FloatArray:
+        """(n,) altitudes at places along the route."""
+        return np.interp(arc_length_m, self.arc_length_m, self.altitude_m)
+
+    def slopes(self, arc_length_m: FloatArray) -> FloatArray:
+        """(n,) climb per distance at places along the route."""
+        step = np.diff(self.arc_length_m)
+        slope = np.divide(np.diff(self.altitude_m), step, out=np.zeros_like(step), where=step > 0.0)
+        return np.concatenate(([0.0], slope, [0.0]))[
+            np.searchsorted(self.arc_length_m, arc_length_m, side="right")
+        ]
+
+    def airspeeds(self, arc_length_m: FloatArray) -> FloatArray:
+        """(n,) airspeeds asked for at places along the route."""
+        at = np.searchsorted(self.speed_from_m, arc_length_m, side="right") - 1
+        speeds: FloatArray = self.airspeed_mps[np.maximum(at, 0)]
+        return speeds
+
+
+def flat(altitude_m: float, airspeed_mps: float) -> VerticalProfile:
+    """One altitude and one airspeed."""
+    nought = np.zeros(1)
+    return VerticalProfile(nought, nought + altitude_m, nought, nought + airspeed_mps)
+
+
+def slewed(airspeeds_mps: FloatArray, time_s: FloatArray) -> FloatArray:
+    """(n,) airspeeds as they are commanded, row by row, where those are asked for.
+
+    Args:
+        airspeeds_mps: (n,) asked for.
+        time_s: (n,) when.
+    """
+    if not len(airspeeds_mps) or np.ptp(airspeeds_mps) == 0.0:
+        return airspeeds_mps
+    commanded = np.empty(len(airspeeds_mps))
+    speed, before = float(airspeeds_mps[0]), float(time_s[0])
+    for row, (wanted, now) in enumerate(zip(airspeeds_mps.tolist(), time_s.tolist(), strict=True)):
+        change = SPEED_CHANGE_PER_S * speed * (now - before)
+        speed += min(max(wanted - speed, -change), change)
+        commanded[row], before = speed, now
+    return commanded
+
+
+class AltitudeGuidance:
+    """Commands altitude and airspeed so that the inner loops fly a profile.
+
+    The inner loop climbs at its gain times the altitude error. The command is put where that gives the climb of the
+    profile, plus what takes the present error back, within what the aircraft can climb and sink at its airspeed. A
+    level profile is commanded as it is.
+
+    Args:
+        profile: along the route.
+        gain_1ps: of the inner loop, climb rate over altitude error.
+        limits: the fastest climb and descent at an airspeed, both positive (m/s).
+    """
+
+    def __init__(
+        self, profile: VerticalProfile, gain_1ps: float, limits: Callable[[float], tuple[float, float]]
+    ) -> None:
+        self._profile, self._gain, self._limits = profile, gain_1ps, limits
+        self._slopes = _Slopes(profile)
+        self._airspeed_mps = float(profile.airspeed_mps[0])
+        self._level = profile.level
+
+    def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
+        """Altitude above mean sea level and true airspeed to be held until the next update.
+
+        Args:
+            state: the aircraft now.
+            arc_length_m: where on the route it is.
+        """
+        if self._level:
+            return float(self._profile.altitude_m[0]), self._airspeed_mps
+        wanted = self._slopes.airspeed(arc_length_m)
+        change = SPEED_CHANGE_PER_S * self._airspeed_mps / UPDATE_RATE_HZ
+        self._airspeed_mps += min(max(wanted - self._airspeed_mps, -change), change)
+        altitude, slope = self._slopes.at(arc_length_m, arc_length_m + LEAD_S * state.groundspeed_mps)
+        up, down = self._limits(self._airspeed_mps)
+        climb = self._gain * (altitude - state.up_m) + slope * state.groundspeed_mps
+        climb = min(max(climb, -down), up)
+        # The command is held, and the error shrinks by then: half an update on average.
+        return state.up_m + climb * (1.0 / self._gain + 0.5 / UPDATE_RATE_HZ), self._airspeed_mps
+
+
+class _Slopes:
+    """A profile that is asked for one place after the other."""
+
+    def __init__(self, profile: VerticalProfile) -> None:
+        self._along = profile.arc_length_m
+        self._altitude = profile.altitude_m
+        self._from, self._speed = profile.speed_from_m, profile.airspeed_mps
+
+    def airspeed(self, arc_length_m: float) -> float:
+        return float(self._speed[max(int(np.searchsorted(self._from, arc_length_m, side="right")) - 1, 0)])
+
+    def at(self, here_m: float, ahead_m: float) -> tuple[float, float]:
+        """Altitude at a place, and the slope at another."""
+        altitude = float(np.interp(here_m, self._along, self._altitude))
+        row = int(np.searchsorted(self._along, ahead_m, side="right"))
+        if row in (0, len(self._along)):
+            return altitude, 0.0
+        run = float(self._along[row] - self._along[row - 1])
+        return altitude, float(self._altitude[row] - self._altitude[row - 1]) / run if run > 0.0 else 0.0

@@ -1,0 +1,56 @@
+"""What a path that was given asks of a flight, row by row of the track."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from harness.flight.record import FloatArray
+
+
+class Corner(Protocol):
+    """A corner of a path that was to be flown by."""
+
+    @property
+    def arc_length_m(self) -> float:
+        """Where on the plan the path turns at it."""
+        ...
+
+    @property
+    def waypoint(self) -> int:
+        """Its number in the path as given."""
+        ...
+
+    @property
+    def cut_m(self) -> float:
+        """How far from it the plan passes."""
+        ...
+
+    @property
+    def half_m(self) -> float:
+        """So far before and after that the plan is off the legs that meet at it."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class AsGiven:
+    """A path that was given and how it was flown, row by row of the track.
+
+    Attributes:
+        corners: places on the path, in order; each ends a leg.
+        deviation_m: (n,) distance between the track and the path as given.
+        allowed_m: (n,) what it may be.
+        altitude_m: (n,) altitude that the path has there.
+        climb_mps: (n,) climb that it asks for there, negative for a descent.
+        fastest_mps: (n, 2) fastest climb and descent of the aircraft at its airspeed there.
+        airspeed_mps: (n,) true airspeed that it asks for there.
+    """
+
+    corners: Sequence[Corner]
+    deviation_m: FloatArray
+    allowed_m: FloatArray
+    altitude_m: FloatArray
+    climb_mps: FloatArray
+    fastest_mps: FloatArray
+    airspeed_mps: FloatArray

@@ -1,0 +1,88 @@
+"""Flights recorded by gliders' loggers: IGC files (FAI, Technical Specification for GNSS Flight Recorders)."""
+
+from __future__ import annotations
+
+import io
+import math
+from typing import Any, Final
+
+from harness.files.input_file import InputError
+from harness.run_files.path_as_read import PathAsRead
+
+FLYING_MPS: Final = 12.0
+"""Before the first fix and after the last at this ground speed the aircraft rolls, or stands."""
+
+MOST_BROKEN: Final = 0.05
+"""A file of which a larger share of fixes cannot be read is refused."""
+
+EARTH_M: Final = 6_371_000.0
+
+
+def read_igc(text: str, source: str) -> PathAsRead:
+    """The fixes of a flight, from the takeoff to the landing, at their GNSS altitude.
+
+    Where the logger has no GNSS altitude (0 or no 3-D fix), all of it is at the pressure altitude.
+
+    Args:
+        text: of the file.
+        source: its name, for faults.
+
+    Raises:
+        InputError: it is no IGC file, or has no flight in it.
+    """
+    fixes, broken = _fixes(text, source)
+    valid = [fix for fix in fixes if abs(fix["lat"]) > 1e-9 or abs(fix["lon"]) > 1e-9]
+    flown = _in_flight(valid)
+    if len(flown) < 2:
+        raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
+    satellites = all(fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V" for fix in flown)
+    kind = "gps_alt" if satellites else "pressure_alt"
+    notes = [f"{'GNSS' if satellites else 'pressure'} altitudes of the logger taken as above the sea"]
+    if broken:
+        notes.append(f"{broken} B records that cannot be read passed over")
+    if len(valid) > len(flown):
+        notes.append(f"{len(valid) - len(flown)} fixes on the ground not flown")
+    if len(fixes) > len(valid):
+        notes.append(f"{len(fixes) - len(valid)} fixes without a position passed over")
+    return PathAsRead(
+        False,
+        tuple((float(fix["lat"]), float(fix["lon"])) for fix in flown),
+        tuple(float(fix[kind] or 0.0) for fix in flown),
+        notes=tuple(notes),
+    )
+
+
+def _fixes(text: str, source: str) -> tuple[list[dict[str, Any]], int]:
+    """The fixes of a file, and how many more cannot be read."""
+    from aerofiles.igc import Reader
+
+    if not text.lstrip("\ufeff").startswith("A"):
+        raise InputError(f"{source}:1: must begin with an A record, the logger's number; is no IGC file")
+    # A reader that goes on after a broken line; of each it keeps the error.
+    try:
+        read = Reader(skip_duplicates=True).read(io.StringIO(text))
+    except Exception as error:  # whatever its parser meets
+        raise InputError(f"{source}: is not IGC ({type(error).__name__}: {error})") from error
+    broken, fixes = read["fix_records"]
+    if len(broken) > MOST_BROKEN * len(fixes):
+        raise InputError(
+            f"{source}: has {len(broken)} B records that cannot be read, of {len(broken) + len(fixes)}; must be at "
+            f"most {MOST_BROKEN:.0%}"
+        )
+    return list(fixes), len(broken)
+
+
+def _in_flight(fixes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The fixes from the first to the last that is flown."""
+    flying = [
+        place for place in range(1, len(fixes)) if _speed_mps(fixes[place - 1], fixes[place]) >= FLYING_MPS
+    ]
+    return fixes[flying[0] - 1 : flying[-1] + 1] if flying else []
+
+
+def _speed_mps(before: dict[str, Any], after: dict[str, Any]) -> float:
+    """Ground speed between two fixes."""
+    north = math.radians(after["lat"] - before["lat"])
+    east = math.radians(after["lon"] - before["lon"]) * math.cos(math.radians(after["lat"]))
+    elapsed_s = (after["datetime"] - before["datetime"]).total_seconds()
+    return EARTH_M * math.hypot(north, east) / elapsed_s if elapsed_s > 0 else 0.0

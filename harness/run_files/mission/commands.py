@@ -1,0 +1,183 @@
+"""Commands of MAVLink missions, and what an aeroplane makes of them.
+
+Numbers and parameters: https://mavlink.io/en/messages/common.html#mav_commands, and ardupilotmega.xml for those of
+ArduPilot alone.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+WAYPOINT: Final = 16
+LOITER_UNLIMITED: Final = 17
+LOITER_TURNS: Final = 18
+LOITER_TIME: Final = 19
+RETURN_TO_LAUNCH: Final = 20
+LAND: Final = 21
+TAKEOFF: Final = 22
+CONTINUE_AND_CHANGE_ALTITUDE: Final = 30
+LOITER_TO_ALTITUDE: Final = 31
+SPLINE_WAYPOINT: Final = 82
+VTOL_TAKEOFF: Final = 84
+VTOL_LAND: Final = 85
+JUMP: Final = 177
+CHANGE_SPEED: Final = 178
+LAND_START: Final = 189
+TAG: Final = 600
+JUMP_TO_TAG: Final = 601
+
+LOITERS: Final = (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE)
+TAKEOFFS: Final = {
+    TAKEOFF: "the roll is not flown: the flight begins at the altitude of the takeoff",
+    VTOL_TAKEOFF: "the vertical takeoff is not flown: the flight begins at its altitude",
+}
+LANDINGS: Final = (LAND, VTOL_LAND)
+FLOWN: Final = (
+    WAYPOINT,
+    SPLINE_WAYPOINT,
+    *LOITERS,
+    RETURN_TO_LAUNCH,
+    *LANDINGS,
+    *TAKEOFFS,
+    CONTINUE_AND_CHANGE_ALTITUDE,
+)
+"""Items that are flown to, or about, or along."""
+
+NAMES: Final = {
+    WAYPOINT: "waypoint",
+    LOITER_UNLIMITED: "loiter without limit",
+    LOITER_TURNS: "loiter turns",
+    LOITER_TIME: "loiter time",
+    RETURN_TO_LAUNCH: "return to launch",
+    LAND: "land",
+    TAKEOFF: "takeoff",
+    CONTINUE_AND_CHANGE_ALTITUDE: "continue and change altitude",
+    LOITER_TO_ALTITUDE: "loiter to altitude",
+    SPLINE_WAYPOINT: "spline waypoint",
+    VTOL_TAKEOFF: "VTOL takeoff",
+    VTOL_LAND: "VTOL land",
+    JUMP: "jump",
+    CHANGE_SPEED: "change speed",
+    LAND_START: "landing start",
+    TAG: "jump tag",
+    JUMP_TO_TAG: "jump to tag",
+    32: "follow",
+    80: "region of interest",
+    81: "path planning",
+    83: "altitude wait",
+    92: "guided enable",
+    93: "delay",
+    94: "place payload",
+    112: "condition delay",
+    113: "condition change altitude",
+    114: "condition distance",
+    115: "condition yaw",
+    176: "set mode",
+    179: "set home",
+    180: "set parameter",
+    181: "set relay",
+    182: "repeat relay",
+    183: "set servo",
+    184: "repeat servo",
+    185: "terminate flight",
+    186: "change altitude",
+    187: "set actuator",
+    188: "return path start",
+    190: "rally land",
+    191: "go around",
+    192: "reposition",
+    193: "pause or continue",
+    194: "set reverse",
+    195: "region of interest at a place",
+    196: "region of interest at the next waypoint",
+    197: "no region of interest",
+    201: "region of interest",
+    202: "configure camera",
+    203: "control camera",
+    204: "configure mount",
+    205: "control mount",
+    206: "camera trigger distance",
+    207: "enable fence",
+    208: "parachute",
+    210: "inverted flight",
+    211: "gripper",
+    212: "autotune",
+    214: "camera trigger interval",
+    215: "set resume repeat distance",
+    216: "sprayer",
+    220: "mount quaternion",
+    222: "guided limits",
+    223: "engine control",
+    224: "set current item",
+    530: "camera mode",
+    531: "camera zoom",
+    532: "camera focus",
+    534: "camera source",
+    1000: "gimbal pitch and yaw",
+    1001: "gimbal configure",
+    2000: "take pictures",
+    2001: "stop taking pictures",
+    2003: "camera trigger",
+    2500: "take video",
+    2501: "stop taking video",
+    3000: "VTOL transition",
+    42600: "winch",
+    42702: "send script message",
+}
+"""What each is called for people."""
+
+WITHOUT_EFFECT: Final = frozenset(
+    (
+        *(
+            80,
+            115,
+            181,
+            182,
+            183,
+            184,
+            187,
+            188,
+            190,
+            195,
+            196,
+            197,
+            201,
+            202,
+            203,
+            204,
+            205,
+            206,
+            207,
+            211,
+            212,
+            214,
+        ),
+        *(
+            215,
+            216,
+            220,
+            223,
+            530,
+            531,
+            532,
+            534,
+            1000,
+            1001,
+            2000,
+            2001,
+            2003,
+            2500,
+            2501,
+            3000,
+            42600,
+            42702,
+        ),
+        *(LAND_START, TAG, JUMP, JUMP_TO_TAG),
+    )
+)
+"""Cameras, servos, marks and the like: the path of an aeroplane is the same without them."""
+
+
+def name_of(command: int) -> str:
+    """What a command is called, or its number."""
+    return NAMES.get(command, f"command {command}")

@@ -1,0 +1,68 @@
+"""A mission in the local plane, what it is flown with, and the route that is made of both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from aircraft.guidance.altitude import VerticalProfile
+from harness.run_files.given_path import FloatArray, FlyBy
+from harness.run_files.mission.program import Program
+
+Ground = Callable[[FloatArray, FloatArray], FloatArray]
+"""East and north -> height of the ground above mean sea level, NaN where it is not known."""
+
+
+@dataclass(frozen=True)
+class Flying:
+    """What a mission is flown with.
+
+    Attributes:
+        airspeed_mps: before the mission says otherwise.
+        airspeed_range_mps: what the aircraft holds.
+        turn_radius_m: for a turn at an airspeed.
+        climb_mps: fastest climb and descent at an airspeed.
+        free_cut_m: a corner may be passed at this distance only to make its arc wider.
+        ground: height of the ground; None: not known, then it is taken to be as high as home.
+    """
+
+    airspeed_mps: float
+    airspeed_range_mps: tuple[float, float]
+    turn_radius_m: Callable[[float], float]
+    climb_mps: Callable[[float], tuple[float, float]]
+    free_cut_m: float
+    ground: Ground | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class GivenMission:
+    """A mission in the local plane.
+
+    Attributes:
+        program: what it makes an aeroplane fly.
+        places: of its steps, east + i north; None where a step has none.
+        home_altitude_m: above mean sea level.
+    """
+
+    program: Program
+    places: tuple[complex | None, ...]
+    home_altitude_m: float
+
+
+@dataclass(frozen=True, eq=False)
+class MissionRoute:
+    """A mission as it is flown.
+
+    Attributes:
+        way: lines and arcs; its corners have the numbers of their items.
+        profile: altitude and airspeed along it.
+        asked_mps: the airspeeds that the mission asks for, as those of the profile; the aircraft may not hold them.
+        marks: item and arc length where each is reached.
+        notes: what was assumed, a line each.
+    """
+
+    way: FlyBy
+    profile: VerticalProfile
+    asked_mps: FloatArray
+    marks: tuple[tuple[int, float], ...]
+    notes: tuple[str, ...]

@@ -1,0 +1,379 @@
+"""What a mission makes an aeroplane fly: its items are gone through as an autopilot does, jumps and all.
+
+ArduPlane's and PX4's fixed-wing missions are the model: https://ardupilot.org/plane/docs/common-mavlink-mission-command-messages-mav_cmd.html,
+https://docs.px4.io/main/en/flight_modes_fw/mission.html.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from harness.files.input_file import InputError
+from harness.run_files.mission import commands
+from harness.run_files.mission.items import GROUND, HOME, LOCAL, SEA, Item, MissionAsRead
+
+MOST_STEPS: Final = 20_000
+"""A mission whose jumps make it longer is refused."""
+
+FLOWN, PASSED_OVER, NOT_FLOWN, NOT_REACHED = "flown", "passed over", "not flown", "not reached"
+
+MOST_TURNS: Final = 1000
+MOST_LOITER_S: Final = 86_400.0
+MOST_RADIUS_M: Final = 50_000.0
+MOST_HEIGHT_M: Final = 50_000.0
+"""Beyond these an item is taken for a mistake."""
+
+AIRSPEED, GROUND_SPEED = 0, 1
+"""Kinds of speed of a change of speed, its first parameter."""
+
+
+@dataclass(frozen=True)
+class Loiter:
+    """Circles to be flown.
+
+    Attributes:
+        radius_m: of the circle; 0: the autopilot's own.
+        clockwise: which way round.
+        turns: how many times round; or
+        time_s: how long; or neither: until the altitude is reached.
+    """
+
+    radius_m: float
+    clockwise: bool
+    turns: float | None = None
+    time_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that is flown.
+
+    Attributes:
+        item: the number of its item.
+        name: what the item is called.
+        position: latitude and longitude, or east and north; None: where the step before ends.
+        height_m: altitude; None: that of the step before.
+        above: what it is above: `sea`, `home` or `ground`.
+        acceptance_m: how far off it may be passed; 0 where the file does not say.
+        airspeed_mps: commanded from the begin of this step on; None: as before.
+        loiter: circles about the position.
+        landing: the flight ends on the way down to it.
+        straight: goes straight on until the altitude is reached.
+    """
+
+    item: int
+    name: str
+    position: tuple[float, float] | None
+    height_m: float | None
+    above: str
+    acceptance_m: float = 0.0
+    airspeed_mps: float | None = None
+    loiter: Loiter | None = None
+    landing: bool = False
+    straight: bool = False
+
+
+@dataclass(frozen=True)
+class Told:
+    """What became of an item.
+
+    Attributes:
+        item: its number.
+        name: what it is called.
+        what: `flown`, `passed over`, `not flown` or `not reached`.
+        why: a few words, or none.
+    """
+
+    item: int
+    name: str
+    what: str
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Program:
+    """What a mission makes an aeroplane fly.
+
+    Attributes:
+        local: positions are east and north in metres; else latitude and longitude in degrees.
+        steps: in order.
+        items: what became of every item, in the order of the file.
+        acts_on_ground: an altitude above ground is among them.
+    """
+
+    local: bool
+    steps: tuple[Step, ...]
+    items: tuple[Told, ...]
+
+    @property
+    def above_ground(self) -> tuple[int, ...]:
+        """Numbers of the items with an altitude above ground."""
+        return tuple(dict.fromkeys(step.item for step in self.steps if step.above == GROUND))
+
+
+def program(mission: MissionAsRead) -> Program:
+    """Goes through a mission.
+
+    Args:
+        mission: as read.
+
+    Raises:
+        InputError: a jump leads nowhere, or in a circle; a frame or a position cannot be used; or nothing is flown.
+    """
+    if not mission.items:
+        raise InputError(f"{mission.source}: has no mission items; there is nothing to fly")
+    run = _Run(mission)
+    run.go()
+    if len(run.steps) < 2:
+        told = f" ({run.told[run.steps[0].item].name}, item {run.steps[0].item})" if run.steps else ""
+        raise InputError(
+            f"{mission.source}: has {len(run.steps)} items to fly to{told}; a path has at least 2"
+        )
+    items = tuple(
+        run.told.get(item.number, Told(item.number, commands.name_of(item.command), NOT_REACHED))
+        for item in mission.items
+    )
+    return Program(run.local, tuple(run.steps), items)
+
+
+@dataclass
+class _Run:
+    """A mission while it is gone through."""
+
+    mission: MissionAsRead
+    steps: list[Step] = field(default_factory=list)
+    told: dict[int, Told] = field(default_factory=dict)
+    taken: dict[int, int] = field(default_factory=dict)  # how often each jump has been taken
+    airspeed_mps: float | None = None
+    closing: Item | None = None  # an endless jump back: the flight ends at the next step
+    over: bool = False
+
+    def __post_init__(self) -> None:
+        items = self.mission.items
+        self.index = {item.number: place for place, item in enumerate(items)}
+        if len(self.index) < len(items):
+            number = next(item.number for place, item in enumerate(items) if self.index[item.number] != place)
+            raise InputError(f"{self.mission.source}: item {number} is there twice; numbers must differ")
+        placed = [item.frame in LOCAL for item in items if item.command in commands.FLOWN and item.position]
+        self.local = any(placed)
+        if self.local and not all(placed):
+            raise InputError(f"{self.mission.source}: mixes local and global frames; must have one of both")
+        self.home = (0.0, 0.0) if self.local else self.mission.home
+
+    def go(self) -> None:
+        """Goes through it to its end."""
+        at, idle = 0, 0
+        while at < len(self.mission.items) and not self.over:
+            item, before = self.mission.items[at], len(self.steps)
+            at = self._jump(item, at) if item.command in (commands.JUMP, commands.JUMP_TO_TAG) else at + 1
+            if item.command not in (commands.JUMP, commands.JUMP_TO_TAG):
+                self._do(item)
+            idle = 0 if len(self.steps) > before else idle + 1
+            if idle > 2 * len(self.mission.items):
+                raise InputError(
+                    f"{item.place}: item {item.number} jumps in a circle with nothing to fly in it"
+                )
+            if len(self.steps) > MOST_STEPS:
+                raise InputError(
+                    f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer repeats"
+                )
+
+    def _jump(self, item: Item, at: int) -> int:
+        """Where it goes on after a jump."""
+        target, repeats = self._target(item), int(item.params[1])
+        if repeats >= 0:
+            done = self.taken.get(item.number, 0)
+            self.taken[item.number] = done + 1
+            self._tell(item, FLOWN, f"to item {item.params[0]:g}, {repeats} times")
+            return target if done < repeats else at + 1
+        first = self._first_flown(target)
+        if first is not None and self.told.get(first.number, Told(0, "", "")).what == FLOWN:
+            self.closing = item
+            self._tell(
+                item, FLOWN, f"to item {item.params[0]:g} without end: flown up to item {first.number} again"
+            )
+        else:
+            self._tell(item, FLOWN, f"to item {item.params[0]:g}")
+        return target
+
+    def _target(self, item: Item) -> int:
+        wanted = item.params[0]
+        if item.command == commands.JUMP_TO_TAG:
+            for place, each in enumerate(self.mission.items):
+                if each.command == commands.TAG and each.params[0] == wanted:
+                    return place
+            raise InputError(f"{item.place}: item {item.number} jumps to tag {wanted:g}, which no item has")
+        if wanted not in self.index:
+            raise InputError(
+                f"{item.place}: item {item.number} jumps to item {wanted:g}, which does not exist"
+            )
+        return self.index[int(wanted)]
+
+    def _first_flown(self, at: int) -> Item | None:
+        """The first item from a place on that is flown."""
+        return next((item for item in self.mission.items[at:] if item.command in commands.FLOWN), None)
+
+    def _do(self, item: Item) -> None:
+        if item.command == commands.CHANGE_SPEED:
+            self._change_speed(item)
+        elif item.command in commands.WITHOUT_EFFECT:
+            self._tell(item, PASSED_OVER, "no effect on the path")
+        elif item.command in commands.FLOWN:
+            self._fly(item)
+        else:
+            self._tell(item, NOT_FLOWN, "an aeroplane here cannot")
+
+    def _change_speed(self, item: Item) -> None:
+        kind, speed = int(item.params[0]), item.params[1]
+        if kind == AIRSPEED and speed > 0.0:
+            self.airspeed_mps = speed
+            self._tell(item, FLOWN, f"airspeed {speed:g} m/s")
+        elif speed <= 0.0:
+            self._tell(item, PASSED_OVER, "changes no speed")
+        else:
+            told = "least ground speed" if kind == GROUND_SPEED else "climb or descent speed"
+            self._tell(item, NOT_FLOWN, f"a {told} of {speed:g} m/s is not held")
+
+    def _fly(self, item: Item) -> None:
+        fly: dict[int, Callable[[Item], Step | None]] = {
+            commands.RETURN_TO_LAUNCH: self._home,
+            commands.CONTINUE_AND_CHANGE_ALTITUDE: self._straight,
+            **dict.fromkeys(commands.LOITERS, self._loiter),
+            **dict.fromkeys(commands.LANDINGS, self._land),
+            **dict.fromkeys(commands.TAKEOFFS, self._takeoff),
+        }
+        step = fly.get(item.command, self._waypoint)(item)
+        if step is None:
+            return
+        self.steps.append(step)
+        self.airspeed_mps = None
+        if self.closing is not None or item.command in (
+            commands.LOITER_UNLIMITED,
+            commands.RETURN_TO_LAUNCH,
+            *commands.LANDINGS,
+        ):
+            self.over = True
+
+    def _step(self, item: Item, **more: object) -> Step:
+        """A step to where an item says, at its altitude.
+
+        ArduPilot takes a position of zeros as the present one, and an altitude of 0 with it as the present one, too.
+        """
+        position = item.position
+        height: float | None = _bounded(item, "is at", item.height_m, MOST_HEIGHT_M, "m")
+        if position is None and height == 0.0:
+            height = None
+        above = item.above if height is not None else HOME
+        return Step(
+            item.number,
+            commands.name_of(item.command),
+            position,
+            height,
+            above,
+            airspeed_mps=self.airspeed_mps,
+            **more,  # type: ignore[arg-type]
+        )
+
+    def _waypoint(self, item: Item) -> Step | None:
+        if item.position is None and not self.steps:
+            self._tell(item, NOT_FLOWN, "has no position, and nothing is before it")
+            return None
+        hold = item.params[0]
+        why = f"held for {hold:g} s by a multicopter; an aeroplane flies on" if hold > 1.0 else ""
+        if item.command == commands.SPLINE_WAYPOINT:
+            why = "as a plain waypoint"
+        self._tell(item, FLOWN, why)
+        return self._step(item, acceptance_m=max(item.params[1], 0.0))
+
+    def _takeoff(self, item: Item) -> Step | None:
+        if self.steps:
+            self._tell(item, NOT_FLOWN, "in the air already")
+            return None
+        step = self._step(item)
+        position = step.position or self.home
+        if position is None:
+            self._tell(item, NOT_FLOWN, "neither it nor home has a position")
+            return None
+        self._tell(item, FLOWN, commands.TAKEOFFS[item.command])
+        return Step(
+            item.number, step.name, position, item.height_m, item.above, airspeed_mps=self.airspeed_mps
+        )
+
+    def _loiter(self, item: Item) -> Step | None:
+        if item.position is None and not self.steps:
+            self._tell(item, NOT_FLOWN, "has no position, and nothing is before it")
+            return None
+        first, second, third, _ = item.params[:4]
+        signed = second if item.command == commands.LOITER_TO_ALTITUDE else third
+        turns: float | None = None
+        time_s: float | None = None
+        why = ""
+        if item.command == commands.LOITER_TURNS:
+            turns = _bounded(item, "loiters", max(first, 0.0), MOST_TURNS, "turns")
+            why = f"{turns:g} turns"
+        elif item.command == commands.LOITER_TIME:
+            time_s = _bounded(item, "loiters for", max(first, 0.0), MOST_LOITER_S, "s")
+            why = f"{time_s:g} s"
+        elif item.command == commands.LOITER_UNLIMITED:
+            turns, why = 1.0, "one turn is flown, and the flight ends"
+        radius = _bounded(item, "loiters with a radius of", abs(signed), MOST_RADIUS_M, "m")
+        self._tell(item, FLOWN, why)
+        return self._step(item, loiter=Loiter(radius, signed >= 0.0, turns, time_s))
+
+    def _land(self, item: Item) -> Step | None:
+        if item.position is None:
+            self._tell(item, NOT_FLOWN, "has no position: where it lands is left to the autopilot")
+            self.over = True
+            return None
+        self._tell(item, FLOWN, "the approach, not the touchdown")
+        return self._step(item, landing=True)
+
+    def _home(self, item: Item) -> Step | None:
+        if self.home is None or not self.steps:
+            self._tell(item, NOT_FLOWN, "home has no position" if self.steps else "nothing is before it")
+            self.over = True
+            return None
+        self._tell(item, FLOWN, "to home at the altitude before; what follows there is not flown")
+        name = commands.name_of(item.command)
+        return Step(item.number, name, self.home, None, HOME, airspeed_mps=self.airspeed_mps)
+
+    def _straight(self, item: Item) -> Step | None:
+        if not self.steps:
+            self._tell(item, NOT_FLOWN, "nothing is before it")
+            return None
+        self._tell(item, FLOWN, "straight on until the altitude is reached")
+        name = commands.name_of(item.command)
+        height = _bounded(item, "is at", item.height_m, MOST_HEIGHT_M, "m")
+        return Step(
+            item.number, name, None, height, item.above, airspeed_mps=self.airspeed_mps, straight=True
+        )
+
+    def _tell(self, item: Item, what: str, why: str = "") -> None:
+        self.told.setdefault(item.number, Told(item.number, commands.name_of(item.command), what, why))
+
+
+def _bounded(item: Item, verb: str, value: float, most: float, unit: str) -> float:
+    """A figure of an item; one that is too large is a fault."""
+    if not abs(value) <= most:
+        raise InputError(
+            f"{item.place}: item {item.number} {verb} {value:g} {unit}; must be at most {most:g} {unit}"
+        )
+    return value
+
+
+def altitude_m(step: Step, home_altitude_m: float, ground_m: float, before_m: float) -> float:
+    """Altitude of a step above mean sea level.
+
+    Args:
+        step: the step.
+        home_altitude_m: of home, above mean sea level.
+        ground_m: of the ground below it, above mean sea level; NaN where it is not known.
+        before_m: of the step before, NaN at the first.
+    """
+    if step.height_m is None:
+        return before_m if math.isfinite(before_m) else home_altitude_m
+    base = {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
+    return step.height_m + base

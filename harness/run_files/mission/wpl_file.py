@@ -1,0 +1,46 @@
+"""Missions in plain-text files of MAVLink ground stations (.waypoints, .txt): "QGC WPL".
+
+The format: https://mavlink.io/en/file_formats/#mission_plain_text_file
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from harness.files.input_file import InputError
+from harness.run_files.fences import Fences
+from harness.run_files.mission.items import Item, MissionAsRead
+from harness.run_files.read_values import finite, whole
+
+WPL: Final = "QGC WPL"
+CELLS: Final = 12
+COMMENT: Final = "#"
+
+
+def read_waypoints(text: str, source: str) -> MissionAsRead:
+    """The mission of a plain-text file; its first item is home, lines that begin with # are comments.
+
+    Args:
+        text: of the file.
+        source: its name, for faults.
+
+    Raises:
+        InputError: it is none.
+    """
+    lines = text.splitlines()
+    if not lines or not lines[0].startswith(WPL):
+        raise InputError(f'{source}:1: must begin with "{WPL} 110"')
+    items = []
+    for number, line in enumerate(lines[1:], start=2):
+        cells = line.split()
+        if not cells or cells[0].startswith(COMMENT):
+            continue
+        place = f"{source}:{number}"
+        if len(cells) != CELLS:
+            raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
+        index, frame, command = (whole(cells[i], place) for i in (0, 2, 3))
+        items.append(Item(place, index, command, frame, tuple(finite(c, place) for c in cells[4:11])))
+    if not items:
+        raise InputError(f"{source}: has no items; the first is home, the others are the path")
+    home, *others = items
+    return MissionAsRead(source, tuple(others), home.position, home.params[6], Fences())

@@ -1,0 +1,92 @@
+"""How fast aircraft climb and sink, and the guidance that keeps within it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.airframes import airframe
+from aircraft.climb import ClimbRates, climb_rates, keeps
+from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat, slewed
+from aircraft.interface import AircraftState
+
+
+def test_a_rate_that_is_promised_is_flown_and_a_faster_one_is_not() -> None:
+    frame = airframe("aerosonde")
+    rates = climb_rates(frame)
+    climb, descent = rates.at(25.0)
+    assert 4.0 < climb < 8.0
+    assert 5.0 < descent < 10.0
+    assert keeps(frame, 25.0, 0.95 * climb)
+    assert not keeps(frame, 25.0, 1.2 * climb)
+    assert keeps(frame, 25.0, -0.95 * descent)
+    assert not keeps(frame, 25.0, -1.2 * descent)
+    assert rates.at(rates.airspeeds_mps[-1])[0] < 1.0, "at the fastest there is no throttle left"
+
+
+def test_rates_are_kept_and_made_anew_where_the_cache_is_spoilt(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr("aircraft.climb.steepest_mps", lambda frame, speed, side: 3.0 + side)
+    frame = airframe("aerosonde")
+    rates = climb_rates(frame)
+    assert (rates.climb_mps[0], rates.descent_mps[0]) == (4.0, 2.0)
+    (kept,) = tmp_path.rglob("aerosonde-climb-*.json")
+    kept.write_text(kept.read_text().replace("4.0", "-4.0"))
+    assert climb_rates(frame) == rates
+    assert ClimbRates((10.0, 20.0), (1.0, 3.0), (2.0, 2.0)).at(15.0) == (2.0, 2.0)
+
+
+def state(up_m: float, airspeed_mps: float = 25.0) -> AircraftState:
+    return AircraftState(0, 0, 0, up_m, 0, airspeed_mps, 0, 0, 0, 0, airspeed_mps, 1.0)
+
+
+RAMP = VerticalProfile(
+    np.array([0.0, 1000.0, 2000.0, 3000.0]),
+    np.array([300.0, 300.0, 400.0, 400.0]),
+    np.array([0.0, 2500.0]),
+    np.array([25.0, 20.0]),
+)
+
+
+def test_a_profile_is_linear_between_its_points_and_level_beyond_them() -> None:
+    places = np.array([-10.0, 500.0, 1500.0, 2999.0, 9999.0])
+    assert RAMP.altitudes(places).tolist() == [300.0, 300.0, 350.0, 400.0, 400.0]
+    assert RAMP.slopes(places).tolist() == [0.0, 0.0, 0.1, 0.0, 0.0]
+    assert RAMP.airspeeds(places).tolist() == [25.0, 25.0, 25.0, 20.0, 20.0]
+    assert not RAMP.level
+    assert flat(300.0, 25.0).level
+
+
+def test_the_command_gives_the_climb_of_the_profile_within_what_can_be_flown() -> None:
+    guidance = AltitudeGuidance(RAMP, 0.8, lambda speed: (5.0, 6.0))
+
+    def climb(up_m: float, along_m: float) -> float:
+        """What the inner loop makes of the command, on average until the next."""
+        altitude, _ = guidance.command(state(up_m), along_m)
+        return 0.8 * (altitude - up_m) / (1.0 + 0.8 * 0.05)
+
+    assert climb(350.0, 1500.0) == pytest.approx(2.5)
+    assert climb(348.0, 1500.0) == pytest.approx(2.5 + 1.6)
+    assert climb(300.0, 1500.0) == pytest.approx(5.0)
+    assert climb(400.0, 1500.0) == pytest.approx(-6.0)
+    assert climb(400.0, 2800.0) == pytest.approx(0.0)
+
+
+def test_a_level_profile_is_commanded_as_it_is() -> None:
+    guidance = AltitudeGuidance(flat(321.0, 25.0), 0.8, lambda speed: (math.nan, math.nan))
+    assert guidance.command(state(300.0), 0.0) == (321.0, 25.0)
+
+
+def test_airspeeds_change_slowly_in_command_and_in_what_they_are_held_against() -> None:
+    guidance = AltitudeGuidance(RAMP, 0.8, lambda speed: (5.0, 6.0))
+    commanded = [guidance.command(state(400.0), 2600.0)[1] for _ in range(200)]
+    assert commanded[0] == pytest.approx(25.0 - 0.05)
+    assert commanded[-1] == 20.0
+    time_s = np.arange(1, 201) / 10.0
+    asked = np.append(25.0, np.full(200, 20.0))
+    assert slewed(asked, np.append(0.0, time_s))[1:] == pytest.approx(commanded)

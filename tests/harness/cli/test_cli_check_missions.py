@@ -1,0 +1,214 @@
+"""The command `check` with missions in 3-D, terrain below them, and files of ground stations as they are."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.cli.app import main
+from harness.files.input_file import InputError
+from harness.run_files.path_files import read_path
+from harness.run_files.run_folder import load_run
+
+REAL = Path(__file__).parents[3].parent / "shared" / "real"
+MISSIONS = sorted((REAL / "missions").glob("*")) if REAL.is_dir() else []
+CANBERRA = "obstacles=[{file: {path: %s}}]" % (REAL / "terrain" / "S36E149.hgt.zip")
+
+NORTH_M = 111_200.0
+"""A degree of latitude."""
+
+
+def row(
+    number: int, command: int, *params: float, north_m: float = 0.0, up_m: float = 0.0, frame: int = 3
+) -> str:
+    """An item of a plain-text mission, north of home."""
+    filled = [*params, *(0.0,) * (4 - len(params)), 47.0 + north_m / NORTH_M, 8.0, up_m]
+    return "\t".join(map(str, (number, 0, frame, command, *filled, 1)))
+
+
+def write(path: Path, *rows: str) -> Path:
+    home = "\t".join(map(str, (0, 1, 0, 16, 0, 0, 0, 0, 47.0, 8.0, 400.0, 1)))
+    path.write_text("\n".join(("QGC WPL 110", home, *rows)) + "\n")
+    return path
+
+
+def flown(
+    path: Path, out: Path, *options: str, capsys: pytest.CaptureFixture[str]
+) -> tuple[int, dict[str, Any]]:
+    """Exit status and metrics of a check."""
+    given = ["--aircraft", "aerosonde", "--no-recording", "--json", "--out", str(out), *options]
+    status = main(["check", str(path), *given])
+    return status, json.loads(capsys.readouterr().out)
+
+
+def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write(
+        tmp_path / "m.waypoints",
+        row(1, 22, 15, north_m=0, up_m=60),
+        row(2, 16, north_m=1500, up_m=100),
+        row(3, 206, 25),
+        row(4, 18, 2, 0, 150, north_m=3000, up_m=100),
+        row(5, 178, 0, 22),
+        row(6, 31, 0, 150, north_m=4500, up_m=180),
+        row(7, 112, 5),
+        row(8, 16, north_m=6500, up_m=180),
+        row(9, 21, north_m=9000, up_m=0),
+    )
+    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    assert (status, metrics["check"]["verdict"].partition(":")[0]) == (0, "yes")
+    assert [item["what"] for item in metrics["check"]["items"]] == [
+        *("flown", "flown", "passed over", "flown", "flown", "flown", "not flown", "flown", "flown"),
+    ]
+    assert [leg["waypoint"] for leg in metrics["trackability"]] == [2, 4, 6, 8, 9]
+    assert metrics["altitude_error_m"]["max"] < 10.0
+    track = load_run(tmp_path / "run").track
+    assert (track.up_m[0], track.up_m.max()) == pytest.approx((460.0, 580.0), abs=3.0)
+    assert track.up_m[-1] == pytest.approx(415.0, abs=3.0)
+    assert (
+        main(
+            ["check", str(path), "--aircraft", "aerosonde", "--no-recording", "--out", str(tmp_path / "run")]
+        )
+        == 0
+    )
+    said = " ".join(capsys.readouterr().out.split())
+    assert "items 9: 7 flown, 1 passed over, 1 not flown" in said
+    assert "item 7 condition delay, not flown: an aeroplane here cannot" in said
+
+
+@pytest.mark.parametrize(("up_m", "cause"), [(700.0, "climb too steep"), (-320.0, "descent too steep")])
+def test_what_is_too_steep_is_told(
+    up_m: float, cause: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(
+        tmp_path / "m.waypoints",
+        *(row(1, 16, up_m=100), row(2, 16, north_m=1000, up_m=100), row(3, 16, north_m=2000, up_m=up_m)),
+    )
+    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    assert status == 1
+    assert {leg["cause"] for leg in metrics["trackability"] if not leg["trackable"]} == {cause}
+
+
+def test_a_drawn_line_with_altitudes_is_flown_up_and_down(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "stairs.csv"
+    path.write_text("x_m,y_m,altitude_m\n0,0,300\n0,1500,400\n0,3000,400\n0,4500,320\n")
+    status, metrics = flown(path, tmp_path / "run", capsys=capsys)
+    assert (status, metrics["altitude_error_m"]["max"] < 5.0, len(metrics["trackability"])) == (0, True, 3)
+    status, metrics = flown(path, tmp_path / "run", "--altitude-m", "350", capsys=capsys)
+    track = load_run(tmp_path / "run").track
+    assert status == 0
+    assert (track.up_m.min(), track.up_m.max()) == pytest.approx((350.0, 350.0), abs=0.1)
+
+
+def asc(path: Path) -> Path:
+    """A ridge of 500 m across the way, 2 km north, on a grid of 100 m."""
+    rows = [500.0 if 1800 <= 4000 - 100 * number <= 2200 else 300.0 for number in range(61)]
+    cells = "\n".join(" ".join([f"{height:g}"] * 41) for height in rows)
+    path.write_text(
+        f"ncols 41\nnrows 61\nxllcorner -2000\nyllcorner -2000\ncellsize 100\nNODATA_value -9999\n{cells}\n"
+    )
+    return path
+
+
+def test_a_path_that_meets_terrain_is_told_where(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    terrain = f"obstacles=[{{file: {{path: {asc(tmp_path / 'ridge.asc')}}}}}]"
+    path = tmp_path / "low.csv"
+    path.write_text("x_m,y_m,altitude_m\n0,0,400\n0,1000,440\n0,3500,440\n")
+    status, metrics = flown(path, tmp_path / "run", "--set", terrain, capsys=capsys)
+    (contact,) = metrics["contacts"]
+    assert (status, contact["kind"], metrics["outcome"]) == (1, "terrain", "collision")
+    assert contact["depth_m"] == pytest.approx(60.0, abs=3.0)
+    assert 1600.0 < contact["north_m"] < 2400.0
+    assert metrics["check"]["verdict"].startswith("no: touches the ground at 74 s")
+    path.write_text("x_m,y_m,altitude_m\n0,0,500\n0,1500,550\n0,3500,550\n")
+    status, metrics = flown(path, tmp_path / "run", "--set", terrain, capsys=capsys)
+    assert (status, metrics["contact"]) == (0, False)
+    assert 40.0 < metrics["height_above_ground_m"]["min"] < 60.0
+
+
+def test_a_building_is_touched_only_below_its_roof(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    town = tmp_path / "town.geojson"
+    corners = [[7.999, 47.009], [8.001, 47.009], [8.001, 47.011], [7.999, 47.011], [7.999, 47.009]]
+    shape = {"type": "Polygon", "coordinates": [corners]}
+    house = {"type": "Feature", "properties": {"building": "yes", "height": 120}, "geometry": shape}
+    town.write_text(json.dumps({"type": "FeatureCollection", "features": [house]}))
+    solid = f"obstacles=[{{file: {{path: {town}, ground_m: 0}}}}]"
+    for low_m, contacts in ((60.0, 1), (150.0, 0)):
+        line = {
+            "type": "LineString",
+            "coordinates": [[8, 47, 250], [8, 47.006, low_m], [8, 47.016, low_m + 5]],
+        }
+        path = tmp_path / "line.geojson"
+        path.write_text(json.dumps(line))
+        _, metrics = flown(path, tmp_path / "run", "--set", solid, capsys=capsys)
+        assert [each["name"] for each in metrics["contacts"]] == ["town.geojson"] * contacts
+
+
+MUTILATED: dict[str, str] = {
+    "no header": "QGC WPL 110\n->",
+    "fields": "\t16\t->\t",
+    "text": "47.->forty-seven.",
+    "not finite": "100.0->nan",
+    "far away": "47.->147.",
+    "a jump to nowhere": row(2, 206, 25) + "->" + row(2, 177, 99, 3),
+    "a jump in a circle": row(2, 206, 25) + "->" + row(2, 177, 2, -1),
+    "no end of jumps": row(2, 206, 25) + "->" + row(2, 177, 1, 1e6),
+    "a number twice": "\n3\t->\n1\t",
+    "a frame of nowhere": "\n3\t0\t3->\n3\t0\t8",
+    "mixed frames": "\n3\t0\t3->\n3\t0\t4",
+    "a command of letters": "\t16\t0.0\t->\tfly\t0.0\t",
+}
+
+
+@pytest.mark.parametrize("spoilt", MUTILATED)
+def test_a_mutilated_mission_is_refused_in_a_line(
+    spoilt: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = row(1, 16, 0.0, up_m=100.0), row(2, 206, 25), row(3, 16, 0.0, north_m=1500, up_m=100.0)
+    path = write(tmp_path / "m.waypoints", *rows)
+    before, _, after = MUTILATED[spoilt].partition("->")
+    text = path.read_text()
+    assert before in text
+    path.write_text(text.replace(before, after))
+    assert main(["check", str(path), "--aircraft", "aerosonde", "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr()
+    assert (said.out, len(said.err.splitlines())) == ("", 1)
+    assert said.err.startswith(str(path))
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.name)
+@pytest.mark.parametrize("keep", [0.15, 0.4, 0.7, 0.95])
+def test_a_real_mission_cut_off_is_refused_in_a_line_or_flown_so_far(
+    path: Path, keep: float, tmp_path: Path
+) -> None:
+    """JSON that is cut off is none; of plain text whole lines are left, and a torn one is named."""
+    text = path.read_text()
+    cut = tmp_path / path.name
+    cut.write_text(text[: int(keep * len(text))].rstrip())
+    try:
+        read_path(cut)
+        told = ""
+    except InputError as fault:
+        told = str(fault)
+    assert not told or (told.startswith(str(cut)) and len(told.splitlines()) == 1)
+    assert told or path.suffix == ".txt"
+
+
+@pytest.mark.skipif(not MISSIONS, reason="the real missions lie beside the checkout")
+def test_real_missions_over_their_terrain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = REAL / "missions" / "ardupilot_ap-terrain.txt"
+    _, metrics = flown(path, tmp_path / "run", "--set", CANBERRA, capsys=capsys)
+    assert [item["what"] for item in metrics["check"]["items"]] == ["flown"] * 7
+    assert (metrics["outcome"], metrics["contacts"]) == ("reached", [])
+    assert 10.0 < metrics["height_above_ground_m"]["min"] < 20.0
+    assert 70.0 < metrics["height_above_ground_m"]["mean"] < 110.0
+    causes = {leg["waypoint"]: leg["cause"] for leg in metrics["trackability"]}
+    assert causes[2] == "turn radius too tight"
+    assert causes[3] is None

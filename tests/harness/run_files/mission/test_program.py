@@ -1,0 +1,115 @@
+"""Missions gone through item by item, as an autopilot does."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from harness.files.input_file import InputError
+from harness.run_files.fences import Fences
+from harness.run_files.mission.items import Item, MissionAsRead
+from harness.run_files.mission.program import Program, Told, altitude_m, program
+
+HOME = (47.0, 8.0)
+
+
+def item(number: int, command: int, *params: float, frame: int = 3) -> Item:
+    """An item, its parameters filled up with zeros."""
+    return Item(f"m:{number}", number, command, frame, (*params, *(0.0,) * (7 - len(params))))
+
+
+def at(number: int, command: int = 16, height: float = 100.0, first: float = 0.0, third: float = 0.0) -> Item:
+    """An item with a place of its own."""
+    return item(number, command, first, 0.0, third, 0.0, 47.0 + 0.01 * number, 8.0, height)
+
+
+def run(*items: Item) -> Program:
+    return program(MissionAsRead("m", items, HOME, 400.0, Fences()))
+
+
+def flown(done: Program) -> list[int]:
+    return [step.item for step in done.steps]
+
+
+def told(done: Program) -> dict[int, tuple[str, str]]:
+    return {each.item: (each.what, each.why) for each in done.items}
+
+
+def test_a_jump_is_taken_as_often_as_it_says() -> None:
+    done = run(at(1), at(2), at(3), item(4, 177, 2, 2), at(5))
+    assert flown(done) == [1, 2, 3, 2, 3, 2, 3, 5]
+
+
+def test_a_jump_without_end_forwards_is_a_way_and_backwards_closes_a_loop() -> None:
+    done = run(item(1, 177, 4, -1), at(2), at(3), at(4), at(5), item(6, 177, 4, -1), at(7))
+    assert flown(done) == [4, 5, 4]
+    assert told(done)[6] == ("flown", "to item 4 without end: flown up to item 4 again")
+    assert [number for number, (what, _) in told(done).items() if what == "not reached"] == [2, 3, 7]
+
+
+def test_a_jump_may_go_to_a_tag() -> None:
+    done = run(at(1), item(2, 600, 77), at(3), item(4, 601, 77, 1), at(5))
+    assert flown(done) == [1, 3, 3, 5]
+    with pytest.raises(InputError, match="m:2: item 2 jumps to tag 5, which no item has"):
+        run(at(1), item(2, 601, 5, 1))
+
+
+def test_speeds_hold_from_where_they_are_changed() -> None:
+    done = run(at(1), item(2, 178, 0, 22), at(3), at(4), item(5, 178, 1, 30), item(6, 178, 0, -1), at(7))
+    assert [step.airspeed_mps for step in done.steps] == [None, 22.0, None, None]
+    assert told(done)[5] == ("not flown", "a least ground speed of 30 m/s is not held")
+    assert told(done)[6] == ("passed over", "changes no speed")
+
+
+def test_loiters_have_turns_or_time_or_an_altitude_and_a_side() -> None:
+    done = run(
+        at(1),
+        at(2, 18, first=3, third=80),
+        at(3, 19, first=60, third=-50),
+        item(4, 31, 1, -70, 0, 0, 47, 8, 9),
+    )
+    loiters = [step.loiter for step in done.steps if step.loiter]
+    assert [(each.turns, each.time_s, each.radius_m, each.clockwise) for each in loiters] == [
+        (3.0, None, 80.0, True),
+        (None, 60.0, 50.0, False),
+        (None, None, 70.0, False),
+    ]
+
+
+def test_what_ends_a_mission() -> None:
+    assert flown(run(at(1), at(2), at(3, 17), at(4))) == [1, 2, 3]
+    assert flown(run(at(1), at(2), at(3, 21, 0.0), at(4))) == [1, 2, 3]
+    home = run(at(1), at(2), item(3, 20, frame=2), at(4))
+    assert (flown(home), home.steps[-1].position) == ([1, 2, 3], HOME)
+
+
+def test_what_has_no_effect_is_passed_over_and_what_cannot_be_flown_is_named() -> None:
+    done = run(at(1), item(2, 183, 7, 1430), item(3, 206, 25), item(4, 112, 10), item(5, 31999), at(6))
+    assert flown(done) == [1, 6]
+    assert [what for what, _ in told(done).values()] == [
+        "flown", "passed over", "passed over", "not flown", "not flown", "flown"
+    ]  # fmt: skip
+    assert done.items[4] == Told(5, "command 31999", "not flown", "an aeroplane here cannot")
+
+
+def test_a_takeoff_begins_the_flight_at_its_altitude() -> None:
+    done = run(item(1, 22, 15, 0, 0, 0, 0, 0, 60), at(2), at(3, 22))
+    assert (done.steps[0].position, done.steps[0].height_m) == (HOME, 60.0)
+    assert told(done)[3] == ("not flown", "in the air already")
+    assert flown(done) == [1, 2]
+
+
+def test_an_item_without_a_place_is_where_the_one_before_was() -> None:
+    done = run(at(1, height=120.0), item(2, 19, 30), at(3))
+    loiter = done.steps[1]
+    assert (loiter.position, loiter.height_m) == (None, None)
+    assert altitude_m(loiter, 400.0, math.nan, 520.0) == 520.0
+
+
+@pytest.mark.parametrize(
+    ("frame", "altitude"), [(0, 100.0), (5, 100.0), (3, 500.0), (6, 500.0), (10, 650.0), (11, 650.0)]
+)
+def test_frames_say_what_an_altitude_is_above(frame: int, altitude: float) -> None:
+    step = run(item(1, 16, 0, 0, 0, 0, 47.1, 8, 100, frame=frame), at(2)).steps[0]
+    assert altitude_m(step, 400.0, 550.0, math.nan) == altitude

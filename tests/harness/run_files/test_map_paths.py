@@ -1,0 +1,147 @@
+"""Paths of maps, GPS tools and gliders' loggers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from harness.files.input_file import InputError
+from harness.run_files.path_files import read_path
+
+LINE = "8.0,47.0,500 8.01,47.01,520\n 8.03,47.02,540"
+SQUARE = "8,47,9 8.01,47,9 8.01,47.01,9 8,47.01,9 8,47,9"
+
+
+def kml(line: str = LINE, mode: str = "absolute", more: str = "") -> str:
+    drawn = f"<LineString><altitudeMode>{mode}</altitudeMode><coordinates>{line}</coordinates></LineString>"
+    return (
+        '<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2" '
+        'xmlns:gx="http://www.google.com/kml/ext/2.2"><Document><Folder>'
+        f"<Placemark><name>way</name>{drawn}</Placemark>{more}</Folder></Document></kml>"
+    )
+
+
+def ring(coordinates: str, name: str = "innerBoundaryIs") -> str:
+    return f"<{name}><LinearRing><coordinates>{coordinates}</coordinates></LinearRing></{name}>"
+
+
+ZONE = f"<Placemark><name>zone</name><Polygon>{ring(SQUARE, 'outerBoundaryIs')}</Polygon></Placemark>"
+TRACK = (
+    "<Placemark><gx:Track><altitudeMode>absolute</altitudeMode><when>2026-01-01T00:00:00Z</when>"
+    "<gx:coord>8 47 500</gx:coord><gx:coord>8.01 47 510</gx:coord></gx:Track></Placemark>"
+)
+
+
+def gpx(body: str) -> str:
+    return f'<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1">{body}</gpx>'
+
+
+def point(tag: str, latitude: float, height: str = "<ele>500</ele>") -> str:
+    return f'<{tag} lat="{latitude}" lon="8.0">{height}</{tag}>'
+
+
+SEGMENT = f"<trkseg>{point('trkpt', 47.0)}{point('trkpt', 47.1)}</trkseg>"
+
+
+def igc(*fixes: str) -> str:
+    return "\n".join(("AXXX001", "HFDTE160516", *fixes)) + "\n"
+
+
+FLIGHT = [
+    "B1200005049413N00611520EA0013000195",  # stands
+    "B1200045049413N00611520EA0013000195",
+    "B1200085049513N00611520EA0013500200",  # 46 m/s
+    "B1200125049613N00611520EA0014000205",
+    "B1200165049613N00611520EA0014000205",  # stands
+]
+
+
+def test_a_line_of_kml_with_its_altitudes_and_fences(tmp_path: Path) -> None:
+    path = tmp_path / "a.kml"
+    path.write_text(kml(more=ZONE + "<Placemark><Point><coordinates>8,47</coordinates></Point></Placemark>"))
+    given = read_path(path)
+    assert (given.origin_deg, given.altitudes_m.tolist()) == ((47.0, 8.0), [500.0, 520.0, 540.0])
+    (fence,) = given.fences.every
+    assert (fence.name, fence.inclusion, len(fence.rings[0])) == ("zone", False, 4)
+    assert given.notes == ("1 Point beside the path passed over",)
+    assert read_path(path, polygons="inclusion").fences.every[0].inclusion
+    assert read_path(path, polygons="none").fences.every == ()
+
+
+def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> None:
+    path = tmp_path / "a.kml"
+    path.write_text(kml(mode="relativeToGround"))
+    assert read_path(path).above_ground
+    path.write_text(kml(mode="clampToGround"))
+    given = read_path(path)
+    assert (given.altitudes_m.tolist(), given.above_ground) == ([], False)
+    assert given.notes == ("altitudes passed over: their altitudeMode is clampToGround",)
+
+
+def test_a_track_of_kml(tmp_path: Path) -> None:
+    path = tmp_path / "a.kml"
+    path.write_text(kml().replace("<Placemark><name>way</name>", "<!--").replace("</Placemark>", "-->", 1))
+    path.write_text(path.read_text().replace("</Folder>", f"{TRACK}</Folder>"))
+    assert read_path(path).altitudes_m.tolist() == [500.0, 510.0]
+
+
+def test_a_track_of_gpx_goes_before_routes_and_waypoints(tmp_path: Path) -> None:
+    path = tmp_path / "a.gpx"
+    route = f"<rte>{point('rtept', 46.0)}{point('rtept', 46.1)}</rte>"
+    path.write_text(gpx(f"{point('wpt', 45.0)}{route}<trk>{SEGMENT}{SEGMENT}</trk>"))
+    given = read_path(path)
+    assert (len(given.points_m), given.altitudes_m.tolist()) == (4, [500.0] * 4)
+    assert given.notes == (
+        "2 segments of the track joined by straight lines",
+        "1 route beside the path passed over",
+        "1 waypoint beside the path passed over",
+    )
+    path.write_text(gpx(route.replace("<ele>500</ele>", "")))
+    assert read_path(path).altitudes_m.tolist() == []
+
+
+def test_a_recorded_flight_begins_and_ends_in_the_air(tmp_path: Path) -> None:
+    path = tmp_path / "a.igc"
+    path.write_text(igc(*FLIGHT))
+    given = read_path(path)
+    assert given.altitudes_m.tolist() == [195.0, 200.0, 205.0]
+    assert given.notes == (
+        "GNSS altitudes of the logger taken as above the sea",
+        "2 fixes on the ground not flown",
+    )
+    path.write_text(igc(*(f"B11{n:02}00{FLIGHT[0][7:]}" for n in range(30)), *FLIGHT, "B12"))
+    assert "1 B records that cannot be read passed over" in read_path(path).notes
+    path.write_text(igc(*(fix[:-5] + "00000" for fix in FLIGHT)))
+    assert read_path(path).altitudes_m.tolist() == [130.0, 135.0, 140.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "sentence"),
+    [
+        ("a.kml", kml(more="<Placemark><name>other</name><LineString/></Placemark>"), ": has 2 lines (way, other)"),
+        ("a.kml", kml("8,47 8.1"), ": way: point 1: is '8.1'; must be longitude,latitude[,altitude]"),
+        ("a.kml", kml("8,47,5 8.1,47"), ": way: has an altitude at 1 of 2 points"),
+        ("a.kml", kml("8,47,5 8.1,far,5"), ": way: point 1: is 'far'; must be a finite number"),
+        ("a.kml", kml()[:-20], ":2: is not XML"),
+        ("a.kml", gpx(""), ": is gpx; must be KML"),
+        ("a.kml", kml(more=ZONE.replace("outerBoundaryIs", "x")), ": zone: is a Polygon without a boundary"),
+        ("a.kml", '<!DOCTYPE kml [<!ENTITY a "b">]>' + kml(), ": declares a document type or entities"),
+        ("a.gpx", gpx(""), ": has 0 routes; must have exactly one"),
+        ("a.gpx", gpx(f"<trk>{SEGMENT}</trk><trk>{SEGMENT}</trk>"), ": has 2 tracks; must have exactly one"),
+        ("a.gpx", gpx('<trk><trkseg><trkpt lat="47"/></trkseg></trk>'), ": trkpt 0: lon: is 'None'"),
+        ("a.gpx", gpx(f"<trk><trkseg>{point('trkpt', 47, '')}{point('trkpt', 48)}</trkseg></trk>"), "at 1 of 2 points"),
+        ("a.igc", "B1200005049413N00611520EA0013000195\n", ":1: must begin with an A record"),
+        ("a.igc", igc(), ": has 0 fixes, none of them in flight"),
+        ("a.igc", igc(*FLIGHT[:2]), ": has 2 fixes, none of them in flight"),
+        ("a.igc", igc(*FLIGHT, "B12x"), ": has 1 B records that cannot be read, of 6; must be at most 5%"),
+    ],
+)  # fmt: skip
+def test_says_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    path.write_text(text)
+    with pytest.raises(InputError) as fault:
+        read_path(path)
+    assert str(fault.value).startswith(f"{path}:")
+    assert sentence in str(fault.value)
+    assert len(str(fault.value).splitlines()) == 1
