@@ -244,3 +244,27 @@ class Proof:
             more = more[np.hypot(more[:, 0] - east, more[:, 1] - north) >= keeps_m]
         self._barrier.add(more)
         return self._barrier.closed
+
+
+class Proofs:
+    """What a planner asks of the edge points seen, one proof a question.
+
+    Args:
+        mission: goal, clearance and turn radius.
+        memory: the edge points.
+        least_keeps_m: what a way has to keep from every point to be found at all.
+
+    Attributes:
+        no_way: no vehicle can pass.
+        no_room_to_turn: no vehicle can pass that keeps, beside the clearance, a turn radius from everything.
+        only_given_up: there is no way but through places that were given up.
+        no_way_gap_m: every gap that `no_way` counts as open is wider than this.
+        turning_gap_m: the same for `no_room_to_turn`.
+    """
+
+    def __init__(self, mission: Mission, memory: ObstacleMemory, least_keeps_m: float) -> None:
+        turns_keep_m = mission.clearance_m + mission.turn_radius_m
+        self.no_way = Proof(mission, memory, least_keeps_m)
+        self.no_room_to_turn = Proof(mission, memory, turns_keep_m, mission.turn_radius_m)
+        self.only_given_up = Proof(mission, memory, least_keeps_m, with_refused=True)
+        self.no_way_gap_m, self.turning_gap_m = 2.0 * least_keeps_m, 2.0 * turns_keep_m

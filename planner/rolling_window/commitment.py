@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 import numpy as np
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose, place_on
-from planner.interface import MapView, Mission, Plan, PlanRequest, PlanStatus
+from planner.geometry.curves import Point, Pose, place_on
+from planner.interface import FloatArray, MapView, Mission, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import Certified, Certifier
 from planner.rolling_window.committed_plan import CommittedPlan
-from planner.rolling_window.explanations import picture, sentence
 from planner.rolling_window.local_planning import LocalPlanning, Start
 from planner.rolling_window.multi_step_search import Track
+from planner.rolling_window.window import free_sectors, guide_vector
 
 
 class Commitment:
@@ -63,11 +65,11 @@ class Commitment:
         points, met = self._memory.points_m, self._memory.met_m
         plan = Plan(
             PlanStatus.FOUND,
-            sentence(request.position_m, goal, nodes),
+            explanation(request.position_m, goal, nodes),
             waypoints_m=np.array([start.position, *nodes]),
             path=certified.path,
             picture=partial(
-                picture, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
+                picture_of, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
             ),
             wants_more_time=wants_more_time,
         )
@@ -100,3 +102,39 @@ class Commitment:
     def _certifier(self, spacing_m: float) -> Certifier:
         mission = self._mission
         return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)
+
+
+def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:
+    """What is ahead of the aircraft, and on which side it is passed.
+
+    Args:
+        position: of the aircraft.
+        goal: of the mission.
+        nodes: track points of the course, the goal last.
+    """
+    ux, uy, left = guide_vector(position, goal)
+    if len(nodes) < 2:
+        return f"way to the goal in view, {left / 1000:.1f} km to go"
+    x, y = nodes[0][0] - position[0], nodes[0][1] - position[1]
+    side = "left" if ux * y - uy * x > 0.0 else "right"
+    return f"obstacle ahead at {math.hypot(x, y) / 1000:.1f} km, passing {side}"
+
+
+def picture_of(
+    position: Point,
+    goal: Point,
+    nodes: Sequence[Point],
+    tracks: Iterable[Track],
+    window_m: float,
+    points_m: FloatArray,
+    keep_m: float,
+    met_m: FloatArray,
+) -> PlanPicture:
+    """Guide vector, planning window with its free sectors, what was compared (the chosen course first), what is met."""
+    return PlanPicture(
+        guide_m=np.array([position, goal]),
+        window_m=window_m,
+        sectors=free_sectors(points_m, keep_m, position),
+        candidates=(np.array([position, *nodes]), *(np.array(track.nodes) for track in tracks)),
+        met_m=met_m,
+    )

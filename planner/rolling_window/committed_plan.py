@@ -1,4 +1,4 @@
-"""The plan in effect, and the watch over what is seen in its way."""
+"""The committed plan, and the monitor that compares it with what is seen."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, Segment, between, moved, onward, place_on
 from planner.interface import FloatArray, Mission, Path, Plan
 
-WATCHED_TOGETHER = 16
-"""Edges that are not near are compared with the course once in so many times that the planner is asked."""
+COMPARED_TOGETHER = 16
+"""Edge points that are not near the aircraft are compared with the course once in so many requests."""
 
 PROLONG = 0.6
 """A plan is prolonged when its certified part ends nearer than this share of the sensing range."""
 
 UNHURRIED, CUT, GRAZED = 0.0625, 0.02, 0.005
-"""The window rolls on after this share of the distance to what is wrong with the plan, or a rolling step. Where the
-course is cut, after a share that is smaller, for what lies ahead may be a dead end: not so where the last search made
-the way longer by less than a third share of that distance."""
+"""The next search begins after a share of the distance to what is wrong with the plan. `UNHURRIED` is that share in
+general. `CUT`, which is smaller, holds where the course is cut: what cuts it may be a dead end. A course that the last
+search made longer by less than the share `GRAZED` is only grazed, and `UNHURRIED` holds for it too."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,20 +66,31 @@ class CommittedPlan:
         return Path(np.array([*between(self.path, arc_length_m, turn_at_m), *self.turn.segments.tolist()]))
 
 
-class PlanMonitor:
-    """Compares edges as they come in with the plan in effect, and tells when to look for another.
+@dataclass(frozen=True)
+class MonitorLimits:
+    """Distances that a plan monitor goes by.
 
-    Args:
-        mission: sensing range and goal.
-        keep_m: a course that comes nearer to an edge is cut there.
-        turn_keeps_m: a certified turn that comes nearer to one is broken.
-        urgent_m: edges nearer to the aircraft are compared at once; what is wrong nearer to it is urgent.
-        lead_m: the least way between two searches.
-        step_m: the rolling step, where nothing is urgent.
+    Attributes:
+        keep_m: a course that comes nearer to an edge point is cut there.
+        turn_keeps_m: a certified turn that an edge point comes nearer to is broken.
+        urgent_m: edge points nearer to the aircraft are compared at once; what is wrong nearer to it is urgent.
+        lead_m: least distance flown between two searches.
+        step_m: the rolling step: distance flown between two searches where nothing is urgent.
+        prolong_m: a plan whose certified part ends nearer than this is prolonged.
+        goal_radius_m: a plan that ends so near to the goal leads to it.
     """
 
-    def __init__(
-        self,
+    keep_m: float
+    turn_keeps_m: float
+    urgent_m: float
+    lead_m: float
+    step_m: float
+    prolong_m: float
+    goal_radius_m: float
+
+    @classmethod
+    def of(
+        cls,
         mission: Mission,
         *,
         keep_m: float,
@@ -87,24 +98,58 @@ class PlanMonitor:
         urgent_m: float,
         lead_m: float,
         step_m: float,
-    ) -> None:
-        self._keep, self._turn_keeps, self._urgent = keep_m, turn_keeps_m, urgent_m
-        self._lead, self._step = lead_m, step_m
-        self._prolong, self._goal_radius = PROLONG * mission.sensor_range_m, mission.goal_radius_m
+    ) -> MonitorLimits:
+        """Those of a mission: a plan is prolonged at a share of its sensing range."""
+        prolong_m = PROLONG * mission.sensor_range_m
+        return cls(keep_m, turn_keeps_m, urgent_m, lead_m, step_m, prolong_m, mission.goal_radius_m)
+
+
+class PlanMonitor:
+    """Compares edge points as they come in with the plan in effect, and tells when to search for another.
+
+    Args:
+        limits: distances that it goes by.
+
+    Attributes:
+        plan: the committed plan in effect, None without one.
+        proposed: the plan that was given to the loop last, until it is in effect.
+        cut_m: arc length at which the course comes too near to an edge point seen since it was found; infinite
+            where it does not.
+        broken: the certified part of the plan, or its turn, comes too near to something.
+        lengthened_m: so much longer than the course before it is the one that the last search found.
+        searched_at_m: arc length at which the last search was made.
+    """
+
+    def __init__(self, limits: MonitorLimits) -> None:
+        self._limits = limits
         self._waiting: list[FloatArray] = []
         self._nearest_m = math.inf
-        self._since = WATCHED_TOGETHER  # times asked since edges were compared
+        self._since = COMPARED_TOGETHER  # requests since edge points were compared
+        self.plan: CommittedPlan | None = None
+        self.proposed: CommittedPlan | None = None
         self.cut_m = math.inf
-        """Station at which the course comes too near to an edge seen since it was found."""
         self.broken = False
-        """Its certified part does so, or its turn."""
         self.lengthened_m = math.inf
-        """By so much the last search made the way longer."""
+        self.searched_at_m = 0.0
 
-    def begin(self, effect: CommittedPlan, points_m: FloatArray, gone: int = 0) -> None:
-        """A new plan is in effect: it may be cut by what came in while it was looked for (see `cut_at`)."""
-        self.cut_m = self.cut_at(effect.course, points_m, gone)
-        self.broken = self.cut_m < effect.loiter_entry_m
+    def take_effect(self, flown: Plan | None, points_m: FloatArray, gone: int = 0) -> bool:
+        """Begins to watch the plan that was proposed last, if it is the one that is flown now.
+
+        Args:
+            flown: the plan in effect in the loop.
+            points_m: as in `cut_at`.
+            gone: as in `cut_at`.
+
+        Returns:
+            Whether a new plan is in effect.
+        """
+        if self.proposed is None or flown is not self.proposed.plan:
+            return False
+        self.plan, self.proposed, self.searched_at_m = self.proposed, None, 0.0
+        # It may be cut by what came in while it was looked for.
+        self.cut_m = self.cut_at(self.plan.course, points_m, gone)
+        self.broken = self.cut_m < self.plan.loiter_entry_m
+        return True
 
     def cut_at(self, course: Course, points_m: FloatArray, gone: int = 0) -> float:
         """Station at which a course comes too near to one of (m, 2) still edges that it was not found with.
@@ -114,10 +159,16 @@ class PlanMonitor:
             points_m: (m, 2) all that are remembered, in the order in which they came in.
             gone: so many at most of those that it was found with have been let go of since.
         """
-        return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._keep)
+        return first_breach(course.path, points_m[max(course.known - gone, 0) :], self._limits.keep_m)
 
-    def look(self, effect: CommittedPlan, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
-        """Takes in new edges, (k, 2): compares them at once where one is near, else those of a few times together.
+    def look(self, plan: CommittedPlan, here_m: float, position: Point, fresh_m: FloatArray) -> bool:
+        """Takes in new edge points: compares them at once where one is near, else those of a few requests together.
+
+        Args:
+            plan: the plan in effect.
+            here_m: arc length of the aircraft on it.
+            position: of the aircraft.
+            fresh_m: (k, 2) the new points.
 
         Returns:
             Whether the course is cut anew, or nearer than before.
@@ -129,38 +180,43 @@ class PlanMonitor:
             self._nearest_m = min(self._nearest_m, away_m)
         elif not self._waiting:
             return False
-        if self._since < WATCHED_TOGETHER and self._nearest_m > self._urgent:
+        if self._since < COMPARED_TOGETHER and self._nearest_m > self._limits.urgent_m:
             return False
         self._since = 0
         edges = np.concatenate(self._waiting)
         self._waiting, self._nearest_m = [], math.inf
         before = self.cut_m
-        if not effect.holds(here_m):
-            self.cut_m = min(before, first_breach(effect.course.path, edges, self._keep, here_m))
+        if not plan.holds(here_m):
+            self.cut_m = min(before, first_breach(plan.course.path, edges, self._limits.keep_m, here_m))
         self.broken |= (
-            self.cut_m < effect.loiter_entry_m
-            or first_breach(effect.turn, edges, self._turn_keeps) < math.inf
+            self.cut_m < plan.loiter_entry_m
+            or first_breach(plan.turn, edges, self._limits.turn_keeps_m) < math.inf
         )
         return self.cut_m < before
 
-    def due(self, effect: CommittedPlan, here_m: float, since_m: float, newly_cut: bool) -> bool:
+    def urgent(self, plan: CommittedPlan, here_m: float) -> bool:
+        """Whether the plan in effect is broken, and what is wrong with it is near."""
+        return self.broken and min(self.cut_m, plan.loiter_entry_m) - here_m < self._limits.urgent_m
+
+    def due(self, plan: CommittedPlan, here_m: float, since_m: float, newly_cut: bool) -> bool:
         """Whether to roll the window: the nearer ahead something is wrong with the plan in effect, the sooner.
 
         Args:
-            effect: the plan in effect.
-            here_m: station of the aircraft on it.
+            plan: the plan in effect.
+            here_m: arc length of the aircraft on it.
             since_m: flown since the last search.
             newly_cut: as `look` has it.
         """
-        wrong = min(self.cut_m, effect.loiter_entry_m) - here_m
-        near = wrong < self._urgent
+        limits = self._limits
+        wrong = min(self.cut_m, plan.loiter_entry_m) - here_m
+        near = wrong < limits.urgent_m
         if near and (self.broken or newly_cut):
             return True
-        serves = effect.course.shortest and self.cut_m == math.inf and not self.broken
-        whole = effect.loiter_entry_m >= effect.course.path.length_m - self._goal_radius
-        if serves and (whole or effect.loiter_entry_m - here_m > self._prolong):
+        serves = plan.course.shortest and self.cut_m == math.inf and not self.broken
+        whole = plan.loiter_entry_m >= plan.course.path.length_m - limits.goal_radius_m
+        if serves and (whole or plan.loiter_entry_m - here_m > limits.prolong_m):
             return False
         if self.cut_m < math.inf:
             grazed = self.lengthened_m < GRAZED * wrong
-            return since_m >= max(self._lead, (UNHURRIED if grazed else CUT) * wrong)
-        return since_m >= max(self._lead if near else self._step, UNHURRIED * wrong)
+            return since_m >= max(limits.lead_m, (UNHURRIED if grazed else CUT) * wrong)
+        return since_m >= max(limits.lead_m if near else limits.step_m, UNHURRIED * wrong)

@@ -1,4 +1,8 @@
-"""Places that a course led to and that could not be seen to be safe to enter, and when they are tried again."""
+"""Places that a course led to and that could not be seen to be safe to enter, and when they are tried again.
+
+Such a place is refused: it is remembered like an edge point, so that no course leads there any more. What was refused
+is tried again where nothing else is left, and where something that moved may have been in the way.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,14 @@ ENOUGH = 2
 """So many turns before a place show what can be seen of it."""
 
 RETRY_S = 60.0
-"""So long after something last moved or appeared, what was given up is tried again: it may have been in the way."""
+"""So many seconds after something last moved or appeared, what was given up is tried again."""
+
+MOST_EFFORT = 4
+"""A search that found nothing is repeated with twice the effort, this many times; from then on once a turn."""
+
+MOST_RETRIES = 3
+"""Everything is tried again this many times before a goal is called unreachable for want of room to turn: a narrower
+way may be seen to be safe from elsewhere on the turn, or at another look."""
 
 
 class DeadEnds:
@@ -28,7 +39,7 @@ class DeadEnds:
         self._mission, self._memory = mission, memory
         self._reach = 2.0 * mission.clearance_m  # places nearer to each other are one
         self._places: list[Point] = []
-        self.unrest = WorldStability()
+        self.stability = WorldStability()
         """When something last moved or appeared."""
         self._retry_s = math.inf
 
@@ -43,8 +54,8 @@ class DeadEnds:
 
     def note_change(self, time_s: float, seen: MapView) -> None:
         """Has what was given up tried again when what moved or appeared may have left the way."""
-        if self.unrest.note(time_s, seen):
-            self._retry_s = self.unrest.changed_s + RETRY_S
+        if self.stability.note(time_s, seen):
+            self._retry_s = self.stability.changed_s + RETRY_S
         if time_s > self._retry_s:
             self._retry_s, self._places = math.inf, []
             self._memory.forgive()
@@ -60,3 +71,96 @@ class DeadEnds:
         for i in range(-beside, beside + 1):
             aside_m = i * clearance_m
             self._memory.refuse((east - aside_m * along_north, north + aside_m * along_east))
+
+
+class GivingUp:
+    """What follows from searches that found no way: more effort, places given up, and given-up places tried again.
+
+    Args:
+        mission: goal and limits.
+        memory: the edge points; what is given up is refused there.
+
+    Attributes:
+        dead_ends: the places.
+        effort: how often the work of a wide search is doubled; grows with every search that found nothing.
+        tried_again: what was given up has been tried again for want of another way.
+    """
+
+    def __init__(self, mission: Mission, memory: ObstacleMemory) -> None:
+        self._memory, self._whole_turn_m = memory, math.tau * mission.turn_radius_m
+        self.dead_ends = DeadEnds(mission, memory)
+        self.effort = 0
+        self.tried_again = False
+        self._retries = 0
+        self._given_up_at_m = 0.0
+
+    def new_plan(self) -> None:
+        """A new plan is in effect: arc lengths are counted from its start."""
+        self._given_up_at_m = 0.0
+
+    def settled(self, time_s: float) -> bool:
+        """Whether the world has stood still long enough for a verdict on it."""
+        return self.dead_ends.stability.settled(time_s)
+
+    @property
+    def certain(self) -> bool:
+        """Whether all that was seen still stands, and nothing has contradicted seen-free space."""
+        return not (self._memory.taken_back or self.dead_ends.stability.ever)
+
+    @property
+    def out_of_effort(self) -> bool:
+        """Whether the search has been repeated with all the effort that there is."""
+        return self.effort == MOST_EFFORT
+
+    def whole_turn(self, since_m: float) -> bool:
+        """Whether a whole turn has been flown since an arc length was counted from."""
+        return since_m >= self._whole_turn_m
+
+    def turned_since(self, loiter_entry_m: float, arc_length_m: float) -> bool:
+        """Whether more than a whole turn has been flown since the loiter was entered or a place was given up."""
+        return arc_length_m - max(loiter_entry_m, self._given_up_at_m) > self._whole_turn_m
+
+    def tried_enough(self, edges_went: bool, only_given_up: bool) -> bool:
+        """Whether all searches have been made that a proof for want of room to turn has to wait for.
+
+        Args:
+            edges_went: edge points were let go of since the search began: what was given up may yet be entered.
+            only_given_up: no way is left but through places that were given up.
+        """
+        needed = MOST_EFFORT if edges_went else 1
+        return self.effort >= needed or (only_given_up and self.tried_again)
+
+    def give_up(self, place: Pose, arc_length_m: float) -> None:
+        """Gives up a place: the whole turn before it has shown nothing more of it."""
+        self._given_up_at_m = arc_length_m
+        self.dead_ends.give_up(place)
+
+    def narrow(self, no_room: bool, settled: bool) -> bool:
+        """Whether nothing is left but ways without room to turn.
+
+        Args:
+            no_room: it is proved that no way has room to turn everywhere.
+            settled: the world has stood still long enough.
+        """
+        # What moved may have closed the way; where edge points were only taken back, one more try tells.
+        doubtful = self.dead_ends.stability.ever or (self._memory.taken_back and not self.tried_again)
+        return no_room and settled and not (doubtful and len(self._memory.refused_m))
+
+    def retries_used(self) -> bool:
+        """Whether everything has been tried again as often as it is."""
+        return self._retries == MOST_RETRIES
+
+    def try_again(self, narrow: bool, at_end: bool, arc_length_m: float) -> None:
+        """After a search that found nothing: doubles the effort, or tries again what was given up.
+
+        Args:
+            narrow: nothing is left but ways without room to turn.
+            at_end: nothing is left but what was given up, or the effort is spent, and the turn has shown nothing.
+            arc_length_m: of the aircraft on the plan in effect.
+        """
+        self._retries += narrow
+        if narrow or at_end:
+            self._given_up_at_m = arc_length_m
+            self._memory.forgive()
+            self.tried_again = True
+        self.effort = 0 if narrow else min(self.effort + 1, MOST_EFFORT)

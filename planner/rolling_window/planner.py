@@ -1,11 +1,14 @@
-"""The rolling-window planner of the paper, made safe and convergent.
+"""The rolling-window planner of the paper, made safe and convergent: a state machine over a committed plan.
 
 In every rolling step: take the planning window about the track point where the new plan begins; search N steps deep
 among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum turn radius
 (`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that part is put into
 effect (`commitment`) which ends in a turn seen to be free, or in the goal circle (`certificate`), and flown until the
-window rolls on. A search that takes long goes on while the plan in effect is flown (`deliberation`). Where something
+window rolls on. A search that takes long goes on while the plan in effect is flown (`anytime_search`). Where something
 moves or has just appeared, no plan is flown that would meet it, and one that would is left (`escape`, `evasion`).
+
+What is done about the plan in effect is one of five states (`State`). Each is entered by one method, which gives the
+answer: `_follow`, `_loiter`, `_escape`, `_give_up`, `_prove`.
 
 Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
 way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.
@@ -24,46 +27,88 @@ radius can be moved at the clearance, within the area.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from enum import Enum
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, Segment, along, on_loiter
-from planner.interface import FloatArray, MapView, Mission, Plan, PlanRequest, PlanStatus
+from planner.interface import FloatArray, Mission, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
-from planner.rolling_window.barrier import Proof
+from planner.rolling_window.barrier import Proofs
 from planner.rolling_window.commitment import Commitment
-from planner.rolling_window.committed_plan import CommittedPlan, PlanMonitor
+from planner.rolling_window.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
 from planner.rolling_window.config import LEAD_S, RollingWindowConfig
-from planner.rolling_window.dead_ends import DeadEnds
+from planner.rolling_window.dead_ends import GivingUp
 from planner.rolling_window.encounters import encounters
 from planner.rolling_window.escape import Escapes, left_of, room_m
 from planner.rolling_window.evasion import Threats
-from planner.rolling_window.explanations import no_way_through
 from planner.rolling_window.local_planning import LocalPlanning, Start
-
-BETTER = 0.005
-"""A course that still serves is dropped only for one that is shorter by this share of what is left to fly."""
+from planner.rolling_window.rolling_search import (
+    WORK_WHILE_CUT,
+    WORK_WHILE_SERVING,
+    WORK_WHILE_UNSAFE,
+    RollingSearch,
+    Step,
+    Work,
+)
 
 BROKEN_SHARE = 0.99
-"""Share of the clearance: something seen nearer than that to a certified turn breaks the certificate."""
-
-SERVED, CUT, PRESSED = (3000.0, 1000.0), (5000.0, 2000.0), (12_000.0, 12_000.0)
-"""Work of a search (`planner.rolling_window.window.Tally`) when it begins, and each further time that the planner is
-asked: while the plan in effect serves; where it does not; and where no safe one is flown, or something moves. Most are
-done at once."""
-
-MOST_EFFORT = 4
-"""Searches in vain are repeated with twice the effort each, so many times; then once a turn."""
-
-AGAIN = 3
-"""So often all is tried again before a goal is called unreachable for want of room to turn: a way that is narrower may
-be seen to be safe from elsewhere on the turn, or at another look."""
+"""Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
+NO_BETTER = "the plan in effect serves as well as any other"
+THINKING_ON = "thinking on; the plan in effect goes on"
+NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
+
+
+class State(Enum):
+    """What the planner is doing about the plan in effect."""
+
+    FOLLOWING = "following"
+    """The committed plan leads on; the window rolls as it is due."""
+    LOITERING = "loitering"
+    """The aircraft is in the turn that the committed plan ends with, and the search for a way on goes on."""
+    ESCAPING = "escaping"
+    """No certified plan is in effect, as before the first, or it is broken: what keeps clear longest is flown."""
+    GIVING_UP = "giving up"
+    """A search found no way: a place is given up, or what was given up is tried again, with more effort."""
+    PROVING = "proving"
+    """The edge points seen leave no way: the goal is unreachable."""
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """A request, and where the aircraft is on the plan in effect.
+
+    Attributes:
+        request: what was asked.
+        plan: the committed plan in effect; None without one.
+        here_m: arc length of the aircraft on its path, whole turns of the loiter taken off.
+    """
+
+    request: PlanRequest
+    plan: CommittedPlan | None
+    here_m: float = 0.0
+
+    @property
+    def ahead(self) -> Course | None:
+        """What is left of the course in effect; None without one, and in the loiter, which has left it."""
+        if self.plan is None or self.plan.holds(self.here_m):
+            return None
+        return self.plan.course.ahead(self.here_m)
 
 
 class RollingWindow:
-    """The planner for one flight."""
+    """The planner for one flight.
+
+    Args:
+        config: its keys.
+        mission: goal and limits.
+
+    Attributes:
+        state: what it did at the last request.
+    """
 
     def __init__(self, config: RollingWindowConfig, mission: Mission) -> None:
         config = config.resolved(mission)
@@ -71,258 +116,263 @@ class RollingWindow:
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
         self._mission = mission
-        self._memory = ObstacleMemory(mission.clearance_m)
+        self._memory = memory = ObstacleMemory(mission.clearance_m)
         self._local = LocalPlanning(
             mission,
-            self._memory,
+            memory,
             window_m=config.planning_window_m,
             margin_m=config.margin_m,
             steps=config.steps,
             candidates=config.candidates,
         )
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
-        self._least_m = self._lead_m + 2.0 * mission.turn_radius_m
-        self._commitment = Commitment(mission, self._memory, self._local, self._least_m)
-        self._urgent_m = self._least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps
-        self._proof = Proof(mission, self._memory, self._local.least_keeps_m)
-        self._turns_keep_m = mission.clearance_m + mission.turn_radius_m
-        self._proof_for_turns = Proof(mission, self._memory, self._turns_keep_m, mission.turn_radius_m)
-        self._given_up = Proof(mission, self._memory, self._local.least_keeps_m, with_refused=True)
-        self._thinking: AnytimeSearch | None = None
-        self._dead_ends = DeadEnds(mission, self._memory)
-        self._escapes = Escapes(mission, self._memory, self._local)
-        self._turning: CommittedPlan | None = None  # the last plan that was flown into its turn
-        self._proposed: CommittedPlan | None = None
-        self._effect: CommittedPlan | None = None
-        self._searched_at_m = 0.0  # station and number of edge points at the last search
-        self._searched_with = 0
-        self._gone = 0  # how many points had been let go of when the last search began
-        self._threats: Threats | None = None  # while something moves or has just appeared
-        self._nearer: CommittedPlan | None = None  # certified, but would come too near to that
-        self._least_room_m = BROKEN_SHARE * mission.clearance_m
-        self._effort = 0  # grows with every search that was in vain
-        self._forgiven = False  # what was given up is, or was, tried again
-        self._again = 0  # how often that was where there is no room to turn
-        self._refused_at_m = 0.0
-        self._watch = PlanMonitor(
-            mission,
-            keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
-            turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
-            urgent_m=self._urgent_m,
-            lead_m=self._lead_m,
-            step_m=config.rolling_step_m,
+        least_m = self._lead_m + 2.0 * mission.turn_radius_m
+        self._commitment = Commitment(mission, memory, self._local, least_m)
+        self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
+        self._giving_up = GivingUp(mission, memory)
+        self._escapes = Escapes(mission, memory, self._local)
+        self._monitor = PlanMonitor(
+            MonitorLimits.of(
+                mission,
+                keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
+                turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
+                urgent_m=least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
+                lead_m=self._lead_m,
+                step_m=config.rolling_step_m,
+            )
         )
+        self._search = RollingSearch(
+            mission,
+            memory,
+            self._local,
+            self._commitment,
+            self._monitor,
+            self._giving_up,
+            self._proofs.no_way,
+        )
+        self._threats: Threats | None = None  # while something moves or has just appeared
+        self._loitered: CommittedPlan | None = None  # the last plan whose loiter was entered
+        self.state = State.ESCAPING
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
-        met: list[FloatArray] = []
-        if request.seen.moving:
-            met = encounters(request, self._mission)
-        self._dead_ends.note_change(request.time_s, request.seen)
-        fresh = self._memory.take_in(request.seen, met)
+        fresh_m = self._take_in(request)
+        plan = self._monitor.plan
+        if plan is None:
+            self._proofs.no_room_to_turn.closed(request.position_m)
+            return self._roll(Situation(request, None))
+        now = Situation(request, plan, request.arc_length_m)
+        if plan.holds(request.arc_length_m):
+            now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
+            self._loiter(now, plan)
+        newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
+        if not self._due(now, plan, newly_cut) and self._search.running is None:
+            return KEPT
+        self._monitor.searched_at_m = request.arc_length_m
+        return self._roll(now)
+
+    def _take_in(self, request: PlanRequest) -> FloatArray:
+        """Takes in what was seen and flown since the last request; returns (k, 2) edge points that have come in."""
+        met = encounters(request, self._mission) if request.seen.moving else []
+        self._giving_up.dead_ends.note_change(request.time_s, request.seen)
+        fresh_m = self._memory.take_in(request.seen, met)
         self._local.trail.add(request.position_m)
         self._threats = self._escapes.threats(request)
-        if self._proposed is not None:
-            self._take_effect(request, self._proposed)
-        if self._effect is not None and self._effect.over(request.arc_length_m):
-            self._effect = None
-        effect = self._effect
-        if effect is None:
-            self._proof_for_turns.closed(request.position_m)
-            return self._roll(request, None, 0.0)
-        here = request.arc_length_m
-        if effect.holds(here):
-            here = on_loiter(effect.path, here)
-            self._note_turn(effect, request.seen)
-        newly_cut = self._watch.look(effect, here, request.position_m, fresh)
-        met_in_time = self._threats is not None and self._met_in_time(effect, here)
-        self._watch.broken |= met_in_time
-        since_m = request.arc_length_m - self._searched_at_m
-        if self._effort == MOST_EFFORT and self._searched_with == self._memory.known:
-            due = since_m >= math.tau * self._mission.turn_radius_m
-        else:
-            due = self._watch.due(effect, here, since_m, newly_cut) or met_in_time
-        if self._thinking is None and not due:
-            return KEPT
-        self._searched_at_m = request.arc_length_m
-        return self._roll(request, effect, here)
+        gone = self._memory.gone - self._search.gone
+        if self._monitor.take_effect(request.flown, self._memory.standing_m, gone):
+            self._giving_up.new_plan()
+        if self._monitor.plan is not None and self._monitor.plan.over(request.arc_length_m):
+            self._monitor.plan = None
+        return fresh_m
 
-    def _met_in_time(self, effect: CommittedPlan, here: float) -> bool:
+    def _due(self, now: Situation, plan: CommittedPlan, newly_cut: bool) -> bool:
+        """Whether the window is to roll on now."""
+        meets = self._threats is not None and self._meets_something(plan, now.here_m)
+        self._monitor.broken |= meets
+        since_m = now.request.arc_length_m - self._monitor.searched_at_m
+        if self._giving_up.out_of_effort and self._search.up_to_date:
+            return self._giving_up.whole_turn(since_m)
+        return self._monitor.due(plan, now.here_m, since_m, newly_cut) or meets
+
+    def _meets_something(self, plan: CommittedPlan, here_m: float) -> bool:
         """Whether the plan in effect would come too near to what moves or has just appeared."""
-        left = left_of(effect, here, self._mission)
-        return room_m(left, self._threats, self._least_room_m) < self._least_room_m
+        least_m = BROKEN_SHARE * self._mission.clearance_m
+        return room_m(left_of(plan, here_m, self._mission), self._threats, least_m) < least_m
 
-    def _take_effect(self, request: PlanRequest, proposed: CommittedPlan) -> None:
-        """Begins to watch what was proposed last, if it is flown now."""
-        if request.flown is proposed.plan:
-            self._effect, self._proposed = proposed, None
-            self._watch.begin(proposed, self._memory.standing_m, self._memory.gone - self._gone)
-            self._searched_at_m = self._refused_at_m = 0.0
-
-    def _roll(self, request: PlanRequest, effect: CommittedPlan | None, here: float) -> Plan:
+    def _roll(self, now: Situation) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
-        start, self._nearer = self._start(request, effect, here), None
-        ahead = None if effect is None or effect.holds(here) else effect.course.ahead(here)
-        serves = ahead is not None and math.isinf(self._watch.cut_m) and not self._watch.broken
-        known = self._memory.known
-        whole = ahead is not None and ahead.to_goal and ahead.nodes[-1] == self._mission.goal_m
-        worth_m = ahead.path.length_m * (1.0 - BETTER) if ahead is not None and whole else math.inf
-        if ahead is not None and serves and (ahead.shortest or known == self._searched_with):
-            self._thinking = None
-        else:
-            thinking, begins = self._thinking, self._thinking is None
-            if thinking is None:
-                self._gone = self._memory.gone
-                thinking = self._thinking = AnytimeSearch(
-                    self._local,
-                    known,
-                    self._effort,
-                    lambda: self._proof.closed(request.position_m),
-                    roomy=self._forgiven,
-                )
-            hurried = self._pressed(effect, here) or len(request.seen.moving) > 0
-            work = PRESSED if hurried else SERVED if serves else CUT
-            nearer_m = -math.inf
-            for course in thinking.courses(start, ahead, work[0 if begins else 1]):
-                if tuple(course.path.segments[0, :2]) != tuple(start.prefix[0][:2]):
-                    raise RuntimeError(f"a course begins elsewhere than at {start.prefix[0][:2]}")
-                if serves and course.path.length_m > worth_m:
-                    thinking.done = True
-                    break
-                found = self._commitment.effect(request, start, course, thinking.tracks, self._cut_m(course))
-                if found is not None and self._commitment.leads_on(found):
-                    keeps_m = room_m(found.path, self._threats)
-                    if keeps_m >= self._mission.clearance_m:
-                        self._thinking, self._searched_with, self._effort = None, thinking.known, 0
-                        before_m = -math.inf if ahead is None else ahead.path.length_m
-                        self._watch.lengthened_m = course.path.length_m - before_m
-                        self._proposed = found
-                        return found.plan
-                    if keeps_m > nearer_m:  # what moves may come to what is free now
-                        nearer_m, self._nearer = keeps_m, found
-                thinking.stuck = thinking.stuck or course
-            if thinking.done:
-                self._thinking, self._searched_with = None, thinking.known
-            if not serves:
-                return self._no_way(request, effect, here, thinking)
-        assert ahead is not None
-        assert effect is not None
-        wants_more_time = self._thinking is not None
-        longer = None
-        if request.scanned:
-            longer = self._commitment.effect(request, start, ahead, [], self._cut_m(ahead), wants_more_time)
-        if (
-            longer is not None
-            and longer.loiter_entry_m > effect.loiter_entry_m - here + 0.5 * self._lead_m
-            and room_m(longer.path, self._threats) >= self._mission.clearance_m
-        ):
-            self._proposed = longer
-            return longer.plan
-        return Plan(
-            PlanStatus.NO_BETTER,
-            "the plan in effect serves as well as any other",
-            wants_more_time=wants_more_time,
-        )
+        start, ahead = self._start(now), now.ahead
+        serving = ahead if math.isinf(self._monitor.cut_m) and not self._monitor.broken else None
+        self._search.nearer = None
+        if serving is not None and (serving.shortest or self._search.up_to_date):
+            self._search.stop()
+            return self._prolong(now, start, serving)
+        work = self._work(now, serving is not None)
+        found = self._search.go_on(Step(now.request, start, ahead, serving is not None, work, self._threats))
+        if found is not None:
+            return self._follow(found)
+        if serving is not None:
+            return self._prolong(now, start, serving)
+        return self._no_way_found(now)
 
-    def _pressed(self, effect: CommittedPlan | None, here: float) -> bool:
+    def _work(self, now: Situation, serves: bool) -> Work:
+        """How much is searched before this answer."""
+        if self._unsafe(now) or now.request.seen.moving:
+            return WORK_WHILE_UNSAFE
+        return WORK_WHILE_SERVING if serves else WORK_WHILE_CUT
+
+    def _unsafe(self, now: Situation) -> bool:
         """Whether there is no safe plan in effect to think on."""
-        near_m = 0.0 if effect is None else min(self._watch.cut_m, effect.loiter_entry_m) - here
-        return effect is None or (self._watch.broken and near_m < self._urgent_m)
+        return now.plan is None or self._monitor.urgent(now.plan, now.here_m)
 
-    def _cut_m(self, course: Course) -> float:
-        """Station at which a course comes too near to an edge that it was not found with."""
-        return self._watch.cut_at(course, self._memory.standing_m, self._memory.gone - self._gone)
-
-    def _start(self, request: PlanRequest, effect: CommittedPlan | None, here: float) -> Start:
+    def _start(self, now: Situation) -> Start:
         """Where a new plan begins: a little ahead, on the one in effect or straight on from the aircraft."""
+        request, plan = now.request, now.plan
         prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
-        if effect is not None:
-            uncut_m = math.inf if effect.holds(here) else max(0.0, self._watch.cut_m - here)
-            near_m = self._mission.off_path_m
+        if plan is not None:
+            uncut_m = math.inf if plan.holds(now.here_m) else max(0.0, self._monitor.cut_m - now.here_m)
             pose = Pose(*request.position_m, *request.direction)
-            prefix = effect.onward_from(pose, here, min(self._lead_m, uncut_m), near_m) or prefix
+            lead_m, near_m = min(self._lead_m, uncut_m), self._mission.off_path_m
+            prefix = plan.onward_from(pose, now.here_m, lead_m, near_m) or prefix
         last = prefix[-1]
         return Start(request.position_m, along(last, last[5]), last[4], prefix)
 
-    def _no_way(
-        self, request: PlanRequest, effect: CommittedPlan | None, here: float, thinking: AnytimeSearch | None
-    ) -> Plan:
-        """No new plan yet: think on, prove that there is none, or let the plan in effect end in its turn."""
-        waits = thinking is not None and not thinking.done and not self._pressed(effect, here)
-        if self._watch.broken and effect is not None and not waits:
-            return self._turn_away(request, effect, here)
-        away = None if effect is not None else self._turn_away(request, None, here)
-        if away is not None and away.status is PlanStatus.FOUND:
-            return away  # what is closed is told from a safe turn
-        # Where edges come and go meanwhile, what was given up may yet be entered.
-        in_vain = 1 if self._memory.gone == self._gone else MOST_EFFORT
-        only_given_up = len(self._memory.refused_m) > 0 and self._given_up.closed(request.position_m)
-        tried = self._effort >= in_vain or (only_given_up and self._forgiven)
-        no_room = tried and self._proof_for_turns.closed(request.position_m)
-        if thinking is not None and not thinking.done and effect is not None:
-            return Plan(PlanStatus.NO_PATH, "thinking on; the plan in effect goes on", wants_more_time=True)
-        stuck = None if thinking is None else thinking.stuck
-        settled = self._dead_ends.unrest.settled(request.time_s)
-        if stuck is None and settled and self._proof.closed(request.position_m):
-            gap = 2.0 * self._local.least_keeps_m
-            return Plan(PlanStatus.UNREACHABLE, no_way_through(f"no gap in it is wider than {gap:.0f} m"))
-        if effect is None:
-            assert away is not None
-            return away
-        since_m = request.arc_length_m - max(effect.loiter_entry_m, self._refused_at_m)
-        turned = since_m > math.tau * self._mission.turn_radius_m
-        if stuck is not None and turned:
-            # The whole turn has shown nothing more: what lies ahead there cannot be entered.
-            self._refused_at_m = request.arc_length_m
-            self._dead_ends.give_up(self._commitment.unseen(stuck, request.seen))
-        if stuck is None and thinking is not None:
-            # What moved may have closed it; where edges were only taken back, to try it again once tells.
-            doubtful = self._dead_ends.unrest.ever or (self._memory.taken_back and not self._forgiven)
-            narrow = no_room and settled and not (doubtful and len(self._memory.refused_m))
-            if narrow and self._again == AGAIN:
-                told = (
-                    f"no gap in it has room to turn ({2.0 * self._turns_keep_m:.0f} m) or is seen to lead on"
-                )
-                return Plan(PlanStatus.UNREACHABLE, no_way_through(told))
-            self._again += narrow
-            # No way is left but those given up, or one that takes more looking for. Or none that can be flown
-            # from here: elsewhere on the turn there may be one.
-            at_end = only_given_up or self._effort == MOST_EFFORT
-            if narrow or (at_end and (turned or not thinking.tracks)):
-                self._refused_at_m = request.arc_length_m
-                self._memory.forgive()
-                self._forgiven = True
-            self._effort = 0 if narrow else min(self._effort + 1, MOST_EFFORT)
-        return Plan(PlanStatus.NO_PATH, "no way on can be seen to be safe; the plan in effect goes on")
+    def _follow(self, found: CommittedPlan) -> Plan:
+        """Any state -> FOLLOWING: a new plan is committed to."""
+        self.state = State.FOLLOWING
+        self._monitor.proposed = found
+        return found.plan
 
-    def _certain(self) -> bool:
-        """Whether all that was seen still stands, and nothing has come to what was free."""
-        return not (self._memory.taken_back or self._dead_ends.unrest.ever)
+    def _prolong(self, now: Situation, start: Start, serving: Course) -> Plan:
+        """FOLLOWING -> FOLLOWING: the course in effect serves; more of it is committed to where that is seen free."""
+        self.state = State.FOLLOWING
+        wants_more_time = self._search.running is not None
+        longer = None
+        if now.request.scanned:
+            cut_m = self._search.cut_m(serving)
+            longer = self._commitment.effect(now.request, start, serving, [], cut_m, wants_more_time)
+        if (
+            longer is not None
+            and now.plan is not None
+            and longer.loiter_entry_m > now.plan.loiter_entry_m - now.here_m + 0.5 * self._lead_m
+            and room_m(longer.path, self._threats) >= self._mission.clearance_m
+        ):
+            return self._follow(longer)
+        return Plan(PlanStatus.NO_BETTER, NO_BETTER, wants_more_time=wants_more_time)
 
-    def _note_turn(self, effect: CommittedPlan, seen: MapView) -> None:
-        """Gives up the place that a course could not be seen to enter, if it is the same again."""
-        if effect is self._turning or not effect.course.to_goal:
+    def _loiter(self, now: Situation, plan: CommittedPlan) -> None:
+        """FOLLOWING -> LOITERING: the aircraft is in its turn. A place that was turned before twice is given up."""
+        self.state = State.LOITERING
+        if plan is self._loitered or not plan.course.to_goal:
             return
-        self._turning = effect
-        place = self._commitment.unseen(effect.course, seen)
-        if self._dead_ends.turned_before(place[:2]):
-            self._dead_ends.give_up(place)
+        self._loitered = plan
+        place = self._commitment.unseen(plan.course, now.request.seen)
+        if self._giving_up.dead_ends.turned_before(place[:2]):
+            self._giving_up.dead_ends.give_up(place)
 
-    def _turn_away(self, request: PlanRequest, effect: CommittedPlan | None, here: float) -> Plan:
-        """An answer where nothing is certified."""
-        if effect is None:
-            escape = self._escapes.at_start(request, self._threats, self._lead_m)
+    def _no_way_found(self, now: Situation) -> Plan:
+        """After a search without a plan: goes on searching, escapes, proves that there is no way, or gives up."""
+        search = self._search.last
+        assert search is not None
+        if now.plan is None:
+            return self._without_plan(now, search)
+        if self._monitor.broken and (search.done or self._unsafe(now)):
+            return self._escape(now)
+        no_room, only_given_up = self._proved(now)
+        if not search.done:
+            return Plan(PlanStatus.NO_PATH, THINKING_ON, wants_more_time=True)
+        if search.stuck is None and self._proved_closed(now):
+            return self._prove_no_way()
+        return self._give_up(now, now.plan, search, no_room=no_room, only_given_up=only_given_up)
+
+    def _without_plan(self, now: Situation, search: AnytimeSearch) -> Plan:
+        """Before the first plan, or after one that was flown to its end: what is closed is told from a safe turn."""
+        escape = self._escape(now)
+        if escape.status is PlanStatus.FOUND:
+            return escape
+        self._proved(now)
+        if search.stuck is None and self._proved_closed(now):
+            return self._prove_no_way()
+        return escape
+
+    def _escape(self, now: Situation) -> Plan:
+        """Any state -> ESCAPING: nothing is certified; a turn that keeps clear is flown, or what does so longest."""
+        self.state = State.ESCAPING
+        if now.plan is None:
+            escape = self._escapes.at_start(now.request, self._threats, self._lead_m)
         else:
             escape = self._escapes.from_plan(
-                request,
+                now.request,
                 self._threats,
-                effect,
-                here,
-                until_m=min(self._watch.cut_m, effect.loiter_entry_m),
-                prefix=self._start(request, effect, here).prefix,
-                certain=self._certain(),
-                nearer=self._nearer,
+                now.plan,
+                now.here_m,
+                until_m=min(self._monitor.cut_m, now.plan.loiter_entry_m),
+                prefix=self._start(now).prefix,
+                certain=self._giving_up.certain,
+                nearer=self._search.nearer,
             )
-        self._watch.broken = escape.broken
-        self._proposed = escape.effect or self._proposed
+        self._monitor.broken = escape.broken
+        self._monitor.proposed = escape.effect or self._monitor.proposed
         return escape.plan
+
+    def _proved(self, now: Situation) -> tuple[bool, bool]:
+        """Takes more edge points into the proofs.
+
+        Returns:
+            Whether no way has room to turn, which is asked only when enough has been tried; whether no way is left but
+            through places that were given up.
+        """
+        position, proofs = now.request.position_m, self._proofs
+        only_given_up = len(self._memory.refused_m) > 0 and proofs.only_given_up.closed(position)
+        edges_went = self._memory.gone != self._search.gone
+        tried = self._giving_up.tried_enough(edges_went, only_given_up)
+        return tried and proofs.no_room_to_turn.closed(position), only_given_up
+
+    def _proved_closed(self, now: Situation) -> bool:
+        """Whether the world stands still and the edge points seen leave no way at all."""
+        request = now.request
+        return self._giving_up.settled(request.time_s) and self._proofs.no_way.closed(request.position_m)
+
+    def _give_up(
+        self,
+        now: Situation,
+        plan: CommittedPlan,
+        search: AnytimeSearch,
+        *,
+        no_room: bool,
+        only_given_up: bool,
+    ) -> Plan:
+        """LOITERING -> GIVING_UP: a search was in vain; the plan in effect goes on, into its turn and round that.
+
+        A course that could not be taken is given up after a whole turn before it. Where no course was found, more
+        effort is made, and what was given up is tried again, until nothing is left but to call the goal unreachable.
+        """
+        self.state = State.GIVING_UP
+        giving_up, arc_length_m = self._giving_up, now.request.arc_length_m
+        turned = giving_up.turned_since(plan.loiter_entry_m, arc_length_m)
+        if search.stuck is not None:
+            if turned:
+                giving_up.give_up(self._commitment.unseen(search.stuck, now.request.seen), arc_length_m)
+            return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
+        narrow = giving_up.narrow(no_room, giving_up.settled(now.request.time_s))
+        if narrow and giving_up.retries_used():
+            return self._prove_no_room_to_turn()
+        # No way is left but those given up, or one that takes more looking for. Or none that can be flown from here:
+        # elsewhere on the turn there may be one.
+        at_end = (only_given_up or giving_up.out_of_effort) and (turned or not search.tracks)
+        giving_up.try_again(narrow, at_end, arc_length_m)
+        return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
+
+    def _prove_no_way(self) -> Plan:
+        """Any state -> PROVING: a closed chain of edges with no gap that any vehicle could pass."""
+        return self._prove(f"no gap in it is wider than {self._proofs.no_way_gap_m:.0f} m")
+
+    def _prove_no_room_to_turn(self) -> Plan:
+        """GIVING_UP -> PROVING: a closed chain of edges with no gap that this aircraft could turn in."""
+        gap_m = self._proofs.turning_gap_m
+        return self._prove(f"no gap in it has room to turn ({gap_m:.0f} m) or is seen to lead on")
+
+    def _prove(self, gaps: str) -> Plan:
+        self.state = State.PROVING
+        chain = "a closed chain of obstacles lies between the aircraft and the goal"
+        return Plan(PlanStatus.UNREACHABLE, f"{chain}: {gaps}")

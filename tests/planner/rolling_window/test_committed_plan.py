@@ -1,4 +1,4 @@
-"""The watch over a plan in effect."""
+"""The monitor of the plan in effect."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, pose_at
-from planner.interface import Mission, Path, Plan, PlanStatus
-from planner.rolling_window.committed_plan import CUT, UNHURRIED, CommittedPlan, PlanMonitor
+from planner.interface import FloatArray, Mission, Path, Plan, PlanStatus
+from planner.rolling_window.committed_plan import CUT, UNHURRIED, CommittedPlan, MonitorLimits, PlanMonitor
 
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
 TURN = (2000.0, 0.0, 1.0, 0.0, 0.01, 2.0 * math.pi * 100.0)
@@ -32,8 +32,20 @@ MISSION = Mission(
 )
 
 
-def watching() -> PlanMonitor:
-    return PlanMonitor(MISSION, keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0, lead_m=50.0, step_m=500.0)
+def monitoring() -> PlanMonitor:
+    return PlanMonitor(
+        MonitorLimits.of(
+            MISSION, keep_m=300.0, turn_keeps_m=200.0, urgent_m=1000.0, lead_m=50.0, step_m=500.0
+        )
+    )
+
+
+def in_effect(monitor: PlanMonitor, plan: CommittedPlan, points: FloatArray, gone: int = 0) -> None:
+    """The loop has put into effect what was proposed."""
+    monitor.proposed = plan
+    assert monitor.take_effect(plan.plan, points, gone)
+    assert monitor.plan is plan
+    assert monitor.proposed is None
 
 
 def effect(known: int) -> CommittedPlan:
@@ -43,12 +55,12 @@ def effect(known: int) -> CommittedPlan:
 
 @pytest.mark.parametrize(("known", "cut", "broken"), [(3, False, False), (2, True, True), (1, True, True)])
 def test_a_plan_is_cut_by_what_came_in_while_it_was_looked_for(known: int, cut: bool, broken: bool) -> None:
-    watch = watching()
-    watch.begin(effect(known), EDGES)
-    assert math.isfinite(watch.cut_m) is cut
-    assert watch.broken is broken
+    monitor = monitoring()
+    in_effect(monitor, effect(known), EDGES)
+    assert math.isfinite(monitor.cut_m) is cut
+    assert monitor.broken is broken
     if cut:
-        assert 1200.0 <= watch.cut_m <= 1500.0
+        assert 1200.0 <= monitor.cut_m <= 1500.0
 
 
 def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
@@ -72,14 +84,14 @@ def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_ne
 
 
 def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:
-    flown, watch = effect(3), watching()
-    watch.begin(flown, EDGES[:0])
-    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(5000.0, 100.0)]))
-    assert watch.cut_m == math.inf
-    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 401.0)]))
-    assert not watch.broken
-    assert not watch.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 399.0)]))
-    assert watch.broken
+    flown, monitor = effect(3), monitoring()
+    in_effect(monitor, flown, EDGES[:0])
+    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(5000.0, 100.0)]))
+    assert monitor.cut_m == math.inf
+    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 401.0)]))
+    assert not monitor.broken
+    assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(2000.0, 399.0)]))
+    assert monitor.broken
 
 
 def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
@@ -89,49 +101,59 @@ def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
     assert flown.turn.length_m == 0.0
     assert [flown.over(station) for station in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
     assert not effect(3).over(1e6)
-    watch = watching()
-    watch.begin(flown, EDGES[:0])
-    assert not watch.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 301.0)]))
-    assert not watch.broken
-    watch.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 299.0)]))
-    assert watch.broken
+    monitor = monitoring()
+    in_effect(monitor, flown, EDGES[:0])
+    assert not monitor.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 301.0)]))
+    assert not monitor.broken
+    monitor.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 299.0)]))
+    assert monitor.broken
 
 
 def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
-    watch = watching()
+    monitor = monitoring()
     course = effect(4).course  # one of the four is gone; the last of the edges is new
-    assert watch.cut_at(course, EDGES) == math.inf
-    assert 1200.0 <= watch.cut_at(course, EDGES, gone=2) <= 1500.0
-    watch.begin(effect(4), EDGES, gone=9)
-    assert watch.broken
+    assert monitor.cut_at(course, EDGES) == math.inf
+    assert 1200.0 <= monitor.cut_at(course, EDGES, gone=2) <= 1500.0
+    in_effect(monitor, effect(4), EDGES, gone=9)
+    assert monitor.broken
 
 
 def test_a_cut_beyond_the_turn_does_not_break_the_plan() -> None:
-    watch = watching()
-    watch.begin(effect(1), EDGES[:2])
-    assert 4700.0 <= watch.cut_m <= 5000.0
-    assert not watch.broken
+    monitor = monitoring()
+    in_effect(monitor, effect(1), EDGES[:2])
+    assert 4700.0 <= monitor.cut_m <= 5000.0
+    assert not monitor.broken
 
 
 def test_the_window_rolls_on_the_sooner_the_nearer_something_is_wrong() -> None:
-    flown, watch = effect(3), watching()
-    assert not watch.due(flown, 0.0, 1e4, newly_cut=False)  # all is well, and the turn far ahead
-    assert watch.due(flown, 300.0, 500.0, newly_cut=False)  # the turn comes nearer: a rolling step
-    assert not watch.due(flown, 300.0, 499.0, newly_cut=False)
-    assert watch.due(flown, 1100.0, 60.0, newly_cut=False)  # it is near
-    assert not watch.due(flown, 1100.0, 40.0, newly_cut=False)
-    watch.begin(effect(1), EDGES[:2])
-    least_m = CUT * watch.cut_m
-    assert not watch.due(effect(1), 0.0, 0.9 * 50.0, newly_cut=False)
-    assert watch.due(effect(1), 0.0, max(least_m, 50.0), newly_cut=False)
-    assert watch.due(effect(1), 1100.0, 0.0, newly_cut=True)
+    flown, monitor = effect(3), monitoring()
+    assert not monitor.due(flown, 0.0, 1e4, newly_cut=False)  # all is well, and the turn far ahead
+    assert monitor.due(flown, 300.0, 500.0, newly_cut=False)  # the turn comes nearer: a rolling step
+    assert not monitor.due(flown, 300.0, 499.0, newly_cut=False)
+    assert monitor.due(flown, 1100.0, 60.0, newly_cut=False)  # it is near
+    assert not monitor.due(flown, 1100.0, 40.0, newly_cut=False)
+    in_effect(monitor, effect(1), EDGES[:2])
+    least_m = CUT * monitor.cut_m
+    assert not monitor.due(effect(1), 0.0, 0.9 * 50.0, newly_cut=False)
+    assert monitor.due(effect(1), 0.0, max(least_m, 50.0), newly_cut=False)
+    assert monitor.due(effect(1), 1100.0, 0.0, newly_cut=True)
 
 
 def test_a_way_that_grazes_what_cuts_it_is_looked_at_again_later() -> None:
-    flown, watch = effect(1), watching()
-    watch.begin(flown, EDGES[:2])
+    flown, monitor = effect(1), monitoring()
+    in_effect(monitor, flown, EDGES[:2])
     since_m = 0.5 * (CUT + UNHURRIED) * flown.loiter_entry_m
-    assert watch.due(flown, 0.0, since_m, newly_cut=False)
-    watch.lengthened_m = 0.0
-    assert not watch.due(flown, 0.0, since_m, newly_cut=False)
-    assert watch.due(flown, 0.0, UNHURRIED * watch.cut_m, newly_cut=False)
+    assert monitor.due(flown, 0.0, since_m, newly_cut=False)
+    monitor.lengthened_m = 0.0
+    assert not monitor.due(flown, 0.0, since_m, newly_cut=False)
+    assert monitor.due(flown, 0.0, UNHURRIED * monitor.cut_m, newly_cut=False)
+
+
+def test_only_what_was_proposed_takes_effect() -> None:
+    monitor, proposed, other = monitoring(), effect(3), effect(3)
+    assert not monitor.take_effect(None, EDGES)
+    monitor.proposed = proposed
+    assert not monitor.take_effect(other.plan, EDGES)
+    assert (monitor.plan, monitor.proposed) == (None, proposed)
+    assert monitor.take_effect(proposed.plan, EDGES)
+    assert not monitor.take_effect(proposed.plan, EDGES)

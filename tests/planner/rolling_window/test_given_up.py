@@ -11,8 +11,8 @@ import pytest
 
 from planner.geometry.curves import Pose, end_of
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
-from planner.rolling_window.dead_ends import RETRY_S
-from planner.rolling_window.planner import AGAIN, MOST_EFFORT, RollingWindow
+from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, RETRY_S
+from planner.rolling_window.planner import RollingWindow, Situation
 from planner.world_stability import SETTLED_S
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
@@ -103,13 +103,14 @@ def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, search
     """All is given up, and the edges leave no way that has room to turn: all is tried again before."""
     pilot, seen, plan, flown_m = circling(replace(MISSION, turn_radius_m=500.0), 3000.0)
     pilot._memory.gone += gone
-    request, effect = request_on(plan, flown_m, seen), pilot._effect
-    assert effect is not None
-    pilot._proof_for_turns.closed = lambda position: True  # type: ignore[method-assign]
-    in_vain = SimpleNamespace(done=True, stuck=None, tracks=[])
+    now = Situation(request_on(plan, flown_m, seen), pilot._monitor.plan, flown_m)
+    assert now.plan is not None
+    pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
+    pilot._search.last = SimpleNamespace(done=True, stuck=None, tracks=[])  # type: ignore[assignment]
+    effort = pilot._giving_up.effort
     told = [
-        pilot._no_way(request, effect, flown_m, in_vain).status  # type: ignore[arg-type]
-        for _ in range(searches + 1 + AGAIN * (MOST_EFFORT + 1) - pilot._effort)
+        pilot._no_way_found(now).status
+        for _ in range(searches + 1 + MOST_RETRIES * (MOST_EFFORT + 1) - effort)
     ]
     assert told == [PlanStatus.NO_PATH] * (len(told) - 1) + [PlanStatus.UNREACHABLE]
 
@@ -144,21 +145,19 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
     changed_s = flown_m / 25.0
     seen.last_contradiction_s = changed_s
     far_on(pilot, seen, plan, flown_m, changed_s)
-    effect = pilot._effect
-    assert effect is not None
-    pilot._proof.closed = lambda position: not for_turns_alone  # type: ignore[method-assign]
-    pilot._proof_for_turns.closed = lambda position: True  # type: ignore[method-assign]
-    in_vain = SimpleNamespace(done=True, stuck=None, tracks=[])
+    flown = pilot._monitor.plan
+    assert flown is not None
+    pilot._proofs.no_way.closed = lambda position: not for_turns_alone  # type: ignore[method-assign]
+    pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
+    pilot._search.last = SimpleNamespace(done=True, stuck=None, tracks=[])  # type: ignore[assignment]
 
     def told(time_s: float) -> list[PlanStatus]:
         request = request_on(plan, flown_m, seen)._replace(time_s=time_s)
-        return [
-            pilot._no_way(request, effect, flown_m, in_vain).status  # type: ignore[arg-type]
-            for _ in range((AGAIN + 1) * (MOST_EFFORT + 2))
-        ]
+        now = Situation(request, flown, flown_m)
+        return [pilot._no_way_found(now).status for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2))]
 
     assert set(told(changed_s + SETTLED_S - 1.0)) == {PlanStatus.NO_PATH}
-    pilot._dead_ends.give_up(Pose(3000.0, 0.0, 1.0, 0.0))
+    pilot._giving_up.dead_ends.give_up(Pose(3000.0, 0.0, 1.0, 0.0))
     assert told(changed_s + SETTLED_S + 1.0)[-1] is PlanStatus.UNREACHABLE
     # Where it is for want of room to turn, what was given up was tried again before.
     assert (len(given_up(pilot)) == 0) is for_turns_alone

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from planner.geometry.curves import Point
-from planner.rolling_window.explanations import sentence
+from planner.rolling_window.commitment import explanation
 
 
 @pytest.mark.parametrize(
@@ -16,10 +16,11 @@ from planner.rolling_window.explanations import sentence
     ],
 )
 def test_says_on_which_side_what_is_ahead_is_passed(first: Point, told: str) -> None:
-    assert sentence((0.0, 0.0), (10_000.0, 0.0), [first, (10_000.0, 0.0)]) == told
+    assert explanation((0.0, 0.0), (10_000.0, 0.0), [first, (10_000.0, 0.0)]) == told
 
 
 def test_says_how_far_the_goal_is() -> None:
     assert (
-        sentence((0.0, 0.0), (6000.0, 8000.0), [(6000.0, 8000.0)]) == "way to the goal in view, 10.0 km to go"
+        explanation((0.0, 0.0), (6000.0, 8000.0), [(6000.0, 8000.0)])
+        == "way to the goal in view, 10.0 km to go"
     )

@@ -1,0 +1,168 @@
+"""One rolling step of the search: a portion of work, and the committed plan that comes of it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from planner.geometry.course import Course
+from planner.geometry.curves import Point
+from planner.interface import Mission, PlanRequest
+from planner.memory import ObstacleMemory
+from planner.rolling_window.anytime_search import AnytimeSearch
+from planner.rolling_window.barrier import Proof
+from planner.rolling_window.commitment import Commitment
+from planner.rolling_window.committed_plan import CommittedPlan, PlanMonitor
+from planner.rolling_window.dead_ends import GivingUp
+from planner.rolling_window.escape import room_m
+from planner.rolling_window.evasion import Threats
+from planner.rolling_window.local_planning import LocalPlanning, Start
+
+BETTER = 0.005
+"""A course that still serves is dropped only for one that is shorter by this share of what is left to fly."""
+
+
+class Work(NamedTuple):
+    """How much is searched before the planner answers, as `planner.rolling_window.window.Tally` counts it: about 1 us.
+
+    Attributes:
+        first: when a search begins.
+        more: each further time that the planner is asked.
+    """
+
+    first: float
+    more: float
+
+
+WORK_WHILE_SERVING = Work(3000.0, 1000.0)
+"""While the plan in effect serves there is time."""
+
+WORK_WHILE_CUT = Work(5000.0, 2000.0)
+"""The course is cut somewhere ahead: what is flown leads into its turn."""
+
+WORK_WHILE_UNSAFE = Work(12_000.0, 12_000.0)
+"""No safe plan is flown, or something moves. Most searches are done within this."""
+
+
+class Step(NamedTuple):
+    """What a rolling step begins with.
+
+    Attributes:
+        request: what was asked.
+        start: where a new plan begins.
+        ahead: what is left of the course in effect; None without one.
+        serves: that course leads to the goal, as far as is known.
+        work: how much is searched.
+        threats: what is near, while something moves or has just appeared.
+    """
+
+    request: PlanRequest
+    start: Start
+    ahead: Course | None
+    serves: bool
+    work: Work
+    threats: Threats | None
+
+
+class RollingSearch:
+    """Searches for a new committed plan, a portion of work at a time.
+
+    Args:
+        mission: goal and limits.
+        memory: the edge points.
+        local: does the search.
+        commitment: certifies what was found.
+        monitor: of the plan in effect.
+        giving_up: how much effort is made.
+        no_way: asked before a wide search whether it is proved that there is no way.
+
+    Attributes:
+        running: the search that is not done yet.
+        last: the last search that was at work.
+        known: how many edge points the last search that ended began with.
+        gone: how many edge points had been let go of when the last search began.
+        nearer: a certified plan that the last search found but that would come too near to what moves.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        memory: ObstacleMemory,
+        local: LocalPlanning,
+        commitment: Commitment,
+        monitor: PlanMonitor,
+        giving_up: GivingUp,
+        no_way: Proof,
+    ) -> None:
+        self._clearance_m, self._goal_m = mission.clearance_m, mission.goal_m
+        self._memory, self._local, self._commitment = memory, local, commitment
+        self._monitor, self._giving_up, self._no_way = monitor, giving_up, no_way
+        self.running: AnytimeSearch | None = None
+        self.last: AnytimeSearch | None = None
+        self.known = 0
+        self.gone = 0
+        self.nearer: CommittedPlan | None = None
+
+    @property
+    def up_to_date(self) -> bool:
+        """Whether no edge point has come in since the last search."""
+        return self.known == self._memory.known
+
+    def stop(self) -> None:
+        """Drops a search that is not done: the plan in effect is as good as any."""
+        self.running = None
+
+    def cut_m(self, course: Course) -> float:
+        """Arc length at which a course comes too near to an edge point that it was not found with."""
+        return self._monitor.cut_at(course, self._memory.standing_m, self._memory.gone - self.gone)
+
+    def go_on(self, step: Step) -> CommittedPlan | None:
+        """Searches with one portion of work, and returns the first certified plan that may be flown."""
+        begins = self.running is None
+        search = self.last = self.running or self._begun(step.request.position_m)
+        self.running, nearest_m = search, -math.inf
+        for course in search.courses(step.start, step.ahead, step.work.first if begins else step.work.more):
+            begin = course.path.segments[0, :2]
+            if tuple(begin) != tuple(step.start.prefix[0][:2]):
+                raise RuntimeError(f"a course begins at {begin}, not at {step.start.prefix[0][:2]}")
+            if step.serves and course.path.length_m > self._worth_m(step.ahead):
+                search.done = True
+                break
+            found = self._commitment.effect(
+                step.request, step.start, course, search.tracks, self.cut_m(course)
+            )
+            if found is not None and self._commitment.leads_on(found):
+                keeps_m = room_m(found.path, step.threats)
+                if keeps_m >= self._clearance_m:
+                    self._end(search, step.ahead, course)
+                    return found
+                if keeps_m > nearest_m:  # what moves may come to what is free now
+                    nearest_m, self.nearer = keeps_m, found
+            search.stuck = search.stuck or course
+        if search.done:
+            self.running, self.known = None, search.known
+        return None
+
+    def _begun(self, position: Point) -> AnytimeSearch:
+        """A new search."""
+        self.gone = self._memory.gone
+        return AnytimeSearch(
+            self._local,
+            self._memory.known,
+            self._giving_up.effort,
+            lambda: self._no_way.closed(position),
+            roomy=self._giving_up.tried_again,
+        )
+
+    def _end(self, search: AnytimeSearch, ahead: Course | None, course: Course) -> None:
+        """Ends a search that has found a course."""
+        self.running, self.known = None, search.known
+        self._giving_up.effort = 0
+        before_m = -math.inf if ahead is None else ahead.path.length_m
+        self._monitor.lengthened_m = course.path.length_m - before_m
+
+    def _worth_m(self, ahead: Course | None) -> float:
+        """A course that is longer than this is not worth leaving the one in effect for."""
+        if ahead is None or not ahead.to_goal or ahead.nodes[-1] != self._goal_m:
+            return math.inf
+        return ahead.path.length_m * (1.0 - BETTER)

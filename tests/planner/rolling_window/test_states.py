@@ -1,0 +1,246 @@
+"""The states of the rolling-window planner, and each transition between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from planner.geometry.curves import on_loiter
+from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanStatus
+from planner.memory import ObstacleMemory
+from planner.rolling_window.certificate import CertificateBroken
+from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
+from planner.rolling_window.planner import NO_BETTER, NO_WAY_ON, THINKING_ON, RollingWindow, Situation, State
+from tests.planner.rolling_window.test_rolling_window import (
+    MISSION,
+    SPACING,
+    Seen,
+    first_request,
+    nothing,
+    planner,
+    request_on,
+    seen_at_once,
+)
+
+MakePoints = Callable[..., FloatArray]
+
+
+class HalfOpen(Seen):
+    """Nothing is known of what lies further east than 3 km."""
+
+    def seen_free(self, points_m: FloatArray) -> BoolArray:
+        return points_m[:, 0] < 3000.0
+
+
+def flown(pilot: RollingWindow, seen: Seen) -> Plan:
+    """A first plan, in effect."""
+    plan = pilot.plan(first_request(seen))
+    assert plan.status is PlanStatus.FOUND
+    return plan
+
+
+def loitering(mission: Mission = MISSION) -> tuple[RollingWindow, Seen, Plan, float]:
+    """A planner whose aircraft is in the turn that its plan ends with, and where that begins."""
+    seen, pilot = HalfOpen(nothing()), planner(mission)
+    plan = flown(pilot, seen)
+    assert plan.path is not None
+    entry_m = plan.path.length_m - float(plan.path.segments[-1, 5])
+    pilot.plan(request_on(plan, entry_m - 1.0, seen))
+    assert pilot.state is State.FOLLOWING
+    return pilot, seen, plan, entry_m
+
+
+def searched_in_vain(pilot: RollingWindow, *, done: bool = True, stuck: object = None) -> None:
+    """The last search was this."""
+    search = SimpleNamespace(done=done, stuck=stuck, tracks=[])
+    pilot._search.last = search  # type: ignore[assignment]
+
+
+def proved(pilot: RollingWindow, *, no_way: bool = False, no_room: bool = False) -> None:
+    """So much is proved of the edges seen."""
+    pilot._proofs.no_way.closed = lambda position: no_way  # type: ignore[method-assign]
+    pilot._proofs.no_room_to_turn.closed = lambda position: no_room  # type: ignore[method-assign]
+
+
+def in_the_loiter() -> tuple[RollingWindow, Situation]:
+    pilot, seen, plan, entry_m = loitering()
+    request = request_on(plan, entry_m + 50.0, seen)
+    pilot.plan(request)
+    assert pilot._monitor.plan is not None
+    return pilot, Situation(request, pilot._monitor.plan, entry_m + 50.0)
+
+
+def test_before_the_first_plan_nothing_certified_is_flown() -> None:
+    assert planner().state is State.ESCAPING
+
+
+def test_a_plan_that_is_found_is_followed() -> None:
+    seen, pilot = Seen(nothing()), planner()
+    plan = flown(pilot, seen)
+    assert pilot.state is State.FOLLOWING
+    assert pilot.plan(request_on(plan, 10.0, seen)).status is PlanStatus.KEPT
+    assert pilot.state is State.FOLLOWING
+
+
+def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:
+    seen, pilot = Seen(nothing()), planner()
+    plan = flown(pilot, seen)
+    answers = []
+    for step in range(1, 80):
+        answers.append(pilot.plan(request_on(plan, 100.0 * step, seen)))
+        assert pilot.state is State.FOLLOWING
+        if answers[-1].status is PlanStatus.FOUND:
+            break
+    assert answers[-1].path is not None
+    assert plan.path is not None
+    assert answers[-1].path.length_m > plan.path.length_m - 100.0 * len(answers)
+    assert {each.reason for each in answers[:-1] if each.status is PlanStatus.NO_BETTER} <= {NO_BETTER}
+
+
+def test_in_its_turn_the_aircraft_loiters() -> None:
+    pilot, seen, plan, entry_m = loitering()
+    pilot.plan(request_on(plan, entry_m + 10.0, seen))
+    assert pilot.state in (State.LOITERING, State.GIVING_UP)
+    pilot.plan(request_on(plan, entry_m + 11.0, seen))
+    assert pilot.state is State.LOITERING
+    assert len(pilot._memory.refused_m) == 0
+
+
+def test_a_place_that_was_turned_before_twice_is_given_up_on_entering_the_loiter() -> None:
+    pilot, now = in_the_loiter()
+    assert now.plan is not None
+    assert len(pilot._memory.refused_m) == 0
+    pilot._loitered = None  # as if another plan had come to the same place
+    pilot._loiter(now, now.plan)
+    assert pilot.state is State.LOITERING
+    assert len(pilot._memory.refused_m) > 0
+
+
+def test_from_the_loiter_a_way_that_opens_is_followed() -> None:
+    pilot, _, plan, entry_m = loitering()
+    for step in range(40):
+        answer = pilot.plan(request_on(plan, entry_m + 25.0 * step, Seen(nothing())))
+        if answer.status is PlanStatus.FOUND:
+            break
+    assert answer.status is PlanStatus.FOUND
+    assert pilot.state is State.FOLLOWING
+
+
+def test_walled_in_at_the_start_a_turn_is_the_escape(ring: MakePoints) -> None:
+    pilot = planner()
+    answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 900.0, SPACING))))
+    assert pilot.state is State.ESCAPING
+    assert answer.path is not None
+    assert answer.path.loiter
+
+
+def test_without_room_for_a_turn_at_the_start_there_is_no_escape(ring: MakePoints) -> None:
+    pilot = planner()
+    pilot._proofs.no_way.closed = lambda position: False  # type: ignore[method-assign]
+    answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 250.0, SPACING))))
+    assert (answer.status, pilot.state) == (PlanStatus.NO_PATH, State.ESCAPING)
+
+
+def test_a_broken_plan_is_escaped_from_while_there_is_a_turn() -> None:
+    pilot, now = in_the_loiter()
+    pilot._monitor.broken = True
+    searched_in_vain(pilot)
+    pilot._no_way_found(now)
+    assert pilot.state is State.ESCAPING
+
+
+def test_a_broken_plan_without_an_escape_is_a_broken_certificate(ring: MakePoints) -> None:
+    pilot, seen, plan, entry_m = loitering()
+    request = request_on(plan, entry_m + 50.0, seen)
+    seen.show(np.array(request.position_m) + ring(0.0, 0.0, 60.0, 20.0))
+    with pytest.raises(CertificateBroken):
+        pilot.plan(request)
+    assert pilot.state is State.ESCAPING
+
+
+def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
+    pilot, now = in_the_loiter()
+    before = pilot.state
+    searched_in_vain(pilot, done=False)
+    answer = pilot._no_way_found(now)
+    assert (answer.status, answer.reason, answer.wants_more_time) == (PlanStatus.NO_PATH, THINKING_ON, True)
+    assert pilot.state is before
+
+
+def test_after_a_search_in_vain_more_effort_is_made() -> None:
+    pilot, now = in_the_loiter()
+    proved(pilot)
+    searched_in_vain(pilot)
+    pilot._giving_up.effort = 0
+    answer = pilot._no_way_found(now)
+    assert (answer.status, answer.reason) == (PlanStatus.NO_PATH, NO_WAY_ON)
+    assert pilot.state is State.GIVING_UP
+    assert pilot._giving_up.effort == 1
+
+
+@pytest.mark.parametrize(("turns", "given_up"), [(0.9, False), (1.1, True)])
+def test_a_course_that_cannot_be_entered_is_given_up_after_a_whole_turn(turns: float, given_up: bool) -> None:
+    pilot, now = in_the_loiter()
+    assert now.plan is not None
+    proved(pilot)
+    searched_in_vain(pilot, stuck=now.plan.course)
+    arc_length_m = now.plan.loiter_entry_m + turns * math.tau * MISSION.turn_radius_m
+    later = now.request._replace(arc_length_m=arc_length_m)
+    pilot._no_way_found(Situation(later, now.plan, on_loiter(now.plan.path, arc_length_m)))
+    assert pilot.state is State.GIVING_UP
+    assert (len(pilot._memory.refused_m) > 0) is given_up
+
+
+def test_a_closed_chain_of_edges_is_the_proof_that_there_is_no_way() -> None:
+    pilot, now = in_the_loiter()
+    proved(pilot, no_way=True)
+    searched_in_vain(pilot)
+    answer = pilot._no_way_found(now)
+    assert (answer.status, pilot.state) == (PlanStatus.UNREACHABLE, State.PROVING)
+    assert "no gap in it is wider than" in answer.reason
+
+
+def test_walled_in_without_a_plan_the_proof_is_told_after_the_escape(ring: MakePoints) -> None:
+    pilot = planner()
+    answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 250.0, SPACING))))
+    assert (answer.status, pilot.state) == (PlanStatus.UNREACHABLE, State.PROVING)
+
+
+def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
+    pilot, now = in_the_loiter()
+    proved(pilot, no_room=True)
+    searched_in_vain(pilot)
+    answers = [pilot._no_way_found(now) for _ in range((MOST_RETRIES + 1) * (MOST_EFFORT + 2))]
+    first = next(i for i, each in enumerate(answers) if each.status is PlanStatus.UNREACHABLE)
+    assert first > MOST_RETRIES
+    assert "has room to turn (700 m)" in answers[first].reason
+    assert pilot.state is State.PROVING
+    assert pilot._giving_up.tried_again
+
+
+def test_effort_grows_to_its_end_and_begins_again_with_every_retry() -> None:
+    giving_up = GivingUp(MISSION, ObstacleMemory(MISSION.clearance_m))
+    for _ in range(MOST_EFFORT + 2):
+        giving_up.try_again(narrow=False, at_end=False, arc_length_m=0.0)
+    assert giving_up.out_of_effort
+    assert not giving_up.tried_again
+    for retry in range(MOST_RETRIES):
+        assert giving_up.retries_used() is False, retry
+        giving_up.try_again(narrow=True, at_end=False, arc_length_m=0.0)
+        assert giving_up.effort == 0
+    assert giving_up.retries_used()
+
+
+def test_a_whole_turn_is_counted_from_the_entry_or_from_what_was_given_up_last() -> None:
+    giving_up = GivingUp(replace(MISSION, turn_radius_m=100.0), ObstacleMemory(MISSION.clearance_m))
+    assert not giving_up.turned_since(1000.0, 1000.0 + 628.0)
+    assert giving_up.turned_since(1000.0, 1000.0 + 629.0)
+    giving_up.try_again(narrow=False, at_end=True, arc_length_m=1629.0)
+    assert not giving_up.turned_since(1000.0, 1629.0 + 628.0)
+    giving_up.new_plan()
+    assert giving_up.turned_since(1000.0, 1000.0 + 629.0)
