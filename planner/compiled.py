@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import gc
+import sys
 import threading
 from collections.abc import Callable
 from fractions import Fraction
@@ -48,6 +49,8 @@ class Compiled(Generic[P, R]):
     def __init__(self, function: Callable[P, R], arguments: tuple[str, ...], unchecked: bool = False) -> None:
         self._function, self._arguments, self._unchecked = function, arguments, unchecked
         self._code: Callable[..., R] = self._compile_first
+        self.anew = False
+        """It was compiled by this process, not loaded."""
         functools.update_wrapper(self, function)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -72,6 +75,7 @@ class Compiled(Generic[P, R]):
                 raise
             # There is no place to keep it, or no room there.
             code = numba.njit(signature, error_model="numpy")(self._function)
+        self.anew = not code.stats.cache_hits
         if self._unchecked:
             (only,) = code.overloads.values()
             code = only.entry_point
@@ -113,16 +117,24 @@ def _learn_to_fuse() -> None:
 
 
 def compile_all() -> None:
-    """Compiles all functions imported so far that are not yet: some seconds the first time, then some tenths."""
+    """Compiles all functions imported so far that are not yet: some seconds the first time, then some tenths.
+
+    The first time is told by one line on standard error, where that is a terminal.
+    """
     with _compiling:
         if not _waiting:
             return
+        told = False
         while _waiting:
             _waiting[0].compile()
+            if _waiting[0].anew and not told:
+                told = True
+                _tell("wayproof: compiling for this machine, once; this takes some seconds")
             del _waiting[0]
+        # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
+        # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
+        gc.collect()
         if _process_is_ours:
-            # The compiler stays for good: to look through it for garbage holds a flight up for a tenth of a second.
-            gc.collect()
             gc.freeze()
 
 
@@ -133,3 +145,9 @@ def own_this_process() -> None:
     """Says that nobody else's objects live in this process: what is there after compiling is never garbage."""
     global _process_is_ours
     _process_is_ours = True
+
+
+def _tell(line: str) -> None:
+    """Tells a person who waits; a script is not told."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        sys.stderr.write(f"{line}\n")

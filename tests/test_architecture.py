@@ -151,6 +151,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("rolling_window",),
         ("memory", "world_stability"),
         ("geometry",),
+        ("kernels",),
         ("compiled", "plan_checks"),
         ("interface",),
     ),

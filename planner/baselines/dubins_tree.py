@@ -22,11 +22,11 @@ from importlib.util import find_spec
 import numpy as np
 
 from planner.baselines.joining import departure, stuck
-from planner.compiled import COUNTS, FLOAT, ROWS, compiled
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, along
 from planner.geometry.margin import MARGIN_KEY, margin_of
-from planner.interface import FloatArray, IntArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.kernels.fans import too_near
 from planner.memory import ObstacleMemory
 from planner.rolling_window.route_optimisation import Terrain
 
@@ -250,25 +250,11 @@ class DubinsTree:
         ]
 
 
-@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT)
-def _too_near(places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float) -> bool:
-    """Whether a place is nearer to a point, of those by squares, than is to be kept from it."""
-    for block in range(len(first) - 1):
-        dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
-        if dx * dx + dy * dy >= reach * reach:
-            continue
-        for k in range(first[block], first[block + 1]):
-            dx, dy, keep = places[0, k] - east, places[1, k] - north, places[2, k]
-            if dx * dx + dy * dy < keep * keep:
-                return True
-    return False
-
-
 def is_free(terrain: Terrain, east_m: float, north_m: float) -> bool:
     """Whether a place is in the area and keeps its distance from all that is known."""
     xmin, ymin, xmax, ymax = terrain.bounds_m
     inside = xmin <= east_m <= xmax and ymin <= north_m <= ymax
-    return inside and not _too_near(*terrain.squares, east_m, north_m)
+    return inside and not too_near(*terrain.squares, east_m, north_m)
 
 
 def joined(poses: Sequence[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]] | None:

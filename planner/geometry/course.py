@@ -9,8 +9,8 @@ import numpy as np
 
 from planner.geometry.clearance import distances
 from planner.geometry.curves import Point, between
-from planner.geometry.fans import encircled
 from planner.interface import FloatArray, Path
+from planner.kernels.fans import encircled
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,26 +11,12 @@ link that closes an odd one is noticed: union-find with parity.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from planner.compiled import (
-    BOOL,
-    BOOLS_OUT,
-    COUNT,
-    COUNTS_OUT,
-    FLOAT,
-    FLOATS,
-    ROWS,
-    compiled,
-)
 from planner.geometry.curves import Point
-from planner.interface import BoolArray, FloatArray, IntArray, Mission
+from planner.interface import FloatArray, Mission
+from planner.kernels.chains import link_all
 from planner.memory import ObstacleMemory
-
-OUTSIDE = 0
-"""Node of the world outside of the area."""
 
 PROVED_AT_ONCE = 500
 """So many edge points at most are taken into a proof in one call; all at once where a proof is to be held against what
@@ -43,99 +29,6 @@ but nothing that is not so."""
 
 SQUARES = 4096
 """Into so many lists nodes are put, by where they lie."""
-
-
-@compiled(COUNTS_OUT, BOOLS_OUT, COUNT)
-def _root(parent: IntArray, parity: BoolArray, node: int) -> tuple[int, bool]:
-    """The root of a node's tree and the parity of crossings on the way there; shortens the way."""
-    root, odd = node, False
-    while parent[root] != root:
-        odd ^= parity[root]
-        root = parent[root]
-    left = odd
-    while parent[node] != root and node != root:
-        after, crosses = parent[node], parity[node]
-        parent[node], parity[node] = root, left
-        node, left = after, left ^ crosses
-    return root, odd
-
-
-@compiled(FLOAT, FLOAT, FLOAT, FLOAT, ROWS)
-def _crosses(ax: float, ay: float, bx: float, by: float, ends: FloatArray) -> bool:
-    """Whether the line from a to b crosses that from start to goal."""
-    sx, sy, dx, dy = ends[0, 0], ends[0, 1], ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1]
-    side_a = dx * (ay - sy) - dy * (ax - sx)
-    side_b = dx * (by - sy) - dy * (bx - sx)
-    if (side_a > 0.0) == (side_b > 0.0):
-        return False
-    share = side_a / (side_a - side_b)
-    x, y = ax + share * (bx - ax), ay + share * (by - ay)
-    return bool(0.0 <= (x - sx) * dx + (y - sy) * dy < dx * dx + dy * dy)
-
-
-@compiled(COUNTS_OUT, BOOLS_OUT, COUNT, COUNT, BOOL)
-def _link(parent: IntArray, parity: BoolArray, a: int, b: int, crosses: bool) -> bool:
-    """Links two nodes; whether that closes a chain that parts start and goal."""
-    root_a, parity_a = _root(parent, parity, a)
-    root_b, parity_b = _root(parent, parity, b)
-    odd = parity_a ^ parity_b ^ crosses
-    if root_a == root_b:
-        return odd
-    parent[root_a], parity[root_a] = root_b, odd
-    return False
-
-
-@compiled(ROWS, COUNT, COUNTS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, ROWS, FLOATS, FLOAT, FLOAT)
-def _link_all(
-    places: FloatArray,
-    first: int,
-    parent: IntArray,
-    parity: BoolArray,
-    last: IntArray,
-    before: IntArray,
-    ends: FloatArray,
-    bounds: FloatArray,
-    clearance: float,
-    border: float,
-) -> bool:
-    """Links nodes, from the first one on, with all before that are near enough; whether that closes a chain.
-
-    Args:
-        places: of each node but that of the outside, which is the first.
-        first: the first one to be linked.
-        parent: of each node in its tree.
-        parity: whether the chain to it crosses the line from start to goal an odd number of times.
-        last: by where they lie, told by squares: the last node there.
-        before: of each node the one before it there.
-        ends: start and goal.
-        bounds: xmin, ymin, xmax, ymax.
-        clearance: distance that a way keeps,
-        border: and from the border, but for what of that is nearer to start or goal.
-    """
-    closed, reach = False, 2.0 * clearance
-    xmin, ymin, xmax, ymax = bounds
-    for node in range(first, len(places)):
-        x, y = places[node]
-        parent[node] = node
-        for border_x, border_y in ((xmin, y), (xmax, y), (x, ymin), (x, ymax)):
-            if math.hypot(border_x - x, border_y - y) >= clearance + border:
-                continue
-            from_start = math.hypot(border_x - ends[0, 0], border_y - ends[0, 1])
-            from_goal = math.hypot(border_x - ends[1, 0], border_y - ends[1, 1])
-            if min(from_start, from_goal) >= border:
-                closed |= _link(parent, parity, node, OUTSIDE, _crosses(x, y, border_x, border_y, ends))
-        column, row = math.floor(x / reach), math.floor(y / reach)
-        for i in range(column - 1, column + 2):
-            for j in range(row - 1, row + 2):
-                other = last[(i * 7919 + j) % len(last)]
-                while other > 0:
-                    other_x, other_y = places[other]
-                    if (other_x - x) ** 2 + (other_y - y) ** 2 < reach * reach:
-                        closed |= _link(parent, parity, node, other, _crosses(x, y, other_x, other_y, ends))
-                    other = before[other]
-        square = (column * 7919 + row) % len(last)
-        before[node], last[square] = last[square], node
-    return closed
 
 
 class Barrier:
@@ -183,7 +76,7 @@ class Barrier:
         self._parity = np.concatenate((self._parity, more.astype(np.bool_)))
         nodes = (self._parent, self._parity, self._last, self._before)
         keeps = (self._clearance, self._border)
-        self.closed |= _link_all(self._places, known, *nodes, self._ends, self._bounds, *keeps)
+        self.closed |= link_all(self._places, known, *nodes, self._ends, self._bounds, *keeps)
 
 
 class Proof:

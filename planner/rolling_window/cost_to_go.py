@@ -12,18 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from planner.compiled import (
-    BOOLS_OUT,
-    COUNT,
-    COUNTS_OUT,
-    FLOAT,
-    FLOATS,
-    FLOATS_OUT,
-    ROWS,
-    compiled,
-)
 from planner.geometry.curves import Point
-from planner.interface import BoolArray, FloatArray, IntArray
+from planner.interface import FloatArray
+from planner.kernels.wave import close_cells, spread_wave
 from planner.rolling_window.window import Tally
 
 CELLS = 5.0
@@ -35,75 +26,11 @@ MOST_CELLS = 250_000
 LEAST_M = 1.0
 """Where less is kept, as where start or goal lie at an edge, the grid is made for this."""
 
-EIGHT = (2, 4)
-"""Of five levels of the wave these go on to all 8 neighbours of a cell, the others to 4: what is counted is between the
-length of a way and 0.92 of it, so that what looks shortest on the grid seldom is not."""
-
 AT_ONCE = 20_000
 """So many pairs of a point and a cell, or cells that the wave comes to, make one step of work."""
 
 CLOSED, REACHED = 0.002, 0.012
 """Work of a pair of a point and a cell near it, and of each cell that the wave comes to."""
-
-
-@compiled(BOOLS_OUT, ROWS, FLOATS, FLOAT, FLOAT, FLOAT, COUNT, COUNT)
-def _close(
-    open_: BoolArray,
-    points: FloatArray,
-    keep: FloatArray,
-    west: float,
-    south: float,
-    cell: float,
-    columns: int,
-    rows: int,
-) -> None:
-    """Closes the cells that lie as a whole within what is to be kept from one of some points."""
-    for i in range(len(points)):
-        x, y, within = points[i, 0] - west, points[i, 1] - south, keep[i] - math.sqrt(0.5) * cell
-        if within <= 0.0:
-            continue
-        for column in range(max(int((x - within) / cell), 0), min(int((x + within) / cell) + 1, columns - 2)):
-            east = (column + 0.5) * cell - x
-            for row in range(max(int((y - within) / cell), 0), min(int((y + within) / cell) + 1, rows - 2)):
-                north = (row + 0.5) * cell - y
-                if east * east + north * north < within * within:
-                    open_[(column + 1) * rows + row + 1] = False
-
-
-@compiled(FLOATS_OUT, BOOLS_OUT, COUNTS_OUT, COUNTS_OUT, COUNT, COUNT)
-def _spread(
-    levels: FloatArray, open_: BoolArray, order: IntArray, state: IntArray, rows: int, most: int
-) -> None:
-    """Lets the wave go on, by so many cells and to the end of a level.
-
-    Args:
-        levels: of each cell.
-        open_: whether the wave may go there, and has not.
-        order: cells in the order in which it came there.
-        state: the level; from which one in that order on cells have yet to go on to what touches them at a corner;
-            where the last level begins; where it ends.
-        rows: cells side by side.
-        most: how many.
-    """
-    level, cornered, begin, end = state
-    enough = end + most
-    while cornered < end < enough:
-        level += 1
-        corners = level % 5 in EIGHT
-        # What touches only at a corner is come to later, from all that was new since the last time.
-        front, begin = (cornered if corners else begin), end
-        for i in range(front, begin):
-            for across in (-rows, 0, rows):
-                for up in (-1, 0, 1):
-                    cell = order[i] + across + up
-                    if open_[cell] and (corners or not (across and up)):
-                        open_[cell] = False
-                        levels[cell] = level
-                        order[end] = cell
-                        end += 1
-        if corners:
-            cornered = begin
-    state[:] = (level, cornered, begin, end)
 
 
 class CostToGo:
@@ -157,7 +84,7 @@ class CostToGo:
         west, south = self._low.tolist()
         for i in range(0, len(self._points), some):
             points, keep = self._points[i : i + some], self._keep[i : i + some]
-            _close(open_, points, keep, west, south, self._cell, self._columns, self._rows)
+            close_cells(open_, points, keep, west, south, self._cell, self._columns, self._rows)
             self._tally.add(1, CLOSED, len(points) * width**2)
             yield
         goal = self._index(self._goal)
@@ -166,7 +93,7 @@ class CostToGo:
         state = np.array((0, 0, 0, 1))
         while state[1] < state[3]:
             before = int(state[3])
-            _spread(self._levels, open_, order, state, self._rows, AT_ONCE)
+            spread_wave(self._levels, open_, order, state, self._rows, AT_ONCE)
             self._tally.add(1, REACHED, int(state[3]) - before)
             yield
 

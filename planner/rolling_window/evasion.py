@@ -16,12 +16,12 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.compiled import COUNTS, FLOAT, ROWS, compiled
-from planner.geometry.blocks import Blocks, blocks
 from planner.geometry.clearance import inside_bounds
 from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_turn
 from planner.geometry.stations import poses_at
-from planner.interface import FloatArray, IntArray, Mission, Path, PlanRequest
+from planner.interface import FloatArray, Mission, Path, PlanRequest
+from planner.kernels.buckets import Buckets, bucketed
+from planner.kernels.room import room_along
 from planner.rolling_window.encounters import EARLIEST, LATEST
 
 AHEAD_S = 30.0
@@ -98,12 +98,15 @@ class Threats:
             begin = path.length_m - turn
             stations = np.where(stations > begin, begin + (stations - begin) % turn, stations)
         places = np.ascontiguousarray(poses_at(path, stations)[:, :2])
-        return _room(places, *self._still, self.moving, self.step_m, self.speed_mps, least_m, later)
+        window = (EARLIEST, LATEST, UNKNOWN_S)
+        return room_along(
+            places, *self._still, self.moving, self.step_m, self.speed_mps, least_m, later, *window
+        )
 
     @cached_property
-    def _still(self) -> Blocks:
-        """What stands by squares."""
-        return blocks(self.still_m, np.zeros(len(self.still_m)), SQUARE_STEPS * self.step_m)[1]
+    def _still(self) -> Buckets:
+        """What stands, by squares."""
+        return bucketed(self.still_m, np.zeros(len(self.still_m)), SQUARE_STEPS * self.step_m)[1]
 
 
 def step_along_m(mission: Mission) -> float:
@@ -127,55 +130,6 @@ def far_side(face_m: FloatArray, position_m: Point) -> FloatArray:
     angle = np.linspace(0.0, np.pi, len(face_m))[:, None]
     behind: FloatArray = middle - half * np.cos(angle) + away * np.sin(angle)
     return behind
-
-
-@compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
-def _room(
-    places: FloatArray,
-    still: FloatArray,
-    first: IntArray,
-    circles: FloatArray,
-    moving: FloatArray,
-    step: float,
-    speed: float,
-    least: float,
-    farther: float,
-) -> float:
-    room, i, fastest, beside = math.inf, 0, 0.0, 0
-    for j in range(len(moving)):
-        fastest = max(fastest, math.hypot(moving[j, 2], moving[j, 3]) + moving[j, 4])
-    # So much nearer at most something comes from one place to the next.
-    closer = step * (1.0 + LATEST * fastest / speed)
-    while i < len(places) and room >= least:
-        x, y, later = places[i, 0], places[i, 1], farther * step * i
-        nearest, squared, begin = math.inf, math.inf, beside
-        for k in range(len(first) - 1):
-            block = (begin + k) % (len(first) - 1)
-            dx, dy, reach = circles[0, block] - x, circles[1, block] - y, circles[2, block] + nearest
-            if dx * dx + dy * dy >= reach * reach:
-                continue
-            for j in range(first[block], first[block + 1]):
-                dx, dy = still[0, j] - x, still[1, j] - y
-                if dx * dx + dy * dy < squared:
-                    squared, beside = dx * dx + dy * dy, block
-            nearest = math.sqrt(squared)
-        begins = EARLIEST * step * i / speed
-        lasts = LATEST * step * i / speed - begins
-        for j in range(len(moving)):
-            # To the line along which the point moves while the aircraft may be here.
-            vx, vy = moving[j, 2] * lasts, moving[j, 3] * lasts
-            dx, dy = moving[j, 0] + moving[j, 2] * begins - x, moving[j, 1] + moving[j, 3] * begins - y
-            share = 0.0
-            if vx != 0.0 or vy != 0.0:
-                share = min(max(-(dx * vx + dy * vy) / (vx * vx + vy * vy), 0.0), 1.0)
-            away = math.hypot(dx + share * vx, dy + share * vy)
-            nearest = min(nearest, away - moving[j, 4] * min(begins + lasts, UNKNOWN_S))
-        if nearest == math.inf:
-            break
-        here = nearest + later
-        room = min(room, here)
-        i += max(int((here - room) / closer), 1)
-    return room
 
 
 def rolled_out(prefix: Sequence[Segment], limits: Limits) -> Iterator[Path]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planner.geometry.clearance import to_nearer
 from planner.geometry.course import Course
 from planner.geometry.curves import Limits, Point, Pose, Segment, onward_in_turn
 from planner.interface import FloatArray, Mission, Path
+from planner.kernels.segments import to_nearer
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Track, search

@@ -9,11 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.geometry.blocks import Blocks, blocks
 from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import Limits, Point, Pose, fillet
-from planner.geometry.fans import shortcuts
 from planner.interface import FloatArray, Path
+from planner.kernels.buckets import Buckets, bucketed
+from planner.kernels.fans import shortcuts
 from planner.rolling_window.window import PLACE, Tally
 
 SQUARE = 3.0
@@ -47,10 +47,10 @@ class Terrain:
         return math.isinf(first_breach(path, self.points_m, self.keep_m))
 
     @cached_property
-    def squares(self) -> Blocks:
+    def squares(self) -> Buckets:
         """The edge points by squares."""
         side_m = SQUARE * max(float(self.keep_m.max(initial=0.0)), 1.0)
-        return blocks(self.points_m, self.keep_m, side_m)[1]
+        return bucketed(self.points_m, self.keep_m, side_m)[1]
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.geometry.blocks import Blocks, Cells, blocks, cells, places
 from planner.geometry.curves import Point
-from planner.geometry.fans import entered, fan_edges
 from planner.interface import FloatArray, IntArray
+from planner.kernels.buckets import Buckets, Cells, bucketed, cells_of, gathered
+from planner.kernels.fans import entered, fan_edges
 
 MOST_HIDING = 12
 """So many obstacles at most are looked at for the edges of one."""
 
-BLOCK_CELLS = 4
+BUCKET_CELLS = 4
 """Side of the squares in which points near a line are looked for, in cells."""
 
 CALL, TANGENT, PLACE, HUGGED = 14.0, 0.04, 0.0016, 0.006
@@ -73,7 +73,7 @@ class SectorEdge(NamedTuple):
 
 
 _Obstacle = tuple[FloatArray, Cells]
-"""(3, m) its points as `planner.geometry.blocks.places` has them, and their squares."""
+"""(3, m) its points as `planner.kernels.buckets.gathered` has them, and their squares."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +98,9 @@ class Window:
     _obstacles: dict[int, _Obstacle] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
-    def _blocks(self) -> tuple[Blocks, IntArray]:
+    def _buckets(self) -> tuple[Buckets, IntArray]:
         """The points by squares, and the obstacle of each."""
-        order, squares = blocks(self.points_m, self.keep_m, BLOCK_CELLS * self.cell_m)
+        order, squares = bucketed(self.points_m, self.keep_m, BUCKET_CELLS * self.cell_m)
         return squares, self.labels[order]
 
     def _obstacle(self, label: int) -> _Obstacle:
@@ -108,13 +108,13 @@ class Window:
         if label not in self._obstacles:
             members = np.flatnonzero(self.labels == label)
             self.tally.add(4, TANGENT, len(members))
-            members, squares = cells(self.points_m, members, self.cell_m)
-            self._obstacles[label] = places(self.points_m, self.keep_m, members), squares
+            members, squares = cells_of(self.points_m, members, self.cell_m)
+            self._obstacles[label] = gathered(self.points_m, self.keep_m, members), squares
         return self._obstacles[label]
 
     def entered(self, origin: Point, goal: Point) -> tuple[FloatArray, IntArray]:
         """Where the line to the goal comes too near to edge points, m from the origin, and the obstacle of each."""
-        blocked, labels = self._blocks
+        blocked, labels = self._buckets
         self.tally.add(1, PLACE, len(labels))
         entry, which = entered(*blocked, *origin, *goal, len(labels))
         return entry, labels[which]
@@ -139,7 +139,7 @@ class Window:
         edges: list[SectorEdge] = []
         pending = list(dict.fromkeys(beside))
         looked_at = set(pending)
-        blocked, labels = self._blocks
+        blocked, labels = self._buckets
         if not self._obstacles:  # the squares were laid for this
             self.tally.add(1, TANGENT, len(self.points_m))
         while pending:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from planner import compiled
 from planner.compiled import FLOAT, ROWS, Compiled, fused
-from planner.geometry.fans import encircled
+from planner.kernels.fans import encircled
 
 
 def twice(x: float) -> float:
@@ -82,7 +85,7 @@ def test_where_the_disk_is_full_functions_are_compiled_all_the_same(tmp_path: Pa
     source = """
 import resource
 from planner.compiled import compile_all
-from planner.geometry.fans import encircled
+from planner.kernels.fans import encircled
 import numpy as np
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
 print(encircled(np.zeros((3, 2)), np.ones((1, 2)))[0])
@@ -135,3 +138,46 @@ def test_a_product_and_a_sum_that_are_fused_are_rounded_once() -> None:
     numbers[:, 2] = -numbers[:, 0] * numbers[:, 1]  # nothing but what rounding takes away is left
     assert [made(*each) for each in numbers.tolist()] == [fused(*each) for each in numbers.tolist()]
     assert np.count_nonzero([fused(*each) for each in numbers.tolist()]) > 400
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize(("stream", "lines"), [(Terminal, 1), (io.StringIO, 0)])
+def test_that_it_compiles_is_told_once_and_to_a_person_alone(
+    stream: type[io.StringIO], lines: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    terminal = stream()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setattr(compiled, "_waiting", [Compiled(twice, (FLOAT,)), Compiled(inverse, (FLOAT,))])
+    for made in compiled._waiting:
+        monkeypatch.setattr(made, "compile", partial(setattr, made, "anew", True))
+    compiled.compile_all()
+    assert terminal.getvalue().count("wayproof: compiling for this machine, once") == lines
+    assert terminal.getvalue().count("\n") == lines
+
+
+def test_what_was_kept_is_loaded_and_nothing_is_told(tmp_path: Path) -> None:
+    source = """
+from planner.compiled import FLOAT, Compiled
+from keepable import twice
+made = Compiled(twice, (FLOAT,))
+made.compile()
+print(made.anew)
+"""
+    (tmp_path / "keepable.py").write_text("def twice(x):\n    return 2.0 * x\n")
+    paths = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{os.getcwd()}{os.pathsep}{tmp_path}"}
+    assert [ran(source, tmp_path, **paths) for _ in range(2)] == [["True"], ["False"]]
+
+
+def test_the_garbage_collector_of_a_callers_process_is_left_as_it_is(tmp_path: Path) -> None:
+    source = """
+import gc
+from planner.kernels.fans import encircled
+from planner.compiled import compile_all
+compile_all()
+print(gc.get_freeze_count(), gc.isenabled())
+"""
+    assert ran(source, tmp_path) == ["0", "True"]

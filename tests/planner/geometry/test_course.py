@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, end_of, pose_at
-from planner.geometry.fans import encircled
 from planner.interface import BoolArray, FloatArray, Path
+from planner.kernels.fans import encircled
 
 GOAL = (1000.0, 0.0)
 BELOW: tuple[Point, ...] = ((500.0, -200.0), GOAL)

@@ -1,7 +1,7 @@
 """What obstacles look like from a track point: where their fans end, and how far lines lead past their edge points.
 
 Metres, ENU. Points are (3, m): east, north and the distance to be kept from each, which gives the processor one row
-after the other. Compiled: see `planner.compiled`.
+after the other. Compiled: see `planner.kernels`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from planner.compiled import COUNT, COUNTS, FLOAT, ROWS, compiled
+from planner.compiled import BOOLS_OUT, COUNT, COUNTS, COUNTS_OUT, FLOAT, ROWS, compiled
 from planner.interface import BoolArray, FloatArray, IntArray
 
 EDGE_OFF_RAD = 1e-7
@@ -30,7 +30,7 @@ def first_met(
     """How far a ray leads before it comes too near to a point, and to which; infinite and 0: it never does.
 
     Args:
-        places: all edge points by squares, as `planner.geometry.blocks.blocks` has them,
+        places: all edge points by squares, as `planner.kernels.buckets.Buckets` has them,
         first: where each square begins among them,
         circles: and the circle about it.
         east: where the ray begins.
@@ -70,21 +70,80 @@ def hugged(
         outer: that distance.
         touch: distance along the ray at which it touches.
     """
-    begin, end, count = np.empty(len(own[0])), np.empty(len(own[0])), 0
-    for j in range(len(own[0])):
+    begin, end, count, least = np.empty(own.shape[1]), np.empty(own.shape[1]), 0, 0
+    for j in range(own.shape[1]):
         dx, dy = own[0, j] - east, own[1, j] - north
         ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
         reach = outer * outer - beside * beside
         if reach > 0.0 and ahead > -outer:
             half = math.sqrt(reach)
             begin[count], end[count] = ahead - half, ahead + half
+            if begin[count] < begin[least]:
+                least = count
             count += 1
-    furthest = 0.0
-    for i, k in enumerate(np.argsort(begin[:count])):
-        if i and begin[k] > furthest > touch:
+    if not count:
+        return 0.0
+    # Stretches of the ray near to a point, from the first on: those that overlap are one.
+    furthest = float(end[least])
+    while True:
+        grown = True
+        while grown:
+            grown = False
+            for k in range(count):
+                if begin[k] <= furthest < end[k]:
+                    furthest, grown = float(end[k]), True
+        beyond = -1
+        for k in range(count):
+            if begin[k] > furthest and (beyond < 0 or begin[k] < begin[beyond]):
+                beyond = k
+        if beyond < 0 or furthest > touch:
             return furthest
-        furthest = max(furthest, end[k]) if i else end[k]
-    return furthest
+        furthest = float(end[beyond])
+
+
+@compiled(ROWS, COUNT, COUNTS, COUNTS, COUNTS, COUNTS, COUNTS_OUT, BOOLS_OUT)
+def _find_ends(
+    tangents: FloatArray,
+    row: int,
+    first: IntArray,
+    counts: IntArray,
+    one: IntArray,
+    other: IntArray,
+    outmost: IntArray,
+    ends: BoolArray,
+) -> None:
+    """The cells in which the fan of an obstacle ends on one side.
+
+    Args:
+        tangents: (4, m) unit vectors of the tangents to its points: those on the left, then those on the right.
+        row: 0 for the left, 2 for the right.
+        first: where each cell begins among the points,
+        counts: and how many it has.
+        one: a cell,
+        other: and one that touches it; each pair once.
+        outmost: the outmost point of each cell; written.
+        ends: whether the fan ends there; written.
+    """
+    side = 1.0 - row
+    for cell in range(len(first)):
+        begin = furthest = first[cell]
+        ux, uy, most = tangents[row, begin], tangents[row + 1, begin], 0.0
+        for j in range(begin + 1, begin + counts[cell]):
+            u, v = tangents[row, j], tangents[row + 1, j]
+            beyond = side * (ux * v - uy * u)
+            if beyond > 0.0 and ux * u + uy * v < 0.0:
+                beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
+            if beyond > most:
+                furthest, most = j, beyond
+        outmost[cell], ends[cell] = furthest, True
+    # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
+    for pair in range(len(one)):
+        j, k = outmost[one[pair]], outmost[other[pair]]
+        beyond = side * (tangents[row, j] * tangents[row + 1, k] - tangents[row + 1, j] * tangents[row, k])
+        if beyond > 0.0:
+            ends[one[pair]] = False
+        if beyond < 0.0:
+            ends[other[pair]] = False
 
 
 @compiled(ROWS, COUNTS, ROWS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT)
@@ -105,7 +164,7 @@ def fan_edges(
     """The tangents to the ends of an obstacle's fan that are free as far as they touch, and what hides the others.
 
     Args:
-        places: all edge points by squares, as `planner.geometry.blocks.blocks` has them,
+        places: all edge points by squares, as `planner.kernels.buckets.Buckets` has them,
         block: where each square begins among them,
         circles: and the circle about it.
         labels: the obstacle of each of these points.
@@ -126,8 +185,8 @@ def fan_edges(
         how many tangents were looked along.
     """
     cells, count = len(first), 0
-    tangents = np.empty((4, len(own[0])))
-    for j in range(len(own[0])):
+    tangents = np.empty((4, own.shape[1]))
+    for j in range(own.shape[1]):
         # The direction towards a point, turned to its tangents; from too near they lead square past it.
         dx, dy, keep = own[0, j] - east, own[1, j] - north, own[2, j]
         away2 = max(dx * dx + dy * dy, 1e-12)
@@ -136,26 +195,10 @@ def fan_edges(
         tangents[0, j], tangents[1, j] = dx * cos - dy * sin, dy * cos + dx * sin
         tangents[2, j], tangents[3, j] = dx * cos + dy * sin, dy * cos - dx * sin
     outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
-    x, y = np.empty(cells), np.empty(cells)
     edges, hiding, hides, looked = np.empty((2 * cells, 6)), np.empty(2 * cells, dtype=np.intp), 0, 0
-    for left in (True, False):
-        side, u, v = 1.0 if left else -1.0, tangents[0 if left else 2], tangents[1 if left else 3]
-        for cell in range(cells):
-            begin = furthest = first[cell]
-            ux, uy, most = u[begin], v[begin], 0.0
-            for j in range(begin + 1, begin + counts[cell]):
-                beyond = side * (ux * v[j] - uy * u[j])
-                if beyond > 0.0 and ux * u[j] + uy * v[j] < 0.0:
-                    beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
-                if beyond > most:
-                    furthest, most = j, beyond
-            outmost[cell], x[cell], y[cell], ends[cell] = furthest, u[furthest], v[furthest], True
-        # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
-        for pair in range(len(one)):
-            j, k = one[pair], other[pair]
-            beyond = side * (x[j] * y[k] - y[j] * x[k])
-            ends[j] &= not beyond > 0.0
-            ends[k] &= not beyond < 0.0
+    for row in range(0, 4, 2):
+        side = 1.0 - row
+        _find_ends(tangents, row, first, counts, one, other, outmost, ends)
         for cell in range(cells):
             if not ends[cell]:
                 continue
@@ -164,14 +207,15 @@ def fan_edges(
             touch2 = dx * dx + dy * dy - keep * keep
             if touch2 <= 0.0:
                 continue
-            off = side * EDGE_OFF_RAD
-            towards, aside = x[cell] - off * y[cell], y[cell] + off * x[cell]
+            off, x, y = side * EDGE_OFF_RAD, tangents[row, j], tangents[row + 1, j]
+            towards, aside = x - off * y, y + off * x
             touch = math.sqrt(touch2)
             clear, met = first_met(places, block, circles, east, north, towards, aside)
             looked += 1
             if clear >= touch:
-                again = hugged(own, east, north, towards, aside, outer, touch)
-                edges[count] = (towards, aside, touch, clear, side, again)
+                edges[count, 0], edges[count, 1], edges[count, 2] = towards, aside, touch
+                edges[count, 3], edges[count, 4] = clear, side
+                edges[count, 5] = hugged(own, east, north, towards, aside, outer, touch)
                 count += 1
             if clear < touch + places[2, met] and not (hides and hiding[hides - 1] == labels[met]):
                 hiding[hides] = labels[met]
@@ -255,3 +299,17 @@ def encircled(loop: FloatArray, points: FloatArray) -> BoolArray:
                 odd[i] = not odd[i]
         before = corner
     return odd
+
+
+@compiled(ROWS, COUNTS, ROWS, FLOAT, FLOAT)
+def too_near(places: FloatArray, first: IntArray, circles: FloatArray, east: float, north: float) -> bool:
+    """Whether a place is nearer to a point, of those by squares, than is to be kept from it."""
+    for block in range(len(first) - 1):
+        dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
+        if dx * dx + dy * dy >= reach * reach:
+            continue
+        for k in range(first[block], first[block + 1]):
+            dx, dy, keep = places[0, k] - east, places[1, k] - north, places[2, k]
+            if dx * dx + dy * dy < keep * keep:
+                return True
+    return False

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.geometry.blocks import MOST_BLOCKS, blocks, cells
-from planner.geometry.fans import entered, first_met
+from planner.kernels.buckets import MOST_BUCKETS, bucketed, cells_of
+from planner.kernels.fans import entered, first_met
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -19,7 +19,9 @@ SEEDS = st.integers(0, 2**32 - 1)
 def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count: int, side: float) -> None:
     points = np.random.default_rng(seed).uniform(-4000.0, 4000.0, (count, 2))
     some = np.arange(3, 3 + count)
-    members, (first, counts, one, other) = cells(np.concatenate((np.full((3, 2), 1e6), points)), some, side)
+    members, (first, counts, one, other) = cells_of(
+        np.concatenate((np.full((3, 2), 1e6), points)), some, side
+    )
     assert sorted(members.tolist()) == some.tolist()
     assert first.tolist() == (np.cumsum(counts) - counts).tolist()
     in_square = np.repeat(np.floor(points[members[first] - 3] / side), counts, axis=0)
@@ -41,14 +43,14 @@ def test_squares_hold_each_point_once_and_know_their_neighbours(seed: int, count
 def test_circles_hold_what_is_kept_from_their_points(seed: int, count: int, side: float) -> None:
     rng = np.random.default_rng(seed)
     points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
-    order, (held, first, circles) = blocks(points, keep, side)
+    order, (held, first, circles) = bucketed(points, keep, side)
     assert sorted(order.tolist()) == list(range(count))
     np.testing.assert_array_equal(held, np.vstack((points.T, keep))[:, order])
     assert (first[0], first[-1], len(first)) == (0, count, len(circles.T) + 1)
     about = np.repeat(circles, np.diff(first), axis=1)
     away = np.hypot(*(held[:2] - about[:2]))
     assert (away + held[2] <= about[2] + 1e-9).all()
-    assert len(circles.T) <= 2 * MOST_BLOCKS
+    assert len(circles.T) <= 2 * MOST_BUCKETS
 
 
 @given(seed=SEEDS, count=st.integers(0, 200), bearing=st.floats(-math.pi, math.pi))
@@ -56,7 +58,7 @@ def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, beari
     rng = np.random.default_rng(seed)
     points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
     ux, uy = math.cos(bearing), math.sin(bearing)
-    order, squares = blocks(points, keep, 500.0)
+    order, squares = bucketed(points, keep, 500.0)
     distance, met = first_met(*squares, 100.0, -50.0, ux, uy)
     away = points - (100.0, -50.0)
     ahead, beside = away @ (ux, uy), away @ (uy, -ux)
@@ -70,7 +72,7 @@ def test_a_ray_meets_what_it_meets_among_all_points(seed: int, count: int, beari
 def test_a_line_enters_what_it_enters_among_all_points(seed: int, count: int, length: float) -> None:
     rng = np.random.default_rng(seed)
     points, keep = rng.uniform(-4000.0, 4000.0, (count, 2)), rng.uniform(0.0, 300.0, count)
-    whole, parts = blocks(points, keep, 20_000.0), blocks(points, keep, 500.0)
+    whole, parts = bucketed(points, keep, 20_000.0), bucketed(points, keep, 500.0)
     line = 100.0, -50.0, 100.0 + length, -50.0
     found = [
         dict(zip(order[which].tolist(), entry.tolist(), strict=True))

@@ -1,0 +1,147 @@
+"""Edge points by squares of the plane, so that a question about a few of them does not go through all.
+
+Compiled: see `planner.kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planner.compiled import COUNT, COUNTS, FLOAT, FLOATS, ROWS, compiled
+from planner.interface import FloatArray, IntArray
+
+MOST_BUCKETS = 4096
+"""Where the squares would be more, over all of the ground, they are made larger."""
+
+Cells = tuple[IntArray, IntArray, IntArray, IntArray]
+"""(c,) where each square begins among gathered points; (c,) how many it has; (p,) twice: squares that touch each other,
+diagonally too, each pair once."""
+
+Buckets = tuple[FloatArray, IntArray, FloatArray]
+"""(3, m) east and north of points by squares and the distance to be kept from each; (b + 1,) where each square begins
+among them, and the end; (3, b) centre and radius of a circle about each that holds what is to be kept from them. m."""
+
+
+def cells_of(points: FloatArray, some: IntArray, side: float) -> tuple[IntArray, Cells]:
+    """Some points by squares: what lies in one of them is looked at as one piece of wall.
+
+    Args:
+        points: (n, 2) all points, m.
+        some: (m,) indices of those that are gathered, at least one.
+        side: of the squares, m.
+
+    Returns:
+        (m,) the indices, those of a square next to each other; where the squares begin, and which touch.
+    """
+    squares = np.floor(points[some] / side).astype(np.int64)
+    squares -= squares.min(axis=0) - 1
+    width = int(squares[:, 1].max()) + 2
+    keys = squares @ (width, 1)
+    order = np.argsort(keys, kind="stable")
+    return some[order], _touching(keys[order], width)
+
+
+@compiled(COUNTS, COUNT)
+def _touching(keys: IntArray, width: int) -> Cells:
+    """Where squares begin, how many points each has, and which touch.
+
+    Args:
+        keys: (m,) the square of each point, column times width and row added; sorted.
+        width: rows side by side, one more than there are.
+    """
+    count = 1
+    for j in range(1, len(keys)):
+        if keys[j] != keys[j - 1]:
+            count += 1
+    first, counts = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
+    at = 0
+    first[0] = 0
+    for j in range(1, len(keys)):
+        if keys[j] != keys[j - 1]:
+            counts[at] = j - first[at]
+            at += 1
+            first[at] = j
+    counts[at] = len(keys) - first[at]
+    one, other = np.empty(4 * count, dtype=np.intp), np.empty(4 * count, dtype=np.intp)
+    pairs = 0
+    for turn in range(4):
+        step = 1 if turn == 0 else width + turn - 2
+        # As one goes on from square to square so does what lies a step further.
+        k = 0
+        for j in range(count):
+            there = keys[first[j]] + step
+            while k < count and keys[first[k]] < there:
+                k += 1
+            if k < count and keys[first[k]] == there:
+                one[pairs], other[pairs] = j, k
+                pairs += 1
+    return first, counts, one[:pairs], other[:pairs]
+
+
+@compiled(ROWS, FLOATS, COUNTS)
+def gathered(points: FloatArray, keep: FloatArray, some: IntArray) -> FloatArray:
+    """(3, k) east and north of k of (n, 2) points, and the distance to be kept from each, one row after the other."""
+    rows = np.empty((3, len(some)))
+    for j in range(len(some)):
+        i = some[j]
+        rows[0, j], rows[1, j], rows[2, j] = points[i, 0], points[i, 1], keep[i]
+    return rows
+
+
+@compiled(ROWS, FLOATS, FLOAT)
+def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArray, Buckets]:
+    """All points by squares.
+
+    Args:
+        points: (m, 2) points, m.
+        keep: (m,) distance to be kept from each, m.
+        side: of the squares, m.
+
+    Returns:
+        (m,) indices, those of a square next to each other; the points in this order.
+    """
+    count, order = len(points), np.empty(len(points), dtype=np.intp)
+    west, south, east, north = math.inf, math.inf, -math.inf, -math.inf
+    for i in range(count):
+        west, east = min(west, points[i, 0]), max(east, points[i, 0])
+        south, north = min(south, points[i, 1]), max(north, points[i, 1])
+    if not count:
+        west = south = east = north = 0.0
+    east, north = east - west, north - south
+    side = max(side, (east + north) / MOST_BUCKETS, math.sqrt(east * north / MOST_BUCKETS))
+    width = int(north / side) + 1
+    begins = np.zeros((int(east / side) + 1) * width + 1, dtype=np.intp)
+    key = np.empty(count, dtype=np.intp)
+    for i in range(count):
+        key[i] = int((points[i, 0] - west) / side) * width + int((points[i, 1] - south) / side)
+        begins[key[i] + 1] += 1
+    used = 0
+    for square in range(1, len(begins)):
+        if begins[square]:
+            used += 1
+        begins[square] += begins[square - 1]
+    first, circles = np.empty(used + 1, dtype=np.intp), np.empty((3, used))
+    at = np.empty(len(begins), dtype=np.intp)
+    at[:] = begins
+    for i in range(count):
+        order[at[key[i]]] = i
+        at[key[i]] += 1
+    used = 0
+    for square in range(len(begins) - 1):
+        if begins[square] == begins[square + 1]:
+            continue
+        x, y = points[order[begins[square]], 0], points[order[begins[square]], 1]
+        xmin, xmax, ymin, ymax, kept = x, x, y, y, 0.0
+        for j in range(begins[square], begins[square + 1]):
+            i = order[j]
+            xmin, xmax = min(xmin, points[i, 0]), max(xmax, points[i, 0])
+            ymin, ymax = min(ymin, points[i, 1]), max(ymax, points[i, 1])
+            kept = max(kept, keep[i])
+        circles[0, used], circles[1, used] = 0.5 * (xmin + xmax), 0.5 * (ymin + ymax)
+        circles[2, used] = kept + 0.5 * math.hypot(xmax - xmin, ymax - ymin)
+        first[used] = begins[square]
+        used += 1
+    first[used] = count
+    return order, (gathered(points, keep, order), first, circles)

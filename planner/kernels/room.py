@@ -1,0 +1,79 @@
+"""How near an aircraft comes to edge points that stand and to those that move.
+
+Compiled: see `planner.kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from planner.compiled import COUNTS, FLOAT, ROWS, compiled
+from planner.interface import FloatArray, IntArray
+
+
+@compiled(ROWS, ROWS, COUNTS, ROWS, ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+def room_along(
+    places: FloatArray,
+    still: FloatArray,
+    first: IntArray,
+    circles: FloatArray,
+    moving: FloatArray,
+    step: float,
+    speed: float,
+    least: float,
+    farther: float,
+    earliest: float,
+    latest: float,
+    unknown_s: float,
+) -> float:
+    """How far an aircraft that flies along some places keeps from all edge points, m.
+
+    Args:
+        places: (n, 2) places, in order, one step apart.
+        still: (3, m) edge points that stand, by squares, as `planner.kernels.buckets.Buckets` has them,
+        first: where each square begins among them,
+        circles: and the circle about it.
+        moving: (k, 5) edge points now, their velocity, and how fast they may come nearer beyond that.
+        step: distance between two places, m.
+        speed: of the aircraft, m/s.
+        least: with less room the rest is not looked at, m.
+        farther: for each metre along the way, what is met counts as so much further away.
+        earliest: share of the time at that speed after which the aircraft may be at a place,
+        latest: and until which.
+        unknown_s: an edge point of unknown velocity comes nearer for so long.
+    """
+    room, i, fastest, beside = math.inf, 0, 0.0, 0
+    for j in range(len(moving)):
+        fastest = max(fastest, math.hypot(moving[j, 2], moving[j, 3]) + moving[j, 4])
+    # So much nearer at most something comes from one place to the next.
+    closer = step * (1.0 + latest * fastest / speed)
+    while i < len(places) and room >= least:
+        x, y, later = places[i, 0], places[i, 1], farther * step * i
+        nearest, squared, begin = math.inf, math.inf, beside
+        for k in range(len(first) - 1):
+            block = (begin + k) % (len(first) - 1)
+            dx, dy, reach = circles[0, block] - x, circles[1, block] - y, circles[2, block] + nearest
+            if dx * dx + dy * dy >= reach * reach:
+                continue
+            for j in range(first[block], first[block + 1]):
+                dx, dy = still[0, j] - x, still[1, j] - y
+                if dx * dx + dy * dy < squared:
+                    squared, beside = dx * dx + dy * dy, block
+            nearest = math.sqrt(squared)
+        begins = earliest * step * i / speed
+        lasts = latest * step * i / speed - begins
+        for j in range(len(moving)):
+            # To the line along which the point moves while the aircraft may be here.
+            vx, vy = moving[j, 2] * lasts, moving[j, 3] * lasts
+            dx, dy = moving[j, 0] + moving[j, 2] * begins - x, moving[j, 1] + moving[j, 3] * begins - y
+            share = 0.0
+            if vx != 0.0 or vy != 0.0:
+                share = min(max(-(dx * vx + dy * vy) / (vx * vx + vy * vy), 0.0), 1.0)
+            away = math.hypot(dx + share * vx, dy + share * vy)
+            nearest = min(nearest, away - moving[j, 4] * min(begins + lasts, unknown_s))
+        if nearest == math.inf:
+            break
+        here = nearest + later
+        room = min(room, here)
+        i += max(int((here - room) / closer), 1)
+    return room

@@ -1,0 +1,170 @@
+"""Segments of constant curvature: places along them, and distances to points.
+
+A path is (n, 6) rows, as in `planner.interface.Path`; arc lengths are counted from its start. All in metres.
+
+Compiled: see `planner.kernels`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planner.compiled import COUNT, FLOAT, FLOATS, ROWS, compiled
+from planner.interface import FloatArray
+
+
+@compiled(ROWS, COUNT, FLOAT)
+def place(rows: FloatArray, which: int, along: float) -> tuple[float, float]:
+    """East and north so far along a segment."""
+    x, y, tx, ty = rows[which, 0], rows[which, 1], rows[which, 2], rows[which, 3]
+    half = 0.5 * rows[which, 4] * along
+    chord = along * (math.sin(half) / half if half else 1.0)
+    cos, sin = math.cos(half), math.sin(half)
+    return x + chord * (tx * cos - ty * sin), y + chord * (ty * cos + tx * sin)
+
+
+@compiled(ROWS, COUNT, FLOAT, FLOAT)
+def to_segment(rows: FloatArray, which: int, east: float, north: float) -> tuple[float, float]:
+    """Distance of a place to a segment, and how far along it the nearest place is."""
+    tx, ty, curvature, length = rows[which, 2], rows[which, 3], rows[which, 4], rows[which, 5]
+    dx, dy = east - rows[which, 0], north - rows[which, 1]
+    if abs(curvature) <= 1e-12:
+        along = min(max(dx * tx + dy * ty, 0.0), length)
+        return math.hypot(dx - along * tx, dy - along * ty), along
+    side, radius = math.copysign(1.0, curvature), 1.0 / abs(curvature)
+    # Radial unit vector at the start, seen from the centre, and the tangent in the sense of travel.
+    rx, ry = side * ty, -side * tx
+    dx, dy = dx + radius * rx, dy + radius * ry
+    sweep = length / radius
+    turn = math.atan2(dx * tx + dy * ty, dx * rx + dy * ry) % math.tau
+    if turn > sweep:
+        # Beyond the end the nearer end counts: the middle of the part not swept parts the two.
+        turn = 0.0 if turn > 0.5 * (sweep + math.tau) else sweep
+    cos, sin = radius * math.cos(turn), radius * math.sin(turn)
+    return math.hypot(dx - (cos * rx + sin * tx), dy - (cos * ry + sin * ty)), turn * radius
+
+
+@compiled(ROWS, ROWS)
+def distances(rows: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(m,) distance of each of (m, 2) points to a path, and (m,) arc length of the nearest place."""
+    nearest, arc_lengths = np.full(len(points), np.inf), np.zeros(len(points))
+    begins = 0.0
+    for which in range(len(rows)):
+        for i in range(len(points)):
+            distance, along = to_segment(rows, which, points[i, 0], points[i, 1])
+            if distance < nearest[i]:
+                nearest[i], arc_lengths[i] = distance, begins + along
+        begins += rows[which, 5]
+    return nearest, arc_lengths
+
+
+@compiled(ROWS, ROWS, FLOATS, FLOAT)
+def first_breach(rows: FloatArray, points: FloatArray, radius: FloatArray, from_m: float) -> float:
+    """Arc length at which a path is nearest to the first point that it passes within a radius of; infinite: none.
+
+    The radii are one for all points, (1,), or one for each, (m,). What lies before `from_m` does not count.
+    """
+    first, begins, last = math.inf, 0.0, len(radius) - 1
+    for which in range(len(rows)):
+        half = 0.5 * rows[which, 5]
+        east, north = place(rows, which, half)
+        for i in range(len(points)):
+            keep = radius[min(i, last)]
+            dx, dy, reach = points[i, 0] - east, points[i, 1] - north, half + keep
+            if dx * dx + dy * dy >= reach * reach:
+                continue  # most points are out of reach
+            distance, along = to_segment(rows, which, points[i, 0], points[i, 1])
+            # Where a segment is nearest at its start, the path only leads away from there on.
+            if distance < keep and (along > 0.0 or not which) and from_m <= begins + along < first:
+                first = begins + along
+        begins += rows[which, 5]
+    return first
+
+
+@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+def inside_bounds(rows: FloatArray, xmin: float, ymin: float, xmax: float, ymax: float) -> bool:
+    """Whether a path stays inside a rectangle."""
+    for which in range(len(rows) + 1):
+        end = which == len(rows)
+        x, y = place(rows, which - 1, rows[which - 1, 5]) if end else (rows[which, 0], rows[which, 1])
+        if not (xmin <= x <= xmax and ymin <= y <= ymax):
+            return False
+    for which in range(len(rows)):
+        curvature = rows[which, 4]
+        if abs(curvature) <= 1e-12:
+            continue
+        # Between its ends an arc leaves a rectangle only at one of its four outermost points.
+        radius = 1.0 / abs(curvature)
+        center_x = rows[which, 0] - rows[which, 3] / curvature
+        center_y = rows[which, 1] + rows[which, 2] / curvature
+        for sx, sy in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)):
+            x, y = center_x + sx * radius, center_y + sy * radius
+            if xmin <= x <= xmax and ymin <= y <= ymax:
+                continue
+            if to_segment(rows, which, x, y)[0] < 1e-6 * radius:
+                return False
+    return True
+
+
+@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT)
+def to_nearer(points: FloatArray, ax: float, ay: float, bx: float, by: float) -> FloatArray:
+    """(m,) distance of each point to the nearer of two places a and b, m."""
+    away = np.empty(len(points))
+    for i in range(len(points)):
+        ux, uy, vx, vy = points[i, 0] - ax, points[i, 1] - ay, points[i, 0] - bx, points[i, 1] - by
+        away[i] = math.sqrt(min(ux * ux + uy * uy, vx * vx + vy * vy))
+    return away
+
+
+@compiled(ROWS, FLOAT)
+def pose(rows: FloatArray, arc_length: float) -> tuple[float, float, float, float, float]:
+    """Place and tangent at a arc_length, clamped to the ends, and the curvature there."""
+    which, along = 0, max(arc_length, 0.0)
+    while along > rows[which, 5] and which < len(rows) - 1:
+        along -= rows[which, 5]
+        which += 1
+    along = min(along, rows[which, 5])
+    tx, ty, half = rows[which, 2], rows[which, 3], 0.5 * rows[which, 4] * along
+    chord = along * (math.sin(half) / half if half else 1.0)
+    cos, sin = math.cos(half), math.sin(half)
+    cx, cy = tx * cos - ty * sin, ty * cos + tx * sin  # direction of the chord
+    east, north = rows[which, 0] + chord * cx, rows[which, 1] + chord * cy
+    return east, north, cx * cos - cy * sin, cy * cos + cx * sin, rows[which, 4]
+
+
+@compiled(ROWS, FLOATS)
+def poses_at(rows: FloatArray, arc_lengths: FloatArray) -> FloatArray:
+    """(k, 4) places and tangents at (k,) arc lengths of a path, clamped to its ends."""
+    poses = np.empty((len(arc_lengths), 4))
+    for i in range(len(arc_lengths)):
+        poses[i, 0], poses[i, 1], poses[i, 2], poses[i, 3], _ = pose(rows, arc_lengths[i])
+    return poses
+
+
+@compiled(ROWS, FLOAT, COUNT)
+def places_along(rows: FloatArray, end: float, pieces: int) -> FloatArray:
+    """(pieces + 1, 2) places along a path, evenly spaced from its start to an arc length."""
+    places = np.empty((pieces + 1, 2))
+    for i in range(pieces + 1):
+        arc_length = i * (end / pieces) if i < pieces else end
+        places[i, 0], places[i, 1], _, _, _ = pose(rows, arc_length)
+    return places
+
+
+@compiled(ROWS, FLOATS, FLOAT, FLOAT)
+def turn_centres(rows: FloatArray, arc_lengths: FloatArray, radius: float, roll: float) -> FloatArray:
+    """(k, 2, 2) centres of the turns off a path at (k,) arc lengths: to the left, and to the right.
+
+    Where the path turns the other way, the turn begins after a straight of length `roll`.
+    """
+    centres = np.empty((len(arc_lengths), 2, 2))
+    for i in range(len(arc_lengths)):
+        x, y, tx, ty, curvature = pose(rows, arc_lengths[i])
+        for k in range(2):
+            aside = radius if k == 0 else -radius
+            ahead = roll if aside * curvature < 0.0 else 0.0
+            centres[i, k, 0] = x + ahead * tx - aside * ty
+            centres[i, k, 1] = y + ahead * ty + aside * tx
+    return centres
