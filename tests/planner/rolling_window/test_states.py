@@ -15,6 +15,7 @@ from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import CertificateBroken
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
+from planner.rolling_window.escape import Escape, NoWayToBegin
 from planner.rolling_window.planner import NO_BETTER, NO_WAY_ON, THINKING_ON, RollingWindow, Situation, State
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
@@ -141,9 +142,25 @@ def test_walled_in_at_the_start_a_turn_is_the_escape(ring: MakePoints) -> None:
 
 def test_without_room_for_a_turn_at_the_start_there_is_no_escape(ring: MakePoints) -> None:
     pilot = planner()
-    pilot._proofs.no_way.closed = lambda position: False  # type: ignore[method-assign]
-    answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 250.0, SPACING))))
-    assert (answer.status, pilot.state) == (PlanStatus.NO_PATH, State.ESCAPING)
+    with pytest.raises(NoWayToBegin):
+        pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 250.0, SPACING))))
+    assert pilot.state is State.ESCAPING
+
+
+@pytest.mark.parametrize(
+    ("closed", "status", "state"),
+    [(False, PlanStatus.NO_PATH, State.ESCAPING), (True, PlanStatus.UNREACHABLE, State.PROVING)],
+)
+def test_without_a_plan_the_proof_is_told_where_there_is_no_escape(
+    closed: bool, status: PlanStatus, state: State
+) -> None:
+    pilot, seen = planner(), seen_at_once(np.array([(3000.0, 0.0)]))
+    proved(pilot, no_way=closed)
+    searched_in_vain(pilot)
+    none = Escape(Plan(PlanStatus.NO_PATH, "no room yet"))
+    pilot._escapes.at_start = lambda *_: none  # type: ignore[method-assign]
+    answer = pilot._no_way_found(Situation(first_request(seen), None))
+    assert (answer.status, pilot.state) == (status, state)
 
 
 def test_a_broken_plan_is_escaped_from_while_there_is_a_turn() -> None:
@@ -203,12 +220,6 @@ def test_a_closed_chain_of_edges_is_the_proof_that_there_is_no_way() -> None:
     answer = pilot._no_way_found(now)
     assert (answer.status, pilot.state) == (PlanStatus.UNREACHABLE, State.PROVING)
     assert "no gap in it is wider than" in answer.reason
-
-
-def test_walled_in_without_a_plan_the_proof_is_told_after_the_escape(ring: MakePoints) -> None:
-    pilot = planner()
-    answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 250.0, SPACING))))
-    assert (answer.status, pilot.state) == (PlanStatus.UNREACHABLE, State.PROVING)
 
 
 def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
