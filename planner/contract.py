@@ -36,7 +36,7 @@ from planner.interface import (
 from planner.plan_checks import checked_plan
 from planner.registry import PlannerKind
 
-Circle = tuple[float, float, float]
+Disc = tuple[float, float, float]
 """East and north of the centre, and radius (m)."""
 
 MISSION = Mission(
@@ -52,7 +52,7 @@ MISSION = Mission(
 )
 START: Point = (1000.0, 1000.0)
 AHEAD: Point = (math.sqrt(0.5), math.sqrt(0.5))
-CIRCLES: tuple[Circle, ...] = ((7000.0, 5000.0, 1500.0), (12_000.0, 8200.0, 900.0), (15_500.0, 9000.0, 800.0))
+CIRCLES: tuple[Disc, ...] = ((7000.0, 5000.0, 1500.0), (12_000.0, 8200.0, 900.0), (15_500.0, 9000.0, 800.0))
 
 ASKED_EVERY_S = 0.5
 AMONG_CIRCLES_S, IN_THE_OPEN_S = 300.0, 1500.0
@@ -73,10 +73,10 @@ class InRange:
     moving: tuple[MovingEdges, ...] = ()
     last_contradiction_s = -math.inf
 
-    def __init__(self, circles: Sequence[Circle], range_m: float) -> None:
+    def __init__(self, circles: Sequence[Disc], range_m: float) -> None:
         self.revision = 0
         self._circles, self._range = np.array(circles).reshape(-1, 3), range_m
-        self._hidden = np.concatenate([np.zeros((0, 2)), *(outline(*each) for each in circles)])
+        self._hidden = np.concatenate([np.zeros((0, 2)), *(circle_outline(*each) for each in circles)])
         self._shown: list[FloatArray] = []
         self._places = np.zeros((0, 2))
 
@@ -105,7 +105,7 @@ class InRange:
         return free
 
 
-class Given:
+class GivenMap:
     """A seen world of points given beforehand; everything else is free."""
 
     spacing_m = SPACING_M
@@ -126,7 +126,7 @@ class Given:
         return np.ones(len(points_m), dtype=np.bool_)
 
 
-class Flown:
+class ContractFlight:
     """A planner in a closed loop, its paths flown without error.
 
     Attributes:
@@ -134,9 +134,7 @@ class Flown:
         closest_m: smallest distance to the goal.
     """
 
-    def __init__(
-        self, kind: PlannerKind, mission: Mission, circles: Sequence[Circle], seconds: float
-    ) -> None:
+    def __init__(self, kind: PlannerKind, mission: Mission, circles: Sequence[Disc], seconds: float) -> None:
         planner, seen = make(kind, mission), InRange(circles, mission.sensor_range_m)
         self.answers: list[tuple[PlanRequest, Plan]] = []
         self.closest_m = math.inf
@@ -158,7 +156,7 @@ class Flown:
             station += mission.speed_mps * ASKED_EVERY_S
 
 
-def outline(east_m: float, north_m: float, radius_m: float) -> FloatArray:
+def circle_outline(east_m: float, north_m: float, radius_m: float) -> FloatArray:
     """(k, 2) edge points of a circle."""
     angle = np.arange(0.0, math.tau, SPACING_M / radius_m)
     return np.column_stack((east_m + radius_m * np.cos(angle), north_m + radius_m * np.sin(angle)))
@@ -170,8 +168,8 @@ def make(kind: PlannerKind, mission: Mission) -> Planner:
 
 
 @cache
-def _among_circles(kind: PlannerKind, mission: Mission) -> Flown:
-    return Flown(kind, mission, CIRCLES, AMONG_CIRCLES_S)
+def _among_circles(kind: PlannerKind, mission: Mission) -> ContractFlight:
+    return ContractFlight(kind, mission, CIRCLES, AMONG_CIRCLES_S)
 
 
 def arrays_in(value: Any) -> list[FloatArray]:
@@ -227,26 +225,26 @@ class PlannerContract:
 
     def test_an_empty_world_is_flown_to_the_goal(self) -> None:
         """With nothing in the way the goal is reached, and no plan says that there is no way."""
-        flown = Flown(self.kind, self.mission, (), IN_THE_OPEN_S)
+        flown = ContractFlight(self.kind, self.mission, (), IN_THE_OPEN_S)
         assert flown.closest_m <= self.mission.goal_radius_m
         statuses = {answer.status for _, answer in flown.answers}
         assert not statuses & {PlanStatus.NO_PATH, PlanStatus.UNREACHABLE}
 
     def test_never_raises_wherever_the_first_plan_begins(self) -> None:
         """Whatever is seen, and on whatever course: in the open, in a ring, on an edge point, at the border."""
-        ring = outline(3000.0, 3000.0, 900.0)
+        ring = circle_outline(3000.0, 3000.0, 900.0)
         seen = (np.zeros((0, 2)), ring, np.array([self.mission.goal_m]), np.array([START]))
         for course in np.arange(6) * math.tau / 6:
             direction = (math.sin(course), math.cos(course))
             for points in seen:
                 for position in (START, (3000.0, 3000.0), (0.0, 0.0), self.mission.goal_m):
-                    request = PlanRequest(0.0, position, direction, Given(points))
+                    request = PlanRequest(0.0, position, direction, GivenMap(points))
                     assert isinstance(make(self.kind, self.mission).plan(request).status, PlanStatus)
 
     def test_two_instances_give_the_same_plans_bit_for_bit(self) -> None:
         """No clock, no randomness of its own, nothing shared between planners."""
         first = _among_circles(self.kind, self.mission)
-        again = Flown(self.kind, self.mission, CIRCLES, AMONG_CIRCLES_S)
+        again = ContractFlight(self.kind, self.mission, CIRCLES, AMONG_CIRCLES_S)
         assert [bits(answer) for _, answer in again.answers] == [bits(answer) for _, answer in first.answers]
         assert len({answer.status for _, answer in first.answers}) > 1, "it never changes its answer"
 
@@ -298,10 +296,10 @@ class PlannerContract:
 
     def test_what_it_is_given_stays_as_it_is(self) -> None:
         """Neither the points given nor a plan handed out changes afterwards, and they share no memory."""
-        points = outline(5000.0, 4000.0, 900.0)
+        points = circle_outline(5000.0, 4000.0, 900.0)
         given = points.copy()
         given.setflags(write=False)
-        planner, seen = make(self.kind, self.mission), Given(given)
+        planner, seen = make(self.kind, self.mission), GivenMap(given)
         plan = planner.plan(PlanRequest(0.0, START, AHEAD, seen))
         assert plan.path is not None
         before = bits(plan)
@@ -313,11 +311,11 @@ class PlannerContract:
 
     def test_a_change_to_what_was_given_does_not_reach_the_planner(self) -> None:
         """It remembers what it was shown, not the array that it was shown in."""
-        points = outline(5000.0, 4000.0, 900.0)
+        points = circle_outline(5000.0, 4000.0, 900.0)
         spoilt = points.copy()
         answers = []
         for given in (spoilt, points):
-            planner, seen = make(self.kind, self.mission), Given(given)
+            planner, seen = make(self.kind, self.mission), GivenMap(given)
             plan = planner.plan(PlanRequest(0.0, START, AHEAD, seen))
             assert plan.path is not None
             spoilt[:] = 0.0

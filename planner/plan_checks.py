@@ -19,7 +19,7 @@ import numpy as np
 
 from planner.interface import NOT_UNIT, FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
 
-MOST_LETTERS = 2000
+MOST_REASON_LETTERS = 2000
 """A reason is one sentence, no longer than this."""
 
 MOST_SEGMENTS = 100_000
@@ -86,9 +86,9 @@ def checked_plan(answer: object, position_m: tuple[float, float], mission: Missi
     if not issubclass(type(reason), str):
         raise WrongAnswerError(f"the planner's plan has {_type(reason)} as its reason; it must be a str")
     letters = str.__len__(reason)
-    if letters > MOST_LETTERS:
+    if letters > MOST_REASON_LETTERS:
         raise WrongAnswerError(
-            f"the planner's plan has a reason of {letters:,} characters; it must have at most {MOST_LETTERS:,}"
+            f"the planner's plan has a reason of {letters:,} characters; it must have at most {MOST_REASON_LETTERS:,}"
         )
     if not isinstance(wants_more_time, bool | np.bool_):
         raise WrongAnswerError(

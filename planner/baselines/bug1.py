@@ -21,7 +21,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.baselines.walk import Enclosed, Leg, Mark, PointConfig, Straight, Walker, cut, length_of, mark_at
+from planner.baselines.walk import (
+    Enclosed,
+    Mark,
+    PointConfig,
+    Straight,
+    Walker,
+    WalkLeg,
+    cut,
+    length_of,
+    mark_at,
+)
 from planner.geometry.clearance import distances
 from planner.geometry.curves import Point, Segment, along
 from planner.interface import Path
@@ -66,21 +76,21 @@ class Returning:
     walked_m: float
 
 
-State = Straight | Circling | Returning | Enclosed
+Bug1State = Straight | Circling | Returning | Enclosed
 
 
 class Bug1Config(PointConfig):
     """Keys of `planner.kind: bug1`."""
 
 
-class Bug1(Walker[State]):
+class Bug1(Walker[Bug1State]):
     """The planner for one flight."""
 
-    def begin(self, place: Point) -> State:
+    def begin(self, place: Point) -> Bug1State:
         """Straight to the goal."""
         return Straight()
 
-    def after(self, state: State, flown: Sequence[Segment]) -> State:
+    def after(self, state: Bug1State, flown: Sequence[Segment]) -> Bug1State:
         """Counts what has been followed and remembers Q."""
         if isinstance(state, Circling):
             return self._circled(state, flown)
@@ -88,13 +98,13 @@ class Bug1(Walker[State]):
             return replace(state, walked_m=state.walked_m + length_of(flown))
         return state
 
-    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+    def follows(self, place: Point, state: Bug1State) -> tuple[Point, ...]:
         """The boundary here, and where the way round or back ends."""
         if isinstance(state, Circling | Returning):
             return place, (state.hit if isinstance(state, Circling) else state.q).place
         return ()
 
-    def says(self, state: State) -> str:
+    def says(self, state: Bug1State) -> str:
         """What the planner does."""
         if isinstance(state, Circling):
             return f"going round an obstacle, {state.walked_m / 1000:.1f} km from the hit point"
@@ -102,16 +112,16 @@ class Bug1(Walker[State]):
             return "returning to the boundary point nearest to the goal"
         return "straight to the goal"
 
-    def walk(self, place: Point, state: State) -> Iterator[Leg[State]]:
+    def walk(self, place: Point, state: Bug1State) -> Iterator[WalkLeg[Bug1State]]:
         """Steps 1 to 3 in turn."""
         left = self.horizon_m
         while left > 0.0:
             if isinstance(state, Enclosed):
-                yield Leg(state)
+                yield WalkLeg(state)
                 return
             if isinstance(state, Straight):
                 line, met = self.straight(place, self.goal)
-                yield Leg(state, line)
+                yield WalkLeg(state, line)
                 if not met:
                     return
                 place = along(line[0], line[0][5])[:2] if line else place
@@ -126,7 +136,7 @@ class Bug1(Walker[State]):
             else:
                 stop = self.passes(segments, state.q, 0.0)
             flown = cut(segments, stop)
-            yield Leg(state, flown)
+            yield WalkLeg(state, flown)
             if math.isinf(stop):
                 return
             left -= stop

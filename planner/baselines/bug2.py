@@ -18,7 +18,17 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from planner.baselines.walk import Enclosed, Leg, Mark, PointConfig, Straight, Walker, cut, length_of, mark_at
+from planner.baselines.walk import (
+    Enclosed,
+    Mark,
+    PointConfig,
+    Straight,
+    Walker,
+    WalkLeg,
+    cut,
+    length_of,
+    mark_at,
+)
 from planner.geometry.curves import Point, Segment, along
 from planner.interface import Mission
 
@@ -27,7 +37,7 @@ PROGRESS_SHARE = 0.05
 
 
 @dataclass(frozen=True)
-class Following:
+class RoundObstacle:
     """On the boundary of an obstacle.
 
     Attributes:
@@ -39,63 +49,63 @@ class Following:
     walked_m: float
 
 
-State = Straight | Following | Enclosed
+Bug2State = Straight | RoundObstacle | Enclosed
 
 
 class Bug2Config(PointConfig):
     """Keys of `planner.kind: bug2`."""
 
 
-class Bug2(Walker[State]):
+class Bug2(Walker[Bug2State]):
     """The planner for one flight."""
 
     def __init__(self, config: Bug2Config, mission: Mission) -> None:
         super().__init__(config, mission)
         self._start = mission.goal_m
 
-    def begin(self, place: Point) -> State:
+    def begin(self, place: Point) -> Bug2State:
         """The M-line begins where the flight does."""
         self._start = place
         return Straight()
 
-    def after(self, state: State, flown: Sequence[Segment]) -> State:
+    def after(self, state: Bug2State, flown: Sequence[Segment]) -> Bug2State:
         """Counts what has been followed."""
-        if isinstance(state, Following):
+        if isinstance(state, RoundObstacle):
             return replace(state, walked_m=state.walked_m + length_of(flown))
         return state
 
-    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+    def follows(self, place: Point, state: Bug2State) -> tuple[Point, ...]:
         """The boundary here, and the hit point."""
-        return (place, state.hit.place) if isinstance(state, Following) else ()
+        return (place, state.hit.place) if isinstance(state, RoundObstacle) else ()
 
-    def says(self, state: State) -> str:
+    def says(self, state: Bug2State) -> str:
         """What the planner does."""
-        if isinstance(state, Following):
+        if isinstance(state, RoundObstacle):
             return f"following a boundary, {state.walked_m / 1000:.1f} km from the hit point"
         return "on the M-line to the goal"
 
-    def walk(self, place: Point, state: State) -> Iterator[Leg[State]]:
+    def walk(self, place: Point, state: Bug2State) -> Iterator[WalkLeg[Bug2State]]:
         """Steps 1 and 2 in turn."""
         left = self.horizon_m
         while True:
-            if isinstance(state, Following):
+            if isinstance(state, RoundObstacle):
                 segments = self.boundary(place, self.side, left)
             else:
                 line, met = self.straight(place, self.goal)
-                yield Leg(state, line)
+                yield WalkLeg(state, line)
                 if not met or left <= 0.0:
                     return
                 place = along(line[0], line[0][5])[:2] if line else place
                 segments = self.boundary(place, self.side, left)
-                state = Following(mark_at(segments, 0.0), 0.0)
+                state = RoundObstacle(mark_at(segments, 0.0), 0.0)
             closed = self.passes(segments, state.hit, self.keep_m - state.walked_m)
             leave = self._leaves(segments, math.dist(state.hit.place, self.goal))
             stop = min(closed, leave)
-            yield Leg(state, cut(segments, stop))
+            yield WalkLeg(state, cut(segments, stop))
             if math.isinf(stop):
                 return
             if closed < leave:
-                yield Leg(Enclosed(f"{self.enclosed()}: back at the hit point without a leave point"))
+                yield WalkLeg(Enclosed(f"{self.enclosed()}: back at the hit point without a leave point"))
                 return
             left -= stop
             place, state = mark_at(segments, stop).place, Straight()

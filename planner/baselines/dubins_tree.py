@@ -21,7 +21,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from planner.baselines.joining import departure, stuck
+from planner.baselines.joining import branch_off, stuck
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, along
 from planner.geometry.margin import MARGIN_KEY, margin_of
@@ -36,7 +36,7 @@ GOAL_COURSES = 8
 ROLLS = 16.0
 """A plan that is blocked further ahead, or holds, is dropped after this share of the sensing range."""
 
-PATH_SHARE = 0.125
+CURVE_SHARE = 0.125
 """Share of the margin that a path keeps."""
 
 ATTEMPTS = ((1.0, 1), (0.5, 4))
@@ -101,7 +101,7 @@ class DubinsTree:
         changed = len(fresh) > 0 or gone != self._gone
         self._gone = gone
         path = request.flown.path if request.flown else None
-        keep = self._mission.clearance_m + PATH_SHARE * self._margin_m
+        keep = self._mission.clearance_m + CURVE_SHARE * self._margin_m
         if request.flown is not self._flown:
             self._flown, self._breach_m, self._searched_at_m = request.flown, math.inf, 0.0
         station = request.arc_length_m
@@ -114,7 +114,7 @@ class DubinsTree:
             if math.isinf(self._breach_m) or not (rolled or self._breach_m - station < self._urgent_m):
                 return Plan(PlanStatus.KEPT, "nothing near blocks the plan in effect")
         self._searched_at_m = station
-        pose, prefix = departure(request, self._mission)
+        pose, prefix = branch_off(request, self._mission)
         poses, ways = self._ways(pose, self._terrain(pose, keep))
         if not ways:
             return stuck("the tree found no way", request, self._mission, self._memory.points_m)
@@ -159,7 +159,7 @@ class DubinsTree:
         there past all that is known, to the goal itself.
         """
         goals, radius = self._goals(pose, self._mission.goal_m), self._mission.turn_radius_m
-        direct = [([pose, goal], joined([pose, goal], radius, terrain)) for goal in goals]
+        direct = [([pose, goal], dubins_chain([pose, goal], radius, terrain)) for goal in goals]
         found = [(poses, ways) for poses, ways in direct if ways]
         if found:
             return min(found, key=lambda each: sum(segment[5] for segment in each[1][0]))
@@ -173,7 +173,7 @@ class DubinsTree:
                 if grown is None:
                     continue
                 for onward in [[]] if ends is goals else [[goal] for goal in goals]:
-                    ways = joined([*grown, *onward], radius, terrain)
+                    ways = dubins_chain([*grown, *onward], radius, terrain)
                     if ways:
                         return [*grown, *onward], ways
                 break
@@ -257,7 +257,7 @@ def is_free(terrain: Terrain, east_m: float, north_m: float) -> bool:
     return inside and not too_near(*terrain.squares, east_m, north_m)
 
 
-def joined(poses: Sequence[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]] | None:
+def dubins_chain(poses: Sequence[Pose], radius_m: float, terrain: Terrain) -> list[list[Segment]] | None:
     """Dubins curves from pose to pose, each on to the furthest that one leads to; None where none leads on."""
     ways: list[list[Segment]] = []
     i = 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.geometry.curves import Limits, Pose, Segment, between, pose_at
 from planner.interface import FloatArray, Mission, Path, Plan, PlanRequest, PlanStatus
-from planner.rolling_window.loiter import hold
+from planner.rolling_window.loiter import divert_to_loiter
 from planner.rolling_window.route_optimisation import Terrain
 
 SHARES = (1.0, 0.5, 0.1)
@@ -41,14 +41,14 @@ def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray
     until = min(path.length_m, station + AHEAD_RADII * limits.radius_m)
     for share in SHARES:
         terrain = Terrain(points_m, np.full(len(points_m), share * mission.clearance_m), mission.bounds_m)
-        turn = hold(path, station, until, limits, terrain)
+        turn = divert_to_loiter(path, station, until, limits, terrain)
         if turn is not None:
             waypoints = np.array([request.position_m, *turn.segments[1:, :2].tolist()])
             return Plan(PlanStatus.FOUND, f"{why}; holding", waypoints, turn)
     return Plan(PlanStatus.NO_PATH, f"{why} and there is no room to hold")
 
 
-def departure(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segment]]:
+def branch_off(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segment]]:
     """Where a new path leaves the one in effect, and the stretch up to there; the aircraft where it is off it.
 
     From a holding turn a new path leaves at once.

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.baselines.walk import Enclosed, Leg, Mark, PointConfig, Walker, cut, length_of, mark_at
+from planner.baselines.walk import Enclosed, Mark, PointConfig, Walker, WalkLeg, cut, length_of, mark_at
 from planner.geometry.curves import Point, Segment, along
 from planner.interface import Mission
 from planner.rolling_window.window import Window
@@ -35,7 +35,7 @@ PROGRESS_SHARE = 0.05
 LOOKS = 40.0
 """The graph is looked at anew this many times in a sensing range, and when the way is blocked."""
 
-BETTER = 0.005
+SHORTER = 0.005
 """A way to the goal is dropped only for one that is shorter by this share."""
 
 SHORTCUTS = 24
@@ -54,8 +54,8 @@ class Toward:
 
 
 @dataclass(frozen=True)
-class Following:
-    """Following a boundary.
+class BoundaryFollowing:
+    """BoundaryFollowing a boundary.
 
     Attributes:
         hit: where it was begun.
@@ -74,11 +74,11 @@ class Following:
     followed_m: float
 
 
-State = Toward | Following | Enclosed
+TangentBugState = Toward | BoundaryFollowing | Enclosed
 
 
 @dataclass(frozen=True)
-class Node:
+class TangentNode:
     """A place V of the local tangent graph, and which obstacle it touches on which side (0: none)."""
 
     place: Point
@@ -91,20 +91,20 @@ class TangentBugConfig(PointConfig):
     """Keys of `planner.kind: tangent_bug`."""
 
 
-class TangentBug(Walker[State]):
+class TangentBug(Walker[TangentBugState]):
     """The planner for one flight."""
 
     def __init__(self, config: TangentBugConfig, mission: Mission) -> None:
         super().__init__(config, mission)
         self._progress_m = PROGRESS_SHARE * self.keep_m
 
-    def begin(self, place: Point) -> State:
+    def begin(self, place: Point) -> TangentBugState:
         """Motion to the goal."""
         return Toward(math.inf)
 
-    def after(self, state: State, flown: Sequence[Segment]) -> State:
+    def after(self, state: TangentBugState, flown: Sequence[Segment]) -> TangentBugState:
         """Moves the anchor along with the aircraft."""
-        if not isinstance(state, Following):
+        if not isinstance(state, BoundaryFollowing):
             return state
         followed = min(state.followed_m, self._nearest_m(state.anchor))
         if not state.on_boundary or not flown:
@@ -112,13 +112,13 @@ class TangentBug(Walker[State]):
         place, walked = mark_at(flown, math.inf).place, state.walked_m + length_of(flown)
         return replace(state, anchor=place, walked_m=walked, followed_m=followed)
 
-    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+    def follows(self, place: Point, state: TangentBugState) -> tuple[Point, ...]:
         """The boundary where it is followed on, and where that began."""
-        return (state.anchor, state.hit.place) if isinstance(state, Following) else ()
+        return (state.anchor, state.hit.place) if isinstance(state, BoundaryFollowing) else ()
 
-    def says(self, state: State) -> str:
+    def says(self, state: TangentBugState) -> str:
         """What the planner does."""
-        if isinstance(state, Following):
+        if isinstance(state, BoundaryFollowing):
             return f"local minimum, following a boundary for {state.walked_m / 1000:.1f} km"
         return "motion to the goal"
 
@@ -126,26 +126,26 @@ class TangentBug(Walker[State]):
         """The graph is looked at several times in a sensing range."""
         return self.mission.sensor_range_m / LOOKS
 
-    def prefers(self, new: tuple[Leg[State], ...], left_m: float) -> bool:
+    def prefers(self, new: tuple[WalkLeg[TangentBugState], ...], left_m: float) -> bool:
         """A change of behaviour, a way across a dent, or a shorter or a free way to the goal."""
         state = new[0].state
-        if isinstance(state, Following):
+        if isinstance(state, BoundaryFollowing):
             return not state.on_boundary and length_of(new[0].segments) > self.look_again_m()
-        was_caught = any(isinstance(leg.state, Following) for leg in self.legs)
-        shorter = sum(length_of(leg.segments) for leg in new) < (1.0 - BETTER) * left_m
+        was_caught = any(isinstance(leg.state, BoundaryFollowing) for leg in self.legs)
+        shorter = sum(length_of(leg.segments) for leg in new) < (1.0 - SHORTER) * left_m
         return was_caught or shorter or math.isfinite(self.breach_m)
 
-    def walk(self, place: Point, state: State) -> Iterator[Leg[State]]:
+    def walk(self, place: Point, state: TangentBugState) -> Iterator[WalkLeg[TangentBugState]]:
         """Steps 1 and 2 in turn."""
-        if isinstance(state, Following) and (node := self._leave(place, state)) is not None:
+        if isinstance(state, BoundaryFollowing) and (node := self._leave(place, state)) is not None:
             way, _ = self.straight(place, node.place)
             state = Toward(state.followed_m)
-            yield Leg(state, way)
+            yield WalkLeg(state, way)
             place = node.place
         while isinstance(state, Toward):
             line, met = self.straight(place, self.goal)
             if not met or length_of(line) >= self.mission.sensor_range_m:
-                yield Leg(state, line)
+                yield WalkLeg(state, line)
                 return
             node = self._best(place, self._nodes(place), state.limit_m)
             slide = self._slide(place, node) if node is not None else ()
@@ -153,12 +153,12 @@ class TangentBug(Walker[State]):
             if math.dist(place, self.goal) - math.dist(onto, self.goal) <= self._progress_m:
                 state = self._caught(place, line, state.limit_m)
             else:
-                yield Leg(state, slide)
+                yield WalkLeg(state, slide)
                 place = onto
-        if isinstance(state, Following):
+        if isinstance(state, BoundaryFollowing):
             yield from self._follow(place, state)
 
-    def _nodes(self, place: Point, also: Point | None = None) -> list[Node]:
+    def _nodes(self, place: Point, also: Point | None = None) -> list[TangentNode]:
         """The local tangent graph: what lies about the obstacle that blocks the goal, and about another one.
 
         Args:
@@ -192,11 +192,11 @@ class TangentBug(Walker[State]):
         share = distance_m / whole
         return place[0] + share * (self.goal[0] - place[0]), place[1] + share * (self.goal[1] - place[1])
 
-    def _node(self, place: Point, touch: Point, side: float) -> Node:
+    def _node(self, place: Point, touch: Point, side: float) -> TangentNode:
         to_goal = math.dist(touch, self.goal)
-        return Node(touch, to_goal, math.dist(place, touch) + to_goal, side)
+        return TangentNode(touch, to_goal, math.dist(place, touch) + to_goal, side)
 
-    def _best(self, place: Point, nodes: list[Node], limit_m: float) -> Node | None:
+    def _best(self, place: Point, nodes: list[TangentNode], limit_m: float) -> TangentNode | None:
         """The node to move to; None at a local minimum."""
         here = math.dist(place, self.goal)
         nearer = []
@@ -208,7 +208,7 @@ class TangentBug(Walker[State]):
                 nearer.append(node)
         return min(nearer, key=lambda node: node.way_m, default=None)
 
-    def _slide(self, place: Point, node: Node) -> tuple[Segment, ...]:
+    def _slide(self, place: Point, node: TangentNode) -> tuple[Segment, ...]:
         """To a node and along the obstacle while that leads nearer to the goal and the goal is behind it."""
         way, met = self.straight(place, node.place)
         if met and length_of(way) < math.dist(place, node.place) - self._progress_m:
@@ -225,14 +225,14 @@ class TangentBug(Walker[State]):
             station += segment[5]
         return cut(segments, station)
 
-    def _caught(self, place: Point, line: Sequence[Segment], limit_m: float) -> Following:
+    def _caught(self, place: Point, line: Sequence[Segment], limit_m: float) -> BoundaryFollowing:
         """A local minimum: the boundary ahead is followed to the side of the better node."""
         nodes = [node for node in self._nodes(place) if node.side]
         side = min(nodes, key=lambda node: node.way_m).side if nodes else self.side
         hit = along(line[0], line[0][5])[:2] if line else place
         first = mark_at(self.boundary(hit, side, self.keep_m), 0.0)
         on_boundary = math.dist(place, hit) < self._progress_m
-        return Following(first, side, hit, 0.0, on_boundary, min(limit_m, self._nearest_m(hit)))
+        return BoundaryFollowing(first, side, hit, 0.0, on_boundary, min(limit_m, self._nearest_m(hit)))
 
     def _nearest_m(self, anchor: Point) -> float:
         """How near to the goal the boundary at a place comes, as far as it has been sensed."""
@@ -242,13 +242,13 @@ class TangentBug(Walker[State]):
         points = self.known.points_m[mine]
         return float((np.hypot(points[:, 0] - east, points[:, 1] - north) - self.known.radii_m[mine]).min())
 
-    def _leave(self, place: Point, state: Following) -> Node | None:
+    def _leave(self, place: Point, state: BoundaryFollowing) -> TangentNode | None:
         """The node to leave the boundary for: d_reach < d_followed."""
         limit = state.followed_m - self._progress_m
         nearer = [node for node in self._nodes(place, state.anchor) if node.to_goal_m < limit]
         return min(nearer, key=lambda node: node.way_m, default=None)
 
-    def _follow(self, place: Point, state: Following) -> Iterator[Leg[State]]:
+    def _follow(self, place: Point, state: BoundaryFollowing) -> Iterator[WalkLeg[TangentBugState]]:
         """Along the boundary, the first part of it cut short by a way across a dent."""
         segments = self.boundary(state.anchor, state.side, self.horizon_m)
         off = math.dist(place, state.anchor) > self._progress_m or not state.on_boundary
@@ -263,17 +263,17 @@ class TangentBug(Walker[State]):
             onto = mark_at(segments, station).place
             way, _ = self.straight(place, onto)
             if off or length_of(way) < station - self._progress_m:
-                yield Leg(replace(state, on_boundary=False), way)
+                yield WalkLeg(replace(state, on_boundary=False), way)
                 skipped = cut(segments, station)
                 if math.isfinite(self.passes(skipped, state.hit, self.keep_m - state.walked_m)):
-                    yield Leg(self._gone_round())
+                    yield WalkLeg(self._gone_round())
                     return
                 state = replace(state, anchor=onto, walked_m=state.walked_m + station)
                 segments = self.boundary(onto, state.side, self.horizon_m)
         closed = self.passes(segments, state.hit, self.keep_m - state.walked_m)
-        yield Leg(replace(state, on_boundary=True), cut(segments, closed))
+        yield WalkLeg(replace(state, on_boundary=True), cut(segments, closed))
         if math.isfinite(closed):
-            yield Leg(self._gone_round())
+            yield WalkLeg(self._gone_round())
 
     def _gone_round(self) -> Enclosed:
         return Enclosed(f"{self.enclosed()}: its whole boundary has been gone round")

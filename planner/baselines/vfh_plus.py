@@ -23,7 +23,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.baselines.joining import departure, stuck
+from planner.baselines.joining import branch_off, stuck
 from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import SHORTEST_M, Limits, Point, Pose, Segment, turn_onto
 from planner.geometry.margin import MARGIN_KEY, margin_of
@@ -106,7 +106,7 @@ class VfhPlus:
         """One histogram, one direction; a path only where the direction is a new one."""
         self._memory.take_in(request.seen)
         mission, path = self._mission, request.flown.path if request.flown else None
-        pose, prefix = departure(request, mission)
+        pose, prefix = branch_off(request, mission)
         near = self._near(pose)
         masked = self._masked(pose, near, self._binary(pose, near))
         choice = self._direction(pose, masked)

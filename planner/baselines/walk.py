@@ -34,7 +34,7 @@ SAME_PLACE = 0.5
 """Places on a boundary passed in one sense and nearer than this share of the kept distance are the same: no two
 stretches of a boundary that run the same way can be that near to each other."""
 
-State = TypeVar("State")
+WalkState = TypeVar("WalkState")
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class PointConfig:
 
 
 @dataclass(frozen=True)
-class Leg(Generic[State]):
+class WalkLeg(Generic[WalkState]):
     """A part of a walk on which the state of the algorithm is one.
 
     Attributes:
@@ -72,7 +72,7 @@ class Leg(Generic[State]):
         segments: the way; none where the algorithm ends.
     """
 
-    state: State
+    state: WalkState
     segments: tuple[Segment, ...] = ()
 
 
@@ -105,7 +105,7 @@ class Enclosed:
     sentence: str
 
 
-class Walker(ABC, Generic[State]):
+class Walker(ABC, Generic[WalkState]):
     """The frame of a planner whose vehicle is a point: when to walk anew, and from which state.
 
     Args:
@@ -129,35 +129,35 @@ class Walker(ABC, Generic[State]):
         self._unrest = WorldStability()
         self._tried_again = False
         self._plan: Plan | None = None
-        self.legs: tuple[Leg[State], ...] = ()
+        self.legs: tuple[WalkLeg[WalkState], ...] = ()
         self.breach_m = math.inf
         self._look_at_m = math.inf
 
     @abstractmethod
-    def begin(self, place: Point) -> State:
+    def begin(self, place: Point) -> WalkState:
         """The state at the start of the flight."""
 
     @abstractmethod
-    def after(self, state: State, flown: Sequence[Segment]) -> State:
+    def after(self, state: WalkState, flown: Sequence[Segment]) -> WalkState:
         """The state after a part of a leg."""
 
     @abstractmethod
-    def walk(self, place: Point, state: State) -> Iterable[Leg[State]]:
+    def walk(self, place: Point, state: WalkState) -> Iterable[WalkLeg[WalkState]]:
         """What the algorithm does from a place on, in what is known, leg by leg to the goal or the horizon."""
 
     @abstractmethod
-    def follows(self, place: Point, state: State) -> tuple[Point, ...]:
+    def follows(self, place: Point, state: WalkState) -> tuple[Point, ...]:
         """Where the boundary lies that is followed in a state at a place, and a mark on it; none where none is."""
 
     @abstractmethod
-    def says(self, state: State) -> str:
+    def says(self, state: WalkState) -> str:
         """What the algorithm does in a state, a sentence for the event log."""
 
     def look_again_m(self) -> float:
         """After how much of a walk the algorithm looks round although it can go on (m)."""
         return math.inf
 
-    def prefers(self, new: tuple[Leg[State], ...], left_m: float) -> bool:
+    def prefers(self, new: tuple[WalkLeg[WalkState], ...], left_m: float) -> bool:
         """Whether a new walk is better than the `left_m` that are left of the old one, which can go on."""
         return True
 
@@ -208,7 +208,7 @@ class Walker(ABC, Generic[State]):
         """Whether there is no boundary any more where one was."""
         return math.dist(followed, self.known.seat(followed)[1]) > self.keep_m
 
-    def _state_at(self, path: Path, arc_length_m: float) -> State:
+    def _state_at(self, path: Path, arc_length_m: float) -> WalkState:
         """The state of the algorithm at a station of the path in effect."""
         begin = 0.0
         for leg in self.legs:
@@ -218,7 +218,9 @@ class Walker(ABC, Generic[State]):
             begin = end
         return self.after(leg.state, between(path, begin, arc_length_m))
 
-    def _found(self, legs: tuple[Leg[State], ...], request: PlanRequest, place: Point | None = None) -> Plan:
+    def _found(
+        self, legs: tuple[WalkLeg[WalkState], ...], request: PlanRequest, place: Point | None = None
+    ) -> Plan:
         segments = [segment for leg in legs for segment in leg.segments]
         end = legs[-1].state
         if not segments:
@@ -276,7 +278,7 @@ class Walker(ABC, Generic[State]):
             end = begin + segment[5]
             if end >= from_m:
                 reach = math.dist(segment[:2], mark.place) - segment[5]
-                distance, at = nearest(segment, mark.place) if reach < best else (math.inf, 0.0)
+                distance, at = nearest_on_segment(segment, mark.place) if reach < best else (math.inf, 0.0)
                 if distance < best and _same_way(segment, at, mark) and begin + at >= from_m:
                     best, best_at = distance, begin + at
                 elif math.isfinite(best_at) and begin - best_at > self.keep_m:
@@ -295,7 +297,7 @@ def _same_way(segment: Segment, at_m: float, mark: Mark) -> bool:
     return tx * mark.ux + ty * mark.uy > 0.0
 
 
-def nearest(segment: Segment, place: Point) -> tuple[float, float]:
+def nearest_on_segment(segment: Segment, place: Point) -> tuple[float, float]:
     """Distance of a place from a segment, and where along it (m)."""
     distance, station = distances(Path(np.array([segment])), np.array([place]))
     return float(distance[0]), float(station[0])

@@ -16,14 +16,14 @@ import numpy as np
 from planner.geometry.course import Course
 from planner.interface import FloatArray, Path
 from planner.rolling_window.local_planning import DOUBTED, Attempt, LocalPlanning, Start
-from planner.rolling_window.multi_step_search import Track
-from planner.rolling_window.route_optimisation import Route
+from planner.rolling_window.multi_step_search import Candidate
+from planner.rolling_window.route_optimisation import FlyableRoute
 
 
 class _Found(NamedTuple):
     """A route, where it begins, how far from obstacles it was searched, and among which points."""
 
-    route: Route
+    route: FlyableRoute
     start: Start
     attempt: Attempt
     points_m: FloatArray
@@ -58,7 +58,7 @@ class AnytimeSearch:
         self.known = known
         self.done = False
         self.stuck: Course | None = None
-        self.tracks: list[Track] = []
+        self.tracks: list[Candidate] = []
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
         """Ways found with one more portion of work.
@@ -117,7 +117,7 @@ class AnytimeSearch:
         """Courses along routes, the shorter first, from where a plan would begin now."""
         for each in sorted(found, key=lambda each: each.route.path.length_m):
             start, _ = self._now()
-            route: Route | None = each.route
+            route: FlyableRoute | None = each.route
             if start is not each.start:
                 route = self._local.fitted(start, each.attempt, each.route, each.points_m)
             if route is not None:
@@ -128,12 +128,12 @@ class AnytimeSearch:
         least_m = min((each.route.path.length_m for each in found), default=0.0)
         return least_m > (1.0 + DOUBTED) * min((track.cost_m for track in self.tracks), default=math.inf)
 
-    def _switches(self, route: Route) -> bool:
+    def _switches(self, route: FlyableRoute) -> bool:
         """Whether a way leaves obstacles on the other side than what is flown."""
         start, flown = self._now()
         nodes = (start.pose[:2], *route.nodes)
         return flown is not None and not flown.same_side(nodes, self._local.points_m)
 
-    def _course(self, route: Route, known: int, shortest: bool) -> Course:
+    def _course(self, route: FlyableRoute, known: int, shortest: bool) -> Course:
         path = Path(np.array([*self._now()[0].prefix, *route.path.segments.tolist()]))
         return Course(path, route.nodes, known, shortest)

@@ -37,7 +37,7 @@ until one is among them."""
 
 MOST_STATIONS = 32
 
-AT_ONCE = 4
+ARC_LENGTHS_AT_ONCE = 4
 """So many stations are looked at together: mostly one of the first serves."""
 
 SIDES = (1.0, -1.0)
@@ -108,7 +108,9 @@ class Certifier:
         free_to = min(self.seen_free_to_m(path, seen), to_m)
         step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
         stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
-        for some in (stations[i : i + AT_ONCE] for i in range(0, len(stations), AT_ONCE)):
+        for some in (
+            stations[i : i + ARC_LENGTHS_AT_ONCE] for i in range(0, len(stations), ARC_LENGTHS_AT_ONCE)
+        ):
             free = self._discs_free(path, some, seen).tolist()
             for station, sides_free in zip(some.tolist(), free, strict=True):
                 for side, disc_free in zip(SIDES, sides_free, strict=True):

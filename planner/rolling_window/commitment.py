@@ -15,7 +15,7 @@ from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import Certified, Certifier
 from planner.rolling_window.committed_plan import CommittedPlan
 from planner.rolling_window.local_planning import LocalPlanning, Start
-from planner.rolling_window.multi_step_search import Track
+from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.window import free_sectors, guide_vector
 
 
@@ -39,7 +39,7 @@ class Commitment:
         request: PlanRequest,
         start: Start,
         course: Course,
-        tracks: list[Track],
+        tracks: list[Candidate],
         cut_m: float,
         wants_more_time: bool = False,
     ) -> CommittedPlan | None:
@@ -124,7 +124,7 @@ def picture_of(
     position: Point,
     goal: Point,
     nodes: Sequence[Point],
-    tracks: Iterable[Track],
+    tracks: Iterable[Candidate],
     window_m: float,
     points_m: FloatArray,
     keep_m: float,

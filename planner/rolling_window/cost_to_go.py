@@ -26,7 +26,7 @@ MOST_CELLS = 250_000
 LEAST_M = 1.0
 """Where less is kept, as where start or goal lie at an edge, the grid is made for this."""
 
-AT_ONCE = 20_000
+PAIRS_AT_ONCE = 20_000
 """So many pairs of a point and a cell, or cells that the wave comes to, make one step of work."""
 
 CLOSED, REACHED = 0.002, 0.012
@@ -80,7 +80,7 @@ class CostToGo:
         grid[1:-1, 1:-1] = True
         open_ = grid.ravel()
         width = 2 * int(float(self._keep.max(initial=0.0)) / self._cell) + 3
-        some = max(AT_ONCE // width**2, 1)
+        some = max(PAIRS_AT_ONCE // width**2, 1)
         west, south = self._low.tolist()
         for i in range(0, len(self._points), some):
             points, keep = self._points[i : i + some], self._keep[i : i + some]
@@ -93,7 +93,7 @@ class CostToGo:
         state = np.array((0, 0, 0, 1))
         while state[1] < state[3]:
             before = int(state[3])
-            spread_wave(self._levels, open_, order, state, self._rows, AT_ONCE)
+            spread_wave(self._levels, open_, order, state, self._rows, PAIRS_AT_ONCE)
             self._tally.add(1, REACHED, int(state[3]) - before)
             yield
 

@@ -18,10 +18,10 @@ from planner.rolling_window.certificate import CertificateBroken, Certifier
 from planner.rolling_window.committed_plan import CommittedPlan
 from planner.rolling_window.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
 from planner.rolling_window.local_planning import LocalPlanning
-from planner.rolling_window.loiter import hold
+from planner.rolling_window.loiter import divert_to_loiter
 from planner.rolling_window.route_optimisation import Terrain
 
-HOLD_SHARES = (1.0, 0.5, 0.25)
+LOITER_SHARES = (1.0, 0.5, 0.25)
 """Shares of what paths keep: a turn is sought with one after the other."""
 
 CLEARER = 0.2
@@ -101,16 +101,19 @@ class Escapes:
         self._began_m = self._began_m or request.position_m
         onward_m = self._mission.sensor_range_m
         ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))
-        if hold(ahead, 0.0, onward_m, self._local.limits, self._standing(HOLD_SHARES[-1])) is None:
+        if (
+            divert_to_loiter(ahead, 0.0, onward_m, self._local.limits, self._standing(LOITER_SHARES[-1]))
+            is None
+        ):
             raise NoWayToBegin(NO_ROOM)
         pieces = math.ceil(onward_m / (0.25 * self._local.limits.radius_m))
         if not request.seen.seen_free(places_along(ahead, onward_m, pieces)).any():
             if math.dist(self._began_m, request.position_m) > BLIND * self._mission.clearance_m:
                 raise NoWayToBegin(NOT_SEEN)
             return Escape(Plan(PlanStatus.NO_PATH, NOT_SEEN))
-        for share in HOLD_SHARES:
+        for share in LOITER_SHARES:
             standing = self._standing(share)
-            turn = hold(ahead, 0.0, lead_m, self._local.limits, standing)
+            turn = divert_to_loiter(ahead, 0.0, lead_m, self._local.limits, standing)
             if turn is not None and self._best([_Option(turn)], standing, None, threats, share)[0]:
                 return self._away(request, turn, "no way on can be seen to be safe; turning away")
         return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
@@ -149,7 +152,7 @@ class Escapes:
             if nearer is not None:
                 yield _Option(nearer.path, None, "", nearer)
             yield _Option(left, effect.left(here), GOES_ON)
-            turn = hold(effect.path, here, until_m, self._local.limits, terrain)
+            turn = divert_to_loiter(effect.path, here, until_m, self._local.limits, terrain)
             if turn is not None:
                 yield _Option(turn, None, "no way on can be seen to be safe; turning away")
             if threats is not None:
@@ -158,7 +161,7 @@ class Escapes:
 
         # What hides behind something that moves or has appeared is no better than that: space seen to be free first.
         seen, best, unseen = request.seen if threats else None, None, None
-        for share in HOLD_SHARES:
+        for share in LOITER_SHARES:
             # A turn that keeps so much of all that stands can be flown for ever.
             terrain = self._standing(share)
             best, other = self._best(options(terrain), terrain, seen, threats, share)

@@ -14,9 +14,9 @@ from planner.interface import FloatArray, Mission, Path
 from planner.kernels.segments import to_nearer
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
-from planner.rolling_window.multi_step_search import Track, search
+from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.pose_search import search_poses
-from planner.rolling_window.route_optimisation import Route, Terrain, optimise
+from planner.rolling_window.route_optimisation import FlyableRoute, Terrain, optimise
 from planner.rolling_window.trail import Trail
 from planner.rolling_window.window import PLACE, Tally, Window
 
@@ -154,9 +154,9 @@ class LocalPlanning:
         attempt: Attempt,
         effort: int,
         now: Now,
-        tracks: list[Track],
+        tracks: list[Candidate],
         closed: Callable[[], bool],
-    ) -> Generator[None, None, Route | None]:
+    ) -> Generator[None, None, FlyableRoute | None]:
         """The shortest of the n best tracks, after route optimisation.
 
         What comes in while this goes on is left for the next search: else the shortest way round something that is
@@ -180,7 +180,7 @@ class LocalPlanning:
         labels = self._memory.labels.copy()
         window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.tally)
         begun = start
-        fitted: list[tuple[float, Route]] = []
+        fitted: list[tuple[float, FlyableRoute]] = []
 
         def doubtful() -> bool:
             _, course = now()
@@ -211,11 +211,13 @@ class LocalPlanning:
         routes = (self.fitted(start, attempt, route, points) for _, route in fitted)
         return next((route for route in routes if route is not None), None)
 
-    def fitted(self, start: Start, attempt: Attempt, route: Route, points: FloatArray) -> Route | None:
+    def fitted(
+        self, start: Start, attempt: Attempt, route: FlyableRoute, points: FloatArray
+    ) -> FlyableRoute | None:
         """A route found among (m, 2) points, from where the aircraft has got to; None where it cannot be flown."""
         return self._fit(start, attempt, (start.pose[:2], *route.nodes), points)
 
-    def _reluctance_m(self, track: Track, course: Course | None) -> float:
+    def _reluctance_m(self, track: Candidate, course: Course | None) -> float:
         """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
         if course is not None:
             self.tally.add(4, PLACE, 4 * len(track.nodes) * course.known)
@@ -226,13 +228,13 @@ class LocalPlanning:
 
     def _fit(
         self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
-    ) -> Route | None:
+    ) -> FlyableRoute | None:
         """The curve along a track, from where a plan would begin now."""
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
         return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
 
-    def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
+    def tight_route(self, now: Now) -> Generator[None, None, FlyableRoute | None]:
         """A way found by search over poses, where none through the free sectors can be flown.
 
         While this goes on the aircraft flies the turn that it is in, so that it comes by where the way begins again.
@@ -252,9 +254,9 @@ class LocalPlanning:
         path = Path(np.array([*on, *route.path.segments.tolist()]))
         # What has come in meanwhile may be in its way.
         terrain = self._terrain(begins, self._tight, self._memory.points_m)
-        return Route(route.nodes, path) if terrain.admits(path) else None
+        return FlyableRoute(route.nodes, path) if terrain.admits(path) else None
 
-    def beginning(self, now: Now, track: Track) -> Generator[None, None, Route | None]:
+    def beginning(self, now: Now, track: Candidate) -> Generator[None, None, FlyableRoute | None]:
         """As much of a track as can be flown, where all of it cannot: from there the rest may look otherwise."""
         for end in range(len(track.nodes) - 1, 1, -1):
             start, _ = now()
@@ -284,10 +286,10 @@ class LocalPlanning:
         window: Window,
         attempt: Attempt,
         effort: int,
-        tracks: Sequence[Track],
+        tracks: Sequence[Candidate],
         doubtful: Callable[[], bool],
         closed: Callable[[], bool],
-    ) -> Iterator[Iterator[Track | None]]:
+    ) -> Iterator[Iterator[Candidate | None]]:
         """Searches for the n best tracks, each where those before have not found enough.
 
         Where what was found is doubtful the obstacles around the start are looked at as well: a way out of a pocket
@@ -304,7 +306,7 @@ class LocalPlanning:
 
     def _searched(
         self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
-    ) -> Iterator[Track | None]:
+    ) -> Iterator[Candidate | None]:
         """The n best tracks of one search. None after each step of work."""
         to_go: CostToGo | None = None
         if widening > 1:
@@ -312,7 +314,7 @@ class LocalPlanning:
             to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.tally)
             yield from to_go.spread()
         found = steps_since = 0
-        for track in search(
+        for track in search_candidates(
             window,
             self._mission.goal_m,
             self._mission.bounds_m,

@@ -12,7 +12,7 @@ from planner.interface import Path
 from planner.rolling_window.route_optimisation import Terrain
 
 
-def hold(path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrain) -> Path | None:
+def divert_to_loiter(path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrain) -> Path | None:
     """The path in effect, left as late as may be for a full turn at the minimum radius.
 
     Args:

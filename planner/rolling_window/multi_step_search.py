@@ -27,14 +27,14 @@ BACK_RAD, AWAY_RAD = 2.1, 0.8
 """Largest turn from one step to the next, and largest one away from the obstacle that the last step hugged."""
 
 APART = 0.06
-"""Track points nearer to each other than this share of the distance kept from obstacles are one."""
+"""Candidate points nearer to each other than this share of the distance kept from obstacles are one."""
 
 APART_WIDE = 0.25
 """In a wide search: than this share of the shortest step about a corner, which is to lead on."""
 
 
 @dataclass(frozen=True)
-class Track:
+class Candidate:
     """A track of steps: a candidate or the beginning of one.
 
     Attributes:
@@ -55,7 +55,7 @@ class Track:
         return self.flown_m + self.left_m
 
 
-def search(
+def search_candidates(
     window: Window,
     goal: Point,
     bounds_m: tuple[float, float, float, float],
@@ -67,7 +67,7 @@ def search(
     around: Iterable[int] = (),
     wide: bool = False,
     to_go: CostToGo | None = None,
-) -> Iterator[Track | None]:
+) -> Iterator[Candidate | None]:
     """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
 
     Args:
@@ -90,7 +90,7 @@ def search(
     """
     start = window.center_m
     _, _, straight = guide_vector(start, goal)
-    queue = [(straight if to_go is None else to_go(start), 0, 0, Track((start,), 0.0, straight))]
+    queue = [(straight if to_go is None else to_go(start), 0, 0, Candidate((start,), 0.0, straight))]
     apart_m = APART * outer_m
     if wide:
         kept_m = float(window.keep_m.max(initial=0.0))
@@ -118,7 +118,7 @@ def search(
         count += 1
         if not len(labels):
             heapq.heappush(
-                queue, (track.cost_m, count, depth, Track((*track.nodes, goal), track.cost_m, 0.0))
+                queue, (track.cost_m, count, depth, Candidate((*track.nodes, goal), track.cost_m, 0.0))
             )
             continue
         if depth == steps:
@@ -138,7 +138,7 @@ def search(
                 heapq.heappush(queue, (cost, count, depth + 1, child))
 
 
-def _leads_away(track: Track, edge: SectorEdge) -> bool:
+def _leads_away(track: Candidate, edge: SectorEdge) -> bool:
     """Whether a step leads away from what the last one hugged, or back: a shortest way bends round it."""
     if track.last is None:
         return False
@@ -149,7 +149,7 @@ def _leads_away(track: Track, edge: SectorEdge) -> bool:
     return abs(turn) > BACK_RAD or turn * track.last.side > AWAY_RAD
 
 
-def _step(track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track | None:
+def _step(track: Candidate, edge: SectorEdge, goal: Point, outer_m: float) -> Candidate | None:
     """One step along the edge of a free sector; None where it leads nowhere."""
     here = track.nodes[-1]
     length = min(edge.hugged_m, edge.clear_m - SHORT_OF * outer_m)
@@ -159,7 +159,7 @@ def _step(track: Track, edge: SectorEdge, goal: Point, outer_m: float) -> Track 
     gx, gy, left = guide_vector(here, goal)
     off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
     left = distance_left_m(left, length, off_guide)
-    return Track(
+    return Candidate(
         (*track.nodes, (x, y)), track.flown_m + length, left, edge if length == edge.hugged_m else None
     )
 

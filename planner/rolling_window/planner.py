@@ -7,8 +7,8 @@ effect (`commitment`) which ends in a turn seen to be free, or in the goal circl
 window rolls on. A search that takes long goes on while the plan in effect is flown (`anytime_search`). Where something
 moves or has just appeared, no plan is flown that would meet it, and one that would is left (`escape`, `evasion`).
 
-What is done about the plan in effect is one of five states (`State`). Each is entered by one method, which gives the
-answer: `_follow`, `_loiter`, `_escape`, `_give_up`, `_prove`.
+What is done about the plan in effect is one of five states (`PlanningState`). Each is entered by one method, which
+gives the answer: `_follow`, `_loiter`, `_escape`, `_give_up`, `_prove`.
 
 Why it converges. The search goes through all that is remembered, unseen space taken as free: as long as there is a
 way, the course is a shortest one through what is known. Each course is flown until something seen contradicts it.
@@ -62,7 +62,7 @@ THINKING_ON = "thinking on; the plan in effect goes on"
 NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
 
 
-class State(Enum):
+class PlanningState(Enum):
     """What the planner is doing about the plan in effect."""
 
     FOLLOWING = "following"
@@ -152,7 +152,7 @@ class RollingWindow:
         )
         self._threats: Threats | None = None  # while something moves or has just appeared
         self._loitered: CommittedPlan | None = None  # the last plan whose loiter was entered
-        self.state = State.ESCAPING
+        self.state = PlanningState.ESCAPING
 
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
@@ -239,13 +239,13 @@ class RollingWindow:
 
     def _follow(self, found: CommittedPlan) -> Plan:
         """Any state -> FOLLOWING: a new plan is committed to."""
-        self.state = State.FOLLOWING
+        self.state = PlanningState.FOLLOWING
         self._monitor.proposed = found
         return found.plan
 
     def _prolong(self, now: Situation, start: Start, serving: Course) -> Plan:
         """FOLLOWING -> FOLLOWING: the course in effect serves; more of it is committed to where that is seen free."""
-        self.state = State.FOLLOWING
+        self.state = PlanningState.FOLLOWING
         wants_more_time = self._search.running is not None
         longer = None
         if now.request.scanned:
@@ -262,7 +262,7 @@ class RollingWindow:
 
     def _loiter(self, now: Situation, plan: CommittedPlan) -> None:
         """FOLLOWING -> LOITERING: the aircraft is in its turn. A place that was turned before twice is given up."""
-        self.state = State.LOITERING
+        self.state = PlanningState.LOITERING
         if plan is self._loitered or not plan.course.to_goal:
             return
         self._loitered = plan
@@ -297,7 +297,7 @@ class RollingWindow:
 
     def _escape(self, now: Situation) -> Plan:
         """Any state -> ESCAPING: nothing is certified; a turn that keeps clear is flown, or what does so longest."""
-        self.state = State.ESCAPING
+        self.state = PlanningState.ESCAPING
         if now.plan is None:
             escape = self._escapes.at_start(now.request, self._threats, self._lead_m)
         else:
@@ -347,7 +347,7 @@ class RollingWindow:
         A course that could not be taken is given up after a whole turn before it. Where no course was found, more
         effort is made, and what was given up is tried again, until nothing is left but to call the goal unreachable.
         """
-        self.state = State.GIVING_UP
+        self.state = PlanningState.GIVING_UP
         giving_up, arc_length_m = self._giving_up, now.request.arc_length_m
         turned = giving_up.turned_since(plan.loiter_entry_m, arc_length_m)
         if search.stuck is not None:
@@ -373,6 +373,6 @@ class RollingWindow:
         return self._prove(f"no gap in it has room to turn ({gap_m:.0f} m) or is seen to lead on")
 
     def _prove(self, gaps: str) -> Plan:
-        self.state = State.PROVING
+        self.state = PlanningState.PROVING
         chain = "a closed chain of obstacles lies between the aircraft and the goal"
         return Plan(PlanStatus.UNREACHABLE, f"{chain}: {gaps}")

@@ -16,7 +16,7 @@ import numpy as np
 from planner.geometry.curves import Limits, Point, Pose, Segment, turns_onto
 from planner.geometry.step_model import largest_course_change_rad, step
 from planner.interface import Path
-from planner.rolling_window.route_optimisation import Route, Terrain
+from planner.rolling_window.route_optimisation import FlyableRoute, Terrain
 
 EXPANSIONS = 1000
 """Poses looked at before the search gives up."""
@@ -32,7 +32,7 @@ def search_poses(
     limits: Limits,
     terrain: Terrain,
     to_go: Callable[[Point], float],
-) -> Generator[None, None, Route | None]:
+) -> Generator[None, None, FlyableRoute | None]:
     """The cheapest flyable route by best-first search over (x, y, course), in steps S_0 of one turn radius.
 
     A left turn never follows a right one without a straight step between.
@@ -89,5 +89,5 @@ def search_poses(
     return None
 
 
-def _route(segments: tuple[Segment, ...], end: Point) -> Route:
-    return Route((*(segment[:2] for segment in segments[1:]), end), Path(np.array(segments)))
+def _route(segments: tuple[Segment, ...], end: Point) -> FlyableRoute:
+    return FlyableRoute((*(segment[:2] for segment in segments[1:]), end), Path(np.array(segments)))

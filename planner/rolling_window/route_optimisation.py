@@ -54,8 +54,8 @@ class Terrain:
 
 
 @dataclass(frozen=True)
-class Route:
-    """Track points after the start, and the curve through them."""
+class FlyableRoute:
+    """Candidate points after the start, and the curve through them."""
 
     nodes: tuple[Point, ...]
     path: Path
@@ -75,7 +75,7 @@ def optimise(
     limits: Limits,
     cut_m: float,
     terrain: Terrain,
-) -> Route | None:
+) -> FlyableRoute | None:
     """The curve through the shortcuts of a track, at the minimum turn radius.
 
     All shortcuts are taken first. Where their corners leave no room for the turns, or the curve comes too near
@@ -114,5 +114,5 @@ def optimise(
     for choice, cut, longer_turn, first_radius in choices:
         path = fillet(start, choice, limits, cut, start_curvature, longer_turn, first_radius)
         if path is not None and terrain.admits(path):
-            return Route(tuple(choice), path)
+            return FlyableRoute(tuple(choice), path)
     return None

@@ -14,7 +14,7 @@ import pytest
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanStatus
 from planner.plan_checks import (
     JOIN_M,
-    MOST_LETTERS,
+    MOST_REASON_LETTERS,
     MOST_SEGMENTS,
     START_S,
     WrongAnswerError,
@@ -220,7 +220,7 @@ def test_a_long_path_within_the_bounds_is_taken() -> None:
     plan = checked_plan(found(rows), (0.0, 0.0), MISSION)
     assert plan.path is not None
     assert len(plan.path.segments) == MOST_SEGMENTS
-    assert checked_plan(Plan(PlanStatus.KEPT, "x" * MOST_LETTERS), (0.0, 0.0), MISSION)
+    assert checked_plan(Plan(PlanStatus.KEPT, "x" * MOST_REASON_LETTERS), (0.0, 0.0), MISSION)
 
 
 class Talkative(str):

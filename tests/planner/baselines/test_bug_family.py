@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from planner import contract
 from planner.baselines.bug1 import Bug1, Bug1Config
 from planner.baselines.bug2 import Bug2, Bug2Config, crossings
-from planner.baselines.tangent_bug import Following, TangentBug, TangentBugConfig
+from planner.baselines.tangent_bug import BoundaryFollowing, TangentBug, TangentBugConfig
 from planner.baselines.walk import Enclosed, mark_at
 from planner.geometry.curves import Point, pose_at
 from planner.geometry.margin import margin_of
@@ -356,7 +356,7 @@ def test_a_boundary_that_is_seen_past_the_other_side_has_not_been_followed(
     planner.known.take_in(seen)
     anchor = (10_000.0 + radius * math.cos(turn), 5000.0 + radius * math.sin(turn))
     hit = mark_at(planner.boundary(anchor, side, KEEP), 0.0)
-    legs = list(planner._follow(place, Following(hit, side, anchor, 0.0, False, 7000.0)))
+    legs = list(planner._follow(place, BoundaryFollowing(hit, side, anchor, 0.0, False, 7000.0)))
     assert math.tau * radius < planner.horizon_m
     assert not isinstance(legs[1].state, Enclosed)
 

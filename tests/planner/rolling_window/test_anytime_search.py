@@ -16,8 +16,8 @@ from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdg
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import Attempt, LocalPlanning, Now, Start
-from planner.rolling_window.multi_step_search import Track
-from planner.rolling_window.route_optimisation import Route
+from planner.rolling_window.multi_step_search import Candidate
+from planner.rolling_window.route_optimisation import FlyableRoute
 from planner.rolling_window.window import Tally, Window
 
 MakePoints = Callable[..., FloatArray]
@@ -264,14 +264,14 @@ class TightNearObstacles:
         return [Attempt(60.0, 6.0), Attempt(60.0, 2.4), Attempt(110.0, 6.0)]
 
     def route(
-        self, attempt: Attempt, effort: int, now: Now, tracks: list[Track], closed: Callable[[], bool]
-    ) -> Generator[None, None, Route | None]:
-        tracks.append(Track((START.position, MISSION.goal_m), 6400.0, 0.0))
+        self, attempt: Attempt, effort: int, now: Now, tracks: list[Candidate], closed: Callable[[], bool]
+    ) -> Generator[None, None, FlyableRoute | None]:
+        tracks.append(Candidate((START.position, MISSION.goal_m), 6400.0, 0.0))
         yield
         if attempt.margin_m < 6.0:
             return None
         length = 14_000.0 if attempt.distance_m == 60.0 else 6500.0
-        return Route((MISSION.goal_m,), Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)])))
+        return FlyableRoute((MISSION.goal_m,), Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, length)])))
 
 
 @pytest.mark.parametrize("roomy", [False, True])
@@ -279,12 +279,12 @@ def test_the_widest_ways_are_looked_for_first_where_that_is_asked_for(roomy: boo
     asked: list[Attempt] = []
 
     class InVain(TightNearObstacles):
-        def route(self, attempt: Attempt, *_: object) -> Generator[None, None, Route | None]:
+        def route(self, attempt: Attempt, *_: object) -> Generator[None, None, FlyableRoute | None]:
             asked.append(attempt)
             yield
             return None
 
-        def tight_route(self, now: Now) -> Generator[None, None, Route | None]:
+        def tight_route(self, now: Now) -> Generator[None, None, FlyableRoute | None]:
             yield
             return None
 

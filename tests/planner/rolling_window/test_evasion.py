@@ -16,7 +16,7 @@ from planner.geometry.curves import Limits, onward, pose_at, sample
 from planner.geometry.stations import poses_at
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
 from planner.rolling_window.encounters import EARLIEST, LATEST
-from planner.rolling_window.escape import CLEARER, EVADING_S, HOLD_SHARES
+from planner.rolling_window.escape import CLEARER, EVADING_S, LOITER_SHARES
 from planner.rolling_window.evasion import (
     AHEAD_S,
     LATER,
@@ -237,7 +237,7 @@ def test_where_something_has_appeared_what_is_flown_keeps_away_to_the_end_of_its
         return float(shapely.distance(line, shapely.points(places)).min())
 
     flown = Path(np.array(onward(plan.path, 25.0, plan.path.length_m - 25.0)))
-    least_m = HOLD_SHARES[-1] * pilot._local.path_keeps_m
+    least_m = LOITER_SHARES[-1] * pilot._local.path_keeps_m
     ways = rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits)
     if max(room_m(flown), *(room_m(way) for way in ways)) > least_m + 0.05:
         assert room_m(answer.path or flown) > least_m - 0.05

@@ -11,7 +11,7 @@ import shapely
 
 from planner.geometry.curves import Limits, end_of, pose_at, sample
 from planner.interface import FloatArray, Path
-from planner.rolling_window.loiter import hold
+from planner.rolling_window.loiter import divert_to_loiter
 from planner.rolling_window.route_optimisation import Terrain
 
 MakePoints = Callable[..., FloatArray]
@@ -27,7 +27,7 @@ def terrain(points: FloatArray, bounds: tuple[float, float, float, float] = WIDE
 
 
 def test_in_the_open_the_path_is_flown_as_far_as_it_can_be(assert_flyable: AssertFlyable) -> None:
-    turn = hold(EAST, 300.0, 1000.0, LIMITS, terrain(np.zeros((0, 2))))
+    turn = divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(np.zeros((0, 2))))
     assert turn is not None
     assert turn.loiter
     assert_flyable(turn, 100.0)
@@ -40,7 +40,7 @@ def test_before_a_wall_the_turn_is_begun_where_there_is_room(
     wall: MakePoints, assert_flyable: AssertFlyable
 ) -> None:
     points = wall((1000.0, -800.0), (1000.0, 800.0), 12.0)
-    turn = hold(EAST, 300.0, 950.0, LIMITS, terrain(points))
+    turn = divert_to_loiter(EAST, 300.0, 950.0, LIMITS, terrain(points))
     assert turn is not None
     assert_flyable(turn, 100.0)
     line = shapely.LineString(sample(turn, 20.0, 0.01))
@@ -51,7 +51,7 @@ def test_before_a_wall_the_turn_is_begun_where_there_is_room(
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_it_turns_to_the_side_that_has_room(side: float, wall: MakePoints) -> None:
     points = wall((-500.0, 120.0 * side), (3000.0, 120.0 * side), 12.0)
-    turn = hold(EAST, 300.0, 1000.0, LIMITS, terrain(points))
+    turn = divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(points))
     assert turn is not None
     assert turn.segments[-1, 4] == pytest.approx(-side / 100.0)
 
@@ -61,14 +61,14 @@ def test_a_turn_against_the_one_being_flown_begins_after_the_room_to_roll(
     curvature: float, assert_flyable: AssertFlyable
 ) -> None:
     bent = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 600.0)]))
-    free = hold(bent, 0.0, 500.0, LIMITS, terrain(np.zeros((0, 2))))
+    free = divert_to_loiter(bent, 0.0, 500.0, LIMITS, terrain(np.zeros((0, 2))))
     assert free is not None
     assert free.segments[-1, 4] * curvature > 0.0
     # On the inner side there is no room for the circle anywhere.
     inner = np.array([pose_at(bent, s)[:2] for s in range(-200, 801, 20)])
     courses = [pose_at(bent, s)[2:] for s in range(-200, 801, 20)]
     inner += 120.0 * math.copysign(1.0, curvature) * np.array([(-ty, tx) for tx, ty in courses])
-    turn = hold(bent, 0.0, 500.0, LIMITS, terrain(inner))
+    turn = divert_to_loiter(bent, 0.0, 500.0, LIMITS, terrain(inner))
     assert turn is not None
     assert_flyable(turn, 100.0)
     assert turn.segments[-1, 4] * curvature < 0.0
@@ -77,5 +77,8 @@ def test_a_turn_against_the_one_being_flown_begins_after_the_room_to_roll(
 
 def test_without_room_there_is_none(wall: MakePoints) -> None:
     points = np.concatenate([wall((-900.0, y), (3000.0, y), 12.0) for y in (-120.0, 120.0)])
-    assert hold(EAST, 300.0, 1000.0, LIMITS, terrain(points)) is None
-    assert hold(EAST, 300.0, 1000.0, LIMITS, terrain(np.zeros((0, 2)), (-10.0, -190.0, 2e3, 190.0))) is None
+    assert divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(points)) is None
+    assert (
+        divert_to_loiter(EAST, 300.0, 1000.0, LIMITS, terrain(np.zeros((0, 2)), (-10.0, -190.0, 2e3, 190.0)))
+        is None
+    )

@@ -17,7 +17,7 @@ from planner.geometry.curves import Point
 from planner.interface import FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
-from planner.rolling_window.multi_step_search import Track, search
+from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.window import Tally, Window
 
 MakePoints = Callable[..., FloatArray]
@@ -59,9 +59,9 @@ def tracks_in(
     around: Iterable[int] = (),
     wide: bool = False,
     to_go: CostToGo | None = None,
-) -> list[Track]:
+) -> list[Candidate]:
     """The first dozen tracks, after a look at what is promised of each."""
-    found = search(
+    found = search_candidates(
         window,
         goal,
         bounds,
@@ -283,7 +283,7 @@ def test_the_first_step_may_lead_past_what_does_not_lie_towards_the_goal(
     assert window.nearest_obstacles(1) == [beside]
     assert window.nearest_obstacles(5) == [beside, ahead]
 
-    def passes_the_end_of_the_wall(tracks: list[Track]) -> bool:
+    def passes_the_end_of_the_wall(tracks: list[Candidate]) -> bool:
         return any(math.dist(track.nodes[1], (-3000.0, -2000.0)) < 2.0 * OUTER for track in tracks)
 
     assert not passes_the_end_of_the_wall(tracks_in(window))

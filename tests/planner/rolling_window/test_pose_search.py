@@ -16,7 +16,7 @@ from planner.geometry.curves import Limits, Point, Pose, end_of, sample
 from planner.interface import FloatArray, Path
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.pose_search import AWAY, search_poses
-from planner.rolling_window.route_optimisation import Route, Terrain, optimise
+from planner.rolling_window.route_optimisation import FlyableRoute, Terrain, optimise
 from planner.rolling_window.window import Tally
 
 MakePoints = Callable[..., FloatArray]
@@ -47,7 +47,7 @@ def searched(
     goal: Point,
     points: FloatArray,
     bounds: tuple[float, float, float, float] = WIDE,
-) -> Route | None:
+) -> FlyableRoute | None:
     """What the search finds, led by the distances to go."""
     to_go = distances_to_go(start, goal, points, bounds)
     search = search_poses(start, curvature, goal, LIMITS, terrain(points, bounds), to_go)
@@ -55,7 +55,7 @@ def searched(
         try:
             next(search)
         except StopIteration as end:
-            found: Route | None = end.value
+            found: FlyableRoute | None = end.value
             return found
 
 

@@ -16,7 +16,14 @@ from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import CertificateBroken
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
 from planner.rolling_window.escape import Escape, NoWayToBegin
-from planner.rolling_window.planner import NO_BETTER, NO_WAY_ON, THINKING_ON, RollingWindow, Situation, State
+from planner.rolling_window.planner import (
+    NO_BETTER,
+    NO_WAY_ON,
+    THINKING_ON,
+    PlanningState,
+    RollingWindow,
+    Situation,
+)
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
     SPACING,
@@ -52,7 +59,7 @@ def loitering(mission: Mission = MISSION) -> tuple[RollingWindow, Seen, Plan, fl
     assert plan.path is not None
     entry_m = plan.path.length_m - float(plan.path.segments[-1, 5])
     pilot.plan(request_on(plan, entry_m - 1.0, seen))
-    assert pilot.state is State.FOLLOWING
+    assert pilot.state is PlanningState.FOLLOWING
     return pilot, seen, plan, entry_m
 
 
@@ -77,15 +84,15 @@ def in_the_loiter() -> tuple[RollingWindow, Situation]:
 
 
 def test_before_the_first_plan_nothing_certified_is_flown() -> None:
-    assert planner().state is State.ESCAPING
+    assert planner().state is PlanningState.ESCAPING
 
 
 def test_a_plan_that_is_found_is_followed() -> None:
     seen, pilot = Seen(nothing()), planner()
     plan = flown(pilot, seen)
-    assert pilot.state is State.FOLLOWING
+    assert pilot.state is PlanningState.FOLLOWING
     assert pilot.plan(request_on(plan, 10.0, seen)).status is PlanStatus.KEPT
-    assert pilot.state is State.FOLLOWING
+    assert pilot.state is PlanningState.FOLLOWING
 
 
 def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:
@@ -94,7 +101,7 @@ def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:
     answers = []
     for step in range(1, 80):
         answers.append(pilot.plan(request_on(plan, 100.0 * step, seen)))
-        assert pilot.state is State.FOLLOWING
+        assert pilot.state is PlanningState.FOLLOWING
         if answers[-1].status is PlanStatus.FOUND:
             break
     assert answers[-1].path is not None
@@ -106,9 +113,9 @@ def test_a_plan_that_serves_is_prolonged_and_followed_on() -> None:
 def test_in_its_turn_the_aircraft_loiters() -> None:
     pilot, seen, plan, entry_m = loitering()
     pilot.plan(request_on(plan, entry_m + 10.0, seen))
-    assert pilot.state in (State.LOITERING, State.GIVING_UP)
+    assert pilot.state in (PlanningState.LOITERING, PlanningState.GIVING_UP)
     pilot.plan(request_on(plan, entry_m + 11.0, seen))
-    assert pilot.state is State.LOITERING
+    assert pilot.state is PlanningState.LOITERING
     assert len(pilot._memory.refused_m) == 0
 
 
@@ -118,7 +125,7 @@ def test_a_place_that_was_turned_before_twice_is_given_up_on_entering_the_loiter
     assert len(pilot._memory.refused_m) == 0
     pilot._loitered = None  # as if another plan had come to the same place
     pilot._loiter(now, now.plan)
-    assert pilot.state is State.LOITERING
+    assert pilot.state is PlanningState.LOITERING
     assert len(pilot._memory.refused_m) > 0
 
 
@@ -129,13 +136,13 @@ def test_from_the_loiter_a_way_that_opens_is_followed() -> None:
         if answer.status is PlanStatus.FOUND:
             break
     assert answer.status is PlanStatus.FOUND
-    assert pilot.state is State.FOLLOWING
+    assert pilot.state is PlanningState.FOLLOWING
 
 
 def test_walled_in_at_the_start_a_turn_is_the_escape(ring: MakePoints) -> None:
     pilot = planner()
     answer = pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 900.0, SPACING))))
-    assert pilot.state is State.ESCAPING
+    assert pilot.state is PlanningState.ESCAPING
     assert answer.path is not None
     assert answer.path.loiter
 
@@ -144,15 +151,18 @@ def test_without_room_for_a_turn_at_the_start_there_is_no_escape(ring: MakePoint
     pilot = planner()
     with pytest.raises(NoWayToBegin):
         pilot.plan(first_request(seen_at_once(ring(0.0, 0.0, 250.0, SPACING))))
-    assert pilot.state is State.ESCAPING
+    assert pilot.state is PlanningState.ESCAPING
 
 
 @pytest.mark.parametrize(
     ("closed", "status", "state"),
-    [(False, PlanStatus.NO_PATH, State.ESCAPING), (True, PlanStatus.UNREACHABLE, State.PROVING)],
+    [
+        (False, PlanStatus.NO_PATH, PlanningState.ESCAPING),
+        (True, PlanStatus.UNREACHABLE, PlanningState.PROVING),
+    ],
 )
 def test_without_a_plan_the_proof_is_told_where_there_is_no_escape(
-    closed: bool, status: PlanStatus, state: State
+    closed: bool, status: PlanStatus, state: PlanningState
 ) -> None:
     pilot, seen = planner(), seen_at_once(np.array([(3000.0, 0.0)]))
     proved(pilot, no_way=closed)
@@ -168,7 +178,7 @@ def test_a_broken_plan_is_escaped_from_while_there_is_a_turn() -> None:
     pilot._monitor.broken = True
     searched_in_vain(pilot)
     pilot._no_way_found(now)
-    assert pilot.state is State.ESCAPING
+    assert pilot.state is PlanningState.ESCAPING
 
 
 def test_a_broken_plan_without_an_escape_is_a_broken_certificate(ring: MakePoints) -> None:
@@ -177,7 +187,7 @@ def test_a_broken_plan_without_an_escape_is_a_broken_certificate(ring: MakePoint
     seen.show(np.array(request.position_m) + ring(0.0, 0.0, 60.0, 20.0))
     with pytest.raises(CertificateBroken):
         pilot.plan(request)
-    assert pilot.state is State.ESCAPING
+    assert pilot.state is PlanningState.ESCAPING
 
 
 def test_a_search_that_is_not_done_goes_on_while_the_plan_is_flown() -> None:
@@ -196,7 +206,7 @@ def test_after_a_search_in_vain_more_effort_is_made() -> None:
     pilot._giving_up.effort = 0
     answer = pilot._no_way_found(now)
     assert (answer.status, answer.reason) == (PlanStatus.NO_PATH, NO_WAY_ON)
-    assert pilot.state is State.GIVING_UP
+    assert pilot.state is PlanningState.GIVING_UP
     assert pilot._giving_up.effort == 1
 
 
@@ -209,7 +219,7 @@ def test_a_course_that_cannot_be_entered_is_given_up_after_a_whole_turn(turns: f
     arc_length_m = now.plan.loiter_entry_m + turns * math.tau * MISSION.turn_radius_m
     later = now.request._replace(arc_length_m=arc_length_m)
     pilot._no_way_found(Situation(later, now.plan, on_loiter(now.plan.path, arc_length_m)))
-    assert pilot.state is State.GIVING_UP
+    assert pilot.state is PlanningState.GIVING_UP
     assert (len(pilot._memory.refused_m) > 0) is given_up
 
 
@@ -218,7 +228,7 @@ def test_a_closed_chain_of_edges_is_the_proof_that_there_is_no_way() -> None:
     proved(pilot, no_way=True)
     searched_in_vain(pilot)
     answer = pilot._no_way_found(now)
-    assert (answer.status, pilot.state) == (PlanStatus.UNREACHABLE, State.PROVING)
+    assert (answer.status, pilot.state) == (PlanStatus.UNREACHABLE, PlanningState.PROVING)
     assert "no gap in it is wider than" in answer.reason
 
 
@@ -230,7 +240,7 @@ def test_want_of_room_to_turn_is_proved_after_all_was_tried_again() -> None:
     first = next(i for i, each in enumerate(answers) if each.status is PlanStatus.UNREACHABLE)
     assert first > MOST_RETRIES
     assert "has room to turn (700 m)" in answers[first].reason
-    assert pilot.state is State.PROVING
+    assert pilot.state is PlanningState.PROVING
     assert pilot._giving_up.tried_again
 
 
