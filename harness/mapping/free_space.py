@@ -76,7 +76,8 @@ class FreeSpace:
         if self._needed > MOST_LOOKS or (known and self._needed == 1):
             return
         self._last = (scan.east_m, scan.north_m)
-        reach = self._reach_m(scan)
+        # No cell lies further off than the area is wide.
+        reach = min(self._reach_m(scan), self._cell * math.hypot(self._nx, self._ny))
         if self._reach != reach:
             self._reach, self._disc = reach, _disc(math.ceil(reach / self._cell) + 1)
         # The disc's corner lies at this cell; some of it may lie outside the area.

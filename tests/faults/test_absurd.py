@@ -142,7 +142,7 @@ def test_a_value_beyond_reason_is_refused(
     ("key", "value"),
     [
         ("obstacles[0].circle.radius_m", "1e-9"),
-        ("area.bounds_m", "[-1e6, -1e6, 1e6, 1e6]"),
+        ("area.bounds_m", "[-3e5, -3e5, 3e5, 3e5]"),
         ("sensor.rays", "100000"),
         ("sensor.rate_hz", "120"),
         ("sensor.rate_hz", "0.01"),
