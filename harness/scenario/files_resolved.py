@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -73,7 +74,10 @@ def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:
 
 
 def _path(text: str, folder: Path | None) -> Path:
-    """The file: beside the scenario file, or from here."""
+    """The file: beside the scenario file, or from here; `package:path` lies in an installed package."""
+    package, colon, inner = text.partition(":")
+    if colon and package.isidentifier() and (spec := importlib.util.find_spec(package)) is not None:
+        return Path((spec.submodule_search_locations or [""])[0]) / inner
     if folder is not None:
         try:
             if (beside := folder / Path(text).expanduser()).exists():

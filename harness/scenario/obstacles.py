@@ -100,7 +100,11 @@ KindName = Literal[
 class WorldFile(Section):
     """What of a file of terrain, buildings, airspace, fences or occupancy is solid at the mission's altitude."""
 
-    path: str = key("The file, from the scenario's folder or from here.", min_length=1, max_length=1000)
+    path: str = key(
+        "The file, from the scenario's folder or from here; package:path lies in an installed Python package.",
+        min_length=1,
+        max_length=1000,
+    )
     kind: KindName | None = key("Its kind. Default: told from the file.", default=None)
     vertical_clearance_m: float = key(
         "A part is an obstacle where it reaches into the band of so much below and above mission.altitude_m.",

@@ -127,11 +127,12 @@ def expanded(
     Raises:
         FileFault: a file cannot be used.
     """
+    import shapely
+
     tell = progress or (lambda _: None)
     box = _with_margin(bounds_m)
     loaded: list[tuple[FileSpec, Contents, Mapping]] = []
     for index, spec in enumerate(specs):
-        tell(f"reading {spec.path.name}")
         with _Blaming(index):
             contents = loaded_file(spec.path, spec.kind, spec.reading)
             mapping = Mapping(contents.crs, place, spec.shift_m)
@@ -145,10 +146,7 @@ def expanded(
         tell(f"cutting {spec.path.name} at {altitude_m:g} m")
         with _Blaming(index):
             source = _cut(spec, contents, mapping, field, bounds_m, altitude_m, turn_room_m)
-            corners += sum(
-                len(each.exterior.coords) + sum(len(r.coords) for r in each.interiors)
-                for each in source.polygons
-            )
+            corners += int(shapely.get_num_coordinates(np.array(source.polygons, dtype=object)).sum())
             if corners > MAX_CORNERS or len(source.polygons) > MAX_POLYGONS:
                 raise WorldFileError(
                     f"has {counted(len(source.polygons), 'polygon')} with {corners:,} corners in the area; at most "
@@ -307,13 +305,15 @@ def _heights(
     lowest, highest = HEIGHTS_M
     if not solids:
         return [HEIGHTS_M if cut_m is None else (cut_m, cut_m)] * len(polygons)
-    tree = shapely.STRtree([shapely.point_on_surface(each.shape) for each in solids])
+    tree = shapely.STRtree(shapely.point_on_surface(np.array([each.shape for each in solids], dtype=object)))
     low, high = (np.clip([each[k] for each in solids], lowest, highest) for k in (1, 2))
-    found = []
-    for polygon in polygons:
-        inside = tree.query(polygon, predicate="intersects")
-        found.append((float(low[inside].min()), float(high[inside].max())) if len(inside) else HEIGHTS_M)
-    return found
+    of, inside = tree.query(np.array(polygons, dtype=object), predicate="intersects")
+    bottoms, tops = np.full(len(polygons), np.inf), np.full(len(polygons), -np.inf)
+    np.minimum.at(bottoms, of, low[inside])
+    np.maximum.at(tops, of, high[inside])
+    known = np.isfinite(bottoms)
+    bottoms[~known], tops[~known] = HEIGHTS_M
+    return list(zip(bottoms.tolist(), tops.tolist(), strict=True))
 
 
 def _solid_cells(

@@ -86,24 +86,23 @@ def _covered(
     import shapely
 
     covered = np.zeros((rows, columns), dtype=np.bool_)
-    for polygon in polygons:
-        west, south, east, north = shapely.bounds(polygon)
-        left, right = _span((west - corner[0]) / cell, (east - corner[0]) / cell, columns)
-        low, high = _span((south - corner[1]) / cell, (north - corner[1]) / cell, rows)
-        if left >= right or low >= high:
-            continue
-        if (right - left) * (high - low) > 4:
-            shapely.prepare(polygon)
-        x, y = np.meshgrid(
-            corner[0] + (np.arange(left, right) + 0.5) * cell, corner[1] + (np.arange(low, high) + 0.5) * cell
-        )
-        covered[low:high, left:right] |= shapely.contains_xy(polygon, x, y)
-        if edges:
-            points = shapely.get_coordinates(shapely.segmentize(polygon.boundary, cell / 2))
-            column = np.floor((points[:, 0] - corner[0]) / cell).astype(np.int64)
-            row = np.floor((points[:, 1] - corner[1]) / cell).astype(np.int64)
-            inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
-            covered[row[inside], column[inside]] = True
+    if not len(polygons):
+        return covered
+    shapes = np.array(polygons, dtype=object)
+    cells = (shapely.bounds(shapes) - np.tile(corner, 2)) / cell
+    for index in np.flatnonzero((cells[:, 2:] - cells[:, :2]).min(axis=1) > 1.0).tolist():
+        left, right = _span(cells[index, 0], cells[index, 2], columns)
+        low, high = _span(cells[index, 1], cells[index, 3], rows)
+        if left < right and low < high:
+            shapely.prepare(shapes[index])
+            x, y = np.meshgrid(np.arange(left, right) + 0.5, np.arange(low, high) + 0.5)
+            inside = shapely.contains_xy(shapes[index], corner[0] + cell * x, corner[1] + cell * y)
+            covered[low:high, left:right] |= inside
+    if edges:
+        points = shapely.get_coordinates(shapely.segmentize(shapely.boundary(shapes), cell / 2))
+        column, row = np.floor((points - corner) / cell).astype(np.int64).T
+        kept = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+        covered[row[kept], column[kept]] = True
     return covered
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.world_files.parts import BoolArray, FloatArray
 
@@ -29,12 +30,13 @@ def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
     """
     import shapely
 
-    result = []
-    for polygon in polygons:
+    given = shapely.orient_polygons(np.array(polygons, dtype=object))
+    worth = _improvable(given, tolerance_m)
+    result = list(given[~worth])
+    for polygon in given[worth]:
         budget = MOST_GROWTH * polygon.area / PASSES
-        oriented = shapely.orient_polygons(polygon)
-        shell = shapely.get_coordinates(oriented.exterior)
-        rings = [shapely.get_coordinates(ring) for ring in oriented.interiors]
+        shell = shapely.get_coordinates(polygon.exterior)
+        rings = [shapely.get_coordinates(ring) for ring in polygon.interiors]
         for _ in range(PASSES if tolerance_m > 0 else 1):
             shell, rings = (
                 _filled(shell, tolerance_m, budget),
@@ -47,6 +49,30 @@ def simplified(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
             grown = shapely.union(grown, polygon)
         result += [each for each in shapely.get_parts(grown) if each.geom_type == "Polygon" and each.area > 0]
     return result
+
+
+def _improvable(polygons: NDArray[np.object_], tolerance_m: float) -> BoolArray:
+    """Which of many polygons, their solid on the left, have a corner that could be left out."""
+    import shapely
+
+    found = np.zeros(len(polygons), dtype=np.bool_)
+    if not len(polygons):
+        return found
+    rings, of = shapely.get_rings(polygons, return_index=True)
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    # Of a closed ring its last point is its first: each corner is looked at once, between its neighbours.
+    inner = np.flatnonzero(ring[1:] == ring[:-1])
+    starts = np.append(True, ring[1:] != ring[:-1])
+    last = np.append(np.flatnonzero(starts)[1:], len(points)) - 1
+    before = np.where(starts[inner], last[ring[inner]] - 1, inner - 1)
+    into, on = points[inner] - points[before], points[inner + 1] - points[inner]
+    base = points[inner + 1] - points[before]
+    turn = into[:, 0] * on[:, 1] - into[:, 1] * on[:, 0]
+    depth = np.abs(turn) / np.maximum(np.hypot(base[:, 0], base[:, 1]), 1e-12)
+    straight = ((into * on).sum(axis=1) > 0) & (np.abs(turn) <= STRAIGHT_M * np.hypot(on[:, 0], on[:, 1]))
+    notch = (turn < 0) & (depth <= tolerance_m) if tolerance_m > 0 else np.zeros(len(inner), dtype=np.bool_)
+    found[of[ring[inner[straight | notch]]]] = True
+    return found
 
 
 def _filled(ring: FloatArray, tolerance_m: float, budget_m2: float) -> FloatArray:

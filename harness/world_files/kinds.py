@@ -181,32 +181,22 @@ def _text(path: Path, first: bytes, ending: str) -> str | None:
     return None
 
 
+_JSON_KINDS: Final = (
+    (re.compile(rb'"CityObjects"\s*:'), "cityjson"),
+    (re.compile(rb'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'), "plan_fence"),
+    (re.compile(rb'"UASZoneList"\s*:|"horizontalProjection"\s*:'), "ed269"),
+    (re.compile(rb'"(?:layer|extent)"\s*:\s*\{'), "ed318"),
+    (
+        re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|Polygon|MultiPolygon|GeometryCollection)"'),
+        "geojson",
+    ),
+)
+"""What a JSON file is by what it has somewhere; the first that is found counts."""
+
+
 def _json(path: Path) -> str | None:
-    content = bounded.json_of(path)
-    if not isinstance(content, dict):
-        return None
-    if "CityObjects" in content:
-        return "cityjson"
-    if content.get("fileType") == "Plan" or "geoFence" in content:
-        return "plan_fence"
-    if "UASZoneList" in content:
-        return "ed269"
-    features = content.get("features")
-    if isinstance(features, list) and features and isinstance(features[0], dict):
-        geometry = features[0].get("geometry")
-        if isinstance(geometry, list):
-            return "ed269"
-        geometries = [each.get("geometry") for each in features[:50] if isinstance(each, dict)]
-        return "ed318" if any(_layered(each, 0) for each in geometries) else "geojson"
-    geometric = ("FeatureCollection", "Feature", "Polygon", "MultiPolygon", "GeometryCollection")
-    return "geojson" if content.get("type") in geometric else None
-
-
-def _layered(geometry: object, depth: int) -> bool:
-    """Whether a geometry has the layer or extent of ED-318."""
-    if not isinstance(geometry, dict) or depth > 3:
-        return False
-    if isinstance(geometry.get("layer"), dict) or isinstance(geometry.get("extent"), dict):
-        return True
-    inner = geometry.get("geometries")
-    return isinstance(inner, list) and any(_layered(each, depth + 1) for each in inner[:10])
+    data = bounded.read_bytes(path, bounded.MAX_TREE_BYTES)
+    found = next((kind for pattern, kind in _JSON_KINDS if pattern.search(data)), None)
+    if found is None:
+        bounded.json_of(path)  # says so where it is no JSON at all
+    return found

@@ -90,7 +90,9 @@ def test_the_papers_world_is_near_its_optimum(flown: Flown, tmp_path: Path) -> N
 
 
 @needs_the_judge
-@pytest.mark.parametrize("name", ["paper_circles", "aerosonde_forest", "polygon_town", "one_of_everything"])
+@pytest.mark.parametrize(
+    "name", ["paper_circles", "aerosonde_forest", "polygon_town", "one_of_everything", "jacksboro_terrain"]
+)
 def test_the_judge_finds_no_fault(name: str, flown: Flown) -> None:
     assert judged(flown(name)) == []
 
@@ -102,6 +104,7 @@ def test_the_judge_finds_no_fault(name: str, flown: Flown) -> None:
         # Corners that the map blurs, in gusts.
         ("polygon_town", 1.0, 0.5),
         ("one_of_everything", 1.0, 0.5),
+        ("jacksboro_terrain", 1.0, 0.3),
     ],
 )
 def test_is_reached_with_the_clearance(
@@ -113,6 +116,13 @@ def test_is_reached_with_the_clearance(
     assert run.metrics["min_clearance_m"] >= share_of_clearance * wanted_m
     assert run.metrics["cross_track_m"]["p95"] <= cross_track_p95_m
     assert run.metrics["trackable"] is True
+
+
+def test_real_terrain_is_never_touched(flown: Flown) -> None:
+    run = flown("jacksboro_terrain")
+    assert run.metrics["min_altitude_above_ground_m"] > 10.0
+    (source,) = run.manifest["sources"]
+    assert source["path"].endswith("jacksboro_fault_dem.npz")
 
 
 def test_another_aircraft_flies_the_papers_world(flown: Flown) -> None:

@@ -17,6 +17,7 @@ from harness.world_files.parts import (
     WGS84,
     Contents,
     Datum,
+    FloatArray,
     Limit,
     Part,
     Reading,
@@ -40,19 +41,19 @@ def read(path: Path, reading: Reading) -> Contents:
     notes: list[str] = []
     parts: list[Part] = []
     passed = guessed = bare = 0
-    for tags, geometry, name in _features(content):
-        for one in _simple(geometry, 0):
-            footprint = footprint_of(one)
-            if footprint is None:
-                passed += 1
-            elif limits.is_building(tags):
-                part, guess = limits.building(tags, footprint, reading, name)
-                guessed += guess
-                parts.append(part)
-            else:
-                bare += not limits.has_limits(tags)
-                bottom, top = limits.limits(tags, notes, name)
-                parts.append(Part(footprint, bottom, top, name=name))
+    every = [(tags, name, one) for tags, geometry, name in _features(content) for one in _simple(geometry, 0)]
+    shapes = rings.shapes_of([rings_of(one) for _, _, one in every])
+    for (tags, name, _), footprint in zip(every, shapes, strict=True):
+        if footprint is None:
+            passed += 1
+        elif limits.is_building(tags):
+            part, guess = limits.building(tags, footprint, reading, name)
+            guessed += guess
+            parts.append(part)
+        else:
+            bare += not limits.has_limits(tags)
+            bottom, top = limits.limits(tags, notes, name)
+            parts.append(Part(footprint, bottom, top, name=name))
     if not parts:
         raise WorldFileError("has no polygon; must be GeoJSON with some")
     if guessed:
@@ -168,21 +169,31 @@ def _simple(geometry: Any, depth: int) -> Iterator[dict[str, Any]]:
 
 def footprint_of(geometry: dict[str, Any]) -> Any:
     """The area of a Polygon or MultiPolygon; None of anything else, or without one."""
-    import shapely
+    return rings.shapes_of([rings_of(geometry)])[0]
 
+
+def rings_of(geometry: dict[str, Any]) -> list[list[FloatArray]]:
+    """The rings of each polygon of a geometry; none of what is no Polygon or MultiPolygon."""
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     if kind not in ("Polygon", "MultiPolygon") or not isinstance(coordinates, list):
-        return None
-    shapes = []
-    for polygon in [coordinates] if kind == "Polygon" else coordinates:
-        if not isinstance(polygon, list) or not all(isinstance(ring, list) for ring in polygon):
-            raise WorldFileError("has a polygon whose rings are not lists of positions")
-        closed = [ring for ring in map(places_of, polygon) if len(set(ring)) >= 3]
-        if closed:
-            shapes.append(shapely.Polygon(closed[0], closed[1:]))
-    shapes = [shapely.make_valid(each, method="structure", keep_collapsed=False) for each in shapes]
-    whole = shapes[0] if len(shapes) == 1 else shapely.union_all(shapes)
-    return None if whole.is_empty or whole.area == 0.0 else whole
+        return []
+    polygons = [coordinates] if kind == "Polygon" else coordinates
+    if not all(
+        isinstance(polygon, list) and all(isinstance(r, list) for r in polygon) for polygon in polygons
+    ):
+        raise WorldFileError("has a polygon whose rings are not lists of positions")
+    return [[_places(ring) for ring in polygon] for polygon in polygons if polygon]
+
+
+def _places(positions: list[Any]) -> FloatArray:
+    """(k, 2) the first two numbers of each position."""
+    try:
+        numbers = np.array([each[:2] for each in positions], dtype=np.float64).reshape(-1, 2)
+    except (TypeError, ValueError, IndexError, KeyError) as error:
+        raise WorldFileError("has a position that is not two numbers") from error
+    if not np.isfinite(numbers).all():
+        raise WorldFileError("has a position that is not finite")
+    return numbers
 
 
 def places_of(positions: list[Any]) -> list[rings.Place]:
@@ -191,13 +202,7 @@ def places_of(positions: list[Any]) -> list[rings.Place]:
     Raises:
         WorldFileError: one is not two finite numbers.
     """
-    try:
-        numbers = np.array([(each[0], each[1]) for each in positions], dtype=np.float64).reshape(-1, 2)
-    except (TypeError, ValueError, IndexError, KeyError) as error:
-        raise WorldFileError("has a position that is not two numbers") from error
-    if not np.isfinite(numbers).all():
-        raise WorldFileError("has a position that is not finite")
-    return [(east, north) for east, north in numbers.tolist()]
+    return [(east, north) for east, north in _places(positions).tolist()]
 
 
 def _crs(content: Any) -> str:

@@ -11,9 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from harness.world_files.bounded import read_bytes, xml_events
 from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError, counted
-from harness.world_files.readers import limits
+from harness.world_files.readers import limits, rings
 
 MAX_BYTES: Final = 400_000_000
 AREAS: Final = ("building", "building:part")
@@ -31,11 +33,15 @@ class _Collected:
     def __init__(self, reading: Reading) -> None:
         self.parts: list[Part] = []
         self.reading = reading
+        self._rings: list[tuple[Mapping[str, str], Line, str]] = []
         self.guessed = self.broken = self.closed = 0
 
     def way(self, tags: Mapping[str, str], line: Line, name: str) -> None:
-        """A building that is one way."""
-        self._add(tags, [line], [], name)
+        """A building that is one way; those that are whole rings are made all at once."""
+        if len(line) >= 4 and line[0] == line[-1]:
+            self._rings.append((tags, line, name))
+        else:
+            self._add(tags, [line], [], name)
 
     def relation(
         self, tags: Mapping[str, str], members: Iterable[Member], ways: Mapping[int, Line], name: str
@@ -64,6 +70,14 @@ class _Collected:
         Raises:
             WorldFileError: nothing was.
         """
+        shapes = rings.shapes_of([[[np.array(line)]] for _, line, _ in self._rings])
+        for (tags, _, name), shape in zip(self._rings, shapes, strict=True):
+            if shape is None:
+                self.broken += 1
+                continue
+            part, guessed = limits.building(tags, shape, self.reading, name)
+            self.parts.append(part)
+            self.guessed += guessed
         if not self.parts:
             raise WorldFileError("has no building; must be an extract of OpenStreetMap with some")
         notes = []
@@ -147,7 +161,7 @@ def _area(lines: Sequence[Line]) -> tuple[Any, bool]:
     """The area inside lines that are rings or pieces of them, None without; and whether any had to be closed."""
     import shapely
 
-    rings = [line for line in lines if len(line) >= 4 and line[0] == line[-1]]
+    closed_lines = [line for line in lines if len(line) >= 4 and line[0] == line[-1]]
     pieces = [shapely.LineString(line) for line in lines if len(line) >= 2 and line[0] != line[-1]]
     closed = False
     if pieces:
@@ -156,8 +170,8 @@ def _area(lines: Sequence[Line]) -> tuple[Any, bool]:
             corners = list(chain.coords)
             if len(corners) >= 3:
                 closed |= corners[0] != corners[-1]
-                rings.append(corners)
-    shapes = [shapely.Polygon(ring) for ring in rings]
+                closed_lines.append(corners)
+    shapes = [shapely.Polygon(line) for line in closed_lines]
     valid = [shapely.make_valid(each, method="structure", keep_collapsed=False) for each in shapes]
     whole = valid[0] if len(valid) == 1 else shapely.union_all(valid)
     return (None if whole.is_empty or whole.area == 0.0 else whole), closed

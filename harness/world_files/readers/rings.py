@@ -80,6 +80,43 @@ def ring(places: Sequence[Place]) -> Any:
     return None if shape.is_empty or shape.area == 0.0 else shape
 
 
+def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]]) -> list[Any]:
+    """Shapes of many parts at once: each is some polygons, each polygon its outline and then its holes.
+
+    Args:
+        batch: (k, 2) places of each ring, closed or not; rings with fewer than three places are left out.
+
+    Returns:
+        A valid shapely geometry for each part, None where it has no area.
+    """
+    import shapely
+
+    polygons = [
+        (part, kept)
+        for part, several in enumerate(batch)
+        for rings in several
+        if (kept := [ring for ring in rings if len(ring) >= 3]) and len(rings[0]) >= 3
+    ]
+    found: list[Any] = [None] * len(batch)
+    if not polygons:
+        return found
+    every = [ring for _, rings in polygons for ring in rings]
+    lines = shapely.linearrings(
+        np.concatenate(every), indices=np.repeat(np.arange(len(every)), [len(r) for r in every])
+    )
+    counts = [len(rings) for _, rings in polygons]
+    shapes = shapely.polygons(lines, indices=np.repeat(np.arange(len(polygons)), counts))
+    bad = ~shapely.is_valid(shapes)
+    shapes[bad] = shapely.make_valid(shapes[bad], method="structure", keep_collapsed=False)
+    several: dict[int, list[Any]] = {}
+    for (part, _), shape, area in zip(polygons, shapes, shapely.area(shapes).tolist(), strict=True):
+        if area > 0.0:
+            several.setdefault(part, []).append(shape)
+    for part, pieces in several.items():
+        found[part] = pieces[0] if len(pieces) == 1 else shapely.union_all(pieces)
+    return found
+
+
 def on_earth(longitude: float, latitude: float) -> Place:
     """The place, if it is one.
 

@@ -1,0 +1,174 @@
+"""`wayproof world`: a scenario that flies at once; and a scenario of files that flies alone once it is expanded."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.cli.app import main
+from harness.run.scenario_flight import fly_to_folder
+from harness.run_files.run_folder import load_run
+from harness.scenario.scenario import dump_scenario, load_scenario, parse_scenario
+from harness.world.world import World
+from tests.harness.world_files.making import feature, geojson, geotiff
+
+
+def hill(folder: Path) -> Path:
+    """4 km by 4 km with a hill of 500 m in the middle, in Swiss coordinates."""
+    row, column = np.mgrid[0:400, 0:400]
+    heights = 1000.0 + 500.0 * np.exp(-((row - 200.0) ** 2 + (column - 200.0) ** 2) / 70.0**2)
+    return geotiff(folder / "hill.tif", heights, (781_000.0, 189_500.0), 10.0, 21781)
+
+
+def run_world(out: Path, *arguments: str) -> int:
+    return main(["world", *arguments, "--out", str(out)])
+
+
+def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = hill(tmp_path), tmp_path / "hill.yaml"
+    assert run_world(out, str(path), "--altitude-m", "1250") == 0
+    said = capsys.readouterr()
+    assert "from terrain" in said.out
+    assert "fly it with `wayproof fly" in " ".join(said.out.split())
+    assert said.err == "wayproof: reading hill.tif\nwayproof: cutting hill.tif at 1250 m\n"
+    assert all(len(line) <= 80 for line in said.out.splitlines())
+    scenario = load_scenario(out)
+    (x0, y0), (x1, y1) = scenario.mission.start_m, scenario.mission.goal_m
+    world = World.from_scenario(scenario)
+    middle = world.clearance_at((x0 + x1) / 2, (y0 + y1) / 2, 0.0)
+    assert middle < 0.0  # the straight line goes through the hill
+    folder = tmp_path / "run"
+    figures = fly_to_folder(scenario, folder, recording=False)
+    assert figures["outcome"] == "reached"
+    assert figures["min_altitude_above_ground_m"] > 10.0
+    run = load_run(folder)
+    assert np.isfinite(run.track.altitude_above_ground_m).all()  # type: ignore[arg-type]
+    (source,) = run.manifest["sources"]
+    assert source["sha256"] == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert "file:" not in run.scenario_yaml
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    shutil.copy(folder / "scenario.yaml", alone / "s.yaml")
+    path.unlink()
+    again = fly_to_folder(load_scenario(alone / "s.yaml"), tmp_path / "again", recording=False)
+    assert again["digest"] == figures["digest"]
+    assert again["min_altitude_above_ground_m"] == figures["min_altitude_above_ground_m"]
+
+
+def test_an_expanded_scenario_is_read_back_as_it_was(tmp_path: Path) -> None:
+    out = tmp_path / "hill.yaml"
+    assert run_world(out, str(hill(tmp_path)), "--altitude-m", "1250") == 0
+    scenario = load_scenario(out)
+    assert parse_scenario(dump_scenario(scenario)) == scenario
+    assert scenario.sources is not None
+    assert scenario.sources[0].polygons == len(scenario.obstacles) == 1
+    assert scenario.obstacles[0].heights_m == (1240.0, 1240.0)
+
+
+def test_what_is_solid_follows_the_altitude(tmp_path: Path) -> None:
+    out = tmp_path / "hill.yaml"
+    assert run_world(out, str(hill(tmp_path)), "--altitude-m", "1250") == 0
+
+    def area_m2(altitude_m: str) -> float:
+        import shapely
+
+        loaded = load_scenario(out, [("mission.altitude_m", altitude_m), ("mission.goal_radius_m", "10")])
+        solid = [shapely.Polygon(each.polygon.vertices_m) for each in loaded.obstacles if each.polygon]
+        return float(shapely.area(solid).sum())
+
+    # The hill is 500 exp(-r^2 / 700^2): what reaches to 1240 m is as wide as r^2 = 700^2 ln(500 / 240).
+    assert area_m2("1250") == pytest.approx(math.pi * 700.0**2 * math.log(500 / 240), rel=0.01)
+    assert area_m2("1400") == pytest.approx(math.pi * 700.0**2 * math.log(500 / 390), rel=0.01)
+    assert area_m2("1600") == 0.0
+
+
+def test_start_and_goal_may_be_given_in_degrees(tmp_path: Path) -> None:
+    path = geojson(tmp_path / "a.geojson", feature({"name": "zone"}))
+    out = tmp_path / "zone.yaml"
+    ends = ("--start", "47.005,7.98", "--goal", "47.005,8.03")
+    assert run_world(out, str(path), "--altitude-m", "300", *ends) == 0
+    scenario = load_scenario(out)
+    assert math.dist(scenario.mission.start_m, scenario.mission.goal_m) == pytest.approx(3802.0, rel=0.001)
+    text = out.read_text()
+    start = f"  start_m: [{scenario.mission.start_m[0]}, {scenario.mission.start_m[1]}]"
+    assert start in text
+    out.write_text(text.replace(start, "  start: {latitude_deg: 47.005, longitude_deg: 7.98}"))
+    again = load_scenario(out)
+    assert again.mission.start_m == pytest.approx(scenario.mission.start_m, abs=0.1)
+    assert again.mission.start is None
+    assert "start_m:" in dump_scenario(again)
+
+
+def moving_ai(folder: Path) -> Path:
+    """A map of 32 by 32 cells with a wall in the middle that leaves a gap."""
+    rows = [["."] * 32 for _ in range(32)]
+    for row in range(6, 32):
+        rows[row][16] = "@"
+    path = folder / "wall.map"
+    path.write_text(
+        "type octile\nheight 32\nwidth 32\nmap\n" + "\n".join("".join(row) for row in rows) + "\n"
+    )
+    return path
+
+
+def test_a_map_too_small_names_the_cell_that_would_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = moving_ai(tmp_path), tmp_path / "wall.yaml"
+    assert run_world(out, str(path), "--altitude-m", "300") == 2
+    assert not out.exists()
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert line.startswith(f"{path}: 32 x 32 m, ")
+    assert "too small for aerosonde" in line
+    cell = line.partition("--metres-per-cell ")[2].split()[0]
+    assert run_world(out, str(path), "--altitude-m", "300", "--metres-per-cell", cell) == 0
+    assert load_scenario(out).area.bounds_m[2] == pytest.approx(32.0 * float(cell))
+    assert (
+        run_world(out, str(path), "--altitude-m", "300", "--metres-per-cell", cell, "--aircraft", "c172p")
+        == 2
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--start", "47,8"], "--start and --goal belong together"),
+        (["--start", "47;8", "--goal", "1,2"], "is not A,B"),
+        (["--aircraft", "zeppelin"], "unknown aircraft"),
+        (["--crs", "EPSG:99999"], "which is not known"),
+        (["--start", "48,9", "--goal", "48.1,9"], "lies outside the area"),
+        (["--start", "47.005,8.005", "--goal", "47.005,8.05"], "the scenario would not fly"),
+        (["--altitude-m", "1"], "at least 5"),
+    ],
+)
+def test_bad_usage_is_told_and_nothing_is_written(
+    arguments: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = geojson(tmp_path / "a.geojson", feature({})), tmp_path / "out.yaml"
+    given = ["world", str(path), "--out", str(out), *arguments]
+    assert main([*given, *([] if "--altitude-m" in arguments else ["--altitude-m", "300"])]) == 2
+    assert sentence in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_zones_above_ground_and_terrain_together(tmp_path: Path) -> None:
+    zone: dict[str, Any] = feature(
+        {"name": "over the hill", "lowerLimit": "GND", "upperLimit": "100 m AGL"},
+        [[9.82, 46.80], [9.84, 46.80], [9.84, 46.82], [9.82, 46.82], [9.82, 46.80]],
+    )
+    out = tmp_path / "both.yaml"
+    files = (str(hill(tmp_path)), str(geojson(tmp_path / "zone.geojson", zone)))
+    assert run_world(out, *files, "--altitude-m", "1250") == 0
+    scenario = load_scenario(out)
+    assert scenario.sources is not None
+    assert [each.kind for each in scenario.sources] == ["geotiff", "geojson"]
+    assert json.loads(json.dumps([each.polygons for each in scenario.sources])) == [1, 1]
