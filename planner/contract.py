@@ -28,6 +28,7 @@ from planner.interface import (
     FloatArray,
     Mission,
     MovingEdges,
+    NoWayToBegin,
     Plan,
     Planner,
     PlanRequest,
@@ -231,7 +232,10 @@ class PlannerContract:
         assert not statuses & {PlanStatus.NO_PATH, PlanStatus.UNREACHABLE}
 
     def test_never_raises_wherever_the_first_plan_begins(self) -> None:
-        """Whatever is seen, and on whatever course: in the open, in a ring, on an edge point, at the border."""
+        """Whatever is seen, and on whatever course: in the open, in a ring, on an edge point, at the border.
+
+        Only that there is no way to begin may be raised (`NoWayToBegin`).
+        """
         ring = circle_outline(3000.0, 3000.0, 900.0)
         seen = (np.zeros((0, 2)), ring, np.array([self.mission.goal_m]), np.array([START]))
         for course in np.arange(6) * math.tau / 6:
@@ -239,7 +243,13 @@ class PlannerContract:
             for points in seen:
                 for position in (START, (3000.0, 3000.0), (0.0, 0.0), self.mission.goal_m):
                     request = PlanRequest(0.0, position, direction, GivenMap(points))
-                    assert isinstance(make(self.kind, self.mission).plan(request).status, PlanStatus)
+                    try:
+                        answer = make(self.kind, self.mission).plan(request)
+                    except (
+                        NoWayToBegin
+                    ) as error:  # the one thing that a planner may raise, before its first plan
+                        continue
+                    assert isinstance(answer.status, PlanStatus)
 
     def test_two_instances_give_the_same_plans_bit_for_bit(self) -> None:
         """No clock, no randomness of its own, nothing shared between planners."""

@@ -302,3 +302,7 @@ class Planner(Protocol):
         raised here, ends the flight as `planner_failed` with a sentence that says why.
         """
         ...
+
+
+class NoWayToBegin(RuntimeError):
+    """There is no plan, and there will be none: what is known leaves no room for one, or nothing is seen."""

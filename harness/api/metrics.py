@@ -102,6 +102,7 @@ class LegVerdict(Figures):
         max_airspeed_error_mps: largest absolute error of the airspeed, averaged; None where it is not judged.
         max_load_factor: largest load factor, averaged.
         corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
+        waypoint: number of the mission's waypoint that the leg leads to; None where it is no mission's.
         max_deviation_m: largest distance from the path as given; None where a planner made the path.
         trackable: whether it stayed within all that it may be.
         cause: why not; None where trackable.
@@ -115,6 +116,7 @@ class LegVerdict(Figures):
     max_airspeed_error_mps: float | None = None
     max_load_factor: float | None = None
     corner_cut_m: float | None = None
+    waypoint: int | None = None
     max_deviation_m: float | None = None
     trackable: bool
     cause: str | None = None

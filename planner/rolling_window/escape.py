@@ -12,7 +12,7 @@ import numpy as np
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Segment, onward
 from planner.geometry.stations import places_along
-from planner.interface import MapView, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import CertificateBroken, Certifier
 from planner.rolling_window.committed_plan import CommittedPlan
@@ -41,10 +41,6 @@ be free. A sensor that loses returns takes several scans for that; the start is 
 
 NO_ROOM = "there is no room for a turn at the start"
 NOT_SEEN = "nothing ahead of the aircraft has been seen to be free"
-
-
-class NoWayToBegin(RuntimeError):
-    """There is no plan, and there will be none: what is known leaves no room for one, or nothing is seen."""
 
 
 class _Option(NamedTuple):

@@ -35,9 +35,9 @@ def test_a_path_through_an_obstacle_of_a_scenario_is_told(tmp_path: Path) -> Non
 
 
 def test_what_cannot_be_checked_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "path.txt").touch()
+    (tmp_path / "path.docx").touch()
     with pytest.raises(wayproof.InputError, match="is none of"):
-        wayproof.check(str(tmp_path / "path.txt"))
+        wayproof.check(str(tmp_path / "path.docx"))
     with pytest.raises(wayproof.InputError, match="has the shape"):
         wayproof.check([(0.0, 0.0)])
     with pytest.raises(wayproof.InputError, match="no such file"):

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from planner.geometry.curves import on_loiter
-from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanStatus
+from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Plan, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import CertificateBroken
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
-from planner.rolling_window.escape import Escape, NoWayToBegin
+from planner.rolling_window.escape import Escape
 from planner.rolling_window.planner import (
     NO_BETTER,
     NO_WAY_ON,
