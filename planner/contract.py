@@ -245,9 +245,7 @@ class PlannerContract:
                     request = PlanRequest(0.0, position, direction, GivenMap(points))
                     try:
                         answer = make(self.kind, self.mission).plan(request)
-                    except (
-                        NoWayToBegin
-                    ) as error:  # the one thing that a planner may raise, before its first plan
+                    except NoWayToBegin:  # the one thing that a planner may raise, before its first plan
                         continue
                     assert isinstance(answer.status, PlanStatus)
 
