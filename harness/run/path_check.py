@@ -16,7 +16,8 @@ from harness.analysis.deviation import allowed_m, deviation
 from harness.analysis.metrics import metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.analysis.trackability import AsGiven, FlightLimits
-from harness.flight.closed_loop import Loop, Progress
+from harness.flight.closed_loop import Loop
+from harness.flight.observer import Progress
 from harness.flight.record import Flight, Outcome
 from harness.run.path_flight import fly_along
 from harness.run.path_scenario import has_bounds, scenario_for

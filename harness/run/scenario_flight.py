@@ -22,8 +22,10 @@ from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.analysis.metrics import metrics
 from harness.analysis.trackability import FlightLimits
 from harness.files.errors import WriteError
-from harness.flight.closed_loop import Loop, Observer, Progress, fly
+from harness.flight.closed_loop import Loop, fly
+from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight
+from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
@@ -75,9 +77,9 @@ def make_loop(
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
         guidance=guidance_law(scenario),
+        termination=MissionEnd(world, mission, _given(scenario.mission.time_limit_s)),
         mission=mission,
         altitude_m=scenario.mission.altitude_m,
-        time_limit_s=_given(scenario.mission.time_limit_s),
         scan_rate_hz=scenario.sensor.rate_hz,
     )
 
