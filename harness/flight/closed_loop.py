@@ -180,12 +180,9 @@ class ClosedLoop:
         """Steers along the plan in effect, and logs where the aircraft is and what it is told."""
         loop, plans, true, believed = self._loop, self.plans, self.true, self.believed
         plans.take_effect(believed, loop.guidance)
-        if plans.index >= 0:
-            try:
-                self.steering = loop.guidance.update(believed)
-            except Exception as error:  # a law of somebody else's may raise anything
-                self._law_error = trace(error)
-                return Verdict(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
+        verdict = self._steer()
+        if verdict is not None:
+            return verdict
         loop.model.command(
             self.steering.roll_command_rad,
             # The model holds true values: what it is believed to be off is what it will be off.
@@ -193,6 +190,16 @@ class ClosedLoop:
             self.steering.airspeed_or(loop.mission.speed_mps) + (true.airspeed_mps - believed.airspeed_mps),
         )
         self._log.add(true, self.steering, plans.index)
+        return None
+
+    def _steer(self) -> Verdict | None:
+        """Asks the guidance law, if there is a plan; it may raise anything, which ends the flight."""
+        if self.plans.index >= 0:
+            try:
+                self.steering = self._loop.guidance.update(self.believed)
+            except Exception as error:
+                self._law_error = trace(error)
+                return Verdict(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
         return None
 
     def _advance(self, steps: int) -> Verdict | None:
@@ -216,6 +223,8 @@ class ClosedLoop:
             self._log.add(self.true, self.steering, self.plans.index)
             self._loop.model.advance(self._first_steps)
             self._locate()
+        if verdict.outcome is not Outcome.LOST_CONTROL:
+            self._steer()  # the last row is of the end of the flight, not of the update before
         self._log.add(self.true, self.steering, self.plans.index)
         self.verdict = Verdict(verdict.outcome, verdict.reason + self.plans.last_word(verdict.outcome))
         for observer in self._observers:
