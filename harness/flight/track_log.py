@@ -28,7 +28,7 @@ LOGGED = np.dtype(
 )
 """What is kept of a tick until its block is full."""
 
-PACKED = struct.Struct(f"{len(LOGGED) - 1}dq")
+PACKED = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
 """The same as the standard library writes it."""
 
 NAMES = tuple(LOGGED.fields or ())
@@ -57,7 +57,7 @@ class TrackLog:
         self._clearance, self._ground = clearance, ground
         self._sinks = tuple(sinks)
         self._rows = np.zeros(block_rows, LOGGED)
-        self._bytes, self._used = memoryview(self._rows).cast("B"), 0
+        self._bytes, self._used = self._rows.data.cast("B"), 0
         self._blocks: list[Track] = []
 
     def add(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
