@@ -18,9 +18,9 @@ from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
 
 HELD = {
-    "aerosonde_forest": "32756603418a811b3ef72bae8445f284f22aaced6625d1546d427369abf71330",
-    "polygon_town": "ec575bbed9a4844f7afb963874ed24fe57d66fd04813ebb277c970ba5d8ba571",
-    "one_of_everything": "edd2d01604ff8f4473fd6ea2d049a6cf9a3ec2d2bc2dc8bab41c5c9abf8135c7",
+    "aerosonde_forest": "d151453eb5ac1667971738f38acd6cf14f2a98bd447119c4d4466066028e1cda",
+    "polygon_town": "2b7a09b4b850eb7a27b73a7924864b3bac1969fe7a7aee25addda8b67f83b6dd",
+    "one_of_everything": "98086263ed60ea3b946a9983fa0e74cabeeaf6040c022483619cf1487b13beef",
 }
 """SHA-256 of the first minute of each."""
 
