@@ -78,10 +78,12 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
         flying = ClosedLoop(loop, observers)
         while flying.verdict is None:
             interrupt()
-            flying.step()
-            if progress is not None and (flying.true.time_s >= next_report_s or flying.verdict is not None):
+            if progress is not None and flying.true.time_s >= next_report_s:
                 progress(flying.true.time_s, flying.to_go_m, flying.word)
                 next_report_s = flying.true.time_s + PROGRESS_EVERY_S
+            flying.step()
+        if progress is not None:
+            progress(flying.true.time_s, flying.to_go_m, flying.word)
         return flying.flight()
 
 

@@ -69,7 +69,7 @@ def test_parts_share_the_scenarios_figures() -> None:
     assert (loop.altitude_m, loop.scan_rate_hz) == (400.0, 4.0)
     assert loop.mission.clearance_m == flight_limits(scenario).clearance_m == 150.0
     assert loop.mission.turn_radius_m == performance_of(scenario).turn_radius_m
-    assert len(loop.world.obstacles) == 5
+    assert len(loop.world.obstacles) == 6
 
 
 def fly_for(seconds: float, folder: Path, *, recording: bool = False, **overrides: str) -> dict[str, Any]:
