@@ -140,21 +140,21 @@ class ContractFlight:
         self.answers: list[tuple[PlanRequest, Plan]] = []
         self.closest_m = math.inf
         plan: Plan | None = None
-        station, position, direction = 0.0, START, AHEAD
+        arc_length_m, position, direction = 0.0, START, AHEAD
         for number in range(int(seconds / ASKED_EVERY_S)):
             if plan is not None and plan.path is not None:
-                pose = pose_at(plan.path, on_loiter(plan.path, station))
+                pose = pose_at(plan.path, on_loiter(plan.path, arc_length_m))
                 position, direction = pose[:2], pose[2:]
             self.closest_m = min(self.closest_m, math.dist(position, mission.goal_m))
             if self.closest_m <= mission.goal_radius_m:
                 break
             seen.look(position)
-            request = PlanRequest(ASKED_EVERY_S * number, position, direction, seen, plan, station)
+            request = PlanRequest(ASKED_EVERY_S * number, position, direction, seen, plan, arc_length_m)
             answer = planner.plan(request)
             self.answers.append((request, answer))
             if answer.status is PlanStatus.FOUND:
-                plan, station = answer, 0.0
-            station += mission.speed_mps * ASKED_EVERY_S
+                plan, arc_length_m = answer, 0.0
+            arc_length_m += mission.speed_mps * ASKED_EVERY_S
 
 
 def circle_outline(east_m: float, north_m: float, radius_m: float) -> FloatArray:
@@ -327,9 +327,11 @@ class PlannerContract:
             plan = planner.plan(PlanRequest(0.0, START, AHEAD, seen))
             assert plan.path is not None
             spoilt[:] = 0.0
-            station = 0.4 * plan.path.length_m
-            pose = pose_at(plan.path, station)
-            answers.append(bits(planner.plan(PlanRequest(400.0, pose[:2], pose[2:], seen, plan, station))))
+            arc_length_m = 0.4 * plan.path.length_m
+            pose = pose_at(plan.path, arc_length_m)
+            answers.append(
+                bits(planner.plan(PlanRequest(400.0, pose[:2], pose[2:], seen, plan, arc_length_m)))
+            )
         assert answers[0] == answers[1]
 
     def test_plans_cannot_be_changed(self) -> None:

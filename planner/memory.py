@@ -10,9 +10,9 @@ import numpy as np
 from planner.interface import FloatArray, IntArray, MapView
 
 FIRST_MOVING = -1000
-"""Label of the first obstacle that moves; those of the others are below."""
+"""Label of the first obstacle that moves; the next ones have the numbers below it."""
 MOVED = 0.3
-"""What has moved no further than this share of a cell is left where it was."""
+"""An outline that has moved less than this share of a cell is left where it was."""
 NOTHING = np.zeros((0, 2))
 
 
@@ -20,7 +20,8 @@ class ObstacleMemory:
     """Every edge point seen so far and the obstacle that it belongs to.
 
     Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They
-    are gathered on a grid whose neighbouring cells (diagonals too) are always that near, as they come in.
+    are gathered on a grid whose neighbouring cells (diagonals too) are always that near, as they come in. It has so many
+    attributes because each is one column of the points, which grow by doubling, or one index of the cells.
 
     Args:
         clearance_m: distance to be kept from every point.
@@ -28,10 +29,10 @@ class ObstacleMemory:
 
     def __init__(self, clearance_m: float) -> None:
         self.cell_m = clearance_m / math.sqrt(2.0)
-        self.gone = 0
-        """How many points have been let go of so far: the others have moved up in their order by no more."""
-        self.taken_back = False
-        """Whether any of them had been seen: the sensor errs, or something has gone."""
+        self.cleared = 0
+        """How many edge points have been cleared so far; the others have moved up in their order by no more."""
+        self.ever_cleared = False
+        """Whether an edge point that had been seen was cleared again: the sensor errs, or something has gone."""
         self._outlines: Sequence[FloatArray] = ()
         self._revision = -1
         self._forget()
@@ -131,7 +132,7 @@ class ObstacleMemory:
     def _take_in(self, seen: MapView) -> FloatArray:
         fresh = seen.edges_since(self._revision)
         if seen.last_removal_revision > self._revision >= 0:
-            self.taken_back, known = True, seen.edges_since(-1)
+            self.ever_cleared, known = True, seen.edges_since(-1)
             self._keep_only(known[: len(known) - len(fresh)], self.refused_m)
         self._revision = seen.revision
         if len(fresh):
@@ -140,7 +141,7 @@ class ObstacleMemory:
 
     def _keep_only(self, genuine_m: FloatArray, refused_m: FloatArray) -> None:
         """Gathers what is left into obstacles anew; what was refused comes first, so that nothing else moves up."""
-        self.gone += self._count - len(genuine_m) - len(refused_m)
+        self.cleared += self._count - len(genuine_m) - len(refused_m)
         self._forget()
         for points, genuine in ((refused_m, False), (genuine_m, True)):
             if len(points):

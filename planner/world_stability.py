@@ -7,7 +7,8 @@ import math
 from planner.interface import MapView
 
 SETTLED_S = 600.0
-"""So long after something last moved or appeared no goal is called unreachable: what closes the way may go again."""
+"""No goal is called unreachable within so many seconds after something last moved or appeared: what closes the way
+may go again."""
 
 
 class WorldStability:

@@ -77,7 +77,7 @@ class GrownObstacles:
     @property
     def taken_back(self) -> bool:
         """Whether any edge that was seen has been taken back so far."""
-        return self._memory.taken_back
+        return self._memory.ever_cleared
 
     @property
     def labels(self) -> IntArray:

@@ -162,9 +162,9 @@ class Bug1(Walker[Bug1State]):
         distance, at = distances(Path(np.array(flown)), np.array([self.goal]))
         if distance[0] >= state.q_m:
             return replace(state, walked_m=walked)
-        station = float(at[0])
+        arc_length_m = float(at[0])
         return Circling(
-            state.hit, walked, mark_at(flown, station), float(distance[0]), state.walked_m + station
+            state.hit, walked, mark_at(flown, arc_length_m), float(distance[0]), state.walked_m + arc_length_m
         )
 
     def _returning(self, state: Circling) -> Returning:

@@ -111,7 +111,7 @@ class Bug2(Walker[Bug2State]):
             place, state = mark_at(segments, stop).place, Straight()
 
     def _leaves(self, segments: Sequence[Segment], hit_m: float) -> float:
-        """Station of the first leave point; infinite where there is none."""
+        """Arc length of the first leave point; infinite where there is none."""
         dx, dy = self.goal[0] - self._start[0], self.goal[1] - self._start[1]
         length = math.hypot(dx, dy)
         begin = 0.0

@@ -215,15 +215,15 @@ class TangentBug(Walker[TangentBugState]):
             return way
         segments = (*way, *self.boundary(node.place, node.side, self.horizon_m))
         here = math.dist(node.place, self.goal)
-        station = length_of(way)
+        arc_length_m = length_of(way)
         for segment in segments[len(way) :]:
             end = along(segment, segment[5])[:2]
             there = math.dist(end, self.goal)
             if there > here or not self.known.turned_back(segment[:2], self.goal):
                 break
             here = there
-            station += segment[5]
-        return cut(segments, station)
+            arc_length_m += segment[5]
+        return cut(segments, arc_length_m)
 
     def _caught(self, place: Point, line: Sequence[Segment], limit_m: float) -> BoundaryFollowing:
         """A local minimum: the boundary ahead is followed to the side of the better node."""
@@ -256,19 +256,19 @@ class TangentBug(Walker[TangentBugState]):
         # From off it, more than half of what is left of the round is seen past the other side of the obstacle.
         left_m = self.passes(segments, state.hit, self.keep_m - state.walked_m)
         ahead = cut(segments, 0.5 * left_m if off else left_m)
-        station = self._beyond_a_dent(place, ahead, state.side, least_m)
-        if off and not station and not self._sees(place, state.anchor):
-            station = self._seen_from(place, ahead)
-        if off or station > 0.0:
-            onto = mark_at(segments, station).place
+        arc_length_m = self._beyond_a_dent(place, ahead, state.side, least_m)
+        if off and not arc_length_m and not self._sees(place, state.anchor):
+            arc_length_m = self._seen_from(place, ahead)
+        if off or arc_length_m > 0.0:
+            onto = mark_at(segments, arc_length_m).place
             way, _ = self.straight(place, onto)
-            if off or length_of(way) < station - self._progress_m:
+            if off or length_of(way) < arc_length_m - self._progress_m:
                 yield WalkLeg(replace(state, on_boundary=False), way)
-                skipped = cut(segments, station)
+                skipped = cut(segments, arc_length_m)
                 if math.isfinite(self.passes(skipped, state.hit, self.keep_m - state.walked_m)):
                     yield WalkLeg(self._gone_round())
                     return
-                state = replace(state, anchor=onto, walked_m=state.walked_m + station)
+                state = replace(state, anchor=onto, walked_m=state.walked_m + arc_length_m)
                 segments = self.boundary(onto, state.side, self.horizon_m)
         closed = self.passes(segments, state.hit, self.keep_m - state.walked_m)
         yield WalkLeg(replace(state, on_boundary=True), cut(segments, closed))
@@ -279,13 +279,13 @@ class TangentBug(Walker[TangentBugState]):
         return Enclosed(f"{self.enclosed()}: its whole boundary has been gone round")
 
     def _beyond_a_dent(self, place: Point, segments: Sequence[Segment], side: float, least_m: float) -> float:
-        """The furthest station of a boundary in sight across a dent; 0 where none is beyond the least.
+        """The furthest arc length of a boundary in sight across a dent; 0 where none is beyond the least.
 
         A dent lies on the other side of the way than the obstacle. A way that encloses the obstacle leads round it:
         its end is in sight as well, behind.
         """
-        stations = np.linspace(0.0, length_of(segments), SHORTCUTS + 1)
-        corners = np.array([mark_at(segments, station).place for station in stations]) - place
+        arc_lengths_m = np.linspace(0.0, length_of(segments), SHORTCUTS + 1)
+        corners = np.array([mark_at(segments, arc_length_m).place for arc_length_m in arc_lengths_m]) - place
         doubled = np.cumsum(corners[:-1, 0] * corners[1:, 1] - corners[:-1, 1] * corners[1:, 0])
         dents = 0.5 * side * doubled <= self.keep_m * np.hypot(*corners[1:].T)
         return self._seen_from(place, segments, least_m, dents.tolist())
@@ -293,16 +293,16 @@ class TangentBug(Walker[TangentBugState]):
     def _seen_from(
         self, place: Point, segments: Sequence[Segment], least_m: float = 0.0, among: Sequence[bool] = ()
     ) -> float:
-        """The furthest station of a boundary in sight from a place, of some; 0 where none is beyond the least."""
+        """The furthest arc length of a boundary in sight from a place, of some; 0 where none is beyond the least."""
         whole = length_of(segments)
         for i in range(SHORTCUTS, 0, -1):
-            station = whole * i / SHORTCUTS
-            if station <= least_m:
+            arc_length_m = whole * i / SHORTCUTS
+            if arc_length_m <= least_m:
                 break
             if among and not among[i - 1]:
                 continue
-            if self._sees(place, mark_at(segments, station).place):
-                return station
+            if self._sees(place, mark_at(segments, arc_length_m).place):
+                return arc_length_m
         return 0.0
 
     def _sees(self, place: Point, target: Point) -> bool:

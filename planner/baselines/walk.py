@@ -108,6 +108,9 @@ class Enclosed:
 class Walker(ABC, Generic[WalkState]):
     """The frame of a planner whose vehicle is a point: when to walk anew, and from which state.
 
+    It has so many attributes because the algorithms that it frames read half of them: goal, side, kept distance, horizon,
+    legs, what is known.
+
     Args:
         config: resolved keys.
         mission: what stays the same for the flight.
@@ -168,8 +171,8 @@ class Walker(ABC, Generic[WalkState]):
         path = request.flown.path if request.flown and request.flown is self._plan else None
         if path is None:
             return self._begun(request)
-        station, end = request.arc_length_m, self.legs[-1].state
-        left = path.length_m - station
+        arc_length_m, end = request.arc_length_m, self.legs[-1].state
+        left = path.length_m - arc_length_m
         if isinstance(end, Enclosed) and left < SAME_PLACE * self.keep_m:
             doubtful = taken_back or (self.known.taken_back and not self._tried_again)
             if doubtful or not self._unrest.settled(request.time_s):
@@ -177,25 +180,25 @@ class Walker(ABC, Generic[WalkState]):
                 return self._begun(request)
             return Plan(PlanStatus.UNREACHABLE, end.sentence)
         if len(fresh):
-            breach = first_breach(path, fresh, self._breach_keep_m, station)
+            breach = first_breach(path, fresh, self._breach_keep_m, arc_length_m)
             self.breach_m = min(self.breach_m, breach)
         ends_early = not isinstance(end, Enclosed) and math.dist(end_of(path)[:2], self.goal) > 1.0
         must = (
             taken_back
-            or self.breach_m - station < self._near_m
+            or self.breach_m - arc_length_m < self._near_m
             or (ends_early and left < max(self._near_m, 0.5 * self.horizon_m))
         )
-        if not must and station < self._look_at_m:
+        if not must and arc_length_m < self._look_at_m:
             return Plan(PlanStatus.KEPT, "the walk goes on")
-        place = pose_at(path, station)[:2]
+        place = pose_at(path, arc_length_m)[:2]
         if math.dist(place, request.position_m) > self.mission.off_path_m:
             place = request.position_m
-        state = self._state_at(path, station)
+        state = self._state_at(path, arc_length_m)
         if taken_back and any(map(self._has_gone, self.follows(place, state))):
             state = self.begin(place)
         legs = tuple(self.walk(place, state))
         if not must and not self.prefers(legs, left):
-            self._look_at_m = station + self.look_again_m()
+            self._look_at_m = arc_length_m + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._found(legs, request, place)
 
@@ -209,7 +212,7 @@ class Walker(ABC, Generic[WalkState]):
         return math.dist(followed, self.known.seat(followed)[1]) > self.keep_m
 
     def _state_at(self, path: Path, arc_length_m: float) -> WalkState:
-        """The state of the algorithm at a station of the path in effect."""
+        """The state of the algorithm at an arc length of the path in effect."""
         begin = 0.0
         for leg in self.legs:
             end = begin + length_of(leg.segments)
@@ -272,7 +275,7 @@ class Walker(ABC, Generic[WalkState]):
         return tuple(self.known.path_along(place, contacts, side))
 
     def passes(self, segments: Sequence[Segment], mark: Mark, from_m: float) -> float:
-        """Station at which a way passes a mark in its sense, not before a station; infinite for never."""
+        """Arc length at which a way passes a mark in its sense, not before an arc length; infinite for never."""
         begin, best, best_at = 0.0, SAME_PLACE * self.keep_m, math.inf
         for segment in segments:
             end = begin + segment[5]
@@ -299,16 +302,16 @@ def _same_way(segment: Segment, at_m: float, mark: Mark) -> bool:
 
 def nearest_on_segment(segment: Segment, place: Point) -> tuple[float, float]:
     """Distance of a place from a segment, and where along it (m)."""
-    distance, station = distances(Path(np.array([segment])), np.array([place]))
-    return float(distance[0]), float(station[0])
+    distance, arc_length_m = distances(Path(np.array([segment])), np.array([place]))
+    return float(distance[0]), float(arc_length_m[0])
 
 
 def cut(segments: Sequence[Segment], arc_length_m: float) -> tuple[Segment, ...]:
-    """The way up to a station."""
+    """The way up to an arc length."""
     return tuple(between(Path(np.array(segments)), 0.0, arc_length_m)) if segments else ()
 
 
 def mark_at(segments: Sequence[Segment], arc_length_m: float) -> Mark:
-    """The place at a station of a way, and its direction there."""
+    """The place at an arc length of a way, and its direction there."""
     x, y, ux, uy = pose_at(Path(np.array(segments)), arc_length_m)
     return Mark((x, y), ux, uy)

@@ -1,1 +1,1 @@
-"""Planar geometry of paths and edge points: curves, clearance, fans, stations."""
+"""Planar geometry of paths and edge points: curves, clearance, fans, arc lengths."""

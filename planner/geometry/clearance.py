@@ -23,7 +23,7 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
         points_m: (m, 2) points.
 
     Returns:
-        (m,) distances in metres and (m,) stations along the path of the nearest places.
+        (m,) distances in metres and (m,) arc lengths along the path of the nearest places.
     """
     return segments.distances(path.segments, points_m)
 
@@ -31,16 +31,16 @@ def distances(path: Path, points_m: FloatArray) -> tuple[FloatArray, FloatArray]
 def first_breach(
     path: Path, points_m: FloatArray, radius_m: float | FloatArray, from_m: float = 0.0
 ) -> float:
-    """Station at which a path first comes nearest to a point that it passes within `radius_m` of.
+    """Arc length at which a path first comes nearest to a point that it passes within `radius_m` of.
 
     Args:
         path: the path.
         points_m: (m, 2) points.
         radius_m: the distance to be kept, one for all or one for each point.
-        from_m: what lies before this station does not count.
+        from_m: what lies before this arc length does not count.
 
     Returns:
-        The station in metres; infinite where the distance is kept.
+        The arc length in metres; infinite where the distance is kept.
     """
     radii_m = radius_m if isinstance(radius_m, np.ndarray) else np.array((radius_m,))
     return segments.first_breach(path.segments, points_m, radii_m, from_m)

@@ -32,14 +32,14 @@ class Course:
     to_goal: bool = True
 
     def ahead(self, arc_length_m: float) -> Course:
-        """What is left of it from a station on."""
+        """What is left of it from an arc length on."""
         segments = between(self.path, arc_length_m, self.path.length_m)
         if not segments:
             return self
-        _, stations = distances(self.path, np.array(self.nodes))
+        _, arc_lengths_m = distances(self.path, np.array(self.nodes))
         left = tuple(
             node
-            for node, at in zip(self.nodes[:-1], stations[:-1].tolist(), strict=True)
+            for node, at in zip(self.nodes[:-1], arc_lengths_m[:-1].tolist(), strict=True)
             if at > arc_length_m
         )
         return Course(

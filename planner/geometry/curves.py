@@ -68,7 +68,7 @@ def pose_at(path: Path, arc_length_m: float) -> Pose:
 
 
 def on_loiter(path: Path, arc_length_m: float) -> float:
-    """A station with whole turns of a closing loiter circle taken off."""
+    """An arc length with whole turns of a closing loiter circle taken off."""
     if not path.loiter or arc_length_m <= path.length_m:
         return arc_length_m
     turn = float(path.segments[-1, 5])
@@ -76,7 +76,7 @@ def on_loiter(path: Path, arc_length_m: float) -> float:
 
 
 def between(path: Path, start_m: float, stop_m: float) -> list[Segment]:
-    """The segments of the stretch of a path from one station to another."""
+    """The segments of the stretch of a path from one arc length to another."""
     out: list[Segment] = []
     begin = 0.0
     for row in path.segments.tolist():

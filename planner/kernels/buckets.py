@@ -124,7 +124,8 @@ def bucketed(points: FloatArray, keep: FloatArray, side: float) -> tuple[IntArra
         begins[square] += begins[square - 1]
     first, circles = np.empty(used + 1, dtype=np.intp), np.empty((3, used))
     at = np.empty(len(begins), dtype=np.intp)
-    at[:] = begins
+    for square in range(len(begins)):
+        at[square] = begins[square]
     for i in range(count):
         order[at[key[i]]] = i
         at[key[i]] += 1

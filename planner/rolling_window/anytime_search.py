@@ -1,4 +1,4 @@
-"""Thinking about the way to the goal in portions of work, while the plan in effect is flown.
+"""Anytime search for a way to the goal: in portions of work, while the plan in effect is flown.
 
 The plan in effect ends in a turn that is seen to be free, so that there is time to think: a search that is not done
 within its portion goes on when the planner is asked next. How much is done in a portion is counted, never timed. What
@@ -45,7 +45,7 @@ class AnytimeSearch:
         known: number of edge points, of what stands still, that it began with.
         done: whether all ways have been looked for.
         stuck: the first way that was found and could not be taken.
-        tracks: candidates looked at so far.
+        candidates: candidates looked at so far.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class AnytimeSearch:
         self.known = known
         self.done = False
         self.stuck: Course | None = None
-        self.tracks: list[Candidate] = []
+        self.candidates: list[Candidate] = []
 
     def courses(self, start: Start, flown: Course | None, work: float) -> Iterator[Course]:
         """Ways found with one more portion of work.
@@ -93,9 +93,11 @@ class AnytimeSearch:
         for i, attempt in enumerate(attempts):
             if attempt.distance_m + attempt.margin_m >= closed_m:
                 continue  # what is closed to a narrow way is closed to a wide one
-            before, known, points = len(self.tracks), self._local.known, self._local.points_m
-            route = yield from self._local.route(attempt, self._effort, self._now, self.tracks, self._closed)
-            if len(self.tracks) == before:
+            before, known, points = len(self.candidates), self._local.known, self._local.points_m
+            route = yield from self._local.route(
+                attempt, self._effort, self._now, self.candidates, self._closed
+            )
+            if len(self.candidates) == before:
                 closed_m = attempt.distance_m + attempt.margin_m
             if route is not None:
                 found = True
@@ -108,8 +110,8 @@ class AnytimeSearch:
         yield from self._courses(waiting)
         if not found:
             route = yield from self._local.tight_route(self._now)
-            if route is None and self.tracks:
-                route = yield from self._local.beginning(self._now, self.tracks[0])
+            if route is None and self.candidates:
+                route = yield from self._local.beginning(self._now, self.candidates[0])
             if route is not None:
                 yield self._course(route, self._local.known, shortest=False)
 
@@ -126,7 +128,9 @@ class AnytimeSearch:
     def _passed_over(self, found: list[_Found]) -> bool:
         """Whether a much shorter way could not be flown: further from obstacles it may have room for its turns."""
         least_m = min((each.route.path.length_m for each in found), default=0.0)
-        return least_m > (1.0 + DOUBTED) * min((track.cost_m for track in self.tracks), default=math.inf)
+        return least_m > (1.0 + DOUBTED) * min(
+            (candidate.cost_m for candidate in self.candidates), default=math.inf
+        )
 
     def _switches(self, route: FlyableRoute) -> bool:
         """Whether a way leaves obstacles on the other side than what is flown."""

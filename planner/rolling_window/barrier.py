@@ -109,14 +109,14 @@ class Proof:
     def _begin(self) -> None:
         self._barrier: Barrier | None = None
         self._taken = 0
-        self._begun_at = self._gone = self._memory.gone
+        self._begun_at = self._gone = self._memory.cleared
 
     def closed(self, position: Point) -> bool:
         """Takes in some more of the points and says whether they close all ways from the first position given."""
         # Where the aircraft was first: by a way that it found it can go back, be it narrower than this.
         self._ends = self._ends or (position, self._mission.goal_m)
         closed = self._taken_in(self._ends, PROVED_AT_ONCE)
-        if closed and self._begun_at != self._memory.gone:
+        if closed and self._begun_at != self._memory.cleared:
             # Some of what closes it may have been let go of since: what is left has to close it as well.
             self._begin()
             return self._taken_in(self._ends, self._memory.known)
@@ -127,8 +127,8 @@ class Proof:
         memory, keeps_m = self._memory, self._keeps_m
         if self._barrier is None:
             self._barrier = Barrier(*ends, self._mission.bounds_m, keeps_m, self._border_m)
-        self._taken = max(self._taken - (memory.gone - self._gone), 0)
-        self._gone = memory.gone
+        self._taken = max(self._taken - (memory.cleared - self._gone), 0)
+        self._gone = memory.cleared
         more = memory.genuine_m[self._taken :][:most]
         self._taken += len(more)
         if self._with_refused:

@@ -26,7 +26,7 @@ from planner.geometry.curves import (
     full_turn,
     place_on,
 )
-from planner.geometry.stations import places_along, poses_at, turn_centres
+from planner.geometry.path_samples import places_along, poses_at, turn_centres
 from planner.interface import BoolArray, FloatArray, MapView, Path
 from planner.rolling_window.route_optimisation import Terrain
 
@@ -35,13 +35,13 @@ DISC, BEYOND = 1.04, 0.5
 by this share of the clearance at the least. With all of the clearance forests become ways round: trees hide each other
 until one is among them."""
 
-MOST_STATIONS = 32
+MOST_ARC_LENGTHS = 32
 
 ARC_LENGTHS_AT_ONCE = 4
-"""So many stations are looked at together: mostly one of the first serves."""
+"""So many arc lengths are looked at together: mostly one of the first serves."""
 
 SIDES = (1.0, -1.0)
-"""Left, right."""
+"""Left, right: the sign of the curvature."""
 
 
 class CertificateBroken(RuntimeError):
@@ -64,7 +64,7 @@ class Certified:
 
     Attributes:
         path: up to the turn, and the turn; or all of it, to the goal.
-        loiter_entry_m: station at which the turn begins, or the flight is over.
+        loiter_entry_m: arc length at which the turn begins, or the flight is over.
     """
 
     path: Path
@@ -87,7 +87,7 @@ class Certifier:
         self._disc = _disc(disc_radius_m(limits.radius_m, clearance_m), spacing_m)
 
     def seen_free_to_m(self, path: Path, seen: MapView) -> float:
-        """Station up to which a path lies in space seen to be free: that of the first place that does not."""
+        """Arc length up to which a path lies in space seen to be free: that of the first place that does not."""
         end = min(path.length_m, self._horizon)
         pieces = max(math.ceil(end / self._spacing), 1)
         free = seen.seen_free(places_along(path, end, pieces))
@@ -103,22 +103,23 @@ class Certifier:
             path: a path that keeps its distance from all edges seen, up to `to_m`.
             seen: what has been seen to be free.
             terrain: the edges, and the distance that the turn has to keep from each.
-            to_m: station before which the turn begins.
+            to_m: arc length before which the turn begins.
         """
         free_to = min(self.seen_free_to_m(path, seen), to_m)
-        step = max(0.5 * self._limits.radius_m, free_to / MOST_STATIONS)
-        stations: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
+        step = max(0.5 * self._limits.radius_m, free_to / MOST_ARC_LENGTHS)
+        arc_lengths_m: FloatArray = free_to - step * np.arange(int(free_to / step) + 1, dtype=np.float64)
         for some in (
-            stations[i : i + ARC_LENGTHS_AT_ONCE] for i in range(0, len(stations), ARC_LENGTHS_AT_ONCE)
+            arc_lengths_m[i : i + ARC_LENGTHS_AT_ONCE]
+            for i in range(0, len(arc_lengths_m), ARC_LENGTHS_AT_ONCE)
         ):
             free = self._discs_free(path, some, seen).tolist()
-            for station, sides_free in zip(some.tolist(), free, strict=True):
+            for arc_length_m, sides_free in zip(some.tolist(), free, strict=True):
                 for side, disc_free in zip(SIDES, sides_free, strict=True):
                     if disc_free:
-                        turn = self._turn(path, station, side)
+                        turn = self._turn(path, arc_length_m, side)
                         if terrain.admits(Path(np.array(turn))):
-                            way = between(path, 0.0, station)
-                            return Certified(Path(np.array([*way, *turn]), loiter=True), station)
+                            way = between(path, 0.0, arc_length_m)
+                            return Certified(Path(np.array([*way, *turn]), loiter=True), arc_length_m)
         return None
 
     def certify_up_to(
@@ -129,7 +130,7 @@ class Certifier:
         There is no turn to leave it for: what lies beside it has to be seen to be free as well, as beyond a turn.
 
         Args:
-            over_m: station from which on nothing is flown.
+            over_m: arc length from which on nothing is flown.
             path: a path that keeps its distance from all edges seen, up to there.
             seen: what has been seen to be free.
             bounds_m: xmin, ymin, xmax, ymax.
@@ -137,19 +138,19 @@ class Certifier:
         flown = between(path, 0.0, over_m)
         if not flown or over_m > self._horizon or not inside_bounds(Path(np.array(flown)), bounds_m):
             return None
-        stations: FloatArray = np.linspace(0.0, over_m, max(math.ceil(over_m / self._spacing), 1) + 1)
-        poses = poses_at(path, stations)
+        arc_lengths_m: FloatArray = np.linspace(0.0, over_m, max(math.ceil(over_m / self._spacing), 1) + 1)
+        poses = poses_at(path, arc_lengths_m)
         aside = self._beside * np.column_stack((-poses[:, 3], poses[:, 2]))
         places = np.concatenate([poses[:, :2] + side * aside for side in (0.0, *SIDES)])
         if not seen.seen_free(np.clip(places, bounds_m[:2], bounds_m[2:])).all():
             return None
         return Certified(path, over_m)
 
-    def _discs_free(self, path: Path, stations: FloatArray, seen: MapView) -> BoolArray:
-        """(k, 2) whether the disc of a turn to each side, at each of (k,) stations, has been seen to be free."""
-        centres = turn_centres(path, stations, self._limits.radius_m, self._limits.roll_m)
+    def _discs_free(self, path: Path, arc_lengths_m: FloatArray, seen: MapView) -> BoolArray:
+        """(k, 2) whether the disc of a turn to each side, at each of (k,) arc lengths, has been seen to be free."""
+        centres = turn_centres(path, arc_lengths_m, self._limits.radius_m, self._limits.roll_m)
         places = (centres.reshape(-1, 1, 2) + self._disc).reshape(-1, 2)
-        free: BoolArray = np.all(seen.seen_free(places).reshape(len(stations), len(SIDES), -1), axis=2)
+        free: BoolArray = np.all(seen.seen_free(places).reshape(len(arc_lengths_m), len(SIDES), -1), axis=2)
         return free
 
     def _turn(self, path: Path, arc_length_m: float, side: float) -> list[Segment]:

@@ -26,7 +26,7 @@ class Commitment:
         mission: goal and limits.
         memory: what is remembered.
         local: limits of curves, and where they may lie.
-        least_m: a plan that leaves its course for a turn before this station leads nowhere.
+        least_m: a plan that leaves its course for a turn before this arc length leads nowhere.
     """
 
     def __init__(
@@ -34,12 +34,12 @@ class Commitment:
     ) -> None:
         self._mission, self._memory, self._local, self._least_m = mission, memory, local, least_m
 
-    def effect(
+    def commit(
         self,
         request: PlanRequest,
         start: Start,
         course: Course,
-        tracks: list[Candidate],
+        candidates: list[Candidate],
         cut_m: float,
         wants_more_time: bool = False,
     ) -> CommittedPlan | None:
@@ -49,8 +49,8 @@ class Commitment:
             request: what was asked.
             start: where the course begins.
             course: the course.
-            tracks: candidates that were looked at.
-            cut_m: station at which it comes too near to something.
+            candidates: candidates that were looked at.
+            cut_m: arc length at which it comes too near to something.
             wants_more_time: as the plan has it.
         """
         certifier = self._certifier(1.5 * request.seen.spacing_m)
@@ -69,7 +69,7 @@ class Commitment:
             waypoints_m=np.array([start.position, *nodes]),
             path=certified.path,
             picture=partial(
-                picture_of, start.position, goal, nodes, tracks, self._local.window_m, points, keep_m, met
+                picture_of, start.position, goal, nodes, candidates, self._local.window_m, points, keep_m, met
             ),
             wants_more_time=wants_more_time,
         )
@@ -124,7 +124,7 @@ def picture_of(
     position: Point,
     goal: Point,
     nodes: Sequence[Point],
-    tracks: Iterable[Candidate],
+    candidates: Iterable[Candidate],
     window_m: float,
     points_m: FloatArray,
     keep_m: float,
@@ -135,6 +135,6 @@ def picture_of(
         guide_m=np.array([position, goal]),
         window_m=window_m,
         sectors=free_sectors(points_m, keep_m, position),
-        candidates=(np.array([position, *nodes]), *(np.array(track.nodes) for track in tracks)),
+        candidates=(np.array([position, *nodes]), *(np.array(candidate.nodes) for candidate in candidates)),
         met_m=met_m,
     )

@@ -33,7 +33,7 @@ class CommittedPlan:
         plan: as it was given to the loop.
         path: its path: along the course, then into the turn; or the course, where that is flown to the goal.
         course: the whole way.
-        loiter_entry_m: station at which the path leaves the course for the turn, or the flight is over.
+        loiter_entry_m: arc length at which the path leaves the course for the turn, or the flight is over.
     """
 
     plan: Plan
@@ -152,7 +152,7 @@ class PlanMonitor:
         return True
 
     def cut_at(self, course: Course, points_m: FloatArray, gone: int = 0) -> float:
-        """Station at which a course comes too near to one of (m, 2) still edges that it was not found with.
+        """Arc length at which a course comes too near to one of (m, 2) still edges that it was not found with.
 
         Args:
             course: the course.

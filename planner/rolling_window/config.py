@@ -39,7 +39,7 @@ class RollingWindowConfig:
     candidates: int = field(
         default=12,
         metadata={
-            "doc": "n, how many tracks are kept at every step",
+            "doc": "n, how many candidates are kept at every step",
             "unit": "1",
             "minimum": 1,
             "maximum": 100,

@@ -1,4 +1,4 @@
-"""How far it is to the goal from every place, round all that is known: guides a wide search and tells it when to end.
+"""Cost to go: the distance to the goal from every place, round everything known. It guides a wide search.
 
 A wave that spreads from the goal through a grid (a navigation function, as in Barraquand, Langlois and Latombe, 1992).
 A cell is closed only where no place in it keeps the distance wanted: every way that there is leads through open
@@ -18,19 +18,19 @@ from planner.kernels.wave import close_cells, spread_wave
 from planner.rolling_window.window import Tally
 
 CELLS = 5.0
-"""Cells along the distance that is kept."""
+"""The distance that is kept from edge points is so many cells long."""
 
 MOST_CELLS = 250_000
-"""A grid of more is made coarser: it then closes less, but nothing that is open."""
+"""A grid has at most so many cells; else it is made coarser. It then closes fewer cells, but no open one."""
 
 LEAST_M = 1.0
-"""Where less is kept, as where start or goal lie at an edge, the grid is made for this."""
+"""Least distance (m) that the grid is made for, where less is kept, as where start or goal lie at an edge."""
 
 PAIRS_AT_ONCE = 20_000
-"""So many pairs of a point and a cell, or cells that the wave comes to, make one step of work."""
+"""One step of work is so many pairs of an edge point and a cell, or so many cells that the wave comes to."""
 
 CLOSED, REACHED = 0.002, 0.012
-"""Work of a pair of a point and a cell near it, and of each cell that the wave comes to."""
+"""Work (about microseconds) of a pair of an edge point and a cell near it, and of each cell that the wave comes to."""
 
 
 class CostToGo:

@@ -14,7 +14,7 @@ from planner.memory import ObstacleMemory
 from planner.world_stability import WorldStability
 
 ENOUGH = 2
-"""So many turns before a place show what can be seen of it."""
+"""A place that the aircraft has turned before this many times has shown all that can be seen of it."""
 
 RETRY_S = 60.0
 """So many seconds after something last moved or appeared, what was given up is tried again."""
@@ -93,6 +93,12 @@ class GivingUp:
         self.tried_again = False
         self._retries = 0
         self._given_up_at_m = 0.0
+        self._loitered: object = None
+
+    def first_in_loiter(self, plan: object) -> bool:
+        """Whether a plan is not the one whose loiter was entered last, which is remembered."""
+        first, self._loitered = plan is not self._loitered, plan
+        return first
 
     def new_plan(self) -> None:
         """A new plan is in effect: arc lengths are counted from its start."""
@@ -105,7 +111,7 @@ class GivingUp:
     @property
     def certain(self) -> bool:
         """Whether all that was seen still stands, and nothing has contradicted seen-free space."""
-        return not (self._memory.taken_back or self.dead_ends.stability.ever)
+        return not (self._memory.ever_cleared or self.dead_ends.stability.ever)
 
     @property
     def out_of_effort(self) -> bool:
@@ -143,7 +149,7 @@ class GivingUp:
             settled: the world has stood still long enough.
         """
         # What moved may have closed the way; where edge points were only taken back, one more try tells.
-        doubtful = self.dead_ends.stability.ever or (self._memory.taken_back and not self.tried_again)
+        doubtful = self.dead_ends.stability.ever or (self._memory.ever_cleared and not self.tried_again)
         return no_room and settled and not (doubtful and len(self._memory.refused_m))
 
     def retries_used(self) -> bool:

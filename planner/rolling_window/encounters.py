@@ -19,11 +19,11 @@ from planner.geometry.curves import Point
 from planner.interface import FloatArray, Mission, MovingEdges, PlanRequest
 
 FASTEST = 0.8
-"""Share of the aircraft's speed: faster obstacles may be met anywhere."""
+"""Share of the aircraft's airspeed. An obstacle that is faster may be met anywhere; it is taken to be this fast."""
 EARLIEST, LATEST = 0.85, 1.3
-"""Shares of the time in a straight line at the aircraft's airspeed."""
+"""The aircraft may be at a place between these shares of the time that a straight line there takes at its airspeed."""
 LATER_S = 3.0
-"""And so much later, to turn and pass by."""
+"""And so many seconds later than the latest, to turn and pass by."""
 
 
 def encounters(request: PlanRequest, mission: Mission) -> list[FloatArray]:

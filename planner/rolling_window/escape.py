@@ -1,4 +1,7 @@
-"""A way into a turn where none is seen to be safe: the plan in effect goes on, or is left for a turn, or evades."""
+"""Escapes: what is flown where no certified plan is left.
+
+The plan in effect goes on to its end, or it is left for a turn, or for a way that evades what moves or has appeared.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ import numpy as np
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Segment, onward
-from planner.geometry.stations import places_along
+from planner.geometry.path_samples import places_along
 from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.certificate import CertificateBroken, Certifier
@@ -22,13 +25,14 @@ from planner.rolling_window.loiter import divert_to_loiter
 from planner.rolling_window.route_optimisation import Terrain
 
 LOITER_SHARES = (1.0, 0.5, 0.25)
-"""Shares of what paths keep: a turn is sought with one after the other."""
+"""Shares of the distance that paths keep from edge points. A turn is looked for with one share after the other."""
 
 CLEARER = 0.2
-"""Another way evades what is in the way if it keeps further from it by this share of what paths keep."""
+"""An option is better than those before it only if it keeps further from everything by this share of the distance that
+paths keep."""
 
 EVADING_S = 60.0
-"""The certificate holds for a world that stands still: so long after something appeared it may be broken."""
+"""Certificates hold for a world that stands still. They may be broken for so many seconds after something appeared."""
 
 
 GOES_ON = "the plan in effect goes on to its end, nearer to something than wanted"
@@ -36,44 +40,52 @@ IN_THE_WAY = "something is in the way; turning away"
 
 
 BLIND = 0.9
-"""Share of the clearance: so far the aircraft flies straight on from the start before anything ahead of it was seen to
-be free. A sensor that loses returns takes several scans for that; the start is clear of obstacles by the clearance."""
+"""Share of the clearance. The aircraft flies straight on from the start for this distance before anything ahead has
+to be seen free: a sensor that loses returns needs several scans, and the start is clear of obstacles by the
+clearance."""
 
 NO_ROOM = "there is no room for a turn at the start"
 NOT_SEEN = "nothing ahead of the aircraft has been seen to be free"
 
 
 class _Option(NamedTuple):
-    """A way to go on: what is asked to keep clear of all that stands, why, and what it would put into effect."""
+    """One option of an escape.
+
+    Attributes:
+        path: what would be flown.
+        standing: what of it must keep its distance from everything that stands; None where that is known already.
+        reason: why it is flown, a sentence.
+        committed: the certified plan that it comes from, if it comes from one.
+    """
 
     path: Path
     standing: Path | None = None
     reason: str = ""
-    effect: CommittedPlan | None = None
+    committed: CommittedPlan | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Escape:
-    """What to do where nothing is certified.
+    """The answer where nothing is certified.
 
     Attributes:
         plan: the answer.
-        effect: what it would put into effect, where it is a new plan.
+        committed: the new plan that it commits to; None where the plan in effect goes on.
         broken: the plan in effect comes too near to something.
     """
 
     plan: Plan
-    effect: CommittedPlan | None = None
+    committed: CommittedPlan | None = None
     broken: bool = True
 
 
 class Escapes:
-    """Finds escapes.
+    """Looks for escapes.
 
     Args:
         mission: goal and limits.
-        memory: what is remembered.
-        local: limits of curves, and distances kept.
+        memory: the edge points.
+        local: limits of curves, and the distances that paths keep.
     """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, local: LocalPlanning) -> None:
@@ -118,7 +130,7 @@ class Escapes:
         self,
         request: PlanRequest,
         threats: Threats | None,
-        effect: CommittedPlan,
+        committed: CommittedPlan,
         here: float,
         *,
         until_m: float,
@@ -131,9 +143,9 @@ class Escapes:
         Args:
             request: what was asked.
             threats: what is near, if that is to be feared.
-            effect: the plan in effect.
-            here: station of the aircraft on it.
-            until_m: station up to which it can be flown.
+            committed: the plan in effect.
+            here: arc length of the aircraft on it.
+            until_m: arc length up to which it can be flown.
             prefix: what of it is flown in any case.
             certain: nothing has changed so far, nor been taken back by the sensor.
             nearer: a certified course that would come nearer than wanted to what moves or has appeared.
@@ -141,14 +153,14 @@ class Escapes:
         Raises:
             CertificateBroken: there is no room for a turn, though all is certain.
         """
-        left = left_of(effect, here, self._mission)
+        left = left_of(committed, here, self._mission)
         ways: list[Path] = []  # made when they are first asked for: most plans in effect will do
 
         def options(terrain: Terrain) -> Iterator[_Option]:
             if nearer is not None:
                 yield _Option(nearer.path, None, "", nearer)
-            yield _Option(left, effect.left(here), GOES_ON)
-            turn = divert_to_loiter(effect.path, here, until_m, self._local.limits, terrain)
+            yield _Option(left, committed.left(here), GOES_ON)
+            turn = divert_to_loiter(committed.path, here, until_m, self._local.limits, terrain)
             if turn is not None:
                 yield _Option(turn, None, "no way on can be seen to be safe; turning away")
             if threats is not None:
@@ -167,8 +179,8 @@ class Escapes:
         best = best or unseen
         if best is not None and best.path is left:
             return Escape(Plan(PlanStatus.NO_PATH, best.reason), broken=False)
-        if best is not None and best.effect is not None:
-            return Escape(best.effect.plan, best.effect)
+        if best is not None and best.committed is not None:
+            return Escape(best.committed.plan, best.committed)
         if best is not None:
             return self._away(request, best.path, best.reason)
         if certain:
@@ -234,6 +246,6 @@ def room_m(path: Path, threats: Threats | None, least_m: float = -math.inf, late
     return math.inf if threats is None else threats.room_m(path, least_m, later)
 
 
-def left_of(effect: CommittedPlan, here: float, mission: Mission) -> Path:
+def left_of(committed: CommittedPlan, here: float, mission: Mission) -> Path:
     """What of a plan in effect is flown within `AHEAD_S`."""
-    return Path(np.array(onward(effect.path, here, AHEAD_S * mission.speed_mps)))
+    return Path(np.array(onward(committed.path, here, AHEAD_S * mission.speed_mps)))

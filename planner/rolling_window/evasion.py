@@ -18,29 +18,30 @@ import numpy as np
 
 from planner.geometry.clearance import inside_bounds
 from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_turn
-from planner.geometry.stations import poses_at
+from planner.geometry.path_samples import poses_at
 from planner.interface import FloatArray, Mission, Path, PlanRequest
 from planner.kernels.buckets import Buckets, bucketed
 from planner.kernels.room import room_along
 from planner.rolling_window.encounters import EARLIEST, LATEST
 
 AHEAD_S = 30.0
-"""So far ahead what moves is taken to keep its velocity, and ways are judged."""
+"""What moves is taken to keep its velocity for so many seconds; ways are judged as far ahead."""
 
 LATER = 0.05
-"""For every metre that something is met later along a way, the way counts as if it kept so many metres more from it."""
+"""What is met later can be evaded later: for each metre along a way, what is met there counts as so many metres further
+away."""
 
 UNKNOWN_MPS, UNKNOWN_S = 10.0, 8.0
-"""What has just appeared may come nearer so fast, for so long: of what is told to stand the velocity is not known."""
+"""An obstacle that has just appeared has no known velocity: it may come nearer this fast (m/s) for this long (s)."""
 
 STEP_SHARE, LEAST_STEP = 0.25, 0.02
-"""Ways are looked at every so much of the clearance, and no more often than every so much of the turn radius."""
+"""Ways are looked at in steps of this share of the clearance, but not shorter than this share of the turn radius."""
 
 SQUARE_STEPS = 8.0
-"""What stands is looked at by squares of so many steps."""
+"""Side of the squares in which edge points that stand are looked for, in steps."""
 
 FIRST_DEG, BACK_DEG = (0.0, 20.0, 45.0, 75.0, 110.0, 150.0, 180.0), (0.0, 20.0, 45.0, 75.0, 110.0)
-"""Turns to one side, and back to the other."""
+"""Angles of the first turn, to one side, and of the second, back to the other; deg."""
 
 WAYS = [
     (first, back, straight)
@@ -50,7 +51,8 @@ WAYS = [
     for straight in (2.0, 0.0)
     if straight or not first or back == BACK_DEG[1]
 ]
-"""Both, and how far straight on then, in turn radii; without that the last turn is the same however far was turned."""
+"""First turn, second turn (deg) and the straight after them (turn radii), of each way that is rolled out. Without a
+straight all second turns that lead into the same last turn are one way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,12 +94,14 @@ class Threats:
             least_m: with less it is not looked at to its end.
             later: see `LATER`.
         """
-        stations = np.arange(0.0, AHEAD_S * self.speed_mps, self.step_m)
+        arc_lengths_m = np.arange(0.0, AHEAD_S * self.speed_mps, self.step_m)
         if path.loiter:
             turn = float(path.segments[-1, 5])
             begin = path.length_m - turn
-            stations = np.where(stations > begin, begin + (stations - begin) % turn, stations)
-        places = np.ascontiguousarray(poses_at(path, stations)[:, :2])
+            arc_lengths_m = np.where(
+                arc_lengths_m > begin, begin + (arc_lengths_m - begin) % turn, arc_lengths_m
+            )
+        places = np.ascontiguousarray(poses_at(path, arc_lengths_m)[:, :2])
         window = (EARLIEST, LATEST, UNKNOWN_S)
         return room_along(
             places, *self._still, self.moving, self.step_m, self.speed_mps, least_m, later, *window

@@ -21,34 +21,35 @@ from planner.rolling_window.trail import Trail
 from planner.rolling_window.window import PLACE, Tally, Window
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
-"""Shares of the margin that straight steps and the curve through them keep; track points keep all of it."""
+"""Shares of the margin. Straight steps keep the first beyond the clearance, the curve through them the second;
+track points keep all of the margin."""
 
 LEAST_HUG = 0.005
-"""Share of the clearance: track points lie so much further out than straight steps, even without a margin, for a step
+"""Share of the clearance by which track points lie further out than straight steps, even without a margin: a step
 along an edge ends where that distance is reached again."""
 
 LEAST_MARGIN = 0.4
-"""Share of the margin that is kept where there is no room for all of it."""
+"""Share of the margin that is still kept where there is no room for all of it."""
 
 MOST_TRACKS = 300
-"""So many tracks at most are looked at in one search."""
+"""A search looks at so many candidates at most."""
 
 WIDER, FURTHER = 4, 60
-"""Where n tracks at every one of N steps find no way, this many times as many are tried, led by the cost to go: so that
-the best come first, and after the first only so many steps more are looked at."""
+"""A wide search follows where N steps with n candidates each find no way. It has `WIDER` times as many of both and is
+led by the cost to go, so that the best come first; after the first it looks at only `FURTHER` steps more."""
 
 DOUBTED, MOST_AROUND = 0.1, 8
-"""A way that is longer by this share than the one flown is doubtful: so many of the obstacles nearest to the start are
-looked at as well."""
+"""A way that is longer than the one flown by the share `DOUBTED` is doubtful. Then the `MOST_AROUND` obstacles
+nearest to the start are looked at as well."""
 
 SWITCH = 0.03
-"""The other way round is taken only where it saves this share of the distance left."""
+"""Hysteresis: the other way round an obstacle is taken only where it saves this share of the distance left."""
 
 RETRACE = 0.25
-"""And this share of what it leads back along where the aircraft has been."""
+"""It has to save, beside that, this share of what leads back along where the aircraft has been."""
 
 TRAIL_CLEARANCES = 4.0
-"""So many clearances is as good as the same place for that."""
+"""Places within so many clearances of the flown trail count as where the aircraft has been."""
 
 
 @dataclass(frozen=True)
@@ -154,10 +155,10 @@ class LocalPlanning:
         attempt: Attempt,
         effort: int,
         now: Now,
-        tracks: list[Candidate],
+        candidates: list[Candidate],
         closed: Callable[[], bool],
     ) -> Generator[None, None, FlyableRoute | None]:
-        """The shortest of the n best tracks, after route optimisation.
+        """The shortest of the n best candidates, after route optimisation.
 
         What comes in while this goes on is left for the next search: else the shortest way round something that is
         just coming into view would be dropped, again and again, for a long one that leads away.
@@ -167,7 +168,7 @@ class LocalPlanning:
             effort: how often the work of a wide search is doubled.
             now: tells where a plan would begin, and what is flown: the other side of something is taken only for
                 a shorter way.
-            tracks: the candidates that were looked at are added to it.
+            candidates: the candidates that were looked at are added to it.
             closed: whether it is proved that there is no way; asked before a wider search.
 
         Yields:
@@ -187,20 +188,20 @@ class LocalPlanning:
             least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
             return course is None or least_m > (1.0 + DOUBTED) * course.path.length_m
 
-        for search_on in self._searches(window, attempt, effort, tracks, doubtful, closed):
-            for track in search_on:
-                if track is None:
+        for search_on in self._searches(window, attempt, effort, candidates, doubtful, closed):
+            for candidate in search_on:
+                if candidate is None:
                     yield
                     continue
                 start, course = now()
                 least_m = min((worth_m for worth_m, _ in fitted), default=math.inf)
-                if track.cost_m >= least_m:
+                if candidate.cost_m >= least_m:
                     break
-                tracks.append(track)
-                reluctance_m = self._reluctance_m(track, course)
-                if track.cost_m + reluctance_m >= least_m:
+                candidates.append(candidate)
+                reluctance_m = self._reluctance_m(candidate, course)
+                if candidate.cost_m + reluctance_m >= least_m:
                     continue
-                route = self._fit(start, attempt, track.nodes, points)
+                route = self._fit(start, attempt, candidate.nodes, points)
                 if route is not None:
                     fitted.append((route.path.length_m + reluctance_m, route))
                 yield
@@ -217,19 +218,19 @@ class LocalPlanning:
         """A route found among (m, 2) points, from where the aircraft has got to; None where it cannot be flown."""
         return self._fit(start, attempt, (start.pose[:2], *route.nodes), points)
 
-    def _reluctance_m(self, track: Candidate, course: Course | None) -> float:
+    def _reluctance_m(self, candidate: Candidate, course: Course | None) -> float:
         """So much longer may a way be that leaves obstacles on the side where they are, or does not lead back."""
         if course is not None:
-            self.tally.add(4, PLACE, 4 * len(track.nodes) * course.known)
-            if course.same_side(track.nodes, self._memory.points_m):
+            self.tally.add(4, PLACE, 4 * len(candidate.nodes) * course.known)
+            if course.same_side(candidate.nodes, self._memory.points_m):
                 return 0.0
-        switching = 0.0 if course is None else SWITCH * track.cost_m
-        return switching + RETRACE * self.trail.retraced_m(track.nodes)
+        switching = 0.0 if course is None else SWITCH * candidate.cost_m
+        return switching + RETRACE * self.trail.retraced_m(candidate.nodes)
 
     def _fit(
         self, start: Start, attempt: Attempt, nodes: Sequence[Point], points: FloatArray
     ) -> FlyableRoute | None:
-        """The curve along a track, from where a plan would begin now."""
+        """The curve along a candidate, from where a plan would begin now."""
         cut = (1.0 - SEARCH_SHARE) * attempt.margin_m
         terrain = self._terrain(start, attempt, points)
         return optimise(start.pose, start.curvature, nodes, self.limits, cut, terrain)
@@ -256,11 +257,11 @@ class LocalPlanning:
         terrain = self._terrain(begins, self._tight, self._memory.points_m)
         return FlyableRoute(route.nodes, path) if terrain.admits(path) else None
 
-    def beginning(self, now: Now, track: Candidate) -> Generator[None, None, FlyableRoute | None]:
-        """As much of a track as can be flown, where all of it cannot: from there the rest may look otherwise."""
-        for end in range(len(track.nodes) - 1, 1, -1):
+    def beginning(self, now: Now, candidate: Candidate) -> Generator[None, None, FlyableRoute | None]:
+        """As much of a candidate as can be flown, where all of it cannot: from there the rest may look otherwise."""
+        for end in range(len(candidate.nodes) - 1, 1, -1):
             start, _ = now()
-            nodes = (start.pose[:2], *track.nodes[1:end])
+            nodes = (start.pose[:2], *candidate.nodes[1:end])
             route = self._fit(start, self._tight, nodes, self._memory.points_m)
             if route is not None:
                 return route
@@ -286,18 +287,18 @@ class LocalPlanning:
         window: Window,
         attempt: Attempt,
         effort: int,
-        tracks: Sequence[Candidate],
+        candidates: Sequence[Candidate],
         doubtful: Callable[[], bool],
         closed: Callable[[], bool],
     ) -> Iterator[Iterator[Candidate | None]]:
-        """Searches for the n best tracks, each where those before have not found enough.
+        """Searches for the n best candidates, each where those before have not found enough.
 
         Where what was found is doubtful the obstacles around the start are looked at as well: a way out of a pocket
         may lead past what does not lie towards the goal. Where nothing was found a wider search follows.
         """
-        before = len(tracks)
+        before = len(candidates)
         yield self._searched(window, attempt, 1)
-        if len(tracks) > before:
+        if len(candidates) > before:
             if doubtful():
                 yield self._searched(window, attempt, 1, window.nearest_obstacles(MOST_AROUND))
         elif not closed():
@@ -307,14 +308,14 @@ class LocalPlanning:
     def _searched(
         self, window: Window, attempt: Attempt, widening: int, around: Sequence[int] = ()
     ) -> Iterator[Candidate | None]:
-        """The n best tracks of one search. None after each step of work."""
+        """The n best candidates of one search. None after each step of work."""
         to_go: CostToGo | None = None
         if widening > 1:
             ends = window.center_m, self._mission.goal_m
             to_go = CostToGo(*ends, self._mission.bounds_m, window.points_m, window.keep_m, self.tally)
             yield from to_go.spread()
         found = steps_since = 0
-        for track in search_candidates(
+        for candidate in search_candidates(
             window,
             self._mission.goal_m,
             self._mission.bounds_m,
@@ -326,8 +327,8 @@ class LocalPlanning:
             wide=widening > 1,
             to_go=to_go,
         ):
-            yield track
-            found += track is not None
+            yield candidate
+            found += candidate is not None
             steps_since += found > 0
             if found == self._candidates or steps_since > (MOST_TRACKS if to_go is None else FURTHER):
                 return

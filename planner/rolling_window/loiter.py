@@ -17,8 +17,8 @@ def divert_to_loiter(path: Path, from_m: float, to_m: float, limits: Limits, ter
 
     Args:
         path: the path in effect.
-        from_m: station of the aircraft on it.
-        to_m: station up to which it can still be flown.
+        from_m: arc length of the aircraft on it.
+        to_m: arc length up to which it can still be flown.
         limits: smallest radius and room to roll.
         terrain: where the turn and the way there may lie.
 
@@ -32,8 +32,8 @@ def divert_to_loiter(path: Path, from_m: float, to_m: float, limits: Limits, ter
         to_m = max(from_m, from_m + breach - float(terrain.keep_m.max()))
     count = max(int((to_m - from_m) / (0.25 * limits.radius_m)), 0)
     for i in range(count, -1, -1):
-        station = from_m + i * 0.25 * limits.radius_m
-        pose, curvature = place_on(path, station)
+        arc_length_m = from_m + i * 0.25 * limits.radius_m
+        pose, curvature = place_on(path, arc_length_m)
         for side in (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0):
             roll: list[Segment] = []
             start = pose
@@ -42,7 +42,7 @@ def divert_to_loiter(path: Path, from_m: float, to_m: float, limits: Limits, ter
                 start = _ahead(pose, limits.roll_m)
             turn = full_turn(start, limits.radius_m, side)
             if terrain.admits(Path(np.array([*roll, turn]))):
-                return Path(np.array([*between(path, from_m, station), *roll, turn]), loiter=True)
+                return Path(np.array([*between(path, from_m, arc_length_m), *roll, turn]), loiter=True)
     return None
 
 

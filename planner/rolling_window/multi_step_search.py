@@ -1,4 +1,4 @@
-"""The paper's multi-step search: N steps deep, at every step the n best tracks are kept.
+"""The paper's multi-step search: N steps deep, at every step the n best candidates are kept.
 
 A step goes along the guide vector where nothing is in the way. Otherwise it goes along an edge of one of the
 free sectors: by equation (4) the way that is left grows with the angle off the guide vector, so that in the
@@ -21,21 +21,22 @@ from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.window import SectorEdge, Window, guide_vector
 
 SHORT_OF = 0.005
-"""A step ends short of what it meets by this share of the distance kept: from there edges can be seen."""
+"""A step ends before the obstacle that it meets by this share of the distance kept: from there the edges of that
+obstacle can be seen."""
 
 BACK_RAD, AWAY_RAD = 2.1, 0.8
-"""Largest turn from one step to the next, and largest one away from the obstacle that the last step hugged."""
+"""Largest turn from one step to the next, and largest turn away from the obstacle that the last step hugged; rad."""
 
 APART = 0.06
-"""Candidate points nearer to each other than this share of the distance kept from obstacles are one."""
+"""Track points that are nearer to each other than this share of the distance kept count as one."""
 
 APART_WIDE = 0.25
-"""In a wide search: than this share of the shortest step about a corner, which is to lead on."""
+"""The same for a wide search, as a share of the shortest step about a corner: that step has to lead on."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A track of steps: a candidate or the beginning of one.
+    """A candidate of the search, or the beginning of one: a polyline of track points.
 
     Attributes:
         nodes: track points, from the present one on.
@@ -51,7 +52,7 @@ class Candidate:
 
     @property
     def cost_m(self) -> float:
-        """C: the length of the whole track if nothing more is met."""
+        """C: the length of the whole candidate if nothing more is met."""
         return self.flown_m + self.left_m
 
 
@@ -68,14 +69,14 @@ def search_candidates(
     wide: bool = False,
     to_go: CostToGo | None = None,
 ) -> Iterator[Candidate | None]:
-    """Tracks from the centre of the window to the goal, cheapest first, as far as they are asked for.
+    """Candidates from the centre of the window to the goal, cheapest first, as far as they are asked for.
 
     Args:
         window: the planning window; `window.keep_m` is kept from every point in it.
         goal: where the guide vector points.
         bounds_m: area that no track point may leave.
         steps: N, how many steps are looked ahead.
-        keep_best: n, how many tracks are kept at every step.
+        keep_best: n, how many candidates are kept at every step.
         outer_m: track points lie this far from the obstacle that they pass, a little more than `window.keep_m`,
             so that steps around a round obstacle are long.
         most_tracks: so many are looked at.
@@ -85,7 +86,7 @@ def search_candidates(
             cent; default: straight on, as equation (4) has it.
 
     Yields:
-        Tracks that see the goal from their last track point but one; none where n tracks at every one
+        Candidates that see the goal from their last track point but one; none where n candidates at every one
         of N steps were not enough. None after each step looked at.
     """
     start = window.center_m
@@ -99,13 +100,13 @@ def search_candidates(
     visited: set[tuple[int, int]] = set()
     count = 0
     while queue:
-        cost, _, depth, track = heapq.heappop(queue)
-        if not track.left_m:
-            yield track
+        cost, _, depth, candidate = heapq.heappop(queue)
+        if not candidate.left_m:
+            yield candidate
             continue
         if cost == math.inf:
             return
-        here = track.nodes[-1]
+        here = candidate.nodes[-1]
         place = (round(here[0] / apart_m), round(here[1] / apart_m))
         if place in visited or kept_at[depth] == keep_best:
             continue
@@ -118,7 +119,8 @@ def search_candidates(
         count += 1
         if not len(labels):
             heapq.heappush(
-                queue, (track.cost_m, count, depth, Candidate((*track.nodes, goal), track.cost_m, 0.0))
+                queue,
+                (candidate.cost_m, count, depth, Candidate((*candidate.nodes, goal), candidate.cost_m, 0.0)),
             )
             continue
         if depth == steps:
@@ -127,31 +129,31 @@ def search_candidates(
         if wide:
             # Whatever lies towards the goal, not only what comes first; and on round what it hugs.
             beside += np.unique(labels).tolist()
-            beside += [] if track.last is None else [track.last.obstacle]
+            beside += [] if candidate.last is None else [candidate.last.obstacle]
         for edge in window.sector_edges(here, beside, outer_m):
-            if not wide and _leads_away(track, edge):
+            if not wide and _leads_away(candidate, edge):
                 continue
-            child = _step(track, edge, goal, outer_m)
+            child = _step(candidate, edge, goal, outer_m)
             if child is not None and _inside(child.nodes[-1], bounds_m):
                 count += 1
                 cost = child.cost_m if to_go is None else child.flown_m + to_go(child.nodes[-1])
                 heapq.heappush(queue, (cost, count, depth + 1, child))
 
 
-def _leads_away(track: Candidate, edge: SectorEdge) -> bool:
+def _leads_away(candidate: Candidate, edge: SectorEdge) -> bool:
     """Whether a step leads away from what the last one hugged, or back: a shortest way bends round it."""
-    if track.last is None:
+    if candidate.last is None:
         return False
     turn = math.atan2(
-        track.last.ux * edge.uy - track.last.uy * edge.ux,
-        track.last.ux * edge.ux + track.last.uy * edge.uy,
+        candidate.last.ux * edge.uy - candidate.last.uy * edge.ux,
+        candidate.last.ux * edge.ux + candidate.last.uy * edge.uy,
     )
-    return abs(turn) > BACK_RAD or turn * track.last.side > AWAY_RAD
+    return abs(turn) > BACK_RAD or turn * candidate.last.side > AWAY_RAD
 
 
-def _step(track: Candidate, edge: SectorEdge, goal: Point, outer_m: float) -> Candidate | None:
+def _step(candidate: Candidate, edge: SectorEdge, goal: Point, outer_m: float) -> Candidate | None:
     """One step along the edge of a free sector; None where it leads nowhere."""
-    here = track.nodes[-1]
+    here = candidate.nodes[-1]
     length = min(edge.hugged_m, edge.clear_m - SHORT_OF * outer_m)
     if length < 1e-2 * outer_m:
         return None
@@ -160,7 +162,10 @@ def _step(track: Candidate, edge: SectorEdge, goal: Point, outer_m: float) -> Ca
     off_guide = math.atan2(gx * edge.uy - gy * edge.ux, gx * edge.ux + gy * edge.uy)
     left = distance_left_m(left, length, off_guide)
     return Candidate(
-        (*track.nodes, (x, y)), track.flown_m + length, left, edge if length == edge.hugged_m else None
+        (*candidate.nodes, (x, y)),
+        candidate.flown_m + length,
+        left,
+        edge if length == edge.hugged_m else None,
     )
 
 

@@ -1,7 +1,7 @@
 """The rolling-window planner of the paper, made safe and convergent: a state machine over a committed plan.
 
 In every rolling step: take the planning window about the track point where the new plan begins; search N steps deep
-among the free sectors for the n best tracks (`multi_step_search`); shorten each under the minimum turn radius
+among the free sectors for the n best candidates (`multi_step_search`); shorten each under the minimum turn radius
 (`route_optimisation`); the shortest of the n is the course (`local_planning`). Of the course that part is put into
 effect (`commitment`) which ends in a turn seen to be free, or in the goal circle (`certificate`), and flown until the
 window rolls on. A search that takes long goes on while the plan in effect is flown (`anytime_search`). Where something
@@ -151,7 +151,6 @@ class RollingWindow:
             self._proofs.no_way,
         )
         self._threats: Threats | None = None  # while something moves or has just appeared
-        self._loitered: CommittedPlan | None = None  # the last plan whose loiter was entered
         self.state = PlanningState.ESCAPING
 
     def plan(self, request: PlanRequest) -> Plan:
@@ -178,7 +177,7 @@ class RollingWindow:
         fresh_m = self._memory.take_in(request.seen, met)
         self._local.trail.add(request.position_m)
         self._threats = self._escapes.threats(request)
-        gone = self._memory.gone - self._search.gone
+        gone = self._memory.cleared - self._search.gone
         if self._monitor.take_effect(request.flown, self._memory.standing_m, gone):
             self._giving_up.new_plan()
         if self._monitor.plan is not None and self._monitor.plan.over(request.arc_length_m):
@@ -250,7 +249,7 @@ class RollingWindow:
         longer = None
         if now.request.scanned:
             cut_m = self._search.cut_m(serving)
-            longer = self._commitment.effect(now.request, start, serving, [], cut_m, wants_more_time)
+            longer = self._commitment.commit(now.request, start, serving, [], cut_m, wants_more_time)
         if (
             longer is not None
             and now.plan is not None
@@ -263,9 +262,8 @@ class RollingWindow:
     def _loiter(self, now: Situation, plan: CommittedPlan) -> None:
         """FOLLOWING -> LOITERING: the aircraft is in its turn. A place that was turned before twice is given up."""
         self.state = PlanningState.LOITERING
-        if plan is self._loitered or not plan.course.to_goal:
+        if not plan.course.to_goal or not self._giving_up.first_in_loiter(plan):
             return
-        self._loitered = plan
         place = self._commitment.unseen(plan.course, now.request.seen)
         if self._giving_up.dead_ends.turned_before(place[:2]):
             self._giving_up.dead_ends.give_up(place)
@@ -312,7 +310,7 @@ class RollingWindow:
                 nearer=self._search.nearer,
             )
         self._monitor.broken = escape.broken
-        self._monitor.proposed = escape.effect or self._monitor.proposed
+        self._monitor.proposed = escape.committed or self._monitor.proposed
         return escape.plan
 
     def _proved(self, now: Situation) -> tuple[bool, bool]:
@@ -324,7 +322,7 @@ class RollingWindow:
         """
         position, proofs = now.request.position_m, self._proofs
         only_given_up = len(self._memory.refused_m) > 0 and proofs.only_given_up.closed(position)
-        edges_went = self._memory.gone != self._search.gone
+        edges_went = self._memory.cleared != self._search.gone
         tried = self._giving_up.tried_enough(edges_went, only_given_up)
         return tried and proofs.no_room_to_turn.closed(position), only_given_up
 
@@ -359,7 +357,7 @@ class RollingWindow:
             return self._prove_no_room_to_turn()
         # No way is left but those given up, or one that takes more looking for. Or none that can be flown from here:
         # elsewhere on the turn there may be one.
-        at_end = (only_given_up or giving_up.out_of_effort) and (turned or not search.tracks)
+        at_end = (only_given_up or giving_up.out_of_effort) and (turned or not search.candidates)
         giving_up.try_again(narrow, at_end, arc_length_m)
         return Plan(PlanStatus.NO_PATH, NO_WAY_ON)
 

@@ -94,7 +94,7 @@ class RollingSearch:
         giving_up: GivingUp,
         no_way: Proof,
     ) -> None:
-        self._clearance_m, self._goal_m = mission.clearance_m, mission.goal_m
+        self._mission = mission
         self._memory, self._local, self._commitment = memory, local, commitment
         self._monitor, self._giving_up, self._no_way = monitor, giving_up, no_way
         self.running: AnytimeSearch | None = None
@@ -114,7 +114,7 @@ class RollingSearch:
 
     def cut_m(self, course: Course) -> float:
         """Arc length at which a course comes too near to an edge point that it was not found with."""
-        return self._monitor.cut_at(course, self._memory.standing_m, self._memory.gone - self.gone)
+        return self._monitor.cut_at(course, self._memory.standing_m, self._memory.cleared - self.gone)
 
     def go_on(self, step: Step) -> CommittedPlan | None:
         """Searches with one portion of work, and returns the first certified plan that may be flown."""
@@ -128,12 +128,12 @@ class RollingSearch:
             if step.serves and course.path.length_m > self._worth_m(step.ahead):
                 search.done = True
                 break
-            found = self._commitment.effect(
-                step.request, step.start, course, search.tracks, self.cut_m(course)
+            found = self._commitment.commit(
+                step.request, step.start, course, search.candidates, self.cut_m(course)
             )
             if found is not None and self._commitment.leads_on(found):
                 keeps_m = room_m(found.path, step.threats)
-                if keeps_m >= self._clearance_m:
+                if keeps_m >= self._mission.clearance_m:
                     self._end(search, step.ahead, course)
                     return found
                 if keeps_m > nearest_m:  # what moves may come to what is free now
@@ -145,7 +145,7 @@ class RollingSearch:
 
     def _begun(self, position: Point) -> AnytimeSearch:
         """A new search."""
-        self.gone = self._memory.gone
+        self.gone = self._memory.cleared
         return AnytimeSearch(
             self._local,
             self._memory.known,
@@ -163,6 +163,6 @@ class RollingSearch:
 
     def _worth_m(self, ahead: Course | None) -> float:
         """A course that is longer than this is not worth leaving the one in effect for."""
-        if ahead is None or not ahead.to_goal or ahead.nodes[-1] != self._goal_m:
+        if ahead is None or not ahead.to_goal or ahead.nodes[-1] != self._mission.goal_m:
             return math.inf
         return ahead.path.length_m * (1.0 - BETTER)

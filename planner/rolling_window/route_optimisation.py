@@ -17,10 +17,10 @@ from planner.kernels.fans import shortcuts
 from planner.rolling_window.window import PLACE, Tally
 
 SQUARE = 3.0
-"""Side of the squares in which points near a line are looked for, in distances kept."""
+"""Side of the squares in which edge points near a line are looked for, as a multiple of the distance kept."""
 
 MOST_LEFT_OUT = 6
-"""So many corners at most, from the first on, are tried to be left out."""
+"""It is tried to leave out one of so many corners at most, from the first on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,12 @@ class Terrain:
 
 @dataclass(frozen=True)
 class FlyableRoute:
-    """Candidate points after the start, and the curve through them."""
+    """A candidate that can be flown.
+
+    Attributes:
+        nodes: its track points after the start, the goal last.
+        path: the curve through them.
+    """
 
     nodes: tuple[Point, ...]
     path: Path

@@ -1,4 +1,4 @@
-"""Where the aircraft has been: so that of two ways nearly alike the one is taken that does not lead back."""
+"""Where the aircraft has been. Of two ways nearly as long, the one that does not lead back is taken."""
 
 from __future__ import annotations
 

@@ -24,17 +24,21 @@ from planner.kernels.buckets import Buckets, Cells, bucketed, cells_of, gathered
 from planner.kernels.fans import entered, fan_edges
 
 MOST_HIDING = 12
-"""So many obstacles at most are looked at for the edges of one."""
+"""For the edges of one obstacle at most so many are looked at: those that hide its edges are looked at with it."""
 
 BUCKET_CELLS = 4
-"""Side of the squares in which points near a line are looked for, in cells."""
+"""Side, in cells, of the squares in which edge points near a line are looked for."""
 
 CALL, TANGENT, PLACE, HUGGED = 14.0, 0.04, 0.0016, 0.006
-"""Work of a question, and more of it for each point that tangents are laid at, is compared, or may be hugged."""
+"""Work in about microseconds: of one question, and of each point that it lays tangents at, compares with a line, or
+looks at for how long a step hugs it."""
 
 
 class Tally:
-    """Work done, counted by what was looked at and never timed: one is about a microsecond on an ordinary core."""
+    """Work done so far, counted by what was looked at and never timed: one is about a microsecond on an ordinary core.
+
+    Counted work makes a search that is cut short end at the same place in every run.
+    """
 
     def __init__(self) -> None:
         self.done = 0.0

@@ -54,23 +54,23 @@ class Flight:
 
     def go(self, seconds: int) -> None:
         """Asks after every scan, twice a second, and flies 25 m a second, up to the goal."""
-        flown, station = self.request.flown, self.request.arc_length_m
+        flown, arc_length_m = self.request.flown, self.request.arc_length_m
         for number in range(2 * seconds):
             time_s = 0.5 * number
             position, direction = START, AHEAD
             if flown is not None and flown.path is not None:
-                pose = pose_at(flown.path, on_loiter(flown.path, station))
+                pose = pose_at(flown.path, on_loiter(flown.path, arc_length_m))
                 position, direction = pose[:2], pose[2:]
             if math.dist(position, MISSION.goal_m) <= MISSION.goal_radius_m:
                 break
             heading = math.atan2(*direction)
             self.seen.update(self._sensor.scan(*position, heading, time_s))
-            self.request = PlanRequest(time_s, position, direction, self.seen, flown, station)
+            self.request = PlanRequest(time_s, position, direction, self.seen, flown, arc_length_m)
             answer = self.planner.plan(self.request)
             self.answers.append((self.request, answer))
             if answer.status is PlanStatus.FOUND:
-                flown, station = answer, 0.0
-            station += 12.5
+                flown, arc_length_m = answer, 0.0
+            arc_length_m += 12.5
 
 
 def test_a_kind_that_is_left_out_needs_a_package_that_is_not_there() -> None:

@@ -247,10 +247,10 @@ def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_fo
         else:
             memory.refuse(place)
         for revision, known, gone in known_at:
-            behind = memory.points_m[max(known - (memory.gone - gone), 0) :]
+            behind = memory.points_m[max(known - (memory.cleared - gone), 0) :]
             later = seen.edges_since(revision)
             assert {*map(tuple, later.tolist())} <= {*map(tuple, behind.tolist())}
-        known_at.append((seen.revision, memory.known, memory.gone))
+        known_at.append((seen.revision, memory.known, memory.cleared))
 
 
 def test_what_moves_outlasts_what_is_taken_back_and_what_is_forgiven() -> None:
@@ -277,10 +277,10 @@ def test_what_was_refused_outlasts_what_is_taken_back_until_it_is_forgiven() -> 
     left = scattered(1, 7, 500.0)
     seen.take_back(left)
     memory.take_in(seen)
-    assert memory.gone == 23
+    assert memory.cleared == 23
     np.testing.assert_array_equal(memory.refused_m, [(900.0, 900.0)])
     np.testing.assert_array_equal(memory.genuine_m, left)
     memory.forgive()
     memory.take_in(seen)
-    assert memory.gone == 24
+    assert memory.cleared == 24
     np.testing.assert_array_equal(memory.points_m, left)

@@ -161,20 +161,22 @@ def walk(
 ) -> Walk:
     """Flies a planner's path without error until it is at the goal or says that it never will be."""
     planner, seen = MAKE[kind](mission), world(points, mission.sensor_range_m)
-    place, direction, station, length = start, (1.0, 0.0), 0.0, 0.0
+    place, direction, arc_length_m, length = start, (1.0, 0.0), 0.0, 0.0
     flown: Plan | None = None
     track, plans = [start], list[Plan]()
     while length < most_m:
         seen.look(place)
-        plan = planner.plan(PlanRequest(length / mission.speed_mps, place, direction, seen, flown, station))
+        plan = planner.plan(
+            PlanRequest(length / mission.speed_mps, place, direction, seen, flown, arc_length_m)
+        )
         if plan.status is PlanStatus.FOUND:
-            flown, station = plan, 0.0
+            flown, arc_length_m = plan, 0.0
             plans.append(plan)
         if plan.status is PlanStatus.UNREACHABLE or flown is None or flown.path is None:
             return Walk(plan.status, plan.reason, length, np.array(track), tuple(plans))
-        station += step_m
+        arc_length_m += step_m
         length += step_m
-        x, y, ux, uy = pose_at(flown.path, station)
+        x, y, ux, uy = pose_at(flown.path, arc_length_m)
         place, direction = (x, y), (ux, uy)
         track.append(place)
         if math.dist(place, mission.goal_m) <= mission.goal_radius_m:
@@ -433,14 +435,16 @@ def test_the_goal_is_reached_where_there_is_a_way_and_only_there(
 def test_crossings_of_a_segment_lie_on_the_line(curvature: float) -> None:
     segment = (0.0, -100.03, 0.6, 0.8, curvature, 3000.0)
     found = crossings(segment, (0.0, 0.0), (0.0, 1.0))
-    station = np.linspace(0.0, 3000.0, 30_001)
+    arc_length_m = np.linspace(0.0, 3000.0, 30_001)
     _, y, tx, ty, _, _ = segment
     if curvature:
         heights = (
-            y + (ty * np.sin(curvature * station) + tx * (1.0 - np.cos(curvature * station))) / curvature
+            y
+            + (ty * np.sin(curvature * arc_length_m) + tx * (1.0 - np.cos(curvature * arc_length_m)))
+            / curvature
         )
     else:
-        heights = y + ty * station
-    crossed = station[:-1][np.sign(heights[:-1]) != np.sign(heights[1:])]
+        heights = y + ty * arc_length_m
+    crossed = arc_length_m[:-1][np.sign(heights[:-1]) != np.sign(heights[1:])]
     assert len(found) == len(crossed)
     np.testing.assert_allclose(found, crossed, atol=0.2)

@@ -46,18 +46,18 @@ class Seen:
 def flown(points: FloatArray, most_m: float = 20_000.0) -> tuple[FloatArray, list[Plan], bool]:
     """The track of an exact flight, all plans, and whether the goal was reached."""
     planner, seen = VfhPlus(VfhPlusConfig(), MISSION), Seen(points)
-    place, direction, station = START, (1.0, 0.0), 0.0
+    place, direction, arc_length_m = START, (1.0, 0.0), 0.0
     current: Plan | None = None
     track, plans = [START], list[Plan]()
     for _ in range(int(most_m / 25.0)):
-        plan = planner.plan(PlanRequest(0.0, place, direction, seen, current, station))
+        plan = planner.plan(PlanRequest(0.0, place, direction, seen, current, arc_length_m))
         if plan.status is PlanStatus.FOUND:
-            current, station = plan, 0.0
+            current, arc_length_m = plan, 0.0
             plans.append(plan)
         assert current is not None
         assert current.path is not None
-        station += 25.0
-        x, y, ux, uy = pose_at(current.path, station)
+        arc_length_m += 25.0
+        x, y, ux, uy = pose_at(current.path, arc_length_m)
         place, direction = (x, y), (ux, uy)
         track.append(place)
         if math.dist(place, MISSION.goal_m) < MISSION.goal_radius_m:
@@ -178,8 +178,8 @@ def test_near_the_border_a_path_ends_inside_and_none_is_held_back_far_from_it(
             assert not (far and "no turn stays inside" in plan.reason)
             if plan.path is None or plan.path.loiter:
                 break
-            stations = np.linspace(0.0, plan.path.length_m, 100).tolist()
-            x, y = np.array([pose_at(plan.path, station)[:2] for station in stations]).T
+            arc_lengths_m = np.linspace(0.0, plan.path.length_m, 100).tolist()
+            x, y = np.array([pose_at(plan.path, arc_length_m)[:2] for arc_length_m in arc_lengths_m]).T
             assert xmin - 1e-6 <= x.min() <= x.max() <= xmax + 1e-6
             assert ymin - 1e-6 <= y.min() <= y.max() <= ymax + 1e-6
             ux, uy = plan.path.segments[-1, 2:4].tolist()

@@ -46,12 +46,12 @@ def test_distances_and_their_stations(
 ) -> None:
     path = path_of(pieces)
     points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (40, 2))
-    distance, station = distances(path, points)
+    distance, arc_length_m = distances(path, points)
     line = dense_line(path, integrated)
     np.testing.assert_allclose(distance, shapely.distance(line, shapely.points(points)), atol=2e-3)
-    assert (station >= 0.0).all()
-    assert (station <= path.length_m + 1e-6).all()
-    places = np.array([pose_at(path, s)[:2] for s in station])
+    assert (arc_length_m >= 0.0).all()
+    assert (arc_length_m <= path.length_m + 1e-6).all()
+    places = np.array([pose_at(path, s)[:2] for s in arc_length_m])
     np.testing.assert_allclose(np.hypot(*(places - points).T), distance, atol=1e-6)
 
 
@@ -64,15 +64,15 @@ def test_a_breach_is_told_where_and_only_where_there_is_one(
     points = np.random.default_rng(seed).uniform(-1500.0, 1500.0, (6, 2))
     nearest = shapely.distance(dense_line(path, integrated), shapely.points(points))
     assume(np.abs(nearest - radius).min() > 0.01)
-    station = first_breach(path, points, radius)
-    assert math.isfinite(station) == (nearest < radius).any()
-    if math.isfinite(station):
-        place = np.array(pose_at(path, station)[:2])
+    arc_length_m = first_breach(path, points, radius)
+    assert math.isfinite(arc_length_m) == (nearest < radius).any()
+    if math.isfinite(arc_length_m):
+        place = np.array(pose_at(path, arc_length_m)[:2])
         assert np.hypot(*(points - place).T).min() < radius
     for i, each in enumerate(points):
         alone = first_breach(path, each[None], radius)
         assert math.isfinite(alone) == (nearest[i] < radius)
-        assert station <= alone
+        assert arc_length_m <= alone
 
 
 def test_the_first_of_several_breaches_counts() -> None:

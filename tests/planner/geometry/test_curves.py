@@ -32,7 +32,7 @@ from planner.geometry.curves import (
     turn_onto,
     turns_onto,
 )
-from planner.geometry.stations import places_along, poses_at, turn_centres
+from planner.geometry.path_samples import places_along, poses_at, turn_centres
 from planner.interface import FloatArray, Path
 
 Integrated = Callable[..., FloatArray]
@@ -305,25 +305,25 @@ def test_poses_at_many_stations_are_those_of_integration(
     start: Pose, pieces: list[tuple[float, float]], shares: list[float], integrated: Integrated
 ) -> None:
     path = Path(np.array(joined(start, pieces)))
-    stations = np.array(shares) * path.length_m
-    found = poses_at(path, stations)
+    arc_lengths_m = np.array(shares) * path.length_m
+    found = poses_at(path, arc_lengths_m)
     assert found.shape == (len(shares), 4)
-    for station, pose in zip(stations.tolist(), found, strict=True):
-        kept = between(path, 0.0, station)
+    for arc_length_m, pose in zip(arc_lengths_m.tolist(), found, strict=True):
+        kept = between(path, 0.0, arc_length_m)
         expected = integrated(start, kept, 0.5)[-1] if kept else np.array(start)
         np.testing.assert_allclose(pose[:2], expected[:2], atol=5e-3)
         np.testing.assert_allclose(pose[2:], expected[2:], atol=1e-6)
-        np.testing.assert_allclose(pose, pose_at(path, station), atol=1e-6)
-    end_m = float(stations.max())
+        np.testing.assert_allclose(pose, pose_at(path, arc_length_m), atol=1e-6)
+    end_m = float(arc_lengths_m.max())
     even = np.linspace(0.0, end_m, len(shares) + 1)
     np.testing.assert_allclose(places_along(path, end_m, len(shares)), poses_at(path, even)[:, :2], atol=1e-6)
 
 
 def test_a_path_may_be_given_column_by_column() -> None:
     rows = joined(EAST, [(0.0, 100.0), (0.01, 50.0)])
-    stations = np.array([30.0, 120.0])
-    by_columns = poses_at(Path(np.asfortranarray(rows)), stations)
-    np.testing.assert_array_equal(by_columns, poses_at(Path(np.array(rows)), stations))
+    arc_lengths_m = np.array([30.0, 120.0])
+    by_columns = poses_at(Path(np.asfortranarray(rows)), arc_lengths_m)
+    np.testing.assert_array_equal(by_columns, poses_at(Path(np.array(rows)), arc_lengths_m))
 
 
 @settings(max_examples=60)
@@ -338,9 +338,9 @@ def test_turns_off_a_path_begin_after_a_straight_where_it_turns_the_other_way(
     start: Pose, pieces: list[tuple[float, float]], share: float
 ) -> None:
     path = Path(np.array(joined(start, pieces)))
-    station = share * path.length_m
-    pose, bend = place_on(path, station)
-    centres = turn_centres(path, np.array([0.0, station]), 100.0, 15.0)
+    arc_length_m = share * path.length_m
+    pose, bend = place_on(path, arc_length_m)
+    centres = turn_centres(path, np.array([0.0, arc_length_m]), 100.0, 15.0)
     assert centres.shape == (2, 2, 2)
     for side, centre in zip((1.0, -1.0), centres[1], strict=True):
         begins = along((*pose, 0.0, 0.0), 15.0) if side * bend < 0.0 else pose
@@ -367,17 +367,17 @@ def test_onward_goes_round_the_loiter_as_integration_does(
     before = joined(start, pieces)
     turn = full_turn(along(before[-1], before[-1][5]), 150.0, side)
     path = Path(np.array([*before, turn]), loiter=True)
-    station = share * path.length_m
-    stretch = onward(path, station, further)
+    arc_length_m = share * path.length_m
+    stretch = onward(path, arc_length_m, further)
     assert sum(segment[5] for segment in stretch) == pytest.approx(further, abs=1e-4)
     # The truth: the path with so many turns at its end that it cannot run out.
     endless = Path(np.array([*before, *[turn] * 8]))
-    np.testing.assert_allclose(stretch[0][:4], pose_at(endless, station), atol=1e-5)
-    end = integrated(pose_at(endless, station), stretch, 0.5)[-1]
-    truth = integrated(start, between(endless, 0.0, station + further), 0.5)[-1]
+    np.testing.assert_allclose(stretch[0][:4], pose_at(endless, arc_length_m), atol=1e-5)
+    end = integrated(pose_at(endless, arc_length_m), stretch, 0.5)[-1]
+    truth = integrated(start, between(endless, 0.0, arc_length_m + further), 0.5)[-1]
     np.testing.assert_allclose(end, truth, atol=2e-2)
     np.testing.assert_allclose(
-        along(stretch[-1], stretch[-1][5]), pose_at(path, on_loiter(path, station + further)), atol=1e-4
+        along(stretch[-1], stretch[-1][5]), pose_at(path, on_loiter(path, arc_length_m + further)), atol=1e-4
     )
 
 

@@ -225,7 +225,7 @@ def test_a_wide_search_is_led_to_a_way_that_leads_back_and_told_soon_that_there_
     local, thinking = planning(known(np.concatenate([*walls, *rings])))
     courses, _ = all_courses(thinking, 10**9, lambda: START)
     assert local.tally.done < (400_000.0 if gap_m else 100_000.0)
-    assert (len(thinking.tracks) > 0) == (len(courses) > 0) == (gap_m > 0.0)
+    assert (len(thinking.candidates) > 0) == (len(courses) > 0) == (gap_m > 0.0)
     shortest = (
         3000.0
         + math.dist((west, 0.0), (west - 200.0, north))
@@ -264,9 +264,9 @@ class TightNearObstacles:
         return [Attempt(60.0, 6.0), Attempt(60.0, 2.4), Attempt(110.0, 6.0)]
 
     def route(
-        self, attempt: Attempt, effort: int, now: Now, tracks: list[Candidate], closed: Callable[[], bool]
+        self, attempt: Attempt, effort: int, now: Now, candidates: list[Candidate], closed: Callable[[], bool]
     ) -> Generator[None, None, FlyableRoute | None]:
-        tracks.append(Candidate((START.position, MISSION.goal_m), 6400.0, 0.0))
+        candidates.append(Candidate((START.position, MISSION.goal_m), 6400.0, 0.0))
         yield
         if attempt.margin_m < 6.0:
             return None

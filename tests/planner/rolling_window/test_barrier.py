@@ -305,6 +305,6 @@ def test_what_was_let_go_of_proves_nothing_any_more(closes: bool, wall: MakePoin
     assert not proof.closed(START)
     seen.second_look()
     proof._memory.take_in(seen)
-    assert proof._memory.gone == len(between)
+    assert proof._memory.cleared == len(between)
     assert proof.closed(START) is closes
     assert proof.closed(START) is closes

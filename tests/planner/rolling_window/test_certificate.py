@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Limits, along, between, end_of, pose_at, sample
-from planner.geometry.stations import poses_at
+from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path
 from planner.rolling_window.certificate import DISC, Certified, Certifier, disc_radius_m, least_sensor_range_m
 from planner.rolling_window.route_optimisation import Terrain
@@ -99,12 +99,12 @@ def assert_certified(
     assert seen.depth_m(filled_disc(found.path, DISC_M - SPACING, 4.0)).max() <= SPACING
     line = shapely.LineString(sample(found.path, 5.0, 0.01))
     assert shapely.distance(line, shapely.points(points)).min(initial=math.inf) >= KEEP - 0.02
-    stations = np.linspace(0.0, found.loiter_entry_m, 50)
-    np.testing.assert_allclose(poses_at(found.path, stations), poses_at(path, stations), atol=1e-6)
+    arc_lengths_m = np.linspace(0.0, found.loiter_entry_m, 50)
+    np.testing.assert_allclose(poses_at(found.path, arc_lengths_m), poses_at(path, arc_lengths_m), atol=1e-6)
 
 
-def disc_is_free(path: Path, station: float, side: float, seen: FreeDiscs) -> bool:
-    x, y, tx, ty = pose_at(path, station)
+def disc_is_free(path: Path, arc_length_m: float, side: float, seen: FreeDiscs) -> bool:
+    x, y, tx, ty = pose_at(path, arc_length_m)
     probe = Path(np.array([(x, y, tx, ty, side / RADIUS, 1.0)]))
     return bool(seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all())
 
@@ -129,13 +129,13 @@ def test_what_is_certified_is_free_everywhere(
     # Nothing: then no disc beside the part of the path that is free is free of points and seen through.
     # Where even the coarse places are free the answer would have been another.
     free_to = CERTIFIER.seen_free_to_m(path, seen)
-    for station in free_to - 50.0 * np.arange(int(free_to / 50.0) + 1):
+    for arc_length_m in free_to - 50.0 * np.arange(int(free_to / 50.0) + 1):
         for side in (1.0, -1.0):
-            if not disc_is_free(path, station, side, seen):
+            if not disc_is_free(path, arc_length_m, side, seen):
                 continue
-            pose = pose_at(path, station)
+            pose = pose_at(path, arc_length_m)
             turn = Path(np.array([(*pose, side / RADIUS, math.tau * RADIUS)]))
-            bends = [row[4] for row in between(path, station, station + 1e-3)]
+            bends = [row[4] for row in between(path, arc_length_m, arc_length_m + 1e-3)]
             opposite = any(side * bend < 0.0 for bend in bends) or side * path.segments[-1, 4] < 0.0
             assert opposite or not terrain(points).admits(turn)
 

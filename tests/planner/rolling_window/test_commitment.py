@@ -56,7 +56,7 @@ def committed(
     east, north = course.path.segments[0, :2].tolist()
     start = Start((east, north), Pose(east, north, 1.0, 0.0))
     request = PlanRequest(0.0, (east, north), (1.0, 0.0), seen)
-    return commitment, commitment.effect(request, start, course, [], cut_m)
+    return commitment, commitment.commit(request, start, course, [], cut_m)
 
 
 @pytest.mark.parametrize(("room_m", "fits"), [(41.0, False), (42.5, False), (43.5, True)])

@@ -48,7 +48,7 @@ def in_effect(monitor: PlanMonitor, plan: CommittedPlan, points: FloatArray, gon
     assert monitor.proposed is None
 
 
-def effect(known: int) -> CommittedPlan:
+def committed(known: int) -> CommittedPlan:
     course = Course(STRAIGHT, ((9000.0, 0.0),), known, shortest=True)
     return CommittedPlan(Plan(PlanStatus.FOUND, "", path=COMMITTED), COMMITTED, course, 2000.0)
 
@@ -56,7 +56,7 @@ def effect(known: int) -> CommittedPlan:
 @pytest.mark.parametrize(("known", "cut", "broken"), [(3, False, False), (2, True, True), (1, True, True)])
 def test_a_plan_is_cut_by_what_came_in_while_it_was_looked_for(known: int, cut: bool, broken: bool) -> None:
     monitor = monitoring()
-    in_effect(monitor, effect(known), EDGES)
+    in_effect(monitor, committed(known), EDGES)
     assert math.isfinite(monitor.cut_m) is cut
     assert monitor.broken is broken
     if cut:
@@ -68,23 +68,27 @@ def test_what_is_left_has_the_straight_on_which_it_rolls() -> None:
     x, y, ux, uy = pose_at(Path(np.array([way])), 400.0)
     turn = (x + roll * ux, y + roll * uy, ux, uy, -0.01, 2.0 * math.pi * 100.0)
     path = Path(np.array([way, (x, y, ux, uy, 0.0, roll), turn]), loiter=True)
-    flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=path), path, effect(3).course, 400.0)
-    for station, lengths in ((100.0, [300.0, roll, turn[5]]), (410.0, [30.0, turn[5]]), (450.0, [turn[5]])):
-        left = flown.left(station)
+    flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=path), path, committed(3).course, 400.0)
+    for arc_length_m, lengths in (
+        (100.0, [300.0, roll, turn[5]]),
+        (410.0, [30.0, turn[5]]),
+        (450.0, [turn[5]]),
+    ):
+        left = flown.left(arc_length_m)
         assert left.segments[:, 5].tolist() == pytest.approx(lengths)
         for before, after in itertools.pairwise(left.segments):
             assert pose_at(Path(before[None]), before[5])[:2] == pytest.approx(after[:2])
 
 
 def test_a_new_plan_begins_on_the_one_in_effect_or_at_an_aircraft_that_is_not_near_it() -> None:
-    flown, aircraft = effect(3), Pose(400.0, 4.0, 1.0, 0.0)
+    flown, aircraft = committed(3), Pose(400.0, 4.0, 1.0, 0.0)
     for near_m, north in ((4.5, 0.0), (3.5, 4.0)):
         onward = flown.onward_from(aircraft, 400.0, 300.0, near_m)
         assert onward == [pytest.approx((400.0, north, 1.0, 0.0, 0.0, 300.0))]
 
 
 def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside_its_course() -> None:
-    flown, monitor = effect(3), monitoring()
+    flown, monitor = committed(3), monitoring()
     in_effect(monitor, flown, EDGES[:0])
     assert not monitor.look(flown, 2100.0, (2100.0, 100.0), np.array([(5000.0, 100.0)]))
     assert monitor.cut_m == math.inf
@@ -95,12 +99,17 @@ def test_in_its_turn_a_plan_is_broken_by_what_is_near_that_and_by_nothing_beside
 
 
 def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
-    course = effect(3).course
+    course = committed(3).course
     flown = CommittedPlan(Plan(PlanStatus.FOUND, "", path=STRAIGHT), STRAIGHT, course, 8953.0)
     assert flown.left(400.0).length_m == pytest.approx(8600.0)
     assert flown.turn.length_m == 0.0
-    assert [flown.over(station) for station in (8953.0, 8999.0, 9000.0, 9100.0)] == [False, False, True, True]
-    assert not effect(3).over(1e6)
+    assert [flown.over(arc_length_m) for arc_length_m in (8953.0, 8999.0, 9000.0, 9100.0)] == [
+        False,
+        False,
+        True,
+        True,
+    ]
+    assert not committed(3).over(1e6)
     monitor = monitoring()
     in_effect(monitor, flown, EDGES[:0])
     assert not monitor.look(flown, 400.0, (400.0, 0.0), np.array([(1000.0, 301.0)]))
@@ -111,36 +120,36 @@ def test_a_plan_that_ends_at_the_goal_has_no_turn_and_is_over_there() -> None:
 
 def test_what_has_gone_meanwhile_hides_nothing_that_came_in() -> None:
     monitor = monitoring()
-    course = effect(4).course  # one of the four is gone; the last of the edges is new
+    course = committed(4).course  # one of the four is gone; the last of the edges is new
     assert monitor.cut_at(course, EDGES) == math.inf
     assert 1200.0 <= monitor.cut_at(course, EDGES, gone=2) <= 1500.0
-    in_effect(monitor, effect(4), EDGES, gone=9)
+    in_effect(monitor, committed(4), EDGES, gone=9)
     assert monitor.broken
 
 
 def test_a_cut_beyond_the_turn_does_not_break_the_plan() -> None:
     monitor = monitoring()
-    in_effect(monitor, effect(1), EDGES[:2])
+    in_effect(monitor, committed(1), EDGES[:2])
     assert 4700.0 <= monitor.cut_m <= 5000.0
     assert not monitor.broken
 
 
 def test_the_window_rolls_on_the_sooner_the_nearer_something_is_wrong() -> None:
-    flown, monitor = effect(3), monitoring()
+    flown, monitor = committed(3), monitoring()
     assert not monitor.due(flown, 0.0, 1e4, newly_cut=False)  # all is well, and the turn far ahead
     assert monitor.due(flown, 300.0, 500.0, newly_cut=False)  # the turn comes nearer: a rolling step
     assert not monitor.due(flown, 300.0, 499.0, newly_cut=False)
     assert monitor.due(flown, 1100.0, 60.0, newly_cut=False)  # it is near
     assert not monitor.due(flown, 1100.0, 40.0, newly_cut=False)
-    in_effect(monitor, effect(1), EDGES[:2])
+    in_effect(monitor, committed(1), EDGES[:2])
     least_m = CUT * monitor.cut_m
-    assert not monitor.due(effect(1), 0.0, 0.9 * 50.0, newly_cut=False)
-    assert monitor.due(effect(1), 0.0, max(least_m, 50.0), newly_cut=False)
-    assert monitor.due(effect(1), 1100.0, 0.0, newly_cut=True)
+    assert not monitor.due(committed(1), 0.0, 0.9 * 50.0, newly_cut=False)
+    assert monitor.due(committed(1), 0.0, max(least_m, 50.0), newly_cut=False)
+    assert monitor.due(committed(1), 1100.0, 0.0, newly_cut=True)
 
 
 def test_a_way_that_grazes_what_cuts_it_is_looked_at_again_later() -> None:
-    flown, monitor = effect(1), monitoring()
+    flown, monitor = committed(1), monitoring()
     in_effect(monitor, flown, EDGES[:2])
     since_m = 0.5 * (CUT + UNHURRIED) * flown.loiter_entry_m
     assert monitor.due(flown, 0.0, since_m, newly_cut=False)
@@ -150,7 +159,7 @@ def test_a_way_that_grazes_what_cuts_it_is_looked_at_again_later() -> None:
 
 
 def test_only_what_was_proposed_takes_effect() -> None:
-    monitor, proposed, other = monitoring(), effect(3), effect(3)
+    monitor, proposed, other = monitoring(), committed(3), committed(3)
     assert not monitor.take_effect(None, EDGES)
     monitor.proposed = proposed
     assert not monitor.take_effect(other.plan, EDGES)

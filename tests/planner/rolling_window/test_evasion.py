@@ -13,7 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Limits, onward, pose_at, sample
-from planner.geometry.stations import poses_at
+from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
 from planner.rolling_window.encounters import EARLIEST, LATEST
 from planner.rolling_window.escape import CLEARER, EVADING_S, LOITER_SHARES
@@ -57,14 +57,14 @@ def moving(points: FloatArray, velocity: tuple[float, float]) -> FloatArray:
 
 def room_by_hand(path: Path, of: Threats) -> float:
     """At every place, and for what moves at every moment of a fine grid of those at which it may be met."""
-    stations = np.arange(0.0, AHEAD_S * SPEED, STEP)
+    arc_lengths_m = np.arange(0.0, AHEAD_S * SPEED, STEP)
     room = math.inf
-    for station, place in zip(stations, poses_at(path, stations)[:, :2], strict=True):
+    for arc_length_m, place in zip(arc_lengths_m, poses_at(path, arc_lengths_m)[:, :2], strict=True):
         away = [np.hypot(*(of.still_m - place).T)]
         for share in np.linspace(EARLIEST, LATEST, 40):
-            now = of.moving[:, :2] + of.moving[:, 2:4] * share * station / SPEED
+            now = of.moving[:, :2] + of.moving[:, 2:4] * share * arc_length_m / SPEED
             away.append(np.hypot(*(now - place).T))
-        room = min(room, np.concatenate(away).min(initial=math.inf) + LATER * station)
+        room = min(room, np.concatenate(away).min(initial=math.inf) + LATER * arc_length_m)
     return room
 
 
@@ -105,10 +105,10 @@ def test_from_what_has_just_appeared_it_keeps_further(place: tuple[float, float]
     """It is met wherever it can get to."""
     path = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 800.0)]))
     unknown = threats(moving=np.array([(*place, 0.0, 0.0, UNKNOWN_MPS)]))
-    stations = np.arange(0.0, AHEAD_S * SPEED, STEP)
-    away = np.hypot(*(poses_at(path, stations)[:, :2] - place).T)
-    reach = UNKNOWN_MPS * np.minimum(LATEST * stations / SPEED, UNKNOWN_S)
-    assert unknown.room_m(path) == pytest.approx((away - reach + LATER * stations).min())
+    arc_lengths_m = np.arange(0.0, AHEAD_S * SPEED, STEP)
+    away = np.hypot(*(poses_at(path, arc_lengths_m)[:, :2] - place).T)
+    reach = UNKNOWN_MPS * np.minimum(LATEST * arc_lengths_m / SPEED, UNKNOWN_S)
+    assert unknown.room_m(path) == pytest.approx((away - reach + LATER * arc_lengths_m).min())
 
 
 @pytest.mark.parametrize("bearing", [0.3, 2.0, 4.0])
@@ -342,17 +342,17 @@ def test_a_plan_is_left_in_time_for_what_comes_to_it(ring: MakePoints) -> None:
     mission = replace(MISSION, turn_radius_m=230.0, clearance_m=60.0, sensor_range_m=2000.0)
     seen, pilot = Seen(nothing()), planner(mission)
     outline, velocity = ring(2500.0, 0.0, 80.0, 20.0), np.array((-9.0, 0.0))
-    plan, station, nearest = pilot.plan(first_request(seen)), 0.0, math.inf
+    plan, arc_length_m, nearest = pilot.plan(first_request(seen)), 0.0, math.inf
     for step in range(160):
         time_s = 0.5 * step
         now = outline + velocity * time_s
-        request = request_on(plan, station, seen)._replace(time_s=time_s)
+        request = request_on(plan, arc_length_m, seen)._replace(time_s=time_s)
         away = np.hypot(*(now - request.position_m).T).min()
         nearest = min(nearest, float(away))
         if away < 1000.0:
             seen.moving = (MovingEdges(time_s, now, (-9.0, 0.0)),)
         answer = pilot.plan(request)
         if answer.status is PlanStatus.FOUND:
-            plan, station = answer, 0.0
-        station += 0.5 * 25.0
+            plan, arc_length_m = answer, 0.0
+        arc_length_m += 0.5 * 25.0
     assert nearest > 0.9 * mission.clearance_m

@@ -102,11 +102,11 @@ def test_a_goal_in_view_that_cannot_be_hit_is_approached_another_way() -> None:
 def test_where_edges_go_while_it_searches_no_way_is_told_later(gone: int, searches: int) -> None:
     """All is given up, and the edges leave no way that has room to turn: all is tried again before."""
     pilot, seen, plan, flown_m = circling(replace(MISSION, turn_radius_m=500.0), 3000.0)
-    pilot._memory.gone += gone
+    pilot._memory.cleared += gone
     now = Situation(request_on(plan, flown_m, seen), pilot._monitor.plan, flown_m)
     assert now.plan is not None
     pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
-    pilot._search.last = SimpleNamespace(done=True, stuck=None, tracks=[])  # type: ignore[assignment]
+    pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
     effort = pilot._giving_up.effort
     told = [
         pilot._no_way_found(now).status
@@ -149,7 +149,7 @@ def test_while_something_may_be_gone_again_no_goal_is_called_unreachable(for_tur
     assert flown is not None
     pilot._proofs.no_way.closed = lambda position: not for_turns_alone  # type: ignore[method-assign]
     pilot._proofs.no_room_to_turn.closed = lambda position: True  # type: ignore[method-assign]
-    pilot._search.last = SimpleNamespace(done=True, stuck=None, tracks=[])  # type: ignore[assignment]
+    pilot._search.last = SimpleNamespace(done=True, stuck=None, candidates=[])  # type: ignore[assignment]
 
     def told(time_s: float) -> list[PlanStatus]:
         request = request_on(plan, flown_m, seen)._replace(time_s=time_s)

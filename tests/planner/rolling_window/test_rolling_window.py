@@ -14,7 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import end_of, pose_at, sample
-from planner.geometry.stations import poses_at
+from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
 from planner.rolling_window.config import RollingWindowConfig
 from planner.rolling_window.planner import RollingWindow
@@ -85,11 +85,11 @@ def first_request(seen: Seen, position: tuple[float, float] = (0.0, 0.0)) -> Pla
     return PlanRequest(0.0, position, (1.0, 0.0), seen)
 
 
-def request_on(plan: Plan, station: float, seen: Seen) -> PlanRequest:
+def request_on(plan: Plan, arc_length_m: float, seen: Seen) -> PlanRequest:
     """The request of an aircraft that flies a plan without error."""
     assert plan.path is not None
-    pose = pose_at(plan.path, station)
-    return PlanRequest(station / 25.0, pose[:2], pose[2:], seen, plan, station)
+    pose = pose_at(plan.path, arc_length_m)
+    return PlanRequest(arc_length_m / 25.0, pose[:2], pose[2:], seen, plan, arc_length_m)
 
 
 def flight(
@@ -100,11 +100,11 @@ def flight(
     seen.look(0.0, 0.0)
     plan = pilot.plan(first_request(seen))
     assert plan.status is PlanStatus.FOUND
-    places, plans, station = [(0.0, 0.0)], [plan], 0.0
+    places, plans, arc_length_m = [(0.0, 0.0)], [plan], 0.0
     while math.dist(places[-1], mission.goal_m) > mission.goal_radius_m:
         assert len(places) < 1500, "does not arrive"
-        station += step_m
-        request = request_on(plan, station, seen)
+        arc_length_m += step_m
+        request = request_on(plan, arc_length_m, seen)
         places.append(request.position_m)
         seen.look(*request.position_m)
         answer = pilot.plan(request)
@@ -114,7 +114,7 @@ def flight(
             start = pose_at(answer.path, 0.0)
             np.testing.assert_allclose(start[:2], request.position_m, atol=1e-4)
             np.testing.assert_allclose(start[2:], request.direction, atol=1e-5)
-            plan, station = answer, 0.0
+            plan, arc_length_m = answer, 0.0
             plans.append(plan)
         else:
             assert answer.path is None
@@ -199,25 +199,25 @@ def test_arrives_through_fields_of_separate_circles(
 def test_a_plan_is_kept_while_nothing_changes(ring: MakePoints) -> None:
     seen, pilot = seen_at_once(ring(9000.0, 500.0, 2000.0, SPACING)), planner()
     plan = pilot.plan(first_request(seen))
-    for station in (0.0, 10.0, 50.0, 200.0):
-        answer = pilot.plan(request_on(plan, station, seen))
+    for arc_length_m in (0.0, 10.0, 50.0, 200.0):
+        answer = pilot.plan(request_on(plan, arc_length_m, seen))
         assert answer.status is PlanStatus.KEPT
         assert answer.path is None
         assert len(answer.waypoints_m) == 0
     # From then on it is only prolonged: the same track points, the same way, as far as can be certified.
-    course, station, prolonged = plan.waypoints_m[1:].tolist(), 0.0, 0
-    while math.dist(pose_at(plan.path or Path(nothing()), station)[:2], MISSION.goal_m) > 500.0:
-        station += 250.0
-        answer = pilot.plan(request_on(plan, station, seen))
+    course, arc_length_m, prolonged = plan.waypoints_m[1:].tolist(), 0.0, 0
+    while math.dist(pose_at(plan.path or Path(nothing()), arc_length_m)[:2], MISSION.goal_m) > 500.0:
+        arc_length_m += 250.0
+        answer = pilot.plan(request_on(plan, arc_length_m, seen))
         assert answer.status in (PlanStatus.KEPT, PlanStatus.NO_BETTER, PlanStatus.FOUND)
         if answer.path is None or plan.path is None:
             continue
         assert [node for node in answer.waypoints_m[1:].tolist() if node not in course] == []
         overlap = np.linspace(0.0, 2000.0, 5)
         np.testing.assert_allclose(
-            poses_at(answer.path, overlap), poses_at(plan.path, station + overlap), atol=1e-3
+            poses_at(answer.path, overlap), poses_at(plan.path, arc_length_m + overlap), atol=1e-3
         )
-        plan, station, prolonged = answer, 0.0, prolonged + 1
+        plan, arc_length_m, prolonged = answer, 0.0, prolonged + 1
     assert 1 <= prolonged <= 40
 
 

@@ -65,7 +65,7 @@ def loitering(mission: Mission = MISSION) -> tuple[RollingWindow, Seen, Plan, fl
 
 def searched_in_vain(pilot: RollingWindow, *, done: bool = True, stuck: object = None) -> None:
     """The last search was this."""
-    search = SimpleNamespace(done=done, stuck=stuck, tracks=[])
+    search = SimpleNamespace(done=done, stuck=stuck, candidates=[])
     pilot._search.last = search  # type: ignore[assignment]
 
 
@@ -123,7 +123,7 @@ def test_a_place_that_was_turned_before_twice_is_given_up_on_entering_the_loiter
     pilot, now = in_the_loiter()
     assert now.plan is not None
     assert len(pilot._memory.refused_m) == 0
-    pilot._loitered = None  # as if another plan had come to the same place
+    pilot._giving_up.first_in_loiter(None)  # as if another plan had come to the same place
     pilot._loiter(now, now.plan)
     assert pilot.state is PlanningState.LOITERING
     assert len(pilot._memory.refused_m) > 0
