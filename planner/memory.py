@@ -19,9 +19,9 @@ NOTHING = np.zeros((0, 2))
 class ObstacleMemory:
     """Every edge point seen so far and the obstacle that it belongs to.
 
-    Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They
-    are gathered on a grid whose neighbouring cells (diagonals too) are always that near, as they come in. It has so many
-    attributes because each is one column of the points, which grow by doubling, or one index of the cells.
+    Points nearer to each other than twice the clearance leave no way between them: they are one obstacle. They are
+    gathered on a grid whose neighbouring cells (diagonals too) are always that near, as they come in. Each attribute is
+    a column of the points, which grow by doubling, or an index of the cells: hence so many.
 
     Args:
         clearance_m: distance to be kept from every point.

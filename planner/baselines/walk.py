@@ -108,8 +108,7 @@ class Enclosed:
 class Walker(ABC, Generic[WalkState]):
     """The frame of a planner whose vehicle is a point: when to walk anew, and from which state.
 
-    It has so many attributes because the algorithms that it frames read half of them: goal, side, kept distance, horizon,
-    legs, what is known.
+    The algorithms that it frames read half of its attributes: goal, side, kept distance, horizon, legs, what is known.
 
     Args:
         config: resolved keys.
