@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Generic, Literal, Self, TypeVar
@@ -33,6 +33,9 @@ BREACH_SHARE = 0.25
 SAME_PLACE = 0.5
 """Places on a boundary passed in one sense and nearer than this share of the kept distance are the same: no two
 stretches of a boundary that run the same way can be that near to each other."""
+
+GAP_M = 1e-3
+"""A path that would jump further than this between two segments is joined by a straight line."""
 
 WalkState = TypeVar("WalkState")
 
@@ -223,6 +226,7 @@ class Walker(ABC, Generic[WalkState]):
     def _found(
         self, legs: tuple[WalkLeg[WalkState], ...], request: PlanRequest, place: Point | None = None
     ) -> Plan:
+        legs = tuple(connected(legs))
         segments = [segment for leg in legs for segment in leg.segments]
         end = legs[-1].state
         if not segments:
@@ -297,6 +301,21 @@ def length_of(segments: Iterable[Segment]) -> float:
 def _same_way(segment: Segment, at_m: float, mark: Mark) -> bool:
     _, _, tx, ty = along(segment, at_m)
     return tx * mark.ux + ty * mark.uy > 0.0
+
+
+def connected(legs: Sequence[WalkLeg[WalkState]]) -> Iterator[WalkLeg[WalkState]]:
+    """Legs with a straight line wherever a segment begins off where the one before ends, as beside a boundary."""
+    at: Point | None = None
+    for leg in legs:
+        segments: list[Segment] = []
+        for segment in leg.segments:
+            gap_m = 0.0 if at is None else math.dist(at, segment[:2])
+            if at is not None and gap_m > GAP_M:
+                ux, uy = (segment[0] - at[0]) / gap_m, (segment[1] - at[1]) / gap_m
+                segments.append((*at, ux, uy, 0.0, gap_m))
+            segments.append(segment)
+            at = along(segment, segment[5])[:2]
+        yield replace(leg, segments=tuple(segments))
 
 
 def nearest_on_segment(segment: Segment, place: Point) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from planner import contract
 from planner.baselines.bug1 import Bug1, Bug1Config
 from planner.baselines.bug2 import Bug2, Bug2Config, crossings
 from planner.baselines.tangent_bug import BoundaryFollowing, TangentBug, TangentBugConfig
-from planner.baselines.walk import Enclosed, mark_at
+from planner.baselines.walk import Enclosed, WalkLeg, connected, mark_at
 from planner.geometry.curves import Point, pose_at
 from planner.geometry.margin import margin_of
 from planner.interface import (
@@ -448,3 +448,14 @@ def test_crossings_of_a_segment_lie_on_the_line(curvature: float) -> None:
     crossed = arc_length_m[:-1][np.sign(heights[:-1]) != np.sign(heights[1:])]
     assert len(found) == len(crossed)
     np.testing.assert_allclose(found, crossed, atol=0.2)
+
+
+def test_legs_that_begin_off_the_one_before_are_joined_by_a_line() -> None:
+    """Beside a boundary a walk goes on along it from nearby: its path does not jump there."""
+    east, north = (0.0, 0.0, 1.0, 0.0, 0.0, 100.0), (103.0, 4.0, 0.0, 1.0, 0.0, 50.0)
+    first, second = connected((WalkLeg("one", (east,)), WalkLeg("two", (north,))))
+    assert (first.state, first.segments) == ("one", (east,))
+    line, after = second.segments
+    assert line == pytest.approx((100.0, 0.0, 0.6, 0.8, 0.0, 5.0))
+    assert (second.state, after) == ("two", north)
+    assert list(connected(())) == []
