@@ -77,14 +77,15 @@ class JsbsimModel:
         self._stall_rad = math.radians(self.airframe.stall_angle_deg)
         self._stall_fps = STALL_SPEED_SHARE * self.airframe.airspeed_range_mps[0] / FOOT_M
         self._plane = PatchedPlane(plane, *map(math.radians, plane.geodetic(start.east_m, start.north_m)))
-        self._convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
-        """Meridian convergence where the state was last read."""
+        convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
+        self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
+        """Of the meridian convergence where the state was last read."""
         self._gust: Gust | None = None
         self._windy = atmosphere.wind_mps > 0.0
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
 
         fdm = self._fdm = load(self.airframe.files, step_rate_hz)
-        trim(fdm, self.airframe.name, plane, start, heading_rad + self._convergence_rad)
+        trim(fdm, self.airframe.name, plane, start, heading_rad + convergence_rad)
         self._read = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
@@ -122,22 +123,22 @@ class JsbsimModel:
             throttle,
         ) = [read() for read in self._read]
         east_m, north_m, convergence_rad = self._plane.project(latitude_rad, longitude_rad)
-        self._convergence_rad = convergence_rad
-        cosine_m, sine_m = FOOT_M * math.cos(convergence_rad), FOOT_M * math.sin(convergence_rad)
+        self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
+        cosine_m, sine_m = FOOT_M * self._cosine, FOOT_M * self._sine
         return AircraftState(
-            time_s=self._step / self._step_rate_hz,
-            east_m=east_m,
-            north_m=north_m,
-            up_m=up_ft * FOOT_M,
-            velocity_east_mps=east_fps * cosine_m - north_fps * sine_m,
-            velocity_north_mps=east_fps * sine_m + north_fps * cosine_m,
-            velocity_up_mps=climb_fps * FOOT_M,
-            heading_rad=(true_heading_rad - convergence_rad) % math.tau,
-            roll_rad=roll_rad,
-            pitch_rad=pitch_rad,
-            airspeed_mps=airspeed_fps * FOOT_M,
-            load_factor=load_factor,
-            throttle=throttle,
+            self._step / self._step_rate_hz,
+            east_m,
+            north_m,
+            up_ft * FOOT_M,
+            east_fps * cosine_m - north_fps * sine_m,
+            east_fps * sine_m + north_fps * cosine_m,
+            climb_fps * FOOT_M,
+            (true_heading_rad - convergence_rad) % math.tau,
+            roll_rad,
+            pitch_rad,
+            airspeed_fps * FOOT_M,
+            load_factor,
+            throttle,
         )
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:
@@ -240,12 +241,13 @@ class JsbsimModel:
         if self._gust is not None:
             share = self._gust.share(self._step / self._step_rate_hz) / FOOT_M
             east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
-        sine, cosine = math.sin(self._convergence_rad), math.cos(self._convergence_rad)
-        return east * cosine + north * sine, north * cosine - east * sine
+        return east * self._cosine + north * self._sine, north * self._cosine - east * self._sine
 
     def _blow(self) -> None:
-        for write, value in zip(self._write_wind, self._wind_true(), strict=True):
-            write(value)
+        write_east, write_north = self._write_wind
+        east_fps, north_fps = self._wind_true()
+        write_east(east_fps)
+        write_north(north_fps)
 
     def _stir(self, model: str, intensity: str, seed: int) -> None:
         """Starts turbulence after MIL-F-8785C."""

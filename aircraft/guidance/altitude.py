@@ -81,8 +81,24 @@ def slewed(airspeeds_mps: FloatArray, time_s: FloatArray) -> FloatArray:
     return commanded
 
 
+class LevelFlight:
+    """One altitude and one airspeed all along. Implements `VerticalLaw`.
+
+    Args:
+        altitude_m: above mean sea level.
+        airspeed_mps: true airspeed.
+    """
+
+    def __init__(self, altitude_m: float, airspeed_mps: float) -> None:
+        self._held = altitude_m, airspeed_mps
+
+    def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
+        """What is held."""
+        return self._held
+
+
 class AltitudeGuidance:
-    """Commands altitude and airspeed so that the inner loops fly a profile.
+    """Commands altitude and airspeed so that the inner loops fly a profile. Implements `VerticalLaw`.
 
     The inner loop climbs at its gain times the altitude error. The command is put where that gives the climb of the
     profile, plus what takes the present error back, within what the aircraft can climb and sink at its airspeed. A

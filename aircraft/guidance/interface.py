@@ -85,3 +85,19 @@ class GuidanceLaw(Protocol):
             RuntimeError: there is no route yet.
         """
         ...
+
+
+class VerticalLaw(Protocol):
+    """Says at which altitude and airspeed the aircraft flies, asked `UPDATE_RATE_HZ` times a second.
+
+    One object serves one flight. The state it is given is what the aircraft believes of itself.
+    """
+
+    def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
+        """Altitude above mean sea level (m) and true airspeed (m/s) to be held until the next update.
+
+        Args:
+            state: the aircraft now.
+            arc_length_m: where on the route it is; NaN before the first route.
+        """
+        ...

@@ -15,7 +15,7 @@ from harness.scenario.given import GUIDANCE, PLANNER, Part, registered
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 
 if TYPE_CHECKING:
-    from harness.flight.closed_loop import Progress
+    from harness.flight.observer import Progress
 
 
 def fly(

@@ -18,7 +18,8 @@ from typing import Any, TypeVar
 
 from aircraft.interface import AircraftState
 from harness.bench.stopwatch import Stopwatch
-from harness.flight.closed_loop import Loop, Progress, fly
+from harness.flight.closed_loop import Loop, fly
+from harness.flight.observer import Progress
 from harness.flight.record import AcceptedPlan, Track
 from harness.mapping.scan import RangeScan
 from harness.run.scenario_flight import (

@@ -8,48 +8,19 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from types import MappingProxyType
+from typing import Annotated, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.interface import AircraftState
 from planner.interface import Plan
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-Clearance = Callable[[FloatArray, FloatArray], FloatArray]
-"""(k, 2) points and (k,) times -> (k,) true distance to the nearest active obstacle edge, m."""
-
-COLUMNS = (
-    "time_s",
-    "east_m",
-    "north_m",
-    "up_m",
-    "course_deg",
-    "heading_deg",
-    "roll_deg",
-    "pitch_deg",
-    "airspeed_mps",
-    "groundspeed_mps",
-    "load_factor",
-    "roll_command_deg",
-    "cross_track_m",
-    "clearance_m",
-    "plan_index",
-)
-"""Columns of `track.parquet` that the digest covers, in its order."""
-
-BLOCK_ROWS = 6000
-"""Rows that are handed on together: ten minutes of flight, which is less than a second of the loop."""
-
-ROW = len(AircraftState._fields) + 4
-"""Numbers in a row: a state, roll command, cross-track error and arc length, plan index."""
-THROTTLE = AircraftState._fields.index("throttle")
-"""What comes before it in a row is finite while the aircraft is under control."""
 
 
 class Outcome(Enum):
@@ -64,61 +35,69 @@ class Outcome(Enum):
     PLANNER_FAILED = "planner_failed"
 
 
+class Column(NamedTuple):
+    """What a column of the track is."""
+
+    doc: str
+    """What it holds, in the unit that its name says."""
+    dtype: str = "<f8"
+    """Of its values, as numpy writes it."""
+    in_digest: bool = True
+    """The digest covers it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """The flown track, one row per log tick. All columns are read-only and equally long.
 
-    Attributes:
-        time_s: simulated time.
-        east_m: position in the local plane.
-        north_m: position in the local plane.
-        up_m: altitude above mean sea level.
-        course_deg: direction of the ground velocity, in [0, 360).
-        heading_deg: direction of the nose, in [0, 360).
-        roll_deg: positive right wing down.
-        pitch_deg: positive nose up.
-        airspeed_mps: true airspeed.
-        groundspeed_mps: horizontal speed over the ground.
-        load_factor: normal load factor, 1 in level flight.
-        roll_command_deg: what guidance asked of the inner loops.
-        cross_track_m: distance from the plan being flown, positive right of it; NaN before the first plan.
-        clearance_m: true distance to the nearest active obstacle edge, negative inside, inf with none.
-        plan_index: row of `plans.parquet` being flown, -1 before the first.
-        arc_length_m: distance along that plan; NaN before the first plan.
-        throttle: throttle command, 0 to 1; NaN for a flight model without an engine.
-        altitude_above_ground_m: height above the true ground; NaN where that is not known, the default.
+    Its fields are the columns of `track.parquet`, in that order; what each holds is said once, here, and written into
+    the file's schema.
     """
 
-    time_s: FloatArray
-    east_m: FloatArray
-    north_m: FloatArray
-    up_m: FloatArray
-    course_deg: FloatArray
-    heading_deg: FloatArray
-    roll_deg: FloatArray
-    pitch_deg: FloatArray
-    airspeed_mps: FloatArray
-    groundspeed_mps: FloatArray
-    load_factor: FloatArray
-    roll_command_deg: FloatArray
-    cross_track_m: FloatArray
-    clearance_m: FloatArray
-    plan_index: IntArray
-    arc_length_m: FloatArray
-    throttle: FloatArray
-    altitude_above_ground_m: FloatArray | None = None
+    time_s: Annotated[FloatArray, Column("simulated time")]
+    east_m: Annotated[FloatArray, Column("position in the local plane")]
+    north_m: Annotated[FloatArray, Column("position in the local plane")]
+    up_m: Annotated[FloatArray, Column("altitude above mean sea level")]
+    course_deg: Annotated[FloatArray, Column("direction of the ground velocity, in [0, 360)")]
+    heading_deg: Annotated[FloatArray, Column("direction of the nose, in [0, 360)")]
+    roll_deg: Annotated[FloatArray, Column("positive right wing down")]
+    pitch_deg: Annotated[FloatArray, Column("positive nose up")]
+    airspeed_mps: Annotated[FloatArray, Column("true airspeed")]
+    groundspeed_mps: Annotated[FloatArray, Column("horizontal speed over the ground")]
+    load_factor: Annotated[FloatArray, Column("normal load factor, 1 in level flight")]
+    roll_command_deg: Annotated[FloatArray, Column("what guidance asked of the inner loops")]
+    cross_track_m: Annotated[
+        FloatArray,
+        Column("distance from the plan being flown, positive right of it; NaN before the first plan"),
+    ]
+    clearance_m: Annotated[
+        FloatArray,
+        Column("true distance to the nearest active obstacle edge, negative inside, inf with none"),
+    ]
+    plan_index: Annotated[IntArray, Column("row of plans.parquet being flown, -1 before the first", "<i8")]
+    arc_length_m: Annotated[
+        FloatArray, Column("distance along the plan being flown; NaN before the first plan", in_digest=False)
+    ]
+    throttle: Annotated[
+        FloatArray,
+        Column("throttle command, 0 to 1; NaN for a flight model without an engine", in_digest=False),
+    ]
+    altitude_above_ground_m: Annotated[
+        FloatArray | None,
+        Column("height above the true ground; NaN where that is not known, the default", in_digest=False),
+    ] = None
 
     def __post_init__(self) -> None:
         if self.altitude_above_ground_m is None:
             object.__setattr__(self, "altitude_above_ground_m", np.full(len(self.time_s), math.nan))
-        for name in TRACK_FIELDS:
-            column = np.array(getattr(self, name), dtype="<i8" if name == "plan_index" else "<f8")
-            if column.shape != (len(self.time_s),):
+        for name, column in TRACK_COLUMNS.items():
+            values = np.array(getattr(self, name), dtype=column.dtype)
+            if values.shape != (len(self.time_s),):
                 raise ValueError(
-                    f"track column {name} has shape {column.shape}, time_s has {len(self.time_s)} rows"
+                    f"track column {name} has shape {values.shape}, time_s has {len(self.time_s)} rows"
                 )
-            column.setflags(write=False)
-            object.__setattr__(self, name, column)
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -137,8 +116,16 @@ class Track:
         )
 
 
-TRACK_FIELDS = (*COLUMNS, "arc_length_m", "throttle", "altitude_above_ground_m")
-"""All columns of `track.parquet`."""
+TRACK_COLUMNS: Mapping[str, Column] = MappingProxyType(
+    {name: hint.__metadata__[0] for name, hint in get_type_hints(Track, include_extras=True).items()}
+)
+"""All columns of `track.parquet`, in its order: the fields of `Track`."""
+
+TRACK_FIELDS = tuple(TRACK_COLUMNS)
+"""Their names."""
+
+COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)
+"""Columns of `track.parquet` that the digest covers, in its order."""
 
 
 def digest(track: Track) -> str:
@@ -147,89 +134,6 @@ def digest(track: Track) -> str:
     for name in COLUMNS:
         sha.update(getattr(track, name).tobytes())
     return sha.hexdigest()
-
-
-class TrackLog:
-    """Collects the track of one flight and hands it on in blocks while flying.
-
-    The true clearance is filled in block by block, not row by row.
-
-    Args:
-        clearance: distance to the nearest obstacle edge, vectorised.
-        ground: height of the ground at east and north, vectorised; None where it is not known.
-        sinks: each is called with every finished block, in order.
-        block_rows: rows a block.
-    """
-
-    def __init__(
-        self,
-        clearance: Clearance,
-        sinks: Iterable[Callable[[Track], None]] = (),
-        block_rows: int = BLOCK_ROWS,
-        ground: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
-    ) -> None:
-        self._clearance, self._ground = clearance, ground
-        self._sinks = tuple(sinks)
-        self._table = np.zeros((block_rows, ROW))  # no more objects while flying than now
-        self._row = 0
-        self.commanded = 0.0, math.nan, math.nan
-        """Roll command, cross-track error and arc length of the last update; 0 and NaN before the first."""
-        self._blocks: list[Track] = []
-
-    def add(
-        self,
-        state: AircraftState,
-        roll_command_rad: float,
-        cross_track_m: float,
-        arc_length_m: float,
-        plan_index: int,
-    ) -> None:
-        """Adds one row; without a plan, `cross_track_m` and `arc_length_m` are NaN and `plan_index` is -1.
-
-        A state that is not finite, with which control is lost, is no row of the track.
-        """
-        self._table[self._row] = (*state, roll_command_rad, cross_track_m, arc_length_m, plan_index)
-        self._row += 1
-        if self._row == len(self._table):
-            self._cut()
-
-    def close(self) -> Track:
-        """Hands on the last block and returns the whole track."""
-        if self._row:
-            self._cut()
-        return Track.joined(self._blocks)
-
-    def _cut(self) -> None:
-        rows = np.ascontiguousarray(self._table[: self._row].T)
-        rows = rows[:, np.isfinite(rows[:THROTTLE]).all(axis=0)]
-        self._row = 0
-        if not rows.size:
-            return
-        time, east, north, up, east_mps, north_mps, _, heading, roll, pitch = rows[:10]
-        airspeed, load_factor, throttle, roll_command, cross_track, station, plan_index = rows[10:]
-        block = Track(
-            time_s=time,
-            east_m=east,
-            north_m=north,
-            up_m=up,
-            course_deg=np.degrees(np.arctan2(east_mps, north_mps)) % 360.0,
-            heading_deg=np.degrees(heading) % 360.0,
-            roll_deg=np.degrees(roll),
-            pitch_deg=np.degrees(pitch),
-            airspeed_mps=airspeed,
-            groundspeed_mps=np.hypot(east_mps, north_mps),
-            load_factor=load_factor,
-            roll_command_deg=np.degrees(roll_command),
-            cross_track_m=cross_track,
-            clearance_m=self._clearance(np.column_stack((east, north)), time),
-            plan_index=plan_index,
-            arc_length_m=station,
-            throttle=throttle,
-            altitude_above_ground_m=None if self._ground is None else up - self._ground(east, north),
-        )
-        self._blocks.append(block)
-        for sink in self._sinks:
-            sink(block)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from typing import NamedTuple, Protocol
 
 from aircraft.interface import AircraftState
 from harness.flight.record import Outcome
@@ -15,58 +15,82 @@ LONGEST_UNCHECKED_S = 5.0
 """Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
 
 
-class Termination:
-    """Says when and how a flight is over.
+class Verdict(NamedTuple):
+    """How a flight ended."""
+
+    outcome: Outcome
+    reason: str
+    """One sentence."""
+
+
+class Termination(Protocol):
+    """Says when and how a flight is over, from the true state. One object serves one flight."""
+
+    contact_m: float
+    """Clearance at a contact between the last two rows of the track; +inf without."""
+
+    def to_go_m(self, state: AircraftState) -> float:
+        """Distance that is left."""
+        ...
+
+    def verdict(self, state: AircraftState, fault: str | None) -> Verdict | None:
+        """How the flight ends now; None while it goes on.
+
+        Args:
+            state: the true state.
+            fault: how control of the aircraft was lost, None while it is not.
+        """
+        ...
+
+
+class MissionEnd:
+    """A flight to a goal: reached, contact, bounds, time limit. Implements `Termination`.
 
     Args:
         world: the truth.
         mission: goal and speed.
         time_limit_s: simulated.
-        fault: a sentence when control of the aircraft is lost, None otherwise.
     """
 
-    def __init__(
-        self, world: World, mission: Mission, time_limit_s: float, fault: Callable[[], str | None]
-    ) -> None:
-        self._world, self._mission, self._time_limit_s, self._fault = world, mission, time_limit_s, fault
-        self.next_look_s = 0.0
-        """Until then nothing but a fault can end the flight."""
+    def __init__(self, world: World, mission: Mission, time_limit_s: float) -> None:
+        self._world, self._mission, self._time_limit_s = world, mission, time_limit_s
+        self._next_look_s = 0.0  # until then nothing but a fault can end the flight
         self._appears_s = -math.inf
         # At the last look at the obstacles: where, when, and how much clearance.
         self._measured = (0.0, 0.0, 0.0, 0.0)
         self._over: Position | None = None  # where it was at the last look at the ground
         self._looked: tuple[Fix, float] | None = None  # at the last look of all: surely so much clearance
         self.contact_m = math.inf
-        """Clearance at a contact since the look before the last; +inf without."""
 
     def to_go_m(self, state: AircraftState) -> float:
         """Straight distance to the goal."""
         east, north = self._mission.goal_m
         return math.hypot(state.east_m - east, state.north_m - north)
 
-    def verdict(self, state: AircraftState) -> tuple[Outcome, str] | None:
+    def verdict(self, state: AircraftState, fault: str | None) -> Verdict | None:
         """How the flight ends now; None while it goes on."""
-        fault = self._fault()
         if fault is not None:
-            return Outcome.LOST_CONTROL, fault
-        if state.time_s < self.next_look_s:
+            return Verdict(Outcome.LOST_CONTROL, fault)
+        if state.time_s < self._next_look_s:
             return None
         world, mission = self._world, self._mission
         east, north = state.east_m, state.north_m
         clearance = self._surely_clear_m(east, north, state.time_s)
         if clearance < 0.0:
-            return Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m"
+            return Verdict(Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m")
         if self.contact_m < 0.0:
-            return Outcome.COLLISION, "touched an obstacle between two steps"
+            return Verdict(Outcome.COLLISION, "touched an obstacle between two steps")
         if world.ground is not None and (hit := self._ground_hit(world.ground, state)):
-            return Outcome.COLLISION, hit
+            return Verdict(Outcome.COLLISION, hit)
         if not world.inside_bounds(east, north):
-            return Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m"
+            return Verdict(Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m")
         to_go = self.to_go_m(state)
         if to_go <= mission.goal_radius_m:
-            return Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s"
+            return Verdict(Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s")
         if state.time_s >= self._time_limit_s:
-            return Outcome.TIMEOUT, f"time limit {self._time_limit_s:g} s, {to_go:.0f} m from the goal"
+            return Verdict(
+                Outcome.TIMEOUT, f"time limit {self._time_limit_s:g} s, {to_go:.0f} m from the goal"
+            )
         xmin, ymin, xmax, ymax = world.bounds_m
         room = min(to_go - mission.goal_radius_m, east - xmin, north - ymin, xmax - east, ymax - north)
         # Whatever it turns to: the wind is no faster than both speeds together.
@@ -77,7 +101,7 @@ class Termination:
             wait = min(wait, reach_m / (fastest + state.airspeed_mps))
         if self._appears_s <= state.time_s:
             self._appears_s = world.next_appearance(state.time_s)
-        self.next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)
+        self._next_look_s = min(state.time_s + wait, self._appears_s, self._time_limit_s)
         return None
 
     def _ground_hit(self, ground: Ground, state: AircraftState) -> str:

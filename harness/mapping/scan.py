@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +115,13 @@ class RangeScan:
     def ends_m(self, rays: IntArray) -> ComplexArray:
         """(k,) from where some beams returned something, east + i north."""
         return self.from_sensor_m(rays) + complex(self.east_m, self.north_m)
+
+    def taken_from(self, east_m: float, north_m: float, heading_rad: float) -> RangeScan:
+        """The same ranges, as from another pose of the sensor: east and north (m), bearing of the nose (rad)."""
+        values = {each.name: getattr(self, each.name) for each in fields(RangeScan) if each.init}
+        start_rad = (self.start_rad + heading_rad - self.heading_rad) % math.tau
+        pose = {"east_m": east_m, "north_m": north_m, "heading_rad": heading_rad, "start_rad": start_rad}
+        return RangeScan(**{**values, **pose})
 
     def kept(self) -> RangeScan:
         """The same, its rays followed by now: nothing leads from it to the world any more."""

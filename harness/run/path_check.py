@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from harness.files.input_file import InputError
-from harness.flight.closed_loop import Loop, Progress
+from harness.flight.closed_loop import Loop
+from harness.flight.observer import Progress
 from harness.run.path_flight import fly_along
 from harness.run.path_measured import measured
 from harness.run.path_plan import PathPlan, planned

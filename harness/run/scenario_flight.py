@@ -15,6 +15,7 @@ import numpy as np
 
 from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
+from aircraft.guidance.altitude import LevelFlight
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import GRAVITY_MPS2, FlightModel
 from aircraft.kinematic_point import KinematicPoint
@@ -22,8 +23,10 @@ from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.analysis.metrics import metrics
 from harness.analysis.trackability import FlightLimits
 from harness.files.errors import WriteError
-from harness.flight.closed_loop import Loop, Observer, Progress, fly
+from harness.flight.closed_loop import Loop, fly
+from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight
+from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
@@ -75,9 +78,9 @@ def make_loop(
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
         guidance=guidance_law(scenario),
+        termination=MissionEnd(world, mission, _given(scenario.mission.time_limit_s)),
         mission=mission,
-        altitude_m=scenario.mission.altitude_m,
-        time_limit_s=_given(scenario.mission.time_limit_s),
+        vertical=LevelFlight(scenario.mission.altitude_m, mission.speed_mps),
         scan_rate_hz=scenario.sensor.rate_hz,
     )
 

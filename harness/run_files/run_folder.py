@@ -26,7 +26,7 @@ from harness.files.folder_lock import FolderLock
 from harness.files.input_file import MAX_JSON_BYTES, read_index, read_text
 from harness.files.versions import FLOWN_WITH, versions
 from harness.files.whole_file import PARTIAL, replace_text
-from harness.flight.record import TRACK_FIELDS, AcceptedPlan, Track
+from harness.flight.record import TRACK_COLUMNS, TRACK_FIELDS, AcceptedPlan, Track
 from harness.run_files.plans_table import PlanRow, plan_rows, plans_table
 
 if TYPE_CHECKING:
@@ -177,7 +177,13 @@ def track_table(track: Track) -> pa.Table:
     """A track as the table that `track.parquet` holds."""
     import pyarrow as pa
 
-    return pa.table({name: getattr(track, name) for name in TRACK_FIELDS})
+    return pa.table(
+        [getattr(track, name) for name in TRACK_COLUMNS],
+        pa.schema(
+            pa.field(name, pa.from_numpy_dtype(column.dtype), metadata={"description": column.doc})
+            for name, column in TRACK_COLUMNS.items()
+        ),
+    )
 
 
 def tables(path: Path) -> tuple[pa.Table, pa.Table]:

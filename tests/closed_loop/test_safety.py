@@ -23,6 +23,7 @@ from aircraft.interface import AircraftState
 from harness.cli.app import main
 from harness.flight.closed_loop import fly
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.flight.termination import MissionEnd
 from harness.mapping.scan import RangeScan
 from harness.mapping.sensed_map import SensedMap
 from harness.run.scenario_flight import make_loop
@@ -197,7 +198,7 @@ def test_the_invariant_sees_a_plan_that_is_not_safe(small_world: SmallWorld) -> 
     truth = make_loop(scenario_with(small_world, [hidden]), PointMass).world
     invariant = Invariant(truth, blind.mission.turn_radius_m, blind.mission.tracking_error_m)
     with pytest.raises(AssertionError, match="plan"):
-        fly(replace(blind, time_limit_s=120.0), [invariant])
+        fly(replace(blind, termination=MissionEnd(blind.world, blind.mission, 120.0)), [invariant])
 
 
 @pytest.mark.parametrize("told", [True, False])

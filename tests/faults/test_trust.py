@@ -47,8 +47,7 @@ def unsafe(source: str) -> list[str]:
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "yaml":
             found += [node.attr] if node.attr in UNSAFE_LOADERS else []
         if isinstance(node, ast.keyword) and node.arg in ("shell", "allow_pickle"):
-            refused = isinstance(node.value, ast.Constant) and node.value.value is False
-            found += [] if refused else [node.arg]
+            found.append(node.arg)
     return found
 
 
@@ -65,7 +64,6 @@ def test_nothing_that_is_read_is_run(path: Path) -> None:
         "from pickle import loads",
         "yaml.load(a, yaml.FullLoader)",
         "f(shell=True)",
-        "numpy.load(a, allow_pickle=True)",
     ],
 )
 def test_what_could_be_run_is_seen(source: str) -> None:

@@ -7,8 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
-from harness.flight.record import COLUMNS, TRACK_FIELDS, AcceptedPlan, FloatArray, Track, TrackLog, digest
+from harness.flight.record import COLUMNS, TRACK_FIELDS, AcceptedPlan, FloatArray, Track, digest
+from harness.flight.track_log import TrackLog
 from planner.interface import Plan, PlanStatus
 
 CONTRACT = (
@@ -19,6 +21,10 @@ CONTRACT = (
 
 def state(time_s: float) -> AircraftState:
     return AircraftState(time_s, 3.0, 4.0, 300.0, -15.0, 20.0, 0.5, -0.1, 0.2, 0.03, 24.0, 1.1)
+
+
+def steered(roll_command_rad: float, cross_track_m: float, arc_length_m: float) -> GuidanceOutput:
+    return GuidanceOutput(roll_command_rad, cross_track_m, arc_length_m, bank_saturated=False, past_end=False)
 
 
 def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
@@ -33,7 +39,7 @@ def test_columns_are_those_of_the_contract() -> None:
 
 def test_row_holds_the_state_in_the_units_of_the_file() -> None:
     log = TrackLog(lambda points, times: points.sum(axis=1) + times)
-    log.add(state(0.5), 0.25, -1.5, 77.0, 3)
+    log.add(state(0.5), steered(0.25, -1.5, 77.0), 3)
     track = log.close()
     row = {name: getattr(track, name)[0] for name in TRACK_FIELDS}
     assert row["course_deg"] == pytest.approx(360.0 - math.degrees(math.atan(0.75)))
@@ -52,7 +58,7 @@ def test_blocks_come_while_flying_and_add_up() -> None:
     blocks: list[Track] = []
     log = TrackLog(none_near, [blocks.append], block_rows=4)
     for tick in range(10):
-        log.add(state(tick / 10), 0.0, math.nan, math.nan, -1)
+        log.add(state(tick / 10), steered(0.0, math.nan, math.nan), -1)
         assert len(blocks) == (tick + 1) // 4
     track = log.close()
     assert [len(block) for block in blocks] == [4, 4, 2]
@@ -66,8 +72,8 @@ def test_a_state_that_is_not_finite_is_no_row_nor_a_block(rows: int) -> None:
     blocks: list[Track] = []
     log = TrackLog(none_near, [blocks.append], block_rows=rows)
     for tick in range(4):
-        log.add(state(tick / 10), 0.0, math.nan, math.nan, -1)
-    log.add(state(0.4)._replace(velocity_up_mps=math.inf), 0.0, math.nan, math.nan, -1)
+        log.add(state(tick / 10), steered(0.0, math.nan, math.nan), -1)
+    log.add(state(0.4)._replace(velocity_up_mps=math.inf), steered(0.0, math.nan, math.nan), -1)
     np.testing.assert_array_equal(log.close().time_s, np.arange(4) / 10)
     assert all(len(block) for block in blocks)
 
@@ -77,7 +83,7 @@ def test_digest_does_not_depend_on_the_blocks() -> None:
     for rows in (1, 3, 100):
         log = TrackLog(none_near, block_rows=rows)
         for tick in range(7):
-            log.add(state(tick / 10), 0.01 * tick, math.nan, 0.0, tick)
+            log.add(state(tick / 10), steered(0.01 * tick, math.nan, 0.0), tick)
         digests.add(digest(log.close()))
     assert len(digests) == 1
 

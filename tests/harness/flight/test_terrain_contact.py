@@ -10,7 +10,7 @@ import pytest
 
 from aircraft.interface import AircraftState
 from harness.flight.record import Outcome
-from harness.flight.termination import Termination
+from harness.flight.termination import MissionEnd
 from harness.world.ground import Ground
 from harness.world.world import World
 from harness.world_files.height_field import HeightField
@@ -51,11 +51,11 @@ def flight(up_m: float, climb_mps: float = 0.0) -> Iterator[AircraftState]:
 
 
 def end(up_m: float, climb_mps: float = 0.0) -> tuple[Outcome, str, AircraftState, int]:
-    judge = Termination(World([], BOUNDS, ridge()), MISSION, 1e4, lambda: None)
+    judge = MissionEnd(World([], BOUNDS, ridge()), MISSION, 1e4)
     looks = 0
     for state in flight(up_m, climb_mps):
-        looks += state.time_s >= judge.next_look_s
-        verdict = judge.verdict(state)
+        looks += state.time_s >= judge._next_look_s
+        verdict = judge.verdict(state, None)
         if verdict is not None:
             return *verdict, state, looks
     raise AssertionError("the flight has no end")

@@ -66,7 +66,8 @@ def test_parts_share_the_scenarios_figures() -> None:
     loop = make_loop(scenario, make_model)
     assert made == [(start_conditions(scenario), atmosphere(scenario))]
     assert isinstance(loop.model, PointMass)
-    assert (loop.altitude_m, loop.time_limit_s, loop.scan_rate_hz) == (400.0, 5400.0, 4.0)
+    assert loop.vertical.command(loop.model.state(), math.nan) == (400.0, 26.0)
+    assert loop.scan_rate_hz == 4.0
     assert loop.mission.clearance_m == flight_limits(scenario).clearance_m == 150.0
     assert loop.mission.turn_radius_m == performance_of(scenario).turn_radius_m
     assert len(loop.world.obstacles) == 6

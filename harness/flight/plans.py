@@ -1,0 +1,146 @@
+"""What has been planned in a flight: the plan in effect, the one on its way, and all before."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from aircraft.guidance.interface import GuidanceLaw
+from aircraft.interface import AircraftState, Route
+from aircraft.route import route_length
+from harness.files.crash import in_a_line
+from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
+from harness.flight.observer import Observer
+from harness.flight.record import AcceptedPlan, Outcome
+from harness.flight.termination import Verdict
+from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
+
+LATE_S = 1e-9
+"""A plan or a scan whose time has come but for this has come: times are sums of floats."""
+
+
+class Plans:
+    """Asks the planner, and hands its plans to the guidance when they take effect.
+
+    Args:
+        planner: planner under test.
+        mission: of the flight.
+        seen: obstacle map, all that the planner sees.
+        observers: look on.
+    """
+
+    def __init__(
+        self, planner: Planner, mission: Mission, seen: MapView, observers: Sequence[Observer]
+    ) -> None:
+        self._planner, self._seen = AskedPlanner(planner, mission, seen), seen
+        self._latency_s, self._observers = mission.compute_latency_s, observers
+        self._coming: tuple[float, Plan, Route] | None = None
+        self._due_s = math.inf  # when the plan on its way takes effect
+        self.index = -1
+        """Index of the plan in effect, -1 before the first."""
+        self.wants_more_time = False
+        """The planner is to be asked again before the next scan."""
+        self.accepted: list[AcceptedPlan] = []
+        self.compute_ms: list[float] = []
+        self.error: str | None = None
+        """The traceback of what the planner raised."""
+        self._told, self._scanned = "", False
+        self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
+        self._stuck = ""  # the last of it
+        self._arc_length_m, self._loiters_from_m = 0.0, math.inf
+
+    @property
+    def state(self) -> str:
+        """One word for people."""
+        if not self.accepted:
+            return "waiting"
+        return "holding" if self._arc_length_m > self._loiters_from_m else "following"
+
+    def ask(self, state: AircraftState, arc_length_m: float, scanned: bool) -> Verdict | None:
+        """Asks the planner, unless a plan of its is still on its way.
+
+        Args:
+            state: what the aircraft believes.
+            arc_length_m: distance along the plan in effect; NaN without one.
+            scanned: the map has taken in a scan since the planner was last asked.
+
+        Returns:
+            How the flight ends, if that is the planner's answer.
+        """
+        self._scanned |= scanned
+        if self._coming is not None:
+            return None
+        self._arc_length_m = arc_length_m
+        request = self._request(state, arc_length_m)
+        self._scanned = False
+        try:
+            plan = self._planner.plan(request)
+        except PlannerFailedError as error:
+            self.error = error.trace
+            return Verdict(Outcome.PLANNER_FAILED, str(error))
+        self._told, self.wants_more_time = plan.reason, plan.wants_more_time
+        if plan.status is PlanStatus.KEPT:
+            return None
+        self.compute_ms.append(self._planner.compute_ms)
+        if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
+            return Verdict(Outcome.UNREACHABLE, in_a_line(plan.reason))
+        if plan.status is PlanStatus.NO_PATH:
+            self._note_failure(state.time_s, plan.reason)
+        if plan.status is PlanStatus.FOUND:
+            self._stuck, self._in_vain = "", set()
+            assert plan.path is not None
+            self._coming = (self._planner.compute_ms, plan, Route(plan.path.segments, plan.path.loiter))
+            self._due_s = state.time_s + self._latency_s - LATE_S
+        return None
+
+    def take_effect(self, state: AircraftState, guidance: GuidanceLaw) -> None:
+        """Hands the plan on its way to the guidance, if it is due.
+
+        Args:
+            state: what the aircraft believes.
+            guidance: follows it from now on.
+        """
+        if self._coming is None or state.time_s < self._due_s:
+            return
+        compute_ms, plan, route = self._coming
+        late_s = state.time_s - (self._due_s - self._latency_s)
+        self._coming, self._due_s = None, math.inf
+        guidance.follow(route, arc_length_m=late_s * state.groundspeed_mps)
+        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
+        self.accepted.append(accepted)
+        self.index = accepted.plan_index
+        turn_m = float(route.segments[-1, 5]) if route.loiter else -math.inf
+        self._arc_length_m, self._loiters_from_m = 0.0, route_length(route) - turn_m
+        for observer in self._observers:
+            observer.on_plan(accepted, state)
+
+    def last_word(self, outcome: Outcome) -> str:
+        """What the planner has to say of an end that is not its own: why it never, or no longer, found anything."""
+        if outcome in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
+            return ""
+        if not (self.accepted or self._coming) and self._told:
+            return f"; no plan was ever found: {in_a_line(self._told)}"
+        if outcome is Outcome.TIMEOUT and self._stuck:
+            return f"; the planner's last word: {in_a_line(self._stuck)}"
+        return ""
+
+    def _request(self, state: AircraftState, arc_length_m: float) -> PlanRequest:
+        flown = self.accepted[-1].plan if self.accepted else None
+        speed_mps = max(state.groundspeed_mps, 1e-9)
+        return PlanRequest(
+            time_s=state.time_s,
+            position_m=(state.east_m, state.north_m),
+            direction=(state.velocity_east_mps / speed_mps, state.velocity_north_mps / speed_mps),
+            seen=self._seen,
+            flown=flown,
+            arc_length_m=arc_length_m if flown else 0.0,
+            scanned=self._scanned,
+        )
+
+    def _note_failure(self, time_s: float, reason: str) -> None:
+        """Tells observers once of each reason why nothing is found."""
+        self._stuck = reason
+        if reason not in self._in_vain:
+            self._in_vain.add(reason)
+            for observer in self._observers:
+                observer.on_event(time_s, reason)

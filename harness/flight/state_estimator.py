@@ -1,0 +1,34 @@
+"""The block between flight model and all that goes by the aircraft's own idea of its state.
+
+Guidance, the altitude and airspeed that are held, the pose with which a scan enters the map, and the position that the
+planner is told are believed ones. World, sensor, contact, `reached` and metrics are of the true state.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from aircraft.interface import AircraftState
+
+
+class StateEstimator(Protocol):
+    """Tells what the aircraft believes of its state. One object serves one flight."""
+
+    def believed(self, state: AircraftState) -> AircraftState:
+        """What the aircraft believes its state to be.
+
+        Args:
+            state: the true one. Times never go back from one call to the next; one may come twice.
+
+        Returns:
+            The believed one; the very object given where nothing is wrong with it.
+        """
+        ...
+
+
+class PerfectEstimator:
+    """The aircraft knows its state exactly. Implements `StateEstimator`."""
+
+    def believed(self, state: AircraftState) -> AircraftState:
+        """The state itself."""
+        return state

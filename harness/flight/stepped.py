@@ -1,0 +1,111 @@
+"""Flights that are stepped from outside: `reset`, then `step` until done. What learning and live views are built on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from aircraft.interface import AircraftState
+from harness.flight.closed_loop import ClosedLoop, Loop
+from harness.flight.observer import Observer
+from harness.flight.record import Flight, Outcome
+
+
+class Status(NamedTuple):
+    """How a flight stands after a step."""
+
+    time_s: float
+    """Simulated time."""
+    state: AircraftState
+    """The true state."""
+    believed: AircraftState
+    """What the aircraft believes it to be."""
+    to_go_m: float
+    """Distance that is left to the goal."""
+    plan_index: int
+    """The plan in effect, -1 before the first."""
+    arc_length_m: float
+    """Distance along that plan at the last update of guidance; NaN without one."""
+    cross_track_m: float
+    """Distance from that plan, as guidance saw it, positive to its right; NaN without one."""
+    outcome: Outcome | None
+    """How the flight ended; None while it goes on."""
+    reason: str
+    """The same as a sentence; empty while it goes on."""
+
+    @property
+    def done(self) -> bool:
+        """Whether the flight is over."""
+        return self.outcome is not None
+
+
+class SteppedLoop:
+    """The closed loop of one scenario, flown as often as it is reset, one guidance interval a step.
+
+    Args:
+        make: makes all parts of a flight, anew for each.
+        observers: look on, at every flight.
+    """
+
+    def __init__(self, make: Callable[[], Loop], observers: Sequence[Observer] = ()) -> None:
+        self._make, self._observers = make, observers
+        self._flying: ClosedLoop | None = None
+
+    def reset(self) -> Status:
+        """Begins a new flight, whatever has become of the one before; it is at its start."""
+        self._flying = ClosedLoop(self._make(), self._observers)
+        return self.status
+
+    def step(self) -> Status:
+        """Flies one guidance interval, or up to the end of the flight if that comes first.
+
+        Raises:
+            RuntimeError: no flight has begun, or it is over.
+        """
+        flying = self._flight_begun()
+        if flying.verdict is not None:
+            raise RuntimeError(
+                f"step() after the end: the flight is over after {flying.true.time_s:g} s "
+                f"({flying.verdict.outcome.value}: {flying.verdict.reason}); reset() begins the next"
+            )
+        flying.step()
+        return self.status
+
+    @property
+    def status(self) -> Status:
+        """How the flight stands.
+
+        Raises:
+            RuntimeError: no flight has begun.
+        """
+        flying = self._flight_begun()
+        outcome, reason = (None, "") if flying.verdict is None else flying.verdict
+        return Status(
+            time_s=flying.true.time_s,
+            state=flying.true,
+            believed=flying.believed,
+            to_go_m=flying.to_go_m,
+            plan_index=flying.plans.index,
+            arc_length_m=flying.steering.arc_length_m,
+            cross_track_m=flying.steering.cross_track_m,
+            outcome=outcome,
+            reason=reason,
+        )
+
+    @property
+    def done(self) -> bool:
+        """Whether the flight that was begun last is over."""
+        return self._flight_begun().verdict is not None
+
+    def flight(self) -> Flight:
+        """The flight, once it is over.
+
+        Raises:
+            RuntimeError: no flight has begun, or it is not over.
+        """
+        return self._flight_begun().flight()
+
+    def _flight_begun(self) -> ClosedLoop:
+        if self._flying is None:
+            raise RuntimeError("reset() before step(): no flight has begun")
+        return self._flying

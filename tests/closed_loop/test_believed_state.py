@@ -1,0 +1,106 @@
+"""What the aircraft believes of its state goes to guidance, planner, map and hold; what is true ends and records."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.guidance.progress import RouteProgress
+from aircraft.interface import AircraftState, Route
+from harness.flight.closed_loop import fly
+from harness.flight.record import Flight, Outcome
+from harness.mapping.scan import RangeScan
+from harness.run.scenario_flight import make_loop
+from planner.interface import Plan, PlanRequest
+from tests.closed_loop.conftest import SmallWorld
+from tests.point_mass import PointMass
+
+EAST_M, NORTH_M, UP_M, AIRSPEED_MPS = 30.0, -40.0, 7.0, 2.0
+TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
+
+
+class Shifted:
+    """Believes to be elsewhere, always by as much."""
+
+    def believed(self, state: AircraftState) -> AircraftState:
+        return state._replace(
+            east_m=state.east_m + EAST_M,
+            north_m=state.north_m + NORTH_M,
+            up_m=state.up_m + UP_M,
+            airspeed_mps=state.airspeed_mps + AIRSPEED_MPS,
+        )
+
+
+class Asked:
+    """A planner that notes where it is told to be."""
+
+    def __init__(self, planner: object) -> None:
+        self._plan = planner.plan  # type: ignore[attr-defined]
+        self.requests: list[PlanRequest] = []
+
+    def plan(self, request: PlanRequest) -> Plan:
+        self.requests.append(request)
+        return self._plan(request)  # type: ignore[no-any-return]
+
+
+@pytest.fixture(scope="module")
+def flown(small_world: SmallWorld) -> tuple[Flight, Asked, np.ndarray]:
+    loop = make_loop(small_world(TREE), PointMass)
+    asked = Asked(loop.planner)
+    flight = fly(replace(loop, planner=asked, navigator=Shifted()))
+    return flight, asked, loop.seen.edges_since(0)
+
+
+def test_the_planner_is_told_where_the_aircraft_believes_to_be(
+    flown: tuple[Flight, Asked, np.ndarray],
+) -> None:
+    flight, asked, _ = flown
+    times = flight.track.time_s.tolist()
+    for request in asked.requests[::20]:
+        row = times.index(request.time_s)
+        true = flight.track.east_m[row], flight.track.north_m[row]
+        assert request.position_m == pytest.approx((true[0] + EAST_M, true[1] + NORTH_M))
+
+
+def test_scans_enter_the_map_from_there(flown: tuple[Flight, Asked, np.ndarray]) -> None:
+    edges = flown[2] - (3000.0 + EAST_M, 3000.0 + NORTH_M)
+    assert len(edges) > 50
+    np.testing.assert_allclose(np.hypot(*edges.T), 300.0, atol=5.0)
+
+
+def test_guidance_follows_the_plan_where_it_believes_to_be(flown: tuple[Flight, Asked, np.ndarray]) -> None:
+    """It sees no error; the aircraft is off by all that it is wrong about."""
+    flight = flown[0]
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    assert np.nanpercentile(np.abs(flight.track.cross_track_m), 95) < 1.0
+    track, plan = flight.track, flight.plans[-1]
+    progress = RouteProgress(Route(plan.segments, plan.loiter))
+    rows = np.flatnonzero(track.plan_index == plan.plan_index)[:-1]
+    assert len(rows) > 20
+    for east, north, told in zip(
+        track.east_m[rows], track.north_m[rows], track.cross_track_m[rows], strict=True
+    ):
+        point = progress.nearest(float(east) + EAST_M, float(north) + NORTH_M)
+        assert point.cross_track_m == pytest.approx(told, abs=1e-6)
+
+
+def test_altitude_and_airspeed_that_are_held_are_believed_ones(
+    flown: tuple[Flight, Asked, np.ndarray],
+) -> None:
+    track = flown[0].track
+    np.testing.assert_allclose(track.up_m[1:], 300.0 - UP_M)
+    np.testing.assert_allclose(track.airspeed_mps[1:], 25.0 - AIRSPEED_MPS)
+
+
+def test_a_scan_taken_from_elsewhere_has_the_same_ranges() -> None:
+    fan = np.exp(1j * np.radians([90.0, 0.0, -90.0]))
+    scan = RangeScan(1.0, 1.5, 10.0, 20.0, 0.5, 0.2, np.radians(90.0), fan, np.array([5.0, 7.0, 9.0]), 50.0)
+    moved = scan.taken_from(110.0, 220.0, 0.6)
+    assert (moved.time_s, moved.available_s, moved.max_range_m) == (1.0, 1.5, 50.0)
+    assert (moved.east_m, moved.north_m, moved.heading_rad) == (110.0, 220.0, 0.6)
+    assert moved.start_rad == pytest.approx(0.3)
+    rays = np.arange(3)
+    turned = scan.from_sensor_m(rays) * np.exp(-0.1j)
+    np.testing.assert_allclose(moved.ends_m(rays), turned + 110.0 + 220.0j)
