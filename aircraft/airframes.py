@@ -12,7 +12,7 @@ from typing import Any
 
 from aircraft.airframe import FIGURES, Airframe, Entry
 from aircraft.autopilot import Gains
-from aircraft.card_cache import cached, figure
+from aircraft.card_cache import cached, figure, is_kept
 from aircraft.model_files import AircraftError as AircraftError
 from aircraft.model_files import ModelFiles, model_files
 
@@ -45,7 +45,24 @@ def airframe(name: str) -> Airframe:
 
         return survey(entry, found)
 
-    return cached(f"{found.name}-airframe", found.digest(), surveyed, partial(_of_survey, entry, found))
+    return cached(_title(found), found.digest(), surveyed, partial(_of_survey, entry, found))
+
+
+def is_surveyed(name: str) -> bool:
+    """Whether an aircraft's figures are kept, so that `airframe` need not fly it for them.
+
+    Args:
+        name: as `airframe` takes it.
+
+    Raises:
+        AircraftError: there is none.
+    """
+    found = model_files(name)
+    return is_kept(_title(found), found.digest())
+
+
+def _title(found: ModelFiles) -> str:
+    return f"{found.name}-airframe"
 
 
 def _of_survey(entry: Entry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:

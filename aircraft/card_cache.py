@@ -38,7 +38,7 @@ def cached(
         measure: measures; its result consists of what JSON has.
         read: makes what is wanted of a result; raises KeyError, TypeError or ValueError where it is none.
     """
-    file = cache_folder() / f"{title}-{digest[:16]}.json"
+    file = _file(title, digest)
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         with file.open("rb") as opened:
             kept = json.loads(opened.read(MAX_BYTES))
@@ -48,6 +48,20 @@ def cached(
     with suppress(OSError):
         _write(file, json.dumps({"digest": digest, "result": result}, indent=1))
     return read(result)
+
+
+def is_kept(title: str, digest: str) -> bool:
+    """Whether the cache has something of a measurement, which `cached` then takes if it is sound.
+
+    Args:
+        title: as `cached` takes it.
+        digest: likewise.
+    """
+    return _file(title, digest).is_file()
+
+
+def _file(title: str, digest: str) -> Path:
+    return cache_folder() / f"{title}-{digest[:16]}.json"
 
 
 def figure(value: object, least: float = 0.0) -> float:

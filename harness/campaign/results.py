@@ -46,6 +46,7 @@ METRICS: Final = {
     "clearance_violation_s": "number",
     **{f"cross_track_m.{name}": "number" for name in _SPREAD},
     **{f"altitude_error_m.{name}": "number" for name in _SPREAD},
+    "min_altitude_above_ground_m": "number",
     **{f"smoothness.{of}.{f.name}": "number" for of in ("planned", "flown") for f in fields(Smoothness)},
     "bank_saturation_fraction": "number",
     "max_load_factor": "number",

@@ -20,7 +20,8 @@ from harness.cli.envelope import envelope
 from harness.cli.export import export
 from harness.cli.falsify import falsify
 from harness.cli.flights import bench, compare, fly
-from harness.cli.formats import list_names, schema, validate
+from harness.cli.formats import schema, validate
+from harness.cli.names import list_names
 from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
 from harness.cli.review import report, view
 from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
@@ -100,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(words: Sequence[str], debug: bool) -> int:
     try:
         with kept_up():
-            status = int(app(words, prog_name="wayproof", standalone_mode=False) or 0)
+            status = int(app(list(words) or ["--help"], prog_name="wayproof", standalone_mode=False) or 0)
             _flush()
         return status
     except KeyboardInterrupt:

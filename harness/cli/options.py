@@ -112,10 +112,30 @@ JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothi
 
 def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
     """A scenario by file or shipped name, with keys replaced."""
+    from harness.files.strict_yaml import InputError
     from harness.scenario.scenario import load_scenario
     from harness.scenario.shipped import scenario_path
 
-    return load_scenario(scenario_path(scenario), overrides)
+    try:
+        return load_scenario(scenario_path(scenario), overrides)
+    except InputError as error:
+        if _is_campaign(scenario):
+            raise InputError(f"{scenario}: this is a campaign: use `wayproof sweep {scenario}`") from error
+        raise
+
+
+def _is_campaign(text: str) -> bool:
+    """Whether what was given for a scenario is a campaign's file or name."""
+    import os
+
+    from harness.campaign.campaign_file import is_campaign
+    from harness.files.strict_yaml import InputError
+    from harness.scenario.shipped import campaign_path
+
+    try:
+        return os.path.isfile(campaign_path(text)) and is_campaign(campaign_path(text))
+    except (InputError, OSError):
+        return False
 
 
 def chosen(

@@ -36,8 +36,9 @@ SETTLE_S = 1.5
 
 LOG = "viewer.log"
 NO_SCREEN = (
-    "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); "
-    f"copy the run's {RECORDING} to a machine that has one and open it there with: rerun {RECORDING}"
+    "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); `wayproof view --web` "
+    f"serves it to a browser, or copy the run's {RECORDING} to a machine with a screen and open it there: "
+    f"rerun {RECORDING}"
 )
 NO_DRIVER = (
     "the headless viewer did not start: it needs a Vulkan driver "

@@ -33,6 +33,7 @@ KINDS: Final[dict[str, Reader]] = {
     "numpy_dem": grids.read_numpy,
     "osm": osm.read_xml,
     "osm_pbf": osm.read_pbf,
+    "osm_json": osm.read_json,
     "cityjson": city_json.read,
     "geojson": geo_json.read,
     "kml": kml.read,
@@ -190,6 +191,7 @@ _JSON_KINDS: Final = (
         re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|Polygon|MultiPolygon|GeometryCollection)"'),
         "geojson",
     ),
+    (re.compile(rb'"elements"\s*:\s*\['), "osm_json"),
 )
 """What a JSON file is by what it has somewhere; the first that is found counts."""
 

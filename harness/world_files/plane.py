@@ -94,6 +94,24 @@ def flat_crs(name: str) -> Any:
         ) from error
 
 
+def vertical_unit_m(name: str) -> float:
+    """Length in metres of the unit of heights of a coordinate reference system; 1 where it has no heights.
+
+    Raises:
+        WorldFileError: there is none of that name.
+    """
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    try:
+        axes = CRS.from_user_input(name).axis_info
+    except CRSError as error:
+        raise WorldFileError(
+            f"has the crs {name[:60]!r}, which is not known; give one as EPSG:32632"
+        ) from error
+    return next((float(axis.unit_conversion_factor) for axis in axes if axis.direction == "up"), 1.0)
+
+
 def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Latitude and longitude (WGS84, degrees) of places in a file."""
     from pyproj import Transformer

@@ -41,6 +41,7 @@ def wall(east_m: float) -> dict[str, Any]:
     return {"polygon": {"vertices_m": corners}}
 
 
+@pytest.mark.filterwarnings("ignore:All-NaN:RuntimeWarning")  # the referee's, of a track without any plan
 @pytest.mark.parametrize(
     ("obstacles", "mission"),
     [

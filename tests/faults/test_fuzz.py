@@ -6,6 +6,7 @@ A reader of another kind of file is one entry of `READERS`. The larger numbers o
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -267,6 +268,12 @@ def taken_or_refused(path: Path, read: Callable[[], object]) -> None:
     assert max(map(len, lines)) < LONGEST_LINE + len(str(path))
     assert said.replace("\n", "").isprintable()
     assert time.monotonic() - begun < LONGEST_S
+
+
+@pytest.fixture(autouse=True)
+def files_beside(tmp_path: Path) -> None:
+    """The scenario of every key names a file beside itself."""
+    shutil.copy(SCENARIOS / "one_of_everything.geojson", tmp_path)
 
 
 @pytest.mark.parametrize("kind", READERS)

@@ -71,6 +71,8 @@ def _part(volume: Any, name: str, notes: list[str]) -> Part:
             f"has zone {name!r} whose projection is neither a circle nor a polygon with an area"
         )
     feet = str(volume.get("uomDimensions", "M")).upper().startswith("F")
+    if feet and projection.get("type") == "Circle":
+        notes.append(f"{name or 'a zone'}: its radius is taken as metres, its limits as feet")
     found: list[Limit | None] = []
     for word, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
         value = volume.get(f"{word}Limit")

@@ -35,6 +35,8 @@ def read_plan(path: Path, reading: Reading) -> Contents:
             (rings.ring([_turned(each) for each in polygon["polygon"]]), bool(polygon.get("inclusion")))
             for polygon in fence.get("polygons") or ()
         ]
+        if isinstance(old := fence.get("polygon"), list) and old:  # before version 2: one, to stay inside of
+            found.append((rings.ring([_turned(each) for each in old]), True))
         for one in fence.get("circles") or ():
             shape = rings.circle(_turned(one["circle"]["center"]), float(one["circle"]["radius"]))
             found.append((shape, bool(one.get("inclusion"))))
@@ -78,12 +80,18 @@ def _items(rows: list[list[str]]) -> list[tuple[Any, bool]]:
     """Fences among the items of a waypoint file: four numbers, the fourth the command, four parameters, the place."""
     found: list[tuple[Any, bool]] = []
     pending: list[rings.Place] = []
+    before = 0
     for row in rows:
         try:
             command, first = int(row[3]), float(row[4])
             place = rings.on_earth(float(row[9]), float(row[8]))
         except (ValueError, IndexError) as error:
             raise WorldFileError("has a line that is no item of a waypoint file") from error
+        if pending and command != before:
+            raise WorldFileError(
+                f"has a fence of {len(pending)} corners that should have more; it may be torn"
+            )
+        before = command
         if command not in FENCE_COMMANDS:
             continue
         if command in CIRCLES:
@@ -93,6 +101,8 @@ def _items(rows: list[list[str]]) -> list[tuple[Any, bool]]:
         if len(pending) >= first:
             found.append((rings.ring(pending), FENCE_COMMANDS[command]))
             pending = []
+    if pending:
+        raise WorldFileError(f"has a fence of {len(pending)} corners that should have more; it may be torn")
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -40,27 +41,22 @@ def read(path: Path, reading: Reading) -> Contents:
     content = json_of(path)
     notes: list[str] = []
     parts: list[Part] = []
-    passed = guessed = bare = 0
+    unknown = Counter[str]()
+    passed = bare = 0
     every = [(tags, name, one) for tags, geometry, name in _features(content) for one in _simple(geometry, 0)]
     shapes = rings.shapes_of([rings_of(one) for _, _, one in every])
     for (tags, name, _), footprint in zip(every, shapes, strict=True):
         if footprint is None:
             passed += 1
         elif limits.is_building(tags):
-            part, guess = limits.building(tags, footprint, reading, name)
-            guessed += guess
-            parts.append(part)
+            parts.append(limits.building(tags, footprint, reading, unknown, name))
         else:
             bare += not limits.has_limits(tags)
             bottom, top = limits.limits(tags, notes, name)
             parts.append(Part(footprint, bottom, top, name=name))
     if not parts:
         raise WorldFileError("has no polygon; must be GeoJSON with some")
-    if guessed:
-        notes.append(
-            f"{counted(guessed, 'building')} without height and levels taken as {reading.default_height_m:g} m high"
-            " (default_height_m)"
-        )
+    notes += limits.building_notes(unknown, reading)
     if bare:
         notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
     if passed:

@@ -5,20 +5,37 @@ Tags are those of OGC GeoTIFF 1.1 (OGC 19-008r4).
 
 from __future__ import annotations
 
+import math
+import re
+import warnings
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from harness.world_files.bounded import read_bytes
-from harness.world_files.parts import Contents, Raster, Reading, WorldFileError
+from harness.world_files.parts import FOOT_M, Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.plane import vertical_unit_m
 
 MAX_CELLS: Final = 60_000_000
 """Half a gigabyte of heights while they are read."""
 PIXEL_SCALE, TIE_POINTS, TRANSFORMATION, GEO_KEYS, NODATA = 33550, 33922, 34264, 34735, 42113
 GEOGRAPHIC_CRS, PROJECTED_CRS, RASTER_TYPE = 2048, 3072, 1025
+VERTICAL_CRS, VERTICAL_UNIT, METADATA = 4096, 4099, 42112
 USER_DEFINED: Final = 32767
+FOOT, US_FOOT = 9002, 9003
+"""EPSG numbers of units."""
+US_FOOT_M: Final = 1200.0 / 3937.0
+EPSG_UNITS_M: Final = {9001: 1.0, FOOT: FOOT_M, US_FOOT: US_FOOT_M}
+UNITS_M: Final = {
+    **dict.fromkeys(("m", "metre", "meter", "metres", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet", "international foot"), FOOT_M),
+    **dict.fromkeys(("us survey foot", "us-ft", "ftus", "us_survey_foot", "foot_us", "sfoot"), US_FOOT_M),
+    **dict.fromkeys(("cm", "centimetre", "centimeter"), 0.01),
+    **dict.fromkeys(("dm", "decimetre", "decimeter"), 0.1),
+}
+"""Units of height by the names that GDAL writes."""
 POINT: Final = 2
 """Of RASTER_TYPE: a tie point is the middle of a cell, not its corner."""
 MISSING: Final = "rasterio reads it: pip install 'wayproof[maps]'"
@@ -54,6 +71,8 @@ def _with_pillow(path: Path, reading: Reading) -> Contents:
                 raise WorldFileError(
                     f"has {len(image.getbands())} bands; must have one, of heights; {MISSING}"
                 )
+            if image.mode in ("P", "1"):
+                raise WorldFileError(f"has a palette; must have numbers, of heights; {MISSING}")
             values = np.asarray(image).astype(np.float64)
     except WorldFileError:
         raise
@@ -69,7 +88,64 @@ def _with_pillow(path: Path, reading: Reading) -> Contents:
     keys = _geo_keys(tags.get(GEO_KEYS, ()))
     crs = reading.crs or _crs(keys)
     affine = _affine(tags, keys.get(RASTER_TYPE) == POINT)
-    return Contents("geotiff", crs, terrain=Raster(plausible(values), affine))
+    values, notes = in_metres(values, _scaling(tags, keys))
+    return Contents("geotiff", crs, terrain=Raster(plausible(values), affine), notes=notes)
+
+
+class Scaling(NamedTuple):
+    """What makes heights above mean sea level, in metres, of a file's numbers: times a factor, plus an offset."""
+
+    factor: float = 1.0
+    offset_m: float = 0.0
+
+
+def in_metres(values: FloatArray, scaling: Scaling) -> tuple[FloatArray, tuple[str, ...]]:
+    """Heights in metres, and what to say of it."""
+    if scaling == Scaling():
+        return values, ()
+    told = f"its heights are its numbers times {scaling.factor:.6g}"
+    told += f" plus {scaling.offset_m:g} m" if scaling.offset_m else ""
+    return scaling.factor * values + scaling.offset_m, (told + ", as it says",)
+
+
+def unit_m(name: str) -> float:
+    """Length of a unit, as GDAL names it, in metres.
+
+    Raises:
+        WorldFileError: it is none that is known.
+    """
+    word = name.strip().lower()
+    if word not in UNITS_M:
+        raise WorldFileError(
+            f"has heights in {name[:20]!r}, which is no unit that is known; convert it to metres"
+        )
+    return UNITS_M[word]
+
+
+def _scaling(tags: dict[int, Any], keys: dict[int, int]) -> Scaling:
+    """Unit, scale and offset of heights, as GDAL's own tag, the vertical unit or the vertical system says."""
+    items = {
+        match[1].lower(): match[2]
+        for match in re.finditer(r"<Item[^>]*\brole=\"(\w+)\"[^>]*>([^<]*)<", str(tags.get(METADATA, "")))
+    }
+    scale, offset = (_number(items.get(name, none)) for name, none in (("scale", "1"), ("offset", "0")))
+    if items.get("unittype"):
+        unit = unit_m(items["unittype"])
+    else:
+        unit = EPSG_UNITS_M.get(keys.get(VERTICAL_UNIT, 0)) or _vertical_unit_m(keys.get(VERTICAL_CRS, 0))
+    if (
+        scale is None
+        or offset is None
+        or not (math.isfinite(scale) and math.isfinite(offset))
+        or scale == 0.0
+    ):
+        raise WorldFileError("has a scale or an offset of its heights that is no number")
+    return Scaling(scale * unit, offset * unit)
+
+
+def _vertical_unit_m(code: int) -> float:
+    """Of a vertical system by its EPSG number; a metre where there is none."""
+    return vertical_unit_m(f"EPSG:{code}") if 0 < code < USER_DEFINED else 1.0
 
 
 def check_cells(rows: int, columns: int) -> None:
@@ -134,18 +210,27 @@ def _with_rasterio(path: Path, reading: Reading) -> Contents | WorldFileError | 
     """The same with rasterio; what is wrong with it; or None where there is no rasterio."""
     try:
         import rasterio
+        from rasterio.enums import ColorInterp
         from rasterio.errors import RasterioError
     except ImportError:
         return None
     try:
-        with rasterio.open(path) as source:
+        with warnings.catch_warnings(action="ignore"), rasterio.open(path) as source:
             check_cells(source.height, source.width)
+            others = [each for each in source.colorinterp[1:] if each is not ColorInterp.alpha]
+            if others or source.colorinterp[0] is ColorInterp.palette:
+                return WorldFileError(
+                    f"has {source.count} bands or a palette, an image; must have one band, of heights"
+                )
             band = source.read(1, masked=True)
             values = np.ma.filled(band.astype(np.float64), np.nan)
             crs = reading.crs or (source.crs.to_wkt() if source.crs else None)
             if crs is None:
                 return WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
-            return Contents("geotiff", crs, terrain=Raster(plausible(values), tuple(source.transform)[:6]))
+            unit = unit_m(source.units[0]) if source.units[0] else vertical_unit_m(crs)
+            values, notes = in_metres(values, Scaling(source.scales[0] * unit, source.offsets[0] * unit))
+            terrain = Raster(plausible(values), tuple(source.transform)[:6])
+            return Contents("geotiff", crs, terrain=terrain, notes=notes)
     except WorldFileError as error:
         return error
     except (RasterioError, ValueError, OSError, MemoryError) as error:

@@ -14,6 +14,7 @@ import numpy as np
 
 from harness.world_files.bounded import read_bytes, text_of, unzipped
 from harness.world_files.parts import WGS84, Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.plane import flat_crs
 from harness.world_files.readers.geotiff import check_cells, plausible
 
 SIDES: Final = {2 * n * n: n for n in (1201, 3601)}
@@ -58,7 +59,7 @@ def read_ascii(path: Path, reading: Reading) -> Contents:
     values[values == keys.get("nodata_value", -9999.0)] = np.nan
     west = keys.get("xllcorner", keys.get("xllcenter", 0.0) - (dx / 2 if "xllcenter" in keys else 0.0))
     south = keys.get("yllcorner", keys.get("yllcenter", 0.0) - (dy / 2 if "yllcenter" in keys else 0.0))
-    crs = reading.crs
+    crs = reading.crs or _beside(path)
     if crs is None and dx < 0.1 and abs(west) <= 180 and abs(south) <= 90 and west != 0.0:
         crs = WGS84
     if crs is None and reading.metres_per_cell:
@@ -69,6 +70,23 @@ def read_ascii(path: Path, reading: Reading) -> Contents:
         () if crs else ("names no place on earth: its metres are taken as they are (crs, metres_per_cell)",)
     )
     return Contents("ascii_grid", crs, terrain=raster, notes=notes)
+
+
+def _beside(path: Path) -> str | None:
+    """The coordinate reference system of a file `.prj` of the same name, as GIS programs write it."""
+    beside = next(
+        (each for each in (path.with_suffix(".prj"), path.with_suffix(".PRJ")) if each.is_file()), None
+    )
+    if beside is None:
+        return None
+    text = text_of(read_bytes(beside, 100_000)).strip()
+    try:
+        flat_crs(text)
+    except WorldFileError as error:
+        raise WorldFileError(
+            f"has {beside.name} beside it, which names no system that is known; give crs"
+        ) from error
+    return text
 
 
 def read_srtm(path: Path, reading: Reading) -> Contents:

@@ -30,6 +30,7 @@ from harness.world_files.parts import (
 from harness.world_files.readers import limits
 
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
+LINKED: Final = ("NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay")
 PASSED: Final = ("Point", "LineString", "Model", "Track", "MultiTrack")
 
 
@@ -44,8 +45,9 @@ def read(path: Path, reading: Reading) -> Contents:
         data = unzipped(data, (".kml",), MAX_TREE_BYTES)[1]
     notes: list[str] = []
     parts: list[Part] = []
-    passed = flat = 0
+    passed = flat = linked = 0
     for _, element in xml_events(data):
+        linked += _name(element) in LINKED
         if _name(element) != "Placemark":
             continue
         tags = _tags(element)
@@ -65,6 +67,12 @@ def read(path: Path, reading: Reading) -> Contents:
         raise WorldFileError("has no polygon; must be KML with some")
     if flat:
         notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
+    if len(parts) > flat:
+        notes.append(
+            "a polygon in the air, its sides too, is taken as solid from the ground up to its highest corner"
+        )
+    if linked:
+        notes.append(f"{counted(linked, 'image or link')} to other files passed over")
     if passed:
         notes.append(f"{counted(passed, 'point, line or wall')} passed over")
     return Contents("kml", WGS84, tuple(parts), notes=tuple(notes))

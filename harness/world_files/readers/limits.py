@@ -7,37 +7,58 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, Final
 
-from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum, Limit, Part, Reading
+from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum, Limit, Part, Reading, counted
 
 _NUMBER: Final = re.compile(r"[-+]?\d+(?:\.\d*)?|[-+]?\.\d+")
-_SURFACE: Final = re.compile(r"^(SFC|GND|SURFACE|GROUND|0+(\s*(FT|M))?(\s*(AGL|GND|SFC))?)$")
+_SURFACE: Final = re.compile(r"^(SFC|GND|SURFACE|GROUND|0+(\s*(FT|M))?(\s*(AGL|GND|ASFC|SFC))?)$")
 _NO_END: Final = re.compile(r"^(UNL|UNLIM|UNLIMITED|INF|INFINITE)\b")
 _GROUND: Final = re.compile(r"AGL|GND|SFC|GROUND|RELATIVE")
-_METRES: Final = re.compile(r"\d\s*(M|METRES|METERS)\b")
+_WORD: Final = re.compile(
+    r"\d+(?:[.,]\d*)?|\.\d+|[-+]|AMSL|MSL|METRES|METERS|METER|METRE|MEAN|MTR|FEET|FL|FT|F|"
+    r"M(?!\w)|M(?=AMSL|MSL|AGL|ASFC|GND|SFC)|AGL|ASFC|GND|SFC|GROUND|ALT|STD|QNH|ABOVE|SEA|LEVEL|RELATIVE|[()'./]"
+)
+"""Words that a limit may consist of. Of others, as `ASK 123.5`, nothing is guessed."""
+_METRES: Final = re.compile(r"\d\s*(M|METRES?|METERS?|MTR)(?=\b|AMSL|MSL|AGL|ASFC|GND|SFC)")
 _LOWER: Final = (
-    "lowerLimit",
+    "lowerlimit",
     "lower_limit",
     "lower",
+    "lower_val",
     "floor",
     "bottom",
-    "lowerAltitude",
-    "minAltitude",
-    "altMin",
+    "loweraltitude",
+    "minaltitude",
+    "altmin",
 )
 _UPPER: Final = (
-    "upperLimit",
+    "upperlimit",
     "upper_limit",
     "upper",
+    "upper_val",
     "ceiling",
     "top",
-    "upperAltitude",
-    "maxAltitude",
-    "altMax",
+    "upperaltitude",
+    "maxaltitude",
+    "altmax",
 )
-_HEIGHT: Final = ("height", "building_height", "measuredHeight", "render_height", "bldg_height", "hoehe")
+_REFERENCES: Final = ("refer", "code", "datum")
+"""What the name of an attribute has that says what a limit is counted from, as `lowerReference`, `UPPER_CODE`."""
+NO_NUMBER: Final = -9000.0
+"""Limits so low stand for one that is not known, as -9998 of the FAA's files."""
+_HEIGHT: Final = (
+    "height",
+    "building:height",
+    "building_height",
+    "measuredheight",
+    "render_height",
+    "bldg_height",
+    "est_height",
+    "hoehe",
+)
 _LEVELS: Final = (
     "building:levels",
     "building_levels",
@@ -67,13 +88,15 @@ def limit_of(text: str, feet: bool = True, datum: Datum = Datum.SEA) -> Limit | 
         return NO_BOTTOM
     if _NO_END.match(word):
         return NO_TOP
+    if word in ("MSL", "AMSL", "SEA LEVEL"):
+        return Limit(0.0)
     number = _NUMBER.search(word)
-    if number is None:
+    if number is None or _WORD.sub("", word).strip() or len(_NUMBER.findall(word)) > 1:
         return None
     value = float(number[0])
     if "FL" in word:
         return Limit(value * 100.0 * FOOT_M)
-    metres = bool(_METRES.search(word)) if re.search(r"\d\s*(FT|F\b|M)", word) else not feet
+    metres = bool(_METRES.search(word)) if re.search(r"\d\s*(FT|FEET|F\b|M(?!SL))", word) else not feet
     ground = _GROUND.search(word) is not None or (
         datum is Datum.GROUND and not re.search("MSL|STD|ALT", word)
     )
@@ -105,56 +128,87 @@ def metres_of(value: Any) -> float | None:
     text = str(value).strip().lower().replace(",", ".")
     if match := re.fullmatch(r"(\d+)'(?:(\d+)(?:''|\"))?", text):
         return (float(match[1]) + float(match[2] or 0) / 12.0) * FOOT_M
-    if match := re.match(r"([-+]?\d+(?:\.\d+)?)\s*(m\b|metres|meters|ft\b|feet|$)", text):
-        return float(match[1]) * (FOOT_M if match[2] in ("ft", "feet") else 1.0)
+    if match := re.fullmatch(r"([-+]?\d+(?:\.\d+)?)\s*(|m|mtr|metres?|meters?|ft|foot|feet)\.?", text):
+        return float(match[1]) * (FOOT_M if match[2].startswith("f") else 1.0)
     return None
 
 
-def building(tags: Mapping[str, Any], footprint: Any, reading: Reading, name: str = "") -> tuple[Part, bool]:
-    """A building from its tags, and whether its height had to be guessed.
+def building(
+    tags: Mapping[str, Any], footprint: Any, reading: Reading, unknown: Counter[str], name: str = ""
+) -> Part:
+    """A building from its tags.
 
     The rule: `height`; else storeys (`building:levels` and `roof:levels`) of 3 m each; else `default_height_m`. It
-    begins at `min_height`, else `building:min_level` times 3 m, else at the ground.
+    begins at `min_height`, else `building:min_level` times 3 m, else at the ground. Names are told in any case. A
+    height of zero or less says nothing: some files mean by -1 that it is not known.
 
     Args:
         tags: attributes by name, as OpenStreetMap has them.
         footprint: shapely geometry.
         reading: has the default height.
+        unknown: counts the buildings whose height had to be guessed, and heights that cannot be read.
         name: for messages.
     """
-    top = _first(tags, _HEIGHT)
-    levels = _first(tags, _LEVELS)
-    guessed = top is None and levels is None
+    tags = {key.lower(): value for key, value in tags.items()}
+    top = _first(tags, _HEIGHT, unknown)
+    levels = None if top is not None else _first(tags, _LEVELS, unknown)
+    if top is None and levels is not None:
+        top = (levels + (_first(tags, ("roof:levels", "roof_levels"), unknown) or 0.0)) * LEVEL_M
     if top is None:
-        roof = _first(tags, ("roof:levels", "roof_levels")) or 0.0
-        top = reading.default_height_m if levels is None else (levels + roof) * LEVEL_M
-    bottom = _first(tags, _MIN_HEIGHT)
+        top = reading.default_height_m
+        unknown[GUESSED] += 1
+    bottom = _first(tags, _MIN_HEIGHT, unknown, least=True)
     if bottom is None:
-        bottom = (_first(tags, _MIN_LEVEL) or 0.0) * LEVEL_M
+        bottom = (_first(tags, _MIN_LEVEL, unknown, least=True) or 0.0) * LEVEL_M
     begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
-    return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True), guessed
+    return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
+
+
+GUESSED: Final = ""
+"""Counts, in `unknown` of `building`, those of which no height is known."""
+
+
+def building_notes(unknown: Counter[str], reading: Reading) -> list[str]:
+    """What is said of buildings whose height is not known, or cannot be read."""
+    notes = []
+    if unknown[GUESSED]:
+        notes.append(
+            f"{counted(unknown[GUESSED], 'building')} without height and levels taken as "
+            f"{reading.default_height_m:g} m high (default_height_m)"
+        )
+    strange = {text: count for text, count in unknown.items() if text != GUESSED}
+    if strange:
+        notes.append(
+            f"{counted(sum(strange.values()), 'height')} of buildings say nothing, {next(iter(strange))} the first"
+        )
+    return notes
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:
     """Whether attributes are those of a building."""
     if any(str(tags.get(name) or "no") != "no" for name in ("building", "building:part")):
         return True
-    return any(_first(tags, names) is not None for names in (_HEIGHT, _LEVELS)) and not has_limits(tags)
+    lower = {key.lower(): value for key, value in tags.items()}
+    return any(_first(lower, names) is not None for names in (_HEIGHT, _LEVELS)) and not has_limits(tags)
 
 
 def has_limits(tags: Mapping[str, Any]) -> bool:
     """Whether attributes give the limits of an airspace."""
-    return any(tags.get(name) is not None for name in (*_LOWER, *_UPPER))
+    return any(tags[key] is not None for key in tags if key.lower() in _LOWER or key.lower() in _UPPER)
 
 
 def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Limits of an airspace from attributes; a number alone is in metres unless `uom` or `unit` says feet."""
-    unit = str(tags.get("uom") or tags.get("unit") or tags.get("uomDimensions") or "m").lower()
+    """Limits of an airspace from attributes, named in any case; a number alone is in metres unless a unit says feet."""
+    tags = {key.lower(): value for key, value in tags.items() if value is not None}
     found: list[Limit | None] = []
     for names, none, word in ((_LOWER, NO_BOTTOM, "lower"), (_UPPER, NO_TOP, "upper")):
-        value = next((tags[each] for each in names if tags.get(each) is not None), None)
-        reference = str(next((tags[each] for each in tags if str(each).lower().startswith(word)
-                             and "refer" in str(each).lower()), "")).upper()  # fmt: skip
+        value = next((tags[each] for each in names if each in tags), None)
+        units = (f"{word}_uom", f"{word}unit", f"{word}_unit", "uom", "unit", "uomdimensions")
+        unit = next((str(tags[each]) for each in units if each in tags), "m").lower()
+        reference = next(
+            (str(tags[each]).upper() for each in tags if each.startswith(word) and any(r in each for r in _REFERENCES)),
+            "",
+        )  # fmt: skip
         datum = Datum.GROUND if _GROUND.search(reference) else Datum.SEA
         found.append(none if value is None else _limit(value, unit, datum))
     return band_of(found[0], found[1], notes, name)
@@ -178,14 +232,32 @@ def _limit(value: Any, unit: str, datum: Datum) -> Limit | None:
     if isinstance(value, int | float) and not isinstance(value, bool):
         if datum is Datum.GROUND and value == 0:
             return NO_BOTTOM
+        if value <= NO_NUMBER:
+            return None
+        if unit == "fl":
+            return Limit(value * 100.0 * FOOT_M)
         return Limit(value * (FOOT_M if unit.startswith("f") else 1.0), datum)
     return limit_of(str(value), unit.startswith("f"), datum)
 
 
-def _first(tags: Mapping[str, Any], names: tuple[str, ...]) -> float | None:
-    """The first of some attributes that is a length or a number."""
+def _first(
+    tags: Mapping[str, Any], names: tuple[str, ...], unknown: Counter[str] | None = None, least: bool = False
+) -> float | None:
+    """The first of some attributes that is a length or a number; of a list the largest, or the least.
+
+    Args:
+        tags: attributes by lower-case name.
+        names: of which the first that says something counts.
+        unknown: counts what says nothing: no number, or none above zero.
+        least: of the bottom of a building, which may be 0.
+    """
     for name in names:
-        value = metres_of(tags[name]) if name in tags else None
-        if value is not None:
-            return value
+        if (given := tags.get(name)) is None:
+            continue
+        values = [metres_of(each) for each in (given.split(";") if isinstance(given, str) else [given])]
+        known = [each for each in values if each is not None]
+        if len(known) == len(values) and (least or max(known) > 0):
+            return min(known) if least else max(known)
+        if unknown is not None and known != [0.0]:
+            unknown[f"{name}={str(given)[:20]!r}"] += 1
     return None

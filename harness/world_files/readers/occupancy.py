@@ -12,7 +12,16 @@ import numpy as np
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of, xml_events
-from harness.world_files.parts import Contents, Part, Raster, Reading, WorldFileError, counted
+from harness.world_files.parts import (
+    BoolArray,
+    Contents,
+    FloatArray,
+    Part,
+    Raster,
+    Reading,
+    WorldFileError,
+    counted,
+)
 from harness.world_files.readers.geotiff import check_cells
 
 FREE: Final = frozenset(b".GS")
@@ -21,7 +30,8 @@ BLOCKED: Final = frozenset(b"@OTW")
 """Out of bounds, trees and deep water."""
 BARN_CELL_M: Final = 0.15
 """Side of a cell of the BARN worlds: the diameter of their cylinders (Perille et al. 2020)."""
-TALLEST: Final = 1000.0
+MODES: Final = ("trinary", "scale", "raw")
+"""Of ROS map_server: how a grey becomes occupied, free or unknown."""
 
 
 def read_moving_ai(path: Path, reading: Reading) -> Contents:
@@ -58,28 +68,19 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
 def read_ros(path: Path, reading: Reading) -> Contents:
     """Reads a map of ROS map_server: a YAML file and the image that it names.
 
-    Occupied and free are told as map_server does (mode trinary): p = (255 - grey) / 255, or grey / 255 if `negate`;
-    above `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown.
+    Occupied and free are told as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
+    `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown. In mode `raw` p = grey / 100, and
+    above 100 nothing is known; in mode `scale` a cell that is not opaque is unknown.
 
     Raises:
         WorldFileError: it is not such a map, or its image cannot be read.
     """
-    from PIL import Image
-
     keys = _yaml(path)
+    mode = str(keys.get("mode", "trinary")).lower()
+    if mode not in MODES:
+        raise WorldFileError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
     image_path = path.parent / str(keys.get("image", ""))
-    data = read_bytes(image_path)
-    try:
-        with Image.open(_stream(data), formats=["PPM", "PNG", "BMP", "JPEG"]) as image:
-            check_cells(image.height, image.width)
-            grey = np.asarray(image.convert("L"), dtype=np.float64)
-            alpha = np.asarray(image.getchannel("A")) if "A" in image.getbands() else None
-    except WorldFileError:
-        raise
-    except Exception as error:  # Pillow raises many kinds for damaged files
-        raise WorldFileError(
-            f"names the image {image_path.name}, which cannot be read ({str(error)[:80]})"
-        ) from error
+    grey, opaque = _image(image_path)
     size = _positive(keys, "resolution")
     origin = keys.get("origin", (0.0, 0.0, 0.0))
     if not (isinstance(origin, tuple) and len(origin) >= 2 and all(_is_number(each) for each in origin)):
@@ -87,10 +88,12 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     occupied_from, free_to = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
     if not (_is_number(occupied_from) and _is_number(free_to)):
         raise WorldFileError("has thresholds that are no numbers")
-    chance = grey / 255.0 if keys.get("negate", 0) else (255.0 - grey) / 255.0
-    occupied, free = chance > occupied_from, chance < free_to
-    if alpha is not None:
-        occupied, free = occupied & (alpha == 255), free & (alpha == 255)
+    known = opaque
+    if mode == "raw":
+        chance, known = grey / 100.0, known & (grey <= 100.0)
+    else:
+        chance = grey / 255.0 if keys.get("negate", 0) else (255.0 - grey) / 255.0
+    occupied, free = known & (chance > occupied_from), known & (chance < free_to)
     solid = occupied.astype(np.float64)
     solid[~occupied & ~free] = np.nan
     scale = (reading.metres_per_cell or size) / size
@@ -100,6 +103,32 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     if yaw:
         affine = _turned(affine, origin[0] * scale, origin[1] * scale, yaw)
     return Contents("ros_map", None, occupied=Raster(solid, affine))
+
+
+def _image(path: Path) -> tuple[FloatArray, BoolArray]:
+    """Grey from 0 to 255, of colours their mean as map_server has it, and where the image is opaque."""
+    from PIL import Image
+
+    data = read_bytes(path)
+    try:
+        with Image.open(_stream(data), formats=["PPM", "PNG", "BMP", "JPEG"]) as image:
+            check_cells(image.height, image.width)
+            if image.mode in ("I", "I;16", "F"):
+                grey = np.asarray(image, dtype=np.float64) / 257.0
+            elif image.mode in ("L", "1"):
+                grey = np.asarray(image.convert("L"), dtype=np.float64)
+            else:
+                grey = np.asarray(image.convert("RGB"), dtype=np.float64).mean(axis=2)
+            opaque = np.ones(grey.shape, dtype=np.bool_)
+            if "A" in image.convert("RGBA" if "transparency" in image.info else image.mode).getbands():
+                opaque = np.asarray(image.convert("RGBA").getchannel("A")) == 255
+    except WorldFileError:
+        raise
+    except Exception as error:  # Pillow raises many kinds for damaged files
+        raise WorldFileError(
+            f"names the image {path.name}, which cannot be read ({str(error)[:80]})"
+        ) from error
+    return grey, opaque
 
 
 def _stream(data: bytes) -> Any:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -32,7 +33,9 @@ _COORDINATE: Final = re.compile(
     re.IGNORECASE,
 )
 CLOSED: Final = ("AC", "AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")
-"""Commands that are read; all others are drawing, radio and times."""
+"""Commands that are read."""
+DRAWN: Final = ("AT", "AY", "AF", "AG", "AX", "AI", "TO", "TC", "SP", "SB", "TP", "T")
+"""Labels, kinds, radio and drawing: they have no bearing on where an airspace is. All others are named."""
 
 
 class _Airspace:
@@ -70,6 +73,7 @@ def read(path: Path, reading: Reading) -> Contents:
     """
     lines = text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines()
     spaces: list[_Airspace] = []
+    ignored = Counter[str]()
     for number, line in enumerate(lines, 1):
         command, _, rest = line.partition("*")[0].strip().partition(" ")
         command, rest = command.upper(), rest.strip()
@@ -77,6 +81,8 @@ def read(path: Path, reading: Reading) -> Contents:
             spaces.append(_Airspace(rest))
         elif spaces and command in CLOSED:
             _take(spaces[-1], command, rest, number)
+        elif command and command not in DRAWN:
+            ignored[command] += 1
     notes: list[str] = []
     parts = [
         Part(shape, *limits.band_of(each.lower, each.upper, notes, each.name), name=each.name)
@@ -85,6 +91,19 @@ def read(path: Path, reading: Reading) -> Contents:
     ]
     if not parts:
         raise WorldFileError("has no airspace with an area; must be OpenAir with some")
+    classes = Counter(each.kind or "none" for each in spaces)
+    told = ", ".join(f"{count} {kind[:12]}" for kind, count in classes.most_common(6))
+    notes.append(
+        f"airspaces of every class are solid ({told}{', and others' if len(classes) > 6 else ''}): take out what may "
+        "be flown in"
+    )
+    if timed := ignored.pop("AA", 0):
+        notes.append(f"{counted(timed, 'time')} of activation passed over: taken as always active")
+    if ignored:
+        words = ", ".join(repr(word[:12]) for word, _ in ignored.most_common(4))
+        notes.append(
+            f"{counted(ignored.total(), 'line')} with commands that are not known passed over: {words}"
+        )
     empty = sum(not each.footprints() for each in spaces)
     if empty:
         notes.append(f"{counted(empty, 'airspace')} without an area passed over")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,7 @@ def _read(path: Path, reading: Reading) -> Contents:
     import shapely
 
     notes: list[str] = []
+    unknown = Counter[str]()
     parts: list[Part] = []
     crs: str | None = None
     passed = 0
@@ -55,21 +57,24 @@ def _read(path: Path, reading: Reading) -> Contents:
                     continue
                 tags = {str(name): column[row] for name, column in zip(meta["fields"], columns, strict=True)}
                 tags = {name: value for name, value in tags.items() if value is not None and value == value}
-                parts.append(_part(tags, shape, reading, notes))
+                parts.append(_part(tags, shape, reading, notes, unknown))
     except (DataSourceError, DataLayerError, ValueError, RuntimeError, OSError, MemoryError) as error:
         if isinstance(error, WorldFileError):
             raise
         raise WorldFileError(f"cannot be read by GDAL ({' '.join(str(error).split())[:100]})") from error
     if not parts:
         raise WorldFileError("has no polygon; must have some")
+    notes += limits.building_notes(unknown, reading)
     if passed:
         notes.append(f"{counted(passed, 'shape')} without an area passed over")
     return Contents("vector", reading.crs or crs, tuple(parts), notes=tuple(notes))
 
 
-def _part(tags: dict[str, object], shape: object, reading: Reading, notes: list[str]) -> Part:
+def _part(
+    tags: dict[str, object], shape: object, reading: Reading, notes: list[str], unknown: Counter[str]
+) -> Part:
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in tags.items()}
     name = str(plain.get("name", ""))[:40]
     if limits.is_building(plain):
-        return limits.building(plain, shape, reading, name)[0]
+        return limits.building(plain, shape, reading, unknown, name)
     return Part(shape, *limits.limits(plain, notes, name), name=name)

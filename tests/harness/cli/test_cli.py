@@ -14,16 +14,14 @@ from typing import Any
 
 import pytest
 
-from aircraft import airframes
-from aircraft.guidance.registry import guidance_kinds
 from harness.cli import app as cli
 from harness.cli import flights
 from harness.cli.app import main
 from harness.files.errors import RunFolderError
 from harness.scenario import scenario, shipped
-from planner.registry import planner_kinds
 
 ROOT = Path(__file__).parents[3]
+CAMPAIGN = ROOT / "scenarios" / "campaigns" / "forest_planners.yaml"
 SLOW = {"jsbsim", "numba", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "scipy", "yaml"}
 COMMANDS = (
     "fly",
@@ -86,6 +84,15 @@ def test_help_lists_the_commands_and_fits_80_columns(tmp_path: Path) -> None:
     assert all(f"│ {command} " in shown.stdout for command in COMMANDS)
     assert max(map(len, shown.stdout.splitlines())) <= 80
     assert "\x1b" not in shown.stdout
+
+
+def test_no_command_at_all_prints_the_help(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main([]) == 0
+    said = capsys.readouterr()
+    assert "│ fly " in said.out
+    assert said.err == ""
 
 
 def test_help_of_fly_has_every_option_of_the_contract(capsys: pytest.CaptureFixture[str]) -> None:
@@ -170,7 +177,6 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ([], "Missing command"),
         (["flight"], "No such command 'flight'"),
         (["fly"], "SCENARIO"),
         (["fly", "paper_circles", "--sed", "3"], "No such option: --sed"),
@@ -191,6 +197,8 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
         (["view", "no-such-run"], "no-such-run"),
         (["report", "no-such-run"], "no-such-run is not a run folder"),
         (["bench", "nowhere.yaml"], "nowhere.yaml: no such file"),
+        (["fly", "forest_planners"], "this is a campaign: use `wayproof sweep forest_planners`"),
+        (["fly", str(CAMPAIGN)], f"this is a campaign: use `wayproof sweep {CAMPAIGN}`"),
     ],
 )
 def test_bad_usage_is_one_line_and_writes_nothing(
@@ -304,38 +312,6 @@ def test_schema_prints_the_json_schema(capsys: pytest.CaptureFixture[str]) -> No
     printed = json.loads(capsys.readouterr().out)
     assert printed == scenario.scenario_schema()
     assert printed["$defs"]["Sensor"]["properties"]["range_m"]["exclusiveMinimum"] == 0
-
-
-def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = {
-        "planners": tuple(planner_kinds()),
-        "scenarios": tuple(shipped.shipped_scenarios()),
-    }
-    for what, names in wanted.items():
-        assert main(["list", what]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        assert tuple(line.split()[0] for line in lines) == names
-        assert all(len(line.split()) > 3 for line in lines)
-
-
-def test_list_of_guidance_has_keys_and_defaults(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["list", "guidance"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.partition(":")[0] for line in lines if line[0] != " "] == list(guidance_kinds())
-    assert "  period_s = 17 s: period of the track error's decay (NAVL1_PERIOD)" in lines
-    assert all(len(line) <= 80 for line in lines)
-
-
-def test_list_of_aircraft_has_their_figures(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "c172p", "SGS"))
-    assert main(["list", "aircraft"]) == 0
-    heading, aerosonde, cessna, glider = capsys.readouterr().out.splitlines()
-    assert heading.split()[0] == "name"
-    assert aerosonde.split()[:6] == ["aerosonde", "11", "17.6-32.3", "25", "110", "yes"]
-    assert cessna.split()[:2] == ["c172p", "853"]
-    assert glider.startswith("SGS        cannot be flown: SGS cannot be trimmed for level flight")
 
 
 def test_a_flight_of_a_model_that_cannot_be_flown_ends_before_it(

@@ -48,7 +48,7 @@ def test_distances_are_those_of_shapely() -> None:
 
 def test_the_sensor_sees_the_inner_walls_from_the_hole() -> None:
     world = World([Obstacle(RING)], BOUNDS)
-    sensor = RangeSensor(world, Sensor(range_m=2000.0, rays=8), np.random.SeedSequence(1))
+    sensor = RangeSensor(world, Sensor(range_m=2000.0, rays=8, beam_deg=0.0), np.random.SeedSequence(1))
     scan = sensor.scan(500.0, 500.0, 0.0, 0.0)
     assert np.isfinite(scan.ranges_m).all()
     assert scan.ranges_m.min() == pytest.approx(200.0 / math.cos(math.radians(22.5)))

@@ -351,6 +351,7 @@ def test_from_scenario_takes_shape_motion_and_window() -> None:
             scenario_obstacles.Obstacle(circle=circle, velocity_mps=(4.0, 5.0), active_s=(6.0, 7.0)),
             scenario_obstacles.Obstacle(polygon=polygon),
         ),
+        ground=None,
     )
     world = World.from_scenario(scenario)
     assert world.bounds_m == BOUNDS
@@ -362,7 +363,9 @@ def test_from_scenario_takes_shape_motion_and_window() -> None:
 
 def test_an_obstacle_without_a_shape_is_an_error() -> None:
     shapeless = SimpleNamespace(circle=None, polygon=None, velocity_mps=None, active_s=None)
-    scenario: Any = SimpleNamespace(area=SimpleNamespace(bounds_m=BOUNDS), obstacles=(shapeless,))
+    scenario: Any = SimpleNamespace(
+        area=SimpleNamespace(bounds_m=BOUNDS), obstacles=(shapeless,), ground=None
+    )
     with pytest.raises(ValueError, match="needs a circle or a polygon"):
         World.from_scenario(scenario)
 

@@ -1,0 +1,165 @@
+"""The command `list`: the names that a scenario or a command can use, and what there is to know of each."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+
+import typer
+
+from harness.cli.standard_output import say
+
+if TYPE_CHECKING:
+    from aircraft.airframe import Airframe
+
+_AIRCRAFT_ROW: Final = "{:10} {:>7} {:>10} {:>6} {:>6} {:8} "
+_WIDTH: Final = 80
+
+
+def list_names(
+    what: Annotated[
+        Literal["planners", "aircraft", "guidance", "scenarios", "campaigns"], typer.Argument(help="Of what.")
+    ],
+) -> int:
+    """Prints the names that a scenario or a command can use; of planners and guidance laws their own keys too.
+
+    Aircraft that have not been flown here before are flown for their figures, on all processors: all of the fleet
+    takes about a minute. The figures are kept.
+
+    For example: wayproof list planners
+    """
+    if what == "aircraft":
+        _print_aircraft()
+    elif what == "guidance":
+        from aircraft.guidance.registry import guidance_kinds
+
+        _print_kinds(guidance_kinds())
+    elif what == "planners":
+        from planner.registry import planner_kinds
+
+        _print_kinds(planner_kinds())
+    else:
+        _print_shipped(what)
+    return 0
+
+
+def _print_shipped(what: str) -> None:
+    """Shipped files, a line each where they fit."""
+    from harness.cli.terminal import print_columns
+    from harness.scenario.shipped import shipped_campaigns, shipped_scenarios, summary
+
+    files = shipped_campaigns() if what == "campaigns" else shipped_scenarios()
+    print_columns({name: summary(path) for name, path in files.items()})
+
+
+def _print_kinds(kinds: Mapping[str, Any]) -> None:
+    """Every planner, or law, with its own keys: default, unit, what it is."""
+    for name, kind in kinds.items():
+        say(textwrap.fill(f"{name}: {kind.summary}", _WIDTH, subsequent_indent="  "))
+        for own in fields(kind.config):
+            unit = own.metadata.get("unit") or "1"
+            text = f"{own.name} = {_default(own.default)}{'' if unit == '1' else f' {unit}'}: {own.metadata['doc']}"
+            say(textwrap.fill(text, _WIDTH, initial_indent="  ", subsequent_indent="      "))
+
+
+def _default(value: object) -> str:
+    """A default as it stands in a scenario."""
+    if value is None:
+        return "derived"
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+
+
+def _print_aircraft() -> None:
+    """A row for each of the fleet; columns are those of `_AIRCRAFT_ROW`."""
+    from aircraft.airframes import aircraft_names, is_surveyed
+    from harness.cli.terminal import step_bar
+
+    names = aircraft_names()
+    new, faults = [name for name in names if not is_surveyed(name)], {}
+    if new:
+        many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
+        say(f"{many} flown for the figures, the first time only; all of the fleet takes a minute", err=True)
+        with step_bar() as report:
+            faults = _survey(new, report)
+    say(_row(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "verified"), "what"))
+    for name in names:
+        fault = faults.get(name)
+        say(f"{name:10} cannot be flown: {fault}" if fault else _aircraft_row(name))
+
+
+def _survey(names: Sequence[str], report: Callable[[int, int, str], None] | None) -> dict[str, str]:
+    """Flies aircraft for their figures, which are kept, in processes beside this one; returns why some cannot be."""
+    import multiprocessing
+    import os
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+
+    from harness.files.spawning import without_main
+
+    spawn = multiprocessing.get_context("spawn")
+    workers = min(len(names), os.cpu_count() or 1)
+    before = set(multiprocessing.active_children())
+    faults: dict[str, str] = {}
+    with without_main(), ProcessPoolExecutor(workers, mp_context=spawn, initializer=_begin) as pool:
+        coming = {pool.submit(_fault, name): name for name in names}
+        try:
+            for done, one in enumerate(as_completed(coming), start=1):
+                if fault := one.result():
+                    faults[coming[one]] = fault
+                if report is not None:
+                    report(done, len(names), f"{done} of {len(names)} flown, the last {coming[one]}")
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for child in set(multiprocessing.active_children()) - before:
+                child.terminate()
+            raise
+    return faults
+
+
+def _begin() -> None:
+    """What a process of ours does first: standard output and interrupts are the parent's alone."""
+    import os
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.dup2(2, 1)
+
+
+def _fault(name: str) -> str | None:
+    """Has the figures of an aircraft kept; returns why it cannot be flown, if it cannot."""
+    from aircraft.airframes import AircraftError, airframe
+
+    try:
+        airframe(name)
+    except AircraftError as error:
+        return str(error)
+    return None
+
+
+def _aircraft_row(name: str) -> str:
+    from aircraft.airframes import AircraftError, airframe
+    from aircraft.envelope import performance
+
+    try:
+        frame = airframe(name)
+        radius_m = performance(frame, frame.cruise_mps).turn_radius_m
+    except AircraftError as error:
+        return f"{name:10} cannot be flown: {error}"
+    return _row(_cells(frame, radius_m), frame.summary)
+
+
+def _cells(frame: Airframe, radius_m: float) -> str:
+    low, high = frame.airspeed_range_mps
+    cells = (f"{frame.mass_kg:.0f}", f"{low:g}-{high:g}", f"{frame.cruise_mps:g}", f"{radius_m:.0f}")
+    return _AIRCRAFT_ROW.format(frame.name, *cells, "yes" if frame.verified else "no")
+
+
+def _row(cells: str, text: str) -> str:
+    """A row whose last column goes on below itself where a terminal is too narrow for it."""
+    if not sys.stdout.isatty():
+        return cells + text
+    room = max(shutil.get_terminal_size().columns - len(cells), 20)
+    return cells + f"\n{' ' * len(cells)}".join(textwrap.wrap(text, room))

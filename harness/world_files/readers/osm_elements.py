@@ -1,0 +1,182 @@
+"""Buildings of OpenStreetMap from nodes, ways and relations in any order.
+
+Buildings and their parts (`building:part`) are all taken, each with its own height: where they overlap the union is
+solid, which is never less than the Simple 3D Buildings scheme has it. Outlines that the edge of an extract has cut
+open are closed by a straight line.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from harness.world_files.parts import (
+    WGS84,
+    BoolArray,
+    Contents,
+    FloatArray,
+    Part,
+    Reading,
+    WorldFileError,
+    counted,
+)
+from harness.world_files.readers import limits, rings
+
+AREAS: Final = ("building", "building:part")
+MULTIPOLYGON: Final = "multipolygon"
+
+Line = list[tuple[float, float]]
+"""Longitude and latitude of the nodes of a way that are known."""
+Member = tuple[int, bool]
+"""Number of a way, and whether it is an inner ring."""
+
+
+class Collected:
+    """Parts so far, and what has to be said of them."""
+
+    def __init__(self, reading: Reading) -> None:
+        self.parts: list[Part] = []
+        self.reading = reading
+        self._rings: list[tuple[Mapping[str, str], Line, str]] = []
+        self.unknown = Counter[str]()
+        self.broken = self.closed = 0
+
+    def way(self, tags: Mapping[str, str], line: Line, name: str) -> None:
+        """A building that is one way; those that are whole rings are made all at once."""
+        if len(line) >= 4 and line[0] == line[-1]:
+            self._rings.append((tags, line, name))
+        else:
+            self._add(tags, [line], [], name)
+
+    def relation(
+        self, tags: Mapping[str, str], members: Iterable[Member], ways: Mapping[int, Line], name: str
+    ) -> None:
+        """A building of several ways, as far as they are in the file."""
+        there = [(ways[number], inner) for number, inner in members if number in ways]
+        self._add(tags, [w for w, inner in there if not inner], [w for w, inner in there if inner], name)
+
+    def _add(self, tags: Mapping[str, str], outer: Sequence[Line], inner: Sequence[Line], name: str) -> None:
+        import shapely
+
+        solid, closed = _area(outer)
+        if solid is None:
+            self.broken += 1
+            return
+        self.closed += closed
+        hollow, _ = _area(inner) if inner else (None, False)
+        footprint = solid if hollow is None else shapely.difference(solid, hollow)
+        self.parts.append(limits.building(tags, footprint, self.reading, self.unknown, name))
+
+    def contents(self) -> Contents:
+        """What was found.
+
+        Raises:
+            WorldFileError: nothing was.
+        """
+        shapes = rings.shapes_of([[[np.array(line)]] for _, line, _ in self._rings])
+        for (tags, _, name), shape in zip(self._rings, shapes, strict=True):
+            if shape is None:
+                self.broken += 1
+                continue
+            self.parts.append(limits.building(tags, shape, self.reading, self.unknown, name))
+        if not self.parts:
+            raise WorldFileError("has no building; must be an extract of OpenStreetMap with some")
+        notes = limits.building_notes(self.unknown, self.reading)
+        if self.closed:
+            notes.append(f"{counted(self.closed, 'building')} cut open by the edge of the extract closed")
+        if self.broken:
+            notes.append(f"{counted(self.broken, 'building')} whose outline is not there passed over")
+        return Contents("osm", WGS84, tuple(self.parts), notes=tuple(notes))
+
+
+FIRST_INLINE: Final = -(1 << 61)
+"""Numbers below it are given here to nodes that have none."""
+
+
+class Elements:
+    """Nodes, ways and relations of a file, in any order: Overpass puts nodes behind the ways that need them."""
+
+    def __init__(self) -> None:
+        self._ids, self._x, self._y = array("q"), array("d"), array("d")
+        self._refs = array("q")
+        self._spans: dict[int, tuple[int, int]] = {}
+        self._buildings: dict[int, dict[str, str]] = {}
+        self._relations: dict[int, tuple[dict[str, str], list[Member]]] = {}
+
+    def node(self, number: int, longitude: float, latitude: float) -> None:
+        """A place."""
+        self._ids.append(number)
+        self._x.append(longitude)
+        self._y.append(latitude)
+
+    def way(self, number: int, refs: Sequence[int], tags: dict[str, str]) -> None:
+        """A way, by the numbers of its nodes; one without nodes does not replace one with them."""
+        if refs or number not in self._spans:
+            self._spans[number] = len(self._refs), len(self._refs) + len(refs)
+            self._refs.extend(refs)
+        if is_building(tags):
+            self._buildings[number] = tags
+
+    def relation(self, number: int, members: list[Member], tags: dict[str, str]) -> None:
+        """A relation, kept if it is a building's area."""
+        if is_building(tags) and tags.get("type", MULTIPOLYGON) == MULTIPOLYGON:
+            self._relations[number] = tags, members
+
+    def contents(self, reading: Reading) -> Contents:
+        """The buildings.
+
+        Raises:
+            WorldFileError: there is none.
+        """
+        places, known = self._places()
+        found = Collected(reading)
+
+        def line(number: int) -> Line:
+            span = slice(*self._spans[number])
+            return list(map(tuple, places[span][known[span]].tolist()))
+
+        for number, tags in self._buildings.items():
+            found.way(tags, line(number), f"way {number}")
+        needed = {number for _, members in self._relations.values() for number, _ in members}
+        ways = {number: line(number) for number in needed & self._spans.keys()}
+        for number, (tags, members) in self._relations.items():
+            found.relation(tags, members, ways, f"relation {number}")
+        return found.contents()
+
+    def _places(self) -> tuple[FloatArray, BoolArray]:
+        """(k, 2) where the nodes of all ways lie, one way after the other, and which of them are known."""
+        ids, refs = np.array(self._ids, dtype=np.int64), np.array(self._refs, dtype=np.int64)
+        if not len(ids) or not len(refs):
+            return np.zeros((len(refs), 2)), np.zeros(len(refs), dtype=np.bool_)
+        order = np.argsort(ids, kind="stable")
+        at = order[np.minimum(np.searchsorted(ids, refs, sorter=order), len(ids) - 1)]
+        return np.column_stack((np.array(self._x)[at], np.array(self._y)[at])), ids[at] == refs
+
+
+def is_building(tags: Mapping[str, str]) -> bool:
+    """Whether tags are those of a building, or of a part of one."""
+    return any(tags.get(name, "no") != "no" for name in AREAS)
+
+
+def _area(lines: Sequence[Line]) -> tuple[Any, bool]:
+    """The area inside lines that are rings or pieces of them, None without; and whether any had to be closed."""
+    import shapely
+
+    closed_lines = [line for line in lines if len(line) >= 4 and line[0] == line[-1]]
+    pieces = [shapely.LineString(line) for line in lines if len(line) >= 2 and line[0] != line[-1]]
+    closed = False
+    if pieces:
+        joined = shapely.line_merge(shapely.MultiLineString(pieces))
+        for chain in shapely.get_parts(joined):
+            corners = list(chain.coords)
+            if len(corners) >= 3:
+                closed |= corners[0] != corners[-1]
+                closed_lines.append(corners)
+    shapes = [shapely.Polygon(line) for line in closed_lines]
+    valid = [shapely.make_valid(each, method="structure", keep_collapsed=False) for each in shapes]
+    whole = valid[0] if len(valid) == 1 else shapely.union_all(valid)
+    return (None if whole.is_empty or whole.area == 0.0 else whole), closed

@@ -1,0 +1,95 @@
+"""What `wayproof list` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aircraft import airframes
+from aircraft.guidance.registry import guidance_kinds
+from aircraft.model_files import AircraftError
+from harness.cli import names
+from harness.cli.app import main
+from harness.scenario import shipped
+from planner.registry import planner_kinds
+
+
+def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
+    wanted = {
+        "scenarios": tuple(shipped.shipped_scenarios()),
+        "campaigns": tuple(shipped.shipped_campaigns()),
+    }
+    for what, named in wanted.items():
+        assert main(["list", what]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert tuple(line.split()[0] for line in lines) == named
+        assert all(len(line.split()) > 3 for line in lines)
+
+
+def test_planners_and_guidance_are_listed_with_their_keys_and_defaults(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    some = {
+        "guidance": "  period_s = 17 s: period of the track error's decay (NAVL1_PERIOD)",
+        "planners": "  steps = 16: N, how many steps the search looks ahead",
+    }
+    every: dict[str, Mapping[str, Any]] = {"guidance": guidance_kinds(), "planners": planner_kinds()}
+    for what, kinds in every.items():
+        assert main(["list", what]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert [line.partition(":")[0] for line in lines if line[0] != " "] == list(kinds)
+        told = [line.split()[0] for line in lines if line.startswith("  ") and " = " in line]
+        assert told[0] == fields(next(iter(kinds.values())).config)[0].name
+        assert len(told) == sum(len(fields(kind.config)) for kind in kinds.values())
+        assert some[what] in lines
+        assert all(len(line) <= 80 for line in lines)
+
+
+def test_aircraft_are_listed_with_their_figures(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "c172p", "SGS"))
+    assert main(["list", "aircraft"]) == 0
+    heading, aerosonde, cessna, glider = capsys.readouterr().out.splitlines()
+    assert heading.split()[0] == "name"
+    assert aerosonde.split()[:6] == ["aerosonde", "11", "17.6-32.3", "25", "110", "yes"]
+    assert cessna.split()[:2] == ["c172p", "853"]
+    assert glider.startswith("SGS        cannot be flown: SGS cannot be trimmed for level flight")
+
+
+def test_new_aircraft_are_flown_beside_this_process_and_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(airframes, "aircraft_names", lambda: ("aerosonde", "SGS"))
+    told: list[tuple[int, int, str]] = []
+    assert not airframes.is_surveyed("aerosonde")
+    faults = names._survey(["aerosonde", "SGS"], lambda *progress: told.append(progress))
+    assert airframes.is_surveyed("aerosonde")
+    assert list(faults) == ["SGS"]
+    assert [done for done, _, _ in told] == [1, 2]
+    assert main(["list", "aircraft"]) == 0
+    said = capfd.readouterr()
+    assert said.err.startswith("SGS is flown for the figures")
+    assert said.out.splitlines()[1].startswith("aerosonde ")
+
+
+def test_whether_an_aircraft_is_surveyed_is_not_asked_of_nobody() -> None:
+    with pytest.raises(AircraftError):
+        airframes.is_surveyed("no-such-aircraft")
+
+
+def test_the_last_column_goes_on_below_itself(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cells = "x" * 50 + " "
+    assert names._row(cells, "word " * 20) == cells + "word " * 20
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "80")
+    first, second, *_ = names._row(cells, "word " * 20).splitlines()
+    assert first == cells + " ".join(["word"] * 6)
+    assert second == " " * 51 + " ".join(["word"] * 6)

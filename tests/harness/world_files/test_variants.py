@@ -1,0 +1,377 @@
+"""Files as other programs write them: what is read agrees with what pyproj, rasterio and arithmetic say."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from pyproj import CRS
+
+from harness.world_files.kinds import kind_of, read
+from harness.world_files.parts import (
+    FOOT_M,
+    NO_BOTTOM,
+    NO_TOP,
+    Contents,
+    Datum,
+    Limit,
+    Reading,
+    WorldFileError,
+)
+from tests.harness.world_files.making import feature, geojson
+
+pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of rasterio's own
+
+CORNERS = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
+RING = [*CORNERS, CORNERS[0]]
+
+
+def read_any(path: Path, **reading: Any) -> Contents:
+    return read(path, None, Reading(**reading))
+
+
+def same(found: Limit, wanted: Limit) -> bool:
+    return found.datum is wanted.datum and bool(found.height_m == pytest.approx(wanted.height_m))
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("how", "metres"),
+    [
+        ({"units": ("ft",)}, 1000 * FOOT_M),
+        ({"units": ("US survey foot",)}, 1000 * 1200 / 3937),
+        ({"units": ("metre",)}, 1000.0),
+        ({"scales": (0.1,), "offsets": (-50.0,)}, 50.0),
+        ({"crs": "EPSG:26916+6360"}, 1000 * 1200 / 3937),
+        ({"crs": "EPSG:32632+5773"}, 1000.0),
+        ({"dtype": "float64", "units": ("ft",)}, 1000 * FOOT_M),
+    ],
+)
+def test_a_geotiffs_heights_are_in_its_own_unit(how: dict[str, Any], metres: float, tmp_path: Path) -> None:
+    rasterio = pytest.importorskip("rasterio")
+    path, kind = tmp_path / "a.tif", how.get("dtype", "int16")
+    profile = {"driver": "GTiff", "height": 4, "width": 5, "count": 1, "dtype": kind, "nodata": -32768}
+    place = rasterio.transform.from_origin(400_000.0, 5_200_000.0, 10.0, 10.0)
+    heights = np.full((4, 5), 1000, dtype=kind)
+    heights[1, 2] = -32768
+    with rasterio.open(path, "w", crs=how.get("crs", "EPSG:32632"), transform=place, **profile) as file:
+        file.write(heights, 1)
+        for name in ("units", "scales", "offsets"):
+            if name in how:
+                setattr(file, name, how[name])
+    terrain = read_any(path).terrain
+    assert terrain is not None
+    assert terrain.values[0, 0] == pytest.approx(metres)
+    assert np.isnan(terrain.values[1, 2])
+    assert np.isnan(terrain.values).sum() == 1
+
+
+@pytest.mark.parametrize("kind", ["Area", "Point"])
+@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32632", "EPSG:3035"])
+def test_a_geotiff_lies_where_rasterio_has_it(crs: str, kind: str, tmp_path: Path) -> None:
+    rasterio = pytest.importorskip("rasterio")
+    degrees = crs == "EPSG:4326"
+    west, north, cell = (8.0, 47.0, 0.001) if degrees else (4_200_000.0, 2_700_000.0, 25.0)
+    path, place = tmp_path / "a.tif", rasterio.transform.from_origin(west, north, cell, cell)
+    with rasterio.open(
+        path, "w", driver="GTiff", height=3, width=3, count=1, dtype="float32", crs=crs, transform=place
+    ) as file:
+        file.write(np.ones((3, 3), dtype="float32"), 1)
+        file.update_tags(AREA_OR_POINT=kind)
+    found = read_any(path)
+    assert found.terrain is not None
+    with rasterio.open(path) as file:
+        assert found.terrain.affine == pytest.approx(tuple(file.transform)[:6])
+    assert CRS(found.crs) == CRS(crs)
+
+
+def test_a_picture_is_no_terrain(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    Image.new("RGB", (4, 4)).save(path)
+    with pytest.raises(WorldFileError, match="bands"):
+        read_any(path)
+    Image.new("P", (4, 4)).save(path)
+    with pytest.raises(WorldFileError, match="palette"):
+        read_any(path)
+
+
+def test_an_ascii_grid_may_name_centres_and_its_system_beside_it(tmp_path: Path) -> None:
+    path = written(
+        tmp_path / "a.asc",
+        "NCOLS 2\r\nNROWS 2\r\nXLLCENTER 400005\r\nYLLCENTER 5200005\r\nCELLSIZE 10\r\nNODATA_VALUE -1\r\n"
+        "1 2\r\n3 -1\r\n",
+    )
+    found = read_any(path)
+    assert found.crs is None
+    written(tmp_path / "a.prj", CRS("EPSG:32632").to_wkt("WKT1_ESRI"))
+    found = read_any(path)
+    assert CRS(found.crs).to_epsg(50) == 32632
+    assert found.terrain is not None
+    x, y = found.terrain.places(np.array([0.0]), np.array([2.0]))
+    assert (x[0], y[0]) == (400_000.0, 5_200_000.0)
+    assert np.isnan(found.terrain.values[1, 1])
+    written(tmp_path / "a.prj", "no such system")
+    with pytest.raises(WorldFileError, match=r"a\.prj"):
+        read_any(path)
+
+
+def test_an_srtm_tile_of_one_second_north_and_west(tmp_path: Path) -> None:
+    tile = np.zeros((3601, 3601), dtype=">i2")
+    tile[0, 0] = 5
+    path = tmp_path / "N47W122.SRTMGL1.hgt"
+    path.write_bytes(tile.tobytes())
+    found = read_any(path)
+    assert found.terrain is not None
+    # The first sample lies on the north-western corner of the degree.
+    x, y = found.terrain.places(np.array([0.5]), np.array([0.5]))
+    assert (x[0], y[0]) == pytest.approx((-122.0, 48.0))
+    assert found.terrain.values[0, 0] == 5.0
+
+
+def nodes() -> str:
+    return "".join(f'<node id="{k}" lon="{x}" lat="{y}"/>' for k, (x, y) in enumerate(CORNERS, 1))
+
+
+WAY = (
+    '<way id="7"><nd ref="1"/><nd ref="2"/><nd ref="3"/><nd ref="4"/><nd ref="1"/>'
+    '<tag k="building" v="yes"/><tag k="height" v="12 m"/></way>'
+)
+INLINE = "".join(
+    f'<nd ref="{k}" lon="{x}" lat="{y}"/>' for k, (x, y) in zip((1, 2, 3, 4, 1), RING, strict=True)
+)
+BARE = "".join(f'<nd lon="{x}" lat="{y}"/>' for x, y in RING)
+RELATION = (
+    '<relation id="9"><member type="way" ref="7" role="outer">{}</member><tag k="type" v="multipolygon"/>'
+    '<tag k="building" v="yes"/><tag k="height" v="12 m"/></relation>'
+)
+PLAIN_WAY = '<way id="7"><nd ref="1"/><nd ref="2"/><nd ref="3"/><nd ref="4"/><nd ref="1"/></way>'
+
+
+@pytest.mark.parametrize(
+    "body",
+    {
+        "nodes first": nodes() + WAY,
+        "nodes last": WAY + nodes(),
+        "out geom": f'<way id="7">{INLINE}<tag k="building" v="yes"/><tag k="height" v="12 m"/></way>',
+        "relation first": RELATION.format("") + PLAIN_WAY + nodes(),
+        "relation out geom": RELATION.format(BARE),
+        "negative ids": (nodes() + WAY).replace('id="', 'id="-').replace('ref="', 'ref="-'),
+        "deleted": nodes() + WAY + WAY.replace('id="7"', 'id="8" action="delete"'),
+    }.items(),
+    ids=lambda item: item[0],
+)
+def test_openstreetmap_in_any_order(body: tuple[str, str], tmp_path: Path) -> None:
+    found = read_any(
+        written(tmp_path / "a.osm", f'<?xml version="1.0"?>\n<osm version="0.6">{body[1]}</osm>')
+    )
+    (part,) = found.parts
+    assert part.footprint.area == pytest.approx(1e-6)
+    assert part.top == Limit(12.0, Datum.GROUND)
+    assert found.notes == ()
+
+
+@pytest.mark.parametrize("geom", [False, True])
+def test_an_answer_of_overpass_as_json(geom: bool, tmp_path: Path) -> None:
+    places = [{"lat": y, "lon": x} for x, y in RING]
+    way: dict[str, Any] = {"type": "way", "id": 7, "tags": {"building": "yes", "building:levels": "4"}}
+    way |= {"geometry": places} if geom else {"nodes": [1, 2, 3, 4, 1]}
+    every = [way, *({"type": "node", "id": k, **each} for k, each in enumerate(places[:4], 1) if not geom)]
+    path = tmp_path / "export.json"
+    path.write_text(json.dumps({"version": 0.6, "generator": "Overpass API", "elements": every}))
+    assert kind_of(path) == "osm_json"
+    (part,) = read_any(path).parts
+    assert part.footprint.area == pytest.approx(1e-6)
+    assert part.top.height_m == 12.0
+
+
+@pytest.mark.parametrize(
+    ("tags", "top_m", "said"),
+    [
+        ({"building": "yes", "height": -1}, 6.0, True),
+        ({"building": "yes", "height": "about 20"}, 6.0, True),
+        ({"building": "yes", "height": "about 20", "building:levels": "5"}, 15.0, True),
+        ({"building": "yes", "building:levels": "3;5"}, 15.0, False),
+        ({"building": "yes", "height": "12 metres"}, 12.0, False),
+        ({"building": "yes", "height": "40 feet"}, 40 * FOOT_M, False),
+        ({"HEIGHT": 21.5}, 21.5, False),
+        ({"num_floors": 3, "height": None}, 9.0, False),
+        ({"building": "yes", "est_height": "9"}, 9.0, False),
+    ],
+)
+def test_a_height_that_says_nothing_is_told(
+    tags: dict[str, Any], top_m: float, said: bool, tmp_path: Path
+) -> None:
+    found = read_any(geojson(tmp_path / "a.geojson", feature(tags)))
+    (part,) = found.parts
+    assert part.top.height_m == pytest.approx(top_m)
+    assert any("say nothing" in note for note in found.notes) == said
+
+
+@pytest.mark.parametrize(
+    ("tags", "bottom", "top"),
+    [
+        (
+            {"LOWER_VAL": 500, "LOWER_UOM": "FT", "LOWER_CODE": "SFC", "UPPER_VAL": 180, "UPPER_UOM": "FL"},
+            Limit(500 * FOOT_M, Datum.GROUND),
+            Limit(18_000 * FOOT_M),
+        ),
+        ({"UPPER_VAL": -9998, "LOWER_VAL": 0}, Limit(0.0), NO_TOP),
+        (
+            {"lower": "1500 ft AGL", "upper": "FL 65"},
+            Limit(1500 * FOOT_M, Datum.GROUND),
+            Limit(6500 * FOOT_M),
+        ),
+        ({"Floor": "GND", "Ceiling": "3000ft"}, NO_BOTTOM, Limit(3000 * FOOT_M)),
+    ],
+)
+def test_limits_of_a_zone_in_other_peoples_words(
+    tags: dict[str, Any], bottom: Limit, top: Limit, tmp_path: Path
+) -> None:
+    (part,) = read_any(geojson(tmp_path / "a.geojson", feature(tags))).parts
+    for found, wanted in ((part.bottom, bottom), (part.top, top)):
+        assert same(found, wanted)
+
+
+SPACE = "AC R\nAN one\nAL {}\nAH {}\nDP 47:00:00 N 008:00:00 E\nDP 47:00:00 N 008:01:00 E\nDP 47:01:00 N 008:01:00 E\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "limit"),
+    [
+        ("3000ft AGL", Limit(3000 * FOOT_M, Datum.GROUND)),
+        ("3000AGL", Limit(3000 * FOOT_M, Datum.GROUND)),
+        ("1500ft ASFC", Limit(1500 * FOOT_M, Datum.GROUND)),
+        ("FL65", Limit(6500 * FOOT_M)),
+        ("2000MSL", Limit(2000 * FOOT_M)),
+        ("2000 ft ALT", Limit(2000 * FOOT_M)),
+        ("900mMSL", Limit(900.0)),
+        ("900 m", Limit(900.0)),
+        ("UNL", NO_TOP),
+        ("Ask on 122.8", NO_TOP),
+        ("FL95/FL115", NO_TOP),
+    ],
+)
+def test_limits_of_openair(text: str, limit: Limit, tmp_path: Path) -> None:
+    (part,) = read_any(written(tmp_path / "a.txt", SPACE.format("GND", text))).parts
+    assert part.bottom == NO_BOTTOM
+    assert same(part.top, limit)
+
+
+def test_openair_names_what_it_passes_over(tmp_path: Path) -> None:
+    text = (
+        SPACE.format("GND", "FL65")
+        + "AA 2024-01-01T00:00Z/2024-01-02T00:00Z\nAT 47:00:00 N 008:00:00 E\nQQ 1\n"
+    )
+    notes = read_any(written(tmp_path / "a.txt", text)).notes
+    assert any("1 R" in note for note in notes)
+    assert any("activation" in note for note in notes)
+    assert any("'QQ'" in note for note in notes)
+    assert not any("AT" in note for note in notes)
+
+
+ITEM = "{}\t0\t3\t{}\t{}\t0\t0\t0\t{}\t{}\t0\t1\n"
+
+
+def test_a_fence_among_waypoints_with_circles_and_a_torn_one(tmp_path: Path) -> None:
+    rows = [ITEM.format(0, 16, 0, 47.0, 8.0)]
+    rows += [ITEM.format(k, 5001, 4, y, x) for k, (x, y) in enumerate(CORNERS, 1)]
+    rows += [ITEM.format(5, 5004, 20, 47.0005, 8.0005)]
+    found = read_any(written(tmp_path / "fence.waypoints", "QGC WPL 110\n" + "".join(rows)))
+    inside, circle = found.parts
+    assert (inside.keep_in, circle.keep_in) == (True, False)
+    metres2 = circle.footprint.area * 111_170.0 * 111_320.0 * math.cos(math.radians(47.0005))
+    assert metres2 == pytest.approx(math.pi * 400.0, rel=0.005)
+    with pytest.raises(WorldFileError, match="should have more"):
+        read_any(written(tmp_path / "torn.waypoints", "QGC WPL 110\n" + "".join(rows[:4] + rows[5:])))
+
+
+@pytest.mark.parametrize(
+    ("mode", "negate", "wanted"),
+    [
+        ("trinary", 0, [1.0, math.nan, 0.0, 0.0]),
+        ("trinary", 1, [0.0, math.nan, 1.0, 1.0]),
+        ("scale", 0, [1.0, math.nan, 0.0, 0.0]),
+        ("raw", 0, [0.0, math.nan, math.nan, math.nan]),
+    ],
+)
+def test_the_modes_of_a_ros_map(mode: str, negate: int, wanted: list[float], tmp_path: Path) -> None:
+    Image.fromarray(np.array([[0, 128, 254, 255]], dtype=np.uint8)).save(tmp_path / "m.pgm")
+    path = written(
+        tmp_path / "m.yaml",
+        f"image: m.pgm\nmode: {mode}\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: {negate}\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n",
+    )
+    occupied = read_any(path).occupied
+    assert occupied is not None
+    assert occupied.values[0].tolist() == pytest.approx(wanted, nan_ok=True)
+
+
+def test_a_ros_map_of_raw_numbers_and_one_that_is_turned(tmp_path: Path) -> None:
+    Image.fromarray(np.array([[0, 64, 66, 100, 101, 255]], dtype=np.uint8)).save(tmp_path / "m.png")
+    text = "image: m.png\nmode: {}\nresolution: 2\norigin: [10, 20, {}]\nnegate: 0\n"
+    raw = read_any(written(tmp_path / "m.yaml", text.format("raw", 0))).occupied
+    assert raw is not None
+    assert raw.values[0, [0, 2, 3]].tolist() == [0.0, 1.0, 1.0]
+    assert np.isnan(raw.values[0, [4, 5]]).all()
+    turned = read_any(written(tmp_path / "m.yaml", text.format("raw", math.pi / 2))).occupied
+    assert turned is not None
+    x, y = turned.places(
+        np.array([6.0]), np.array([1.0])
+    )  # the lower right corner, 12 m along the lower edge
+    assert (x[0], y[0]) == pytest.approx((10.0, 32.0))
+    with pytest.raises(WorldFileError, match="trinary, scale, raw"):
+        read_any(written(tmp_path / "m.yaml", text.format("octal", 0)))
+
+
+KML = (
+    '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2"><Document>'
+    "<NetworkLink><name>n</name></NetworkLink><Placemark><name>z</name><MultiGeometry><Polygon>"
+    "<extrude>1</extrude><altitudeMode>{}</altitudeMode><outerBoundaryIs><LinearRing><coordinates>"
+    "8,47,120 8.001,47,120 8.001,47.001,120 8,47.001,120 8,47,120</coordinates></LinearRing></outerBoundaryIs>"
+    "</Polygon></MultiGeometry></Placemark></Document></kml>"
+)
+
+
+@pytest.mark.parametrize(
+    ("mode", "top"),
+    [
+        ("absolute", Limit(120.0)),
+        ("relativeToGround", Limit(120.0, Datum.GROUND)),
+        ("clampToGround", NO_TOP),
+    ],
+)
+def test_the_altitude_modes_of_kml(mode: str, top: Limit, tmp_path: Path) -> None:
+    found = read_any(written(tmp_path / "a.kml", KML.format(mode)))
+    (part,) = found.parts
+    assert (part.bottom, part.top) == (NO_BOTTOM, top)
+    assert any("link" in note for note in found.notes)
+
+
+def test_geojson_in_an_older_files_own_system_with_several_polygons(tmp_path: Path) -> None:
+    square = [[[3e5 + x, 6.7e6 + y] for x, y in ((0, 0), (100, 0), (100, 100), (0, 100), (0, 0))]]
+    away = [[[x + 500, y] for x, y in square[0]]]
+    content = {
+        "type": "FeatureCollection",
+        "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::3067"}},
+        "features": [
+            {
+                "type": "Feature",
+                "properties": {"height": 10},
+                "geometry": {"type": "MultiPolygon", "coordinates": [square, away]},
+            }
+        ],
+    }
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps(content))
+    found = read_any(path)
+    assert found.crs == "EPSG:3067"
+    assert found.parts[0].footprint.area == pytest.approx(20_000.0)
