@@ -132,7 +132,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("api",),
         ("cli",),
         ("bench", "campaign", "comparison", "falsify"),
-        ("report",),
+        ("report", "watching"),
         ("run",),
         ("recording",),
         ("analysis",),

@@ -30,9 +30,20 @@ from harness.cli.options import (
 )
 from harness.cli.review import open_viewer
 from harness.cli.standard_output import say
+from harness.cli.watch import (
+    BeyondOption,
+    LiveOption,
+    MavlinkOption,
+    SpeedOption,
+    ViewerOption,
+    Watch,
+    WebOption,
+    opened,
+)
 
 if TYPE_CHECKING:
     from harness.scenario.scenario import Scenario
+    from harness.watching.watched_flight import Onlookers
 
 FLY_STATUS: Final = {"reached": 0, "unreachable": 3}
 """Exit status of `fly` by outcome; FAILED for the others."""
@@ -55,6 +66,12 @@ def fly(
     ] = None,
     no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
     view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
+    live: LiveOption = False,
+    speed: SpeedOption = None,
+    web: WebOption = False,
+    viewer: ViewerOption = None,
+    mavlink: MavlinkOption = None,
+    beyond_this_machine: BeyondOption = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
     as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
 ) -> int:
@@ -74,33 +91,43 @@ def fly(
     """
     if view and no_recording:
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
+    watch = Watch(live, web, viewer, speed, mavlink, beyond_this_machine)
+    watch.check()
     replaced = [*chosen(guidance=guidance), *map(setting, settings or ())]
     given = [*chosen(planner, aircraft, seed), *replaced]
     loaded, digest = _asked(scenario, results, run, given)
     if results is not None:
         replaced += [("from", str(results.resolve())), ("run", str(run))]
     folder = out or _default_folder(loaded, told_apart(replaced))
-    metrics = _fly(loaded, folder, recording=not no_recording, silent=quiet)
-    otherwise = bool(digest) and not given and metrics["digest"] != digest
-    if otherwise:
-        say(
-            f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
-            "aircraft is made of, have changed since",
-            err=True,
-        )
-    if as_json:
-        print_json(metrics)
-    elif not quiet:
-        from harness.cli.terminal import flight_rows, print_table
-
-        title = f"{loaded.name}: {loaded.planner.kind}, {loaded.aircraft.model}{_law(loaded)}"
-        print_table(title, flight_rows(metrics))
-        if digest and not given and not otherwise:
-            say("digest: as the campaign flew it")
-        say(f"run folder: {folder}")
+    with opened(watch, loaded) as looking:
+        metrics = _fly(loaded, folder, looking.onlookers, recording=not no_recording, silent=quiet)
+        otherwise = bool(digest) and not given and metrics["digest"] != digest
+        if otherwise:
+            say(
+                f"wayproof: run {run} was flown otherwise (digest {digest}): versions, or what the planner or the "
+                "aircraft is made of, have changed since",
+                err=True,
+            )
+        if as_json:
+            print_json(metrics)
+        elif not quiet:
+            same = bool(digest) and not given and not otherwise
+            _print_flight(loaded, metrics, folder, same)
+        looking.wait()
     if view:
         open_viewer([folder])
     return FAILED if otherwise else FLY_STATUS.get(metrics["outcome"], FAILED)
+
+
+def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
+    """The table of a flight, and where its files are."""
+    from harness.cli.terminal import flight_rows, print_table
+
+    title = f"{scenario.name}: {scenario.planner.kind}, {scenario.aircraft.model}{_law(scenario)}"
+    print_table(title, flight_rows(metrics))
+    if as_the_campaign:
+        say("digest: as the campaign flew it")
+    say(f"run folder: {folder}")
 
 
 def _law(scenario: Scenario) -> str:
@@ -288,7 +315,9 @@ def _default_folder(scenario: Scenario, apart: str = "") -> Path:
     return Path("runs") / scenario.name / f"{planner}-{model}-{scenario.seed}{apart}"
 
 
-def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> dict[str, Any]:
+def _fly(
+    scenario: Scenario, folder: Path, onlookers: Onlookers | None, *, recording: bool, silent: bool
+) -> dict[str, Any]:
     """Flies into a folder, with a progress bar where a person looks on."""
     from contextlib import nullcontext
 
@@ -300,7 +329,11 @@ def _fly(scenario: Scenario, folder: Path, *, recording: bool, silent: bool) -> 
 
     try:
         with nullcontext() if silent else progress_bar(straight_m(scenario)) as report:
-            return fly_to_folder(scenario, folder, recording, report)
+            if onlookers is None:
+                return fly_to_folder(scenario, folder, recording, report)
+            from harness.watching.watched_flight import fly_watched
+
+            return fly_watched(scenario, folder, recording, report, onlookers)
     except (AircraftError, RunFolderError) as error:
         raise bad_input(error) from error
     except KeyboardInterrupt:

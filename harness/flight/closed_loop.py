@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput, VerticalLaw
 from aircraft.interface import FlightModel
 from harness.files.crash import sentence, trace
-from harness.flight.observer import PROGRESS_EVERY_S, Observer, Progress
+from harness.flight.observer import PROGRESS_EVERY_S, Observer, Progress, RowObserver
 from harness.flight.plans import LATE_S, Plans
 from harness.flight.record import Flight, Outcome
 from harness.flight.signals import held_back
@@ -117,6 +117,7 @@ class ClosedLoop:
             [observer.on_block for observer in observers],
             ground=loop.world.ground_heights,
         )
+        self._row_observers = [each for each in observers if isinstance(each, RowObserver)]
         self._law_error: str | None = None
         self._scans_on_their_way: deque[RangeScan] = deque()
         scan_rate_hz = loop.scan_rate_hz if loop.sensor else 0.0
@@ -147,6 +148,12 @@ class ClosedLoop:
             self._locate()
             if self._over(loop.termination.verdict(self.true, loop.model.fault())):
                 return
+
+    def _log_row(self) -> None:
+        """Logs where the aircraft is and what it was told last."""
+        self._log.add(self.true, self.steering, self.plans.index)
+        for observer in self._row_observers:
+            observer.on_row(self.true, self.steering, self.plans.index)
 
     def _locate(self) -> None:
         """Reads the state, and what the aircraft believes of it."""
@@ -192,7 +199,7 @@ class ClosedLoop:
             altitude_m + (true.up_m - believed.up_m),
             self.steering.airspeed_or(airspeed_mps) + (true.airspeed_mps - believed.airspeed_mps),
         )
-        self._log.add(true, self.steering, plans.index)
+        self._log_row()
         return None
 
     def _steer(self) -> Verdict | None:
@@ -223,12 +230,12 @@ class ClosedLoop:
         if verdict is None:
             return False
         if self.true.time_s == 0.0:  # a track begins before it ends
-            self._log.add(self.true, self.steering, self.plans.index)
+            self._log_row()
             self._loop.model.advance(self._first_steps)
             self._locate()
         if verdict.outcome is not Outcome.LOST_CONTROL:
             self._steer()  # the last row is of the end of the flight, not of the update before
-        self._log.add(self.true, self.steering, self.plans.index)
+        self._log_row()
         self.verdict = Verdict(verdict.outcome, verdict.reason + self.plans.last_word(verdict.outcome))
         for observer in self._observers:
             observer.on_event(self.true.time_s, f"{self.verdict.outcome.value}: {self.verdict.reason}")

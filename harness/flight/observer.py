@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
 from harness.flight.record import AcceptedPlan, Track
 from harness.mapping.scan import RangeScan
@@ -33,4 +34,13 @@ class Observer(Protocol):
 
     def on_event(self, time_s: float, text: str) -> None:
         """Something worth a line in the log."""
+        ...
+
+
+@runtime_checkable
+class RowObserver(Observer, Protocol):
+    """What looks on at every row of the track as well, such as a pace that holds the flight back."""
+
+    def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
+        """One more row: the true state, what guidance decided last, and the plan in effect."""
         ...

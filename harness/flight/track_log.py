@@ -81,15 +81,16 @@ class TrackLog:
         )
         self._used += 1
         if self._used == len(self._rows):
-            self._hand_on()
+            self.hand_on()
 
     def close(self) -> Track:
         """Hands on the last block and returns the whole track."""
         if self._used:
-            self._hand_on()
+            self.hand_on()
         return Track.joined(self._blocks)
 
-    def _hand_on(self) -> None:
+    def hand_on(self) -> None:
+        """Hands on the rows since the last block as a block; without any it does nothing."""
         rows = self._rows[: self._used]
         rows = rows[np.all([np.isfinite(rows[name]) for name in FINITE], axis=0)]
         self._used = 0

@@ -1,4 +1,4 @@
-"""The file of a recording, written in a way that a full disk cannot stop.
+"""Where a recording goes: into its file, in a way that a full disk cannot stop, or to a viewer that is running.
 
 rerun's own file sink gives up for ever at the first write that fails: whoever flushes or ends the recording then
 waits without end. So rerun writes into a pipe, and a thread of ours moves what comes out into the file.
@@ -10,11 +10,14 @@ import os
 import struct
 import threading
 from pathlib import Path
+from typing import Final, Protocol
 
 import rerun as rr
 
 from harness.recording.layout import Layout
 
+ANSWER_S: Final = 5.0
+"""A viewer that has not taken what was sent after so long is taken to be gone."""
 _AT_ONCE_BYTES = 1 << 20
 _HEADER_BYTES = 12
 """What an .rrd file begins with."""
@@ -36,6 +39,56 @@ def recording_stream(recording_id: str) -> rr.RecordingStream:
     rec.set_log_time_enabled(False)
     rec.set_log_tick_enabled(False)
     return rec
+
+
+class Sink(Protocol):
+    """Where a recording goes. `end` must be called, also when the flight breaks off."""
+
+    def flush(self) -> None:
+        """Has rerun pass on what was logged.
+
+        Raises:
+            OSError: it cannot be.
+        """
+        ...
+
+    def end(self) -> None:
+        """Ends the recording; again it does nothing.
+
+        Raises:
+            OSError: some of it was lost.
+        """
+        ...
+
+
+class RunningViewer:
+    """A viewer, or a server of rerun, that a recording is sent to.
+
+    Args:
+        rec: the recording, before anything is logged.
+        url: as rerun+http://127.0.0.1:9876/proxy.
+        default_blueprint: the layout that the viewer takes.
+    """
+
+    def __init__(self, rec: rr.RecordingStream, url: str, default_blueprint: Layout) -> None:
+        self._rec, self._url = rec, url
+        rec.connect_grpc(url, default_blueprint=default_blueprint)
+        default_blueprint.let_go()
+
+    def flush(self) -> None:
+        """Has the viewer take what was logged.
+
+        Raises:
+            OSError: it does not.
+        """
+        try:
+            self._rec.flush(timeout_sec=ANSWER_S)
+        except RuntimeError as error:
+            raise OSError(f"the viewer at {self._url} has gone: {error}") from error
+
+    def end(self) -> None:
+        """Ends the recording."""
+        self._rec.disconnect()
 
 
 class RecordingFile:

@@ -49,7 +49,11 @@ class Layout(rrb.Blueprint):
 
 
 def blueprint(
-    frame: Frame, runs: Sequence[str] = ("",), without: Sequence[str] = (), on_earth: bool = False
+    frame: Frame,
+    runs: Sequence[str] = ("",),
+    without: Sequence[str] = (),
+    on_earth: bool = False,
+    follows: bool = False,
 ) -> Layout:
     """The layout: plan view and 3-D flight, states, events and summary, time series.
 
@@ -59,6 +63,7 @@ def blueprint(
             string.
         without: names of time series that have nothing to show.
         on_earth: whether there is a map of the earth, a tab behind the plan view.
+        follows: whether the cursor stays at the latest time, for a flight that goes on.
     """
     plan: rrb.Container | rrb.View = plan_view(frame, runs)
     if on_earth:
@@ -97,7 +102,12 @@ def blueprint(
             else rrb.Vertical(*series),
             column_shares=[13, 6],
         ),
-        rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
+        rrb.TimePanel(
+            timeline=TIMELINE,
+            play_state="following" if follows else "paused",
+            state="collapsed",
+            playback_speed=60.0,
+        ),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         auto_layout=False,

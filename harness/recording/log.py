@@ -19,7 +19,7 @@ import rerun as rr
 from aircraft.interface import AircraftState
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
-from harness.recording.file import RecordingFile, recording_stream
+from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
 from harness.recording.geographic import globe
 from harness.recording.layout import blueprint
 from harness.recording.moving import Tracked, log_tracked_style
@@ -66,7 +66,8 @@ class RerunLog:
     """Writes one recording. A process that is killed leaves it readable up to the last block.
 
     Args:
-        path: the file; its folder must exist.
+        into: the file, whose folder must exist; or the address of a viewer that is running, as text, which then follows
+            the flight.
         scene: what is known before the flight.
         recording_id: identity of the recording; the same run gives the same one.
         moving: tells what the map takes to move.
@@ -77,17 +78,16 @@ class RerunLog:
 
     def __init__(
         self,
-        path: Path,
+        into: Path | str,
         scene: look.Scene,
         recording_id: str,
         moving: Callable[[], Sequence[MovingEdges]] = tuple,
     ) -> None:
-        if not path.parent.is_dir():
-            raise FileNotFoundError(f"no folder {path.parent} for the recording")
+        if isinstance(into, Path) and not into.parent.is_dir():
+            raise FileNotFoundError(f"no folder {into.parent} for the recording")
         self._scene = scene
         self._rec = recording_stream(recording_id)
-        layout = blueprint(scene.frame, without=scene.empty_series, on_earth=scene.origin_deg is not None)
-        self._file = RecordingFile(self._rec, path, layout)
+        self._sink = self._opened(into)
         self._rec.send_recording_name(scene.name)
         span_m = scene.frame.span_m
         self._chord_error_m = 1e-5 * span_m
@@ -112,6 +112,13 @@ class RerunLog:
         log_tracked_style(self._rec)
         self._log_style()
         self.flush()
+
+    def _opened(self, into: Path | str) -> Sink:
+        follows, on_earth = isinstance(into, str), self._scene.origin_deg is not None
+        layout = blueprint(self._scene.frame, ("",), self._scene.empty_series, on_earth, follows)
+        if isinstance(into, str):
+            return RunningViewer(self._rec, into, layout)
+        return RecordingFile(self._rec, into, layout)
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Takes a scan; keeps it when one is due to be drawn."""
@@ -161,11 +168,11 @@ class RerunLog:
         Raises:
             OSError: it cannot be written.
         """
-        self._file.flush()
+        self._sink.flush()
 
     def end(self) -> None:
         """Ends the file as it is, without summary; after `close` it does nothing."""
-        self._file.end()
+        self._sink.end()
 
     def close(
         self,
@@ -202,8 +209,8 @@ class RerunLog:
             self._rec.send_property("metrics", rr.AnyValues(json=json.dumps(metrics)))
         send_properties(self._rec, RUN, run or {})
         send_properties(self._rec, VARIED, varied or {})
-        self._file.flush()
-        self._file.end()
+        self._sink.flush()
+        self._sink.end()
 
     def _set_time(self, time_s: float) -> None:
         self._rec.set_time(look.TIMELINE, duration=np.timedelta64(round(time_s * 1e9), "ns"))

@@ -153,6 +153,34 @@ def web_viewer(scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str, str]
         yield viewer, f"http://{LOCALHOST}:{web_port}/", f"rerun+http://{LOCALHOST}:{port}/proxy"
 
 
+@contextlib.contextmanager
+def following_viewer(
+    web: bool = False, tell: Callable[[str], None] = lambda address: None
+) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Opens an empty viewer for a flight that goes on; gives it, and the address that takes recordings.
+
+    Args:
+        web: in a browser instead of a window.
+        tell: is told the address for the browser.
+
+    Raises:
+        ViewerError: there is no screen, or the viewer does not start.
+    """
+    if not web:
+        need_screen()
+    with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
+        if web:
+            with web_viewer(Path(scratch)) as (viewer, page, source):
+                tell(address_of(page, source))
+                webbrowser.open(address_of(page, source))
+                yield viewer, source
+            return
+        port = free_port()
+        arguments = ["--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen"]
+        with viewer_process(arguments, Path(scratch), port) as viewer:
+            yield viewer, f"rerun+http://{LOCALHOST}:{port}/proxy"
+
+
 def address_of(page: str, source: str) -> str:
     """The address at which a browser opens the viewer's page on a source of data."""
     return f"{page}?url={quote(source, safe='')}"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -36,6 +36,9 @@ from harness.scenario.scenario import Scenario, dump_scenario, mission_of, perfo
 from harness.scenario.sections import Environment, Origin
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
+
+if TYPE_CHECKING:
+    from harness.recording.blueprint import Scene
 
 SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
 """Numbers of the random streams that derive from the scenario's seed."""
@@ -255,15 +258,28 @@ def _recording(
     identity: str | None,
     thin: bool,
 ) -> Any:
-    from harness.recording.blueprint import Scene
     from harness.recording.log import RerunLog
     from harness.recording.thin import ThinLog
 
-    title = (
-        f"{scenario.name}, {pilot or scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}"
-    )
-    scene = Scene(
-        title,
+    scene = scene_of(scenario, loop, text, pilot)
+    if thin:
+        return ThinLog(folder.recording_path, scene, identity or scene.name)
+    return RerunLog(folder.recording_path, scene, identity or scene.name, moving=lambda: loop.seen.moving)
+
+
+def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None) -> Scene:
+    """What a recording shows before the flight.
+
+    Args:
+        scenario: a complete scenario.
+        loop: the parts of its flight.
+        text: the scenario as YAML, for the summary.
+        pilot: stands in the recording's name; default: the planner's kind, which searches.
+    """
+    from harness.recording.blueprint import Scene
+
+    return Scene(
+        f"{scenario.name}, {pilot or scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}",
         loop.mission,
         scenario.mission.start_m,
         flight_limits(scenario),
@@ -273,9 +289,6 @@ def _recording(
         ground=loop.world.ground.field if loop.world.ground else None,
         origin_deg=_origin_deg(scenario),
     )
-    if thin:
-        return ThinLog(folder.recording_path, scene, identity or title)
-    return RerunLog(folder.recording_path, scene, identity or title, moving=lambda: loop.seen.moving)
 
 
 def _stream(seed: int, number: int) -> np.random.SeedSequence:

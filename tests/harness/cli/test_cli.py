@@ -40,6 +40,7 @@ COMMANDS = (
 FLY_OPTIONS = (
     *("--planner", "--aircraft", "--seed", "--set", "--out"),
     *("--no-recording", "--view", "--quiet", "--json"),
+    *("--live", "--speed", "--mavlink"),
 )
 METRICS: dict[str, Any] = {
     "outcome": "collision",

@@ -1,0 +1,122 @@
+"""A flight in the rerun viewer while it is flown."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from aircraft.guidance.interface import GuidanceOutput
+from aircraft.interface import AircraftState
+from harness.flight.record import AcceptedPlan, Track
+from harness.flight.track_log import TrackLog
+from harness.mapping.scan import RangeScan
+from harness.watching.onlooker import Onlooker
+from harness.watching.relay import Call, Opening
+
+if TYPE_CHECKING:
+    from harness.flight.closed_loop import Loop
+    from harness.recording.blueprint import Scene
+
+HAND_OVER_S: Final = 0.1
+"""Wall time after which what has been flown is handed over: half of what is promised."""
+
+
+class Relay(Protocol):
+    """Takes what a viewer is to show, and never keeps the flight waiting, but before it begins."""
+
+    given_up: bool
+
+    def begin(self, opening: Opening) -> None:
+        """Takes what is told first."""
+        ...
+
+    def hand_over(self, calls: Sequence[Call]) -> None:
+        """Takes calls of the recording's."""
+        ...
+
+
+class LiveLog(Onlooker):
+    """Sends a flight to a viewer that is running. Nothing that becomes of the viewer reaches the flight.
+
+    What is flown is handed over at least five times a second of wall time, if the flight itself goes on that often.
+    `begin` comes first.
+
+    Args:
+        relay: takes what is handed over.
+        url: of the viewer, as rerun+http://127.0.0.1:9876/proxy.
+    """
+
+    def __init__(self, relay: Relay, url: str) -> None:
+        self._relay, self._url = relay, url
+        self._calls: list[Call] = []
+        self._moving: Callable[[], Any] = tuple
+        self._track: TrackLog | None = None
+        self._handed_s = 0.0
+
+    def begin(self, loop: Loop, scene: Scene, identity: str) -> None:
+        """Shows the world before the flight.
+
+        Args:
+            loop: parts of the flight, not yet flown.
+            scene: what is known before it.
+            identity: of the recording.
+        """
+        self._moving = lambda: tuple(loop.seen.moving)
+        self._track = TrackLog(loop.world.clearance, [self.on_rows], ground=loop.world.ground_heights)
+        self._relay.begin(Opening(self._url, scene, identity))
+
+    def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
+        """Keeps a scan until it is handed over."""
+        self._keep("on_scan", scan, state, moving=self._moving())
+
+    def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
+        """Keeps a plan until it is handed over, with the picture of how it came about."""
+        picture = accepted.plan.picture
+        drawn = None if picture is None else partial(_same, picture())
+        self._keep("on_plan", replace(accepted, plan=replace(accepted.plan, picture=drawn)), state)
+
+    def on_event(self, time_s: float, text: str) -> None:
+        """Keeps an event until it is handed over."""
+        self._keep("on_event", time_s, text)
+
+    def on_rows(self, rows: Track) -> None:
+        """Keeps the rows since the last time: blocks of the flight's own are too far apart."""
+        self._keep("on_block", rows)
+
+    def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
+        """Takes a row of the track; hands over what there is, when it is time."""
+        assert self._track is not None
+        self._track.add(state, steering, plan_index)
+        now = time.monotonic()
+        if now - self._handed_s >= HAND_OVER_S:
+            self._handed_s = now
+            self._hand_over()
+
+    def close(self, metrics: Mapping[str, Any], run: Mapping[str, Any]) -> None:
+        """Shows what the whole flight is summed up in.
+
+        Args:
+            metrics: content of `metrics.json`.
+            run: typed figures of the run.
+        """
+        self._hand_over()
+        self._keep("close", dict(metrics), dict(run))
+        self._hand_over()
+
+    def _keep(self, method: str, *arguments: Any, moving: tuple[Any, ...] = ()) -> None:
+        if not self._relay.given_up:
+            self._calls.append(Call(method, arguments, moving))
+
+    def _hand_over(self) -> None:
+        if self._track is not None:
+            self._track.hand_on()
+        if self._calls:
+            calls, self._calls = self._calls, []
+            self._relay.hand_over(calls)
+
+
+def _same(value: Any) -> Any:
+    return value

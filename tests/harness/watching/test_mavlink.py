@@ -1,0 +1,306 @@
+"""A flight as a MAVLink vehicle; pymavlink is the ground station."""
+
+from __future__ import annotations
+
+import math
+import socket
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.frames import LocalPlane
+from aircraft.guidance.interface import GuidanceOutput
+from aircraft.interface import AircraftState
+from harness.cli.app import main
+from harness.flight.closed_loop import NOT_STEERED, fly
+from harness.flight.record import digest
+from harness.run.scenario_flight import make_loop
+from harness.watching.address import Address
+from harness.watching.mavlink import GroundStationLink, Place, body_rates_radps
+from harness.watching.mavlink_mission import PlanAsMission
+from harness.watching.onlooker import Onlooker
+from harness.watching.pace import Pace
+from tests.closed_loop.conftest import world
+from tests.harness.conftest import MakePlan
+from tests.point_mass import PointMass
+
+pymavlink = pytest.importorskip("pymavlink")
+PLANE = LocalPlane(47.0, 8.0)
+STEERED = GuidanceOutput(0.0, 0.0, 2.5, bank_saturated=False, past_end=False)
+TREE = {"circle": {"center_m": [1500.0, 1600.0], "radius_m": 200.0}}
+
+
+class GroundStation:
+    """Listens as QGroundControl does, and asks as it does."""
+
+    def __init__(self) -> None:
+        from pymavlink import mavutil
+
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = free.getsockname()[1]
+        self.link: Any = mavutil.mavlink_connection(f"udpin:127.0.0.1:{self.port}", source_system=255)
+        self.heard: list[Any] = []
+
+    @property
+    def address(self) -> Address:
+        return Address("127.0.0.1", self.port)
+
+    @property
+    def vehicle(self) -> Any:
+        """Where the vehicle sends from."""
+        return next(iter(self.link.clients))
+
+    def listen(self) -> list[Any]:
+        """What has come since the last time."""
+        new = []
+        while (message := self.link.recv_msg()) is not None:
+            new.append(message)
+        self.heard += new
+        return new
+
+    def close(self) -> None:
+        self.link.close()
+
+
+@pytest.fixture
+def station() -> Iterator[GroundStation]:
+    there = GroundStation()
+    yield there
+    there.close()
+
+
+@pytest.fixture
+def link(station: GroundStation, make_plan: MakePlan) -> Iterator[GroundStationLink]:
+    """A vehicle with a mission along a line of 600 m to the east, that has flown a row."""
+    link = GroundStationLink(station.address)
+    link.begin(Place(PLANE, (0.0, 0.0), ground_m=100.0))
+    link.on_plan(
+        make_plan([(0.0, 0.0, 1.0, 0.0, 0.0, 300.0), (300.0, 0.0, 1.0, 0.0, 0.0, 300.0)]), state(0.0)
+    )
+    link.on_row(state(0.1), STEERED, 0)
+    yield link
+    link.close()
+
+
+def state(time_s: float, **other: float) -> AircraftState:
+    """Eastwards at 25 m/s, 300 m above the sea."""
+    still = AircraftState(
+        time_s, 25.0 * time_s, 0.0, 300.0, 25.0, 0.0, 0.5, math.pi / 2.0, 0.1, 0.05, 24.0, 1.0, 0.4
+    )
+    return still._replace(**other)
+
+
+def test_state_and_mission_are_told(station: GroundStation, link: GroundStationLink) -> None:
+    heard = {message.get_type(): message for message in station.listen()}
+    assert heard["HEARTBEAT"].type == 1
+    assert heard["HEARTBEAT"].base_mode & 128
+    at = heard["GLOBAL_POSITION_INT"]
+    north_deg, east_deg = PLANE.geodetic(2.5, 0.0)
+    assert (at.lat, at.lon) == (round(1e7 * north_deg), round(1e7 * east_deg))
+    assert (at.alt, at.relative_alt) == (300_000, 200_000)
+    assert (at.vx, at.vy, at.vz, at.hdg) == (0, 2500, -50, 9000)
+    assert at.time_boot_ms == 100
+    assert heard["ATTITUDE"].roll == pytest.approx(0.1)
+    assert heard["ATTITUDE"].yaw == pytest.approx(math.pi / 2.0, abs=1e-4)
+    assert (heard["VFR_HUD"].airspeed, heard["VFR_HUD"].throttle) == (24.0, 40)
+    assert heard["GPS_RAW_INT"].fix_type == 3
+    assert heard["HOME_POSITION"].altitude == 100_000
+    assert (heard["MISSION_CURRENT"].seq, heard["MISSION_CURRENT"].total) == (1, 2)
+    assert heard["STATUSTEXT"].text == "plan 0: a way was found"
+
+
+def test_the_mission_is_given_item_by_item(station: GroundStation, link: GroundStationLink) -> None:
+    station.listen()
+    station.link.mav.mission_request_list_send(1, 1)
+    (count,) = answers(station, link, "MISSION_COUNT")
+    items = []
+    for number in range(count.count):
+        station.link.mav.mission_request_int_send(1, 1, number)
+        items += answers(station, link, "MISSION_ITEM_INT")
+    degrees = [PLANE.geodetic(east, 0.0) for east in (0.0, 300.0)]
+    assert [(item.x, item.y) for item in items] == [(round(1e7 * a), round(1e7 * b)) for a, b in degrees]
+    assert [(item.seq, item.current, item.command, item.z) for item in items] == [
+        (0, 0, 16, 300.0),
+        (1, 1, 16, 300.0),
+    ]
+    station.link.mav.mission_request_int_send(1, 1, 2)
+    (refused,) = answers(station, link, "MISSION_ACK")
+    assert refused.type == 13
+    station.link.mav.mission_request_list_send(1, 1, 1)
+    (fence,) = answers(station, link, "MISSION_COUNT")
+    assert (fence.count, fence.mission_type) == (0, 1)
+
+
+def test_nobody_can_command_or_change_the_flight(station: GroundStation, link: GroundStationLink) -> None:
+    station.listen()
+    mav = station.link.mav
+    asked: tuple[tuple[Callable[[], Any], str, int], ...] = (
+        (lambda: mav.mission_count_send(1, 1, 3), "MISSION_ACK", 14),
+        (lambda: mav.mission_clear_all_send(1, 1), "MISSION_ACK", 14),
+        (lambda: mav.command_long_send(1, 1, 400, 0, 0, 0, 0, 0, 0, 0, 0), "COMMAND_ACK", 3),
+        (lambda: mav.command_long_send(1, 1, 512, 0, math.nan, 0, 0, 0, 0, 0, 0), "COMMAND_ACK", 3),
+    )
+    for ask, answer, result in asked:
+        ask()
+        (told,) = answers(station, link, answer)
+        assert getattr(told, "type" if answer == "MISSION_ACK" else "result") == result
+    mav.command_long_send(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0)
+    assert len(answers(station, link, "AUTOPILOT_VERSION")) == 1
+    mav.param_request_list_send(1, 1)
+    (parameter,) = answers(station, link, "PARAM_VALUE")
+    assert (parameter.param_count, parameter.param_value) == (1, 1.0)
+
+
+def test_what_is_no_mavlink_is_passed_over(station: GroundStation, link: GroundStationLink) -> None:
+    station.listen()
+    for data in (b"", b"\x00" * 300, b"\xfd\x09" + b"\xff" * 40, bytes(range(256)) * 4):
+        station.link.port.sendto(data, station.vehicle)
+    station.link.mav.mission_request_list_send(1, 1)
+    assert len(answers(station, link, "MISSION_COUNT")) == 1
+
+
+def test_a_stranger_is_not_answered(station: GroundStation, link: GroundStationLink) -> None:
+    station.listen()
+    from pymavlink.dialects.v20 import common
+
+    packed = common.MAVLink(None, 255, 0).mission_request_list_encode(1, 1).pack(common.MAVLink(None, 255, 0))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        stranger.sendto(packed, station.vehicle)
+        assert answers(station, link, "MISSION_COUNT", wait_s=0.2) == []
+
+
+def answers(station: GroundStation, link: GroundStationLink, kind: str, wait_s: float = 5.0) -> list[Any]:
+    """What the vehicle answers of a kind, asked at each of its rows."""
+    found: list[Any] = []
+    until = time.monotonic() + wait_s
+    row = 1
+    while not found and time.monotonic() < until:
+        row += 1
+        link.on_row(state(row / 10.0), STEERED, 0)
+        time.sleep(0.005)
+        found = [message for message in station.listen() if message.get_type() == kind]
+    return found
+
+
+def test_nobody_listens_and_the_flight_goes_on(station: GroundStation) -> None:
+    station.close()
+    link = GroundStationLink(station.address)
+    for row in range(20):
+        link.on_row(state(row / 10.0), NOT_STEERED, -1)
+    link.close()
+
+
+def test_a_model_without_an_engine_is_told(station: GroundStation) -> None:
+    link = GroundStationLink(station.address)
+    link.on_row(state(0.0, throttle=math.nan), NOT_STEERED, -1)
+    link.close()
+    time.sleep(0.05)
+    heard = [message.get_type() for message in station.listen()]
+    assert "VFR_HUD" in heard
+    assert "MISSION_CURRENT" not in heard
+
+
+class Listens(Onlooker):
+    """Lets the ground station hear while the flight is flown in this thread."""
+
+    def __init__(self, station: GroundStation) -> None:
+        self._station = station
+
+    def on_row(self, state: AircraftState, *others: Any) -> None:
+        self._station.listen()
+
+
+def test_a_whole_flight_is_shown_and_stays_the_same(station: GroundStation) -> None:
+    scenario = world(TREE, mission={"goal_m": [2700.0, 2700.0]})
+    alone = fly(make_loop(scenario, PointMass))
+    link = GroundStationLink(station.address)
+    link.begin(Place(PLANE, (300.0, 300.0)))
+    watched = fly(make_loop(scenario, PointMass), [link, Listens(station), Pace(40.0)])
+    link.close()
+    time.sleep(0.05)
+    station.listen()
+    assert digest(watched.track) == digest(alone.track)
+    kinds = Counter(message.get_type() for message in station.heard)
+    assert kinds["GLOBAL_POSITION_INT"] >= 10
+    assert kinds["HEARTBEAT"] >= 3
+    beats = [message.system_status for message in station.heard if message.get_type() == "HEARTBEAT"]
+    assert set(beats[:-1]) == {4}
+    assert beats[-1] == 3
+    last = [message for message in station.heard if message.get_type() == "GLOBAL_POSITION_INT"][-1]
+    east, north = PLANE.plane(last.lat / 1e7, last.lon / 1e7)
+    row = int(np.argmin(np.abs(watched.track.time_s - last.time_boot_ms / 1e3)))
+    assert (east, north) == pytest.approx((watched.track.east_m[row], watched.track.north_m[row]), abs=0.1)
+    texts = [message.text for message in station.heard if message.get_type() == "STATUSTEXT"]
+    assert texts[-1].startswith("reached: ")
+
+
+def test_fly_is_paced_at_real_time_or_faster(
+    station: GroundStation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    to = f"udp:127.0.0.1:{station.port}"
+    limited = ["--set", "mission.time_limit_s=3", "--no-recording", "--out"]
+    begun_s = time.monotonic()
+    assert main(["fly", "aerosonde_forest", "--mavlink", to, *limited, str(tmp_path / "run")]) == 1
+    assert time.monotonic() - begun_s >= 3.0
+    said = capsys.readouterr().err
+    assert "area.origin is not given: the ground station shows the flight about 47, 8" in said
+    assert {"HEARTBEAT", "GLOBAL_POSITION_INT"} <= {message.get_type() for message in station.listen()}
+
+
+def test_the_current_item_is_the_next_along_the_path(make_plan: MakePlan) -> None:
+    circle = (0.0, 0.0, 1.0, 0.0, 0.01, 200.0 * math.pi)
+    there_and_back = make_plan(
+        [(-300.0, 0.0, 1.0, 0.0, 0.0, 300.0), circle, (0.0, 0.0, 1.0, 0.0, 0.0, 300.0)]
+    )
+    mission = PlanAsMission.of(there_and_back, PLANE)
+    assert mission.along_m.tolist() == pytest.approx([0.0, 300.0, 300.0], abs=1.0)
+    assert [mission.current(along) for along in (0.0, 299.0, 301.0, 2000.0)] == [1, 1, 2, 2]
+
+
+def test_rates_are_those_about_the_aircrafts_axes() -> None:
+    before = state(0.0, roll_rad=0.0, pitch_rad=0.0, heading_rad=math.tau - 0.01)
+    rolled = state(0.1, roll_rad=0.02, pitch_rad=0.0, heading_rad=math.tau - 0.01)
+    assert body_rates_radps(before, rolled) == pytest.approx((0.2, 0.0, 0.0))
+    turned = state(0.1, roll_rad=0.0, pitch_rad=0.0, heading_rad=0.01)
+    assert body_rates_radps(before, turned) == pytest.approx((0.0, 0.0, 0.2))
+    banked = state(0.1, roll_rad=0.5, pitch_rad=0.0, heading_rad=0.01)
+    assert body_rates_radps(before, banked)[1] == pytest.approx(0.2 * math.sin(0.5))
+    assert body_rates_radps(before, before) == (0.0, 0.0, 0.0)
+
+
+def test_without_pymavlink_it_is_told_what_to_install(tmp_path: Path) -> None:
+    code = """
+import sys
+sys.modules["pymavlink.dialects.v20"] = None
+from harness.cli.app import main
+sys.exit(main())
+"""
+    run = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            code,
+            "fly",
+            "aerosonde_forest",
+            "--mavlink",
+            "udp:127.0.0.1:9",
+            "--out",
+            "run",
+        ],
+        cwd=tmp_path,
+        env={"PYTHONPATH": str(Path(__file__).parents[3]), "PATH": ""},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 2
+    assert "pip install 'wayproof[mavlink]'" in run.stderr
+    assert list(tmp_path.iterdir()) == []
