@@ -10,11 +10,15 @@ The names are those of the package `harness`, which holds all of the simulation.
 
 from __future__ import annotations
 
+from wayproof.environments import register_environments
+
 TYPE_CHECKING = False  # as of `typing`, which takes longer to import than all of this
 if TYPE_CHECKING:
     from typing import Any
 
     from harness import *  # noqa: F403
+
+register_environments()
 
 
 def __getattr__(name: str) -> Any:

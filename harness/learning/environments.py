@@ -1,0 +1,223 @@
+"""The environments `wayproof/Waypoints-v0` and `wayproof/Roll-v0`.
+
+Reward of a step: the share of the straight way from start to goal by which the goal came nearer; 1 more when it is
+reached; 1 less on a collision, outside the area or with control lost. An episode is terminated by what ends a flight,
+and truncated by the scenario's time limit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from aircraft.airframes import airframe
+from aircraft.guidance.interface import UPDATE_RATE_HZ
+from harness.flight.closed_loop import Loop
+from harness.flight.record import Outcome, digest
+from harness.flight.stepped import Status, SteppedLoop
+from harness.learning.episode import Episode
+from harness.learning.observation import LEAST, MOST, ScanKeeper, state_of
+from harness.learning.pilots import LinePilot, RollPilot, WaypointPilot
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario, load_scenario, mission_of
+from harness.scenario.shipped import scenario_path
+
+Observation = dict[str, NDArray[Any]]
+Action = NDArray[Any]
+
+MOST_BEAMS: Final = 72
+"""Beams of an observation where nobody says how many."""
+BAD: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
+
+
+class FlightEnv(gymnasium.Env[Observation, Action]):
+    """A scenario's flight, steered from outside.
+
+    The first interval after a reset is flown straight ahead, so that there is a scan to be observed. `reset(seed=k)`
+    flies the scenario with `seed: k`; later resets without a seed draw seeds from the generator that it began. Without
+    any seed it is the scenario's own.
+
+    Args:
+        scenario: a scenario, its file, or the name of one that comes with wayproof.
+        step_s: simulated time of a step: a multiple of the interval between two updates of guidance (0.1 s).
+        beams: how many beams of the scan are observed, each the least of neighbouring ones; default: all, at most 72.
+        render_mode: None; `episode` can be flown again with a recording.
+
+    Raises:
+        InputError: the scenario cannot be used.
+        ValueError: step or beams make no sense.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012  as gymnasium declares it
+
+    def __init__(
+        self,
+        scenario: Scenario | str | Path,
+        step_s: float = 1.0,
+        beams: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self._own = self._flown = _loaded(scenario)
+        self._updates = round(step_s * UPDATE_RATE_HZ)
+        if self._updates < 1 or abs(self._updates - step_s * UPDATE_RATE_HZ) > 1e-9:
+            raise ValueError(f"step_s is {step_s:g}; must be a multiple of {1.0 / UPDATE_RATE_HZ:g} s")
+        rays = self._own.sensor.rays
+        self._beams = min(rays, MOST_BEAMS) if beams is None else beams
+        if not 1 <= self._beams <= rays:
+            raise ValueError(f"beams is {beams}; must be from 1 to the {rays} rays of the scenario's sensor")
+        self.render_mode = render_mode
+        self._mission = mission_of(self._own)
+        limits = airframe(self._own.aircraft.model).guidance_limits(self._own.aircraft.airspeed_mps)
+        self._bank_limit_rad = limits.bank_limit_rad
+        self._scans = ScanKeeper()
+        self._loop: SteppedLoop | None = None
+        self._seeded, self._to_go_m = False, math.nan
+        observed: Any = spaces.Dict(
+            {
+                "scan": spaces.Box(0.0, 1.0, (self._beams,), np.float32),
+                "state": spaces.Box(LEAST, MOST, dtype=np.float32),
+            }
+        )
+        self.observation_space = observed
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begins an episode."""
+        super().reset(seed=seed)
+        drawn = int(self.np_random.integers(2**31)) if self._seeded and seed is None else seed
+        self._seeded |= seed is not None
+        self._flown = self._own if drawn is None else self._own.with_({"seed": drawn})
+        self._scans.forget()
+        self._loop = SteppedLoop(lambda: self._steered(make_loop(self._flown)), [self._scans])
+        status = self._advanced(self._loop.reset())
+        self._to_go_m = status.to_go_m
+        return self._observed(status), self._info(status)
+
+    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Flies on for a step."""
+        if self._loop is None:
+            raise RuntimeError("reset() before step(): no episode has begun")
+        before = self._loop.status
+        self._act(np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0), before)
+        status = self._advanced(before)
+        reward = (self._to_go_m - status.to_go_m) / math.dist(
+            self._own.mission.start_m, self._own.mission.goal_m
+        )
+        self._to_go_m = status.to_go_m
+        reward += float(status.outcome is Outcome.REACHED) - float(status.outcome in BAD)
+        truncated = status.outcome is Outcome.TIMEOUT
+        return self._observed(status), reward, status.done and not truncated, truncated, self._info(status)
+
+    @property
+    def episode(self) -> Episode:
+        """What has been flown so far, to be flown again."""
+        raise NotImplementedError
+
+    def _steered(self, loop: Loop) -> Loop:
+        """The parts of a flight with ours among them."""
+        raise NotImplementedError
+
+    def _act(self, action: NDArray[np.float64], status: Status) -> None:
+        """Tells our part what to do."""
+        raise NotImplementedError
+
+    def _advanced(self, status: Status) -> Status:
+        assert self._loop is not None
+        for _ in range(self._updates):
+            if status.done:
+                break
+            status = self._loop.step()
+        return status
+
+    def _observed(self, status: Status) -> Observation:
+        return {
+            "scan": self._scans.ranges(status.time_s, self._beams),
+            "state": state_of(status.believed, self._mission, self._bank_limit_rad),
+        }
+
+    def _info(self, status: Status) -> dict[str, Any]:
+        """Time, distance to go and seed; at the end outcome, reason and digest of the flight."""
+        info: dict[str, Any] = {
+            "time_s": status.time_s,
+            "to_go_m": status.to_go_m,
+            "seed": self._flown.seed,
+        }
+        if status.outcome is not None and self._loop is not None:
+            track = self._loop.flight().track
+            info |= {"outcome": status.outcome.value, "reason": status.reason, "digest": digest(track)}
+        return info
+
+
+class WaypointsEnv(FlightEnv):
+    """`wayproof/Waypoints-v0`: an action is the next waypoint.
+
+    Action: (2,) how far the waypoint lies to the right of the course and ahead of the aircraft, over the sensing range,
+    each from -1 to 1. From the next scan on the aircraft turns onto the line to it, and flies straight on beyond.
+    """
+
+    def __init__(self, *args: Any, **keys: Any) -> None:
+        super().__init__(*args, **keys)
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+        self._pilot = WaypointPilot(self._mission)
+        if self._updates * self._own.sensor.rate_hz < UPDATE_RATE_HZ:
+            raise ValueError(
+                f"step_s is shorter than the {1.0 / self._own.sensor.rate_hz:g} s from scan to scan: "
+                "actions would be passed over"
+            )
+
+    @property
+    def episode(self) -> Episode:
+        """What has been flown so far, to be flown again."""
+        return Episode(self._flown, tuple(self._pilot.noted))
+
+    def _steered(self, loop: Loop) -> Loop:
+        self._pilot = WaypointPilot(loop.mission)
+        return replace(loop, planner=self._pilot)
+
+    def _act(self, action: NDArray[np.float64], status: Status) -> None:
+        right_m, ahead_m = (self._mission.sensor_range_m * action).tolist()
+        believed = status.believed
+        sine, cosine = math.sin(believed.course_rad), math.cos(believed.course_rad)
+        self._pilot.target_m = (
+            believed.east_m + ahead_m * sine + right_m * cosine,
+            believed.north_m + ahead_m * cosine - right_m * sine,
+        )
+
+
+class RollEnv(FlightEnv):
+    """`wayproof/Roll-v0`: an action is a roll command.
+
+    Action: (1,) the roll command over the bank limit, positive to the right, held for the step. The plan is the line
+    from start to goal, from which cross-track errors are measured.
+    """
+
+    def __init__(self, *args: Any, **keys: Any) -> None:
+        super().__init__(*args, **keys)
+        self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+        self._pilot: RollPilot | None = None
+
+    @property
+    def episode(self) -> Episode:
+        """What has been flown so far, to be flown again."""
+        return Episode(self._flown, rolls=tuple(self._pilot.noted) if self._pilot else ())
+
+    def _steered(self, loop: Loop) -> Loop:
+        model, airspeed_mps = self._own.aircraft.model, self._own.aircraft.airspeed_mps
+        self._pilot = RollPilot(airframe(model).guidance_limits(airspeed_mps), loop.mission.goal_m)
+        return replace(loop, planner=LinePilot(loop.mission), guidance=self._pilot)
+
+    def _act(self, action: NDArray[np.float64], status: Status) -> None:
+        assert self._pilot is not None
+        self._pilot.roll_rad = float(action[0]) * self._bank_limit_rad
+
+
+def _loaded(given: Scenario | str | Path) -> Scenario:
+    return given if isinstance(given, Scenario) else load_scenario(scenario_path(str(given)))
