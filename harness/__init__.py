@@ -19,9 +19,11 @@ if TYPE_CHECKING:
     from harness.api.metrics import Metrics
     from harness.api.paths import check
     from harness.api.results import CampaignResult, ComparisonResult, FlightResult
+    from harness.api.stepping import SteppedFlight, make
     from harness.files.crash import PlannerError
     from harness.files.errors import WriteError
     from harness.files.input_file import InputError
+    from harness.flight.stepped import Status
     from harness.scenario.scenario import Scenario, dump_scenario, load_scenario
     from planner.interface import MapView, Mission, Path, Plan, Planner, PlanRequest, PlanStatus
     from planner.registry import PlannerKind
@@ -47,6 +49,8 @@ __all__ = [
     "PlannerKind",
     "Route",
     "Scenario",
+    "Status",
+    "SteppedFlight",
     "WriteError",
     "check",
     "compare",
@@ -55,6 +59,7 @@ __all__ = [
     "load_campaign",
     "load_run",
     "load_scenario",
+    "make",
     "sweep",
 ]
 
@@ -67,9 +72,11 @@ _HOMES = {
     "harness.api.metrics": ("Metrics",),
     "harness.api.paths": ("check",),
     "harness.api.results": ("CampaignResult", "ComparisonResult", "FlightResult"),
+    "harness.api.stepping": ("SteppedFlight", "make"),
     "harness.files.crash": ("PlannerError",),
     "harness.files.errors": ("WriteError",),
     "harness.files.input_file": ("InputError",),
+    "harness.flight.stepped": ("Status",),
     "harness.scenario.scenario": ("Scenario", "dump_scenario", "load_scenario"),
     "planner.interface": ("MapView", "Mission", "Path", "Plan", "PlanRequest", "PlanStatus", "Planner"),
     "planner.registry": ("PlannerKind",),

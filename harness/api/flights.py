@@ -51,11 +51,20 @@ def fly(
         PlannerError: the planner cannot be made.
         WriteError: the run could not be written to its end.
     """
+    flown = given_parts(scenario, planner, guidance)
+    return _flown(flown, Path(out) if out is not None else None, recording, progress)
+
+
+def given_parts(scenario: Scenario | str | Path, planner: object, guidance: object) -> Scenario:
+    """A scenario with a planner and a guidance law that were given, as `fly` takes them.
+
+    Raises:
+        InputError: one of them cannot be used.
+    """
     given = {"planner.kind": (planner, PLANNER), "guidance.kind": (guidance, GUIDANCE)}
     kinds = {key: _name_of(*each) for key, each in given.items() if each[0] is not None}
-    loaded = _scenario(scenario)
-    flown = loaded.with_(kinds) if kinds else loaded
-    return _flown(flown, Path(out) if out is not None else None, recording, progress)
+    loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    return loaded.with_(kinds) if kinds else loaded
 
 
 def load_run(folder: str | Path) -> FlightResult:
@@ -89,10 +98,6 @@ def in_python(what: str) -> str:
     return f"{what} in {Path(script).name}" if script else f"{what} in Python"
 
 
-def _scenario(given: Scenario | str | Path) -> Scenario:
-    return given if isinstance(given, Scenario) else load_scenario(given)
-
-
 def _name_of(given: object, part: Part) -> str:
     try:
         return registered(given, part)
@@ -115,13 +120,9 @@ def _flown(scenario: Scenario, out: Path | None, recording: bool, progress: Prog
 
 
 def _in_memory(scenario: Scenario, progress: Progress | None) -> FlightResult:
-    from harness.analysis.metrics import metrics
     from harness.flight.closed_loop import fly as fly_loop
-    from harness.run.scenario_flight import flight_limits, make_loop
-    from harness.run_files.plans_table import plans_table
-    from harness.run_files.run_folder import track_table
+    from harness.run.scenario_flight import make_loop
 
     with as_input_errors():
         flight = fly_loop(make_loop(scenario), (), progress)
-    figures = Metrics.of(metrics(flight, flight_limits(scenario)))
-    return FlightResult(scenario, figures, track_table(flight.track), plans_table(flight.plans))
+    return FlightResult.of(scenario, flight)

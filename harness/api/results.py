@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from harness.campaign.summary import Summary
+    from harness.flight.record import Flight
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,6 +41,17 @@ class FlightResult:
     folder: Path | None = None
     manifest: Mapping[str, Any] = field(default_factory=dict)
     _scratch: TemporaryDirectory[str] | None = None
+
+    @classmethod
+    def of(cls, scenario: Scenario, flight: Flight) -> FlightResult:
+        """Of a flight of which no run folder is kept."""
+        from harness.analysis.metrics import metrics
+        from harness.run.scenario_flight import flight_limits
+        from harness.run_files.plans_table import plans_table
+        from harness.run_files.run_folder import track_table
+
+        figures = Metrics.of(metrics(flight, flight_limits(scenario)))
+        return cls(scenario, figures, track_table(flight.track), plans_table(flight.plans))
 
     @property
     def outcome(self) -> str:

@@ -118,6 +118,7 @@ class ClosedLoop:
             ground=loop.world.ground_heights,
         )
         self._row_observers = [each for each in observers if isinstance(each, RowObserver)]
+        self._own_roll_rad: float | None = None
         self._law_error: str | None = None
         self._scans_on_their_way: deque[RangeScan] = deque()
         scan_rate_hz = loop.scan_rate_hz if loop.sensor else 0.0
@@ -131,9 +132,13 @@ class ClosedLoop:
             )
         self._over(loop.termination.verdict(self.true, loop.model.fault()))
 
-    def step(self) -> None:
-        """Flies one guidance interval, or up to the end of the flight if that comes first."""
-        loop = self._loop
+    def step(self, roll_command_rad: float | None = None) -> None:
+        """Flies one guidance interval, or up to the end of the flight if that comes first.
+
+        Args:
+            roll_command_rad: held in place of what the guidance law decides; None: the law steers.
+        """
+        loop, self._own_roll_rad = self._loop, roll_command_rad
         for instant in next(self._intervals):
             if instant.scan:
                 self._sense()
@@ -210,6 +215,8 @@ class ClosedLoop:
             except Exception as error:
                 self._law_error = trace(error)
                 return Verdict(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
+        if self._own_roll_rad is not None:
+            self.steering = self.steering._replace(roll_command_rad=self._own_roll_rad)
         return None
 
     def _advance(self, steps: int) -> Verdict | None:

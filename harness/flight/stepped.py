@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -56,11 +57,16 @@ class SteppedLoop:
         self._flying = ClosedLoop(self._make(), self._observers)
         return self.status
 
-    def step(self) -> Status:
+    def step(self, roll_command_rad: float | None = None) -> Status:
         """Flies one guidance interval, or up to the end of the flight if that comes first.
+
+        Args:
+            roll_command_rad: held for this interval in place of what the guidance law decides, positive right wing
+                down; nothing limits it but what the aircraft can do. None: the law steers.
 
         Raises:
             RuntimeError: no flight has begun, or it is over.
+            ValueError: the roll command is not finite.
         """
         flying = self._flight_begun()
         if flying.verdict is not None:
@@ -68,7 +74,9 @@ class SteppedLoop:
                 f"step() after the end: the flight is over after {flying.true.time_s:g} s "
                 f"({flying.verdict.outcome.value}: {flying.verdict.reason}); reset() begins the next"
             )
-        flying.step()
+        if roll_command_rad is not None and not math.isfinite(roll_command_rad):
+            raise ValueError(f"roll_command_rad is {roll_command_rad}; must be finite")
+        flying.step(roll_command_rad)
         return self.status
 
     @property
@@ -96,6 +104,16 @@ class SteppedLoop:
     def done(self) -> bool:
         """Whether the flight that was begun last is over."""
         return self._flight_begun().verdict is not None
+
+    @property
+    def standing(self) -> str:
+        """How the flight stands, in some words for people."""
+        flying = self._flying
+        if flying is None:
+            return "not begun"
+        if flying.verdict is None:
+            return f"at {flying.true.time_s:g} s, {flying.word}"
+        return f"over after {flying.true.time_s:g} s, {flying.word}"
 
     def flight(self) -> Flight:
         """The flight, once it is over.

@@ -1,0 +1,86 @@
+"""Flights that a program steps through from Python: `make`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harness.api.errors import as_input_errors
+from harness.api.flights import given_parts
+from harness.api.results import FlightResult
+from harness.flight.stepped import Status, SteppedLoop
+from harness.scenario.scenario import Scenario
+
+if TYPE_CHECKING:
+    from harness.flight.observer import Observer
+
+
+class SteppedFlight(SteppedLoop):
+    """The closed loop of one scenario, flown step by step and as often as it is reset.
+
+    Attributes:
+        scenario: what is flown, every default filled in.
+    """
+
+    def __init__(self, scenario: Scenario, observers: Sequence[Observer] = ()) -> None:
+        from harness.run.scenario_flight import make_loop
+
+        super().__init__(lambda: make_loop(scenario), observers)
+        self.scenario = scenario
+
+    def reset(self) -> Status:
+        """Begins a new flight, whatever has become of the one before; it is at its start.
+
+        Raises:
+            InputError: the aircraft cannot be loaded or trimmed.
+            PlannerError: the planner cannot be made.
+        """
+        with as_input_errors():
+            return super().reset()
+
+    def result(self) -> FlightResult:
+        """What was flown, as `fly` gives it.
+
+        Raises:
+            RuntimeError: no flight has begun, or it is not over.
+        """
+        return FlightResult.of(self.scenario, self.flight())
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        return f"SteppedFlight({self.scenario.name}: {self.standing})"
+
+
+def make(
+    scenario: Scenario | str | Path,
+    planner: object = None,
+    guidance: object = None,
+    *,
+    observers: Sequence[Observer] = (),
+) -> SteppedFlight:
+    """A scenario's flight that is stepped by the caller, 0.1 simulated seconds a step.
+
+        flight = wayproof.make("aerosonde_forest")
+        status = flight.reset()
+        while not status.done:
+            status = flight.step()
+        run = flight.result()  # as wayproof.fly gives it, with the same digest
+
+    A caller that decides itself gives objects of its own and changes them between two steps: a planner is asked after
+    every scan, a law of guidance at every step. `step(roll_command_rad=...)` steers for one step in place of the law.
+
+    Args:
+        scenario: a scenario, its file, or the name of one that comes with wayproof.
+        planner: as `fly` takes it. An object serves every flight; a class makes one for each.
+        guidance: as `fly` takes it; likewise.
+        observers: look on at every flight, with the methods of `harness.flight.observer.Observer`: each scan, plan and
+            event, and the track in blocks.
+
+    Returns:
+        The flight, not yet begun: `reset()` begins it.
+
+    Raises:
+        InputError: the scenario or planner cannot be used.
+    """
+    return SteppedFlight(given_parts(scenario, planner, guidance), observers)
