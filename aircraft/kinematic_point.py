@@ -27,16 +27,22 @@ class KinematicPoint:
     a closing loiter.
     """
 
-    def __init__(self, start: StartConditions, atmosphere: Atmosphere | None = None) -> None:
+    def __init__(
+        self,
+        start: StartConditions,
+        atmosphere: Atmosphere | None = None,
+        step_rate_hz: int = STEP_RATE_HZ,
+    ) -> None:
         """Starts along the course.
 
         Args:
             start: position, altitude, course and airspeed.
             atmosphere: ignored; taken so that a point is made as other flight models are.
+            step_rate_hz: steps per second that `advance` counts in.
         """
         del atmosphere
         self.command(0.0, start.altitude_m, start.airspeed_mps)
-        self._step = 0
+        self._step, self._step_rate_hz = 0, step_rate_hz
         tangent = math.sin(start.course_rad), math.cos(start.course_rad)
         self._way = Route(np.array([[start.east_m, start.north_m, *tangent, 0.0, 1.0]]))
         self._along_m = 0.0
@@ -46,14 +52,14 @@ class KinematicPoint:
     @property
     def step_rate_hz(self) -> int:
         """Integration steps per simulated second."""
-        return STEP_RATE_HZ
+        return self._step_rate_hz
 
     def state(self) -> AircraftState:
         """The state now; on a corner, in the direction that it leaves it."""
         east, north, tangent_east, tangent_north = route_point(self._way, self._along_m)
         speed = self._airspeed
         return AircraftState(
-            time_s=self._step / STEP_RATE_HZ,
+            time_s=self._step / self._step_rate_hz,
             east_m=east,
             north_m=north,
             up_m=self._altitude,
@@ -75,7 +81,7 @@ class KinematicPoint:
     def advance(self, steps: int) -> None:
         """Moves on by `steps` steps of 1 / step_rate_hz."""
         self._step += steps
-        self._along_m += self._airspeed * steps / STEP_RATE_HZ
+        self._along_m += self._airspeed * steps / self._step_rate_hz
 
     def fault(self) -> str | None:
         """None: a point is always under control."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState
+from aircraft.interface import GRAVITY_MPS2, AircraftState
 from aircraft.start import Atmosphere, StartConditions
 
 LONGEST_STEP_S = 0.1
@@ -23,7 +23,7 @@ class PointMass:
         start: StartConditions,
         atmosphere: Atmosphere | None = None,
         roll_lag_s: float = 0.25,
-        step_rate_hz: int = STEP_RATE_HZ,
+        step_rate_hz: int = 120,
     ) -> None:
         """Starts level, along the course.
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from aircraft.interface import AircraftState
+from aircraft.interface import AircraftState, FlightModel
 from harness.bench.stopwatch import Stopwatch
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Progress
@@ -30,9 +30,13 @@ from harness.run.scenario_flight import (
     start_conditions,
 )
 from harness.scenario.scenario import Scenario
+from harness.scenario.simulation import Simulation
 
 FEWEST_ROUNDS, MOST_ROUNDS = 3, 10
 """Each round is one flight without and one with the recording, both in turns with the bare model."""
+BARE_RATE_HZ = 120
+"""Steps a second of the bare model: JSBSim's own default. It is the same whatever the flight's step rate is, so that
+ratios of flights at different rates can be compared."""
 TURN_S = 30.0
 """The bare model follows the flight in turns of so long, simulated."""
 ALIKE = 0.01
@@ -53,14 +57,15 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     - the same with the recording.
 
     Either takes turns with `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed
-    start in the same air, for as many steps as the flight takes; its loading and trimming are not counted.
+    start in the same air, for as long as the flight takes, at `BARE_RATE_HZ`; its loading and trimming are not counted.
 
     Args:
         scenario: a complete scenario.
         progress: told of the first flight as it goes on, and of each round.
 
     Returns:
-        `scenario`, `outcome`; `sim_s` and `steps` of the flight; `rounds`, how many there were, and whether both
+        `scenario`, `outcome`; `sim_s` and `step_rate_hz` of the flight; `steps` and `bare_rate_hz` of the bare run;
+        `rounds`, how many there were, and whether both
         ratios are `steady`; `cpu_s`, for `closed_loop` and `closed_loop_recording` the seconds of `bare` and `flight`;
         `bare_step_us` in the first of them; the ratios `closed_loop_ratio` and `closed_loop_recording_ratio`;
         `planner_ms`, `p50`, `p99` and `max` of all searches of a flight, the least of all flights; `blocks`, the share
@@ -92,7 +97,9 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         "scenario": scenario.name,
         "outcome": flight.outcome.value,
         "sim_s": flight.sim_s,
+        "step_rate_hz": scenario.simulation.rate_hz,
         "steps": bare.steps,
+        "bare_rate_hz": BARE_RATE_HZ,
         "rounds": number,
         "steady": steady,
         "cpu_s": {
@@ -143,11 +150,17 @@ def block_shares(in_loop: Mapping[str, float], closed: float, recorded: float) -
     return {block: each / recorded for block, each in costs.items()}
 
 
+def bare_model(scenario: Scenario) -> FlightModel:
+    """The aircraft of a scenario at its start, to be flown with nothing around it."""
+    bare = scenario.model_copy(update={"simulation": Simulation(rate_hz=BARE_RATE_HZ)})
+    return jsbsim_aircraft(bare, start_conditions(scenario), atmosphere(scenario))
+
+
 class _Bare:
     """Flies the bare model as far as the flight that it observes has come."""
 
     def __init__(self, scenario: Scenario) -> None:
-        self._model = jsbsim_aircraft(scenario, start_conditions(scenario), atmosphere(scenario))
+        self._model = bare_model(scenario)
         self.cpu_s, self.steps, self._turn_s = 0.0, 0, TURN_S
 
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:

@@ -226,15 +226,21 @@ def bench(
         str,
         typer.Argument(
             metavar="[SCENARIO]",
-            help="A file or shipped name; or the word tracking or worlds.",
+            help="A file or shipped name; or the word tracking, rates or worlds.",
             show_default=True,
         ),
     ] = "paper_circles",
     aircraft: Annotated[
-        str | None, typer.Option(metavar="NAME", help="With tracking: what flies. Default: aerosonde.")
+        str | None,
+        typer.Option(metavar="NAME", help="With tracking and rates: what flies. Default: aerosonde."),
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="With tracking: courses a case. Default: 20.")
+        int | None,
+        typer.Option(
+            metavar="N",
+            min=1,
+            help="With tracking: courses a case. Default: 20. With rates: courses. Default: 3.",
+        ),
     ] = None,
     most: Annotated[
         int | None,
@@ -246,6 +252,7 @@ def bench(
 
     `bench tracking` measures how close an aircraft stays to random courses of 14 turns in calm air, wind and
     turbulence, the worst of all courses of a case; its exit status is 1 if that is more than promised.
+    `bench rates` flies the same at several step rates: how far each is from the finest, and its time.
     `bench worlds` measures the same flight in worlds of 10 to 100,000 obstacles at one density.
 
     For example: wayproof bench aerosonde_forest --json
@@ -254,8 +261,10 @@ def bench(
         raise typer.BadParameter("--most goes with `bench worlds`")
     if scenario == "tracking":
         return bench_tracking(aircraft or "aerosonde", seeds or 20, as_json)
+    if scenario == "rates":
+        return bench_rates(aircraft or "aerosonde", seeds or 3, as_json)
     if aircraft or seeds:
-        raise typer.BadParameter("--aircraft and --seeds go with `bench tracking`")
+        raise typer.BadParameter("--aircraft and --seeds go with `bench tracking` and `bench rates`")
     if scenario == "worlds":
         return bench_worlds(most, as_json)
     loaded = load(scenario)
@@ -293,6 +302,25 @@ def bench_tracking(name: str, seeds: int, as_json: bool) -> int:
         title = f"{result['aircraft']} at {result['airspeed_mps']:g} m/s, worst of {seeds} courses a case"
         print_grid(title, *tracking_rows(result))
     return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
+
+
+def bench_rates(name: str, seeds: int, as_json: bool) -> int:
+    """The table of what the step rate changes."""
+    from aircraft.airframes import AircraftError
+    from harness.bench import rates
+    from harness.cli.terminal import print_grid, rate_rows, step_bar
+
+    try:
+        with step_bar() as report:
+            result = rates.bench_rates(name, seeds, report)
+    except (AircraftError, ArithmeticError) as error:
+        raise bad_input(error) from error
+    if as_json:
+        print_json(result)
+    else:
+        title = f"{name}: largest distance in m from the flight at {result['finest_hz']} Hz"
+        print_grid(title, *rate_rows(result))
+    return 0
 
 
 def bench_worlds(most: int | None, as_json: bool) -> int:

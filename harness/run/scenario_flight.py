@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -90,7 +91,7 @@ def make_loop(
 
 def kinematic_loop(scenario: Scenario) -> Loop:
     """The same loop with a point that flies every path exactly in place of aircraft and guidance."""
-    loop = make_loop(scenario, KinematicPoint)
+    loop = make_loop(scenario, partial(KinematicPoint, step_rate_hz=scenario.simulation.rate_hz))
     return replace(loop, guidance=cast(GuidanceLaw, loop.model))
 
 
@@ -148,7 +149,8 @@ def jsbsim_aircraft(
 
     origin = scenario.area.origin
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
-    return JsbsimModel(airframe(scenario.aircraft.model), start, plane, air, climb_limit_mps=climb_limit_mps)
+    rate_hz = scenario.simulation.rate_hz
+    return JsbsimModel(airframe(scenario.aircraft.model), start, plane, air, rate_hz, climb_limit_mps)
 
 
 def flight_limits(scenario: Scenario) -> FlightLimits:

@@ -38,6 +38,7 @@ from harness.scenario.sections import (
     key,
 )
 from harness.scenario.shipped import scenario_path
+from harness.scenario.simulation import Simulation, step_rate_hz
 from harness.scenario.validation import KeyFault, input_error
 
 if TYPE_CHECKING:
@@ -77,6 +78,7 @@ class Scenario(Section):
     planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
     guidance: GuidanceSpec = key("What steers along the plan.", default_factory=GuidanceSpec)
     navigation: Navigation = key("What it believes of its state.", default_factory=Navigation)
+    simulation: Simulation = key("How finely it is integrated.", default_factory=Simulation)
     environment: Environment = key("The air.", default_factory=Environment)
     trackability: TrackabilitySpec = key(
         "What a leg may be off before it counts as not trackable.", default_factory=TrackabilitySpec
@@ -93,6 +95,7 @@ class Scenario(Section):
                 ("navigation", "kind"),
                 f"is {self.navigation.kind}, which no flight takes yet (all use the true state); must be perfect",
             )
+        self._set("simulation", rate_hz=step_rate_hz(self.simulation.rate_hz, self.sensor))
         self._place_ends()
         found = model_or_folder(self.aircraft.model, folder)
         object.__setattr__(self, "aircraft", self.aircraft.model_copy(update={"model": found}))

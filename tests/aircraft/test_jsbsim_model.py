@@ -24,6 +24,7 @@ from aircraft.properties import FAULT_PROPERTIES
 from aircraft.start import Atmosphere, StartConditions
 
 PLANE = LocalPlane(47.0, 8.0)
+SECOND = 60
 VERIFIED = ("aerosonde", "c172p", "T38")
 WINDS = [(0.0, 0.0), (7.0, -5.0), (-12.0, 3.0)]
 
@@ -50,7 +51,7 @@ def test_state_has_the_throttle_that_holds_the_airspeed() -> None:
 
 def test_is_a_flight_model() -> None:
     model: FlightModel = model_of("aerosonde")
-    assert model.step_rate_hz == 120
+    assert model.step_rate_hz == SECOND
 
 
 def test_is_loaded_on_a_heap_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -163,7 +164,7 @@ def test_starts_trimmed_without_transient(name: str, wind: tuple[float, float]) 
     assert first.airspeed_mps == pytest.approx(cruise, abs=1e-6)
     air_east = first.airspeed_mps * math.sin(first.heading_rad)
     assert first.velocity_east_mps - wind[0] == pytest.approx(air_east, abs=0.1)
-    for _ in range(600):
+    for _ in range(5 * SECOND):
         model.advance(1)
         state = model.state()
         assert abs(state.up_m - 300.0) < (0.03 if name == "T38" else 0.002)
@@ -179,7 +180,7 @@ def test_wind_keeps_its_direction_in_the_plane() -> None:
     for _ in range(600):
         state = model.state()
         model.command(0.0, 300.0, 25.0)
-        model.advance(120)
+        model.advance(SECOND)
     state = model.state()
     horizontal = state.airspeed_mps * math.cos(state.velocity_up_mps / state.airspeed_mps)
     assert state.velocity_east_mps - horizontal * math.sin(state.heading_rad) == pytest.approx(10.0, abs=0.02)
@@ -190,11 +191,11 @@ def test_position_is_the_integral_of_velocity() -> None:
     model = model_of("aerosonde", course=0.7, atmosphere=Atmosphere(4.0, -3.0))
     before = model.state()
     east = north = 0.0
-    for _ in range(2400):
+    for _ in range(20 * SECOND):
         model.advance(1)
         state = model.state()
-        east += state.velocity_east_mps / 120.0
-        north += state.velocity_north_mps / 120.0
+        east += state.velocity_east_mps / SECOND
+        north += state.velocity_north_mps / SECOND
     assert state.east_m - before.east_m == pytest.approx(east, abs=0.1)
     assert state.north_m - before.north_m == pytest.approx(north, abs=0.1)
 
@@ -204,7 +205,7 @@ def test_inner_loops_hold_what_they_are_told(name: str) -> None:
     model = model_of(name)
     cruise = airframe(name).cruise_mps
     model.command(0.5, 310.0, 1.05 * cruise)
-    model.advance(120 * 40)
+    model.advance(40 * SECOND)
     state = model.state()
     assert state.roll_rad == pytest.approx(0.5, abs=0.01)
     assert state.up_m == pytest.approx(310.0, abs=0.004 * cruise)
@@ -226,7 +227,7 @@ def test_disengaged_the_controls_stay_and_the_command_is_not_flown() -> None:
     model = model_of("aerosonde")
     model.engage(False)
     model.command(0.6, 400.0, 25.0)
-    model.advance(240)
+    model.advance(2 * SECOND)
     assert abs(model.state().roll_rad) < 0.05
 
 
@@ -236,7 +237,7 @@ def test_turbulence_is_seeded_and_grows_with_intensity(turbulence: str) -> None:
         model = model_of("aerosonde", atmosphere=Atmosphere(0.0, 0.0, turbulence, intensity, seed))
         flown = []
         for _ in range(600):
-            model.advance(6)
+            model.advance(SECOND // 20)
             flown.append(model.state().roll_rad)
         return flown
 
@@ -256,7 +257,7 @@ def test_faults_name_the_cause() -> None:
     sinking = model_of("aerosonde")
     sinking.command(0.0, -500.0, 25.0)
     for _ in range(20 * 400):
-        sinking.advance(6)
+        sinking.advance(SECOND // 20)
         if sinking.fault():
             break
     assert (sinking.fault() or "").startswith("the aircraft is at the ground (")
@@ -264,14 +265,14 @@ def test_faults_name_the_cause() -> None:
     rolling = model_of("aerosonde")
     rolling.engage(False)
     rolling._fdm["fcs/aileron-cmd-norm"] = 1.0
-    rolling.advance(120)
+    rolling.advance(SECOND)
     assert (rolling.fault() or "").startswith("rolled over: roll ")
 
     stalling = model_of("aerosonde")
     stalling.engage(False)
     stalling._fdm["fcs/elevator-cmd-norm"] = -1.0
     for _ in range(20 * 20):
-        stalling.advance(6)
+        stalling.advance(SECOND // 20)
         if stalling.fault():
             break
     assert (stalling.fault() or "").startswith("stalled: ")
@@ -310,7 +311,7 @@ def test_each_limit_is_a_fault_of_its_own(reading: str, good: float, bad: float,
 def test_a_state_that_is_not_finite_is_a_fault() -> None:
     model = model_of("aerosonde")
     model.command(math.nan, 300.0, 25.0)
-    model.advance(12)
+    model.advance(SECOND // 10)
     assert model.fault() == "the state is not finite"
 
 
@@ -344,7 +345,7 @@ air = Atmosphere(5.0, -2.0, "tustin", "moderate", 3)
 model = JsbsimModel(airframe({name!r}), StartConditions(1e3, 2e3, 300.0, 0.3, {airspeed}), LocalPlane(47.0, 8.0), air)
 for tick in range(600):
     model.command(0.4 if tick % 200 < 100 else -0.4, 300.0, {airspeed})
-    model.advance(6)
+    model.advance(SECOND // 20)
 state = model.state()
 open({out!r}, "w").write(" ".join(value.hex() for value in state))
 """

@@ -15,7 +15,7 @@ from aircraft.route import route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 
 NORTH = StartConditions(east_m=0.0, north_m=0.0, altitude_m=300.0, course_rad=0.0, airspeed_mps=20.0)
-SECOND = 120
+SECOND = 60
 LEFT_TURN_M = 50.0 * math.pi
 CORNER = Route(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 100.0], [0.0, 100.0, 1.0, 0.0, 0.0, 100.0]]))
 BENT = Route(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, 100.0], [0.0, 100.0, 0.0, 1.0, 0.02, LEFT_TURN_M]]))

@@ -206,7 +206,7 @@ def test_loops_are_as_fast_as_the_weave_allows() -> None:
 def test_no_fuel_is_burnt() -> None:
     model = in_flight(airframe("c172p"), 50.0)
     before = mass_kg(model._fdm)
-    model.advance(120 * 300)
+    model.advance(60 * 300)
     assert mass_kg(model._fdm) == pytest.approx(before, abs=1e-6)
 
 

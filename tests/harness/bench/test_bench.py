@@ -55,16 +55,17 @@ def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
     assert result["bare_step_us"] == pytest.approx(1e6 * cpu["closed_loop"]["bare"] / result["steps"])
 
 
-def test_the_bare_run_has_as_many_steps_as_the_flight(result: dict[str, Any]) -> None:
+def test_the_bare_run_takes_as_long_as_the_flight_at_120_steps_a_second(result: dict[str, Any]) -> None:
     assert result["outcome"] == "reached"
+    assert (result["step_rate_hz"], result["bare_rate_hz"]) == (60, 120)
     assert result["steps"] == round(120 * result["sim_s"])
     assert 2600 < 25 * result["sim_s"] < 4000
 
 
-def test_the_loop_costs_more_than_its_flight_model_and_the_recording_more_than_none(
+def test_the_loop_costs_more_than_half_as_many_steps_and_the_recording_more_than_none(
     result: dict[str, Any],
 ) -> None:
-    assert 1.0 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
+    assert 0.5 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
 
 
 def test_every_block_has_its_share(result: dict[str, Any]) -> None:

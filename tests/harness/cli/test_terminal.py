@@ -156,6 +156,8 @@ def test_progress_on_a_terminal_shows_time_and_distance_to_go(
 def test_the_table_of_a_bench_has_every_block() -> None:
     rows = bench_rows(
         {
+            "step_rate_hz": 60,
+            "bare_rate_hz": 120,
             "rounds": 4,
             "steady": True,
             "closed_loop_ratio": 1.4321,
@@ -166,6 +168,7 @@ def test_the_table_of_a_bench_has_every_block() -> None:
     )
     assert rows["closed loop"] == "1.432 of bare JSBSim"
     assert rows["planner"] == "p50 0.10 ms, p99 2.50 ms, max 9.00 ms"
+    assert rows["step rate"] == "60 Hz, of bare JSBSim 120 Hz"
     assert rows["rounds"] == "4, steady"
     assert rows["  dynamics"] == "75.0%"
     assert rows["  planner"] == "5.0%"
