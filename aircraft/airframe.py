@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from aircraft.actuators.actuator import Actuators
 from aircraft.autopilot import Gains
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.model_files import AircraftError, ModelFiles
@@ -23,6 +24,7 @@ class Entry:
         verified: flown against the tracking figures of the tests.
         figures: attributes of `Airframe` that replace what the survey makes of the model.
         gains: gains of the autopilot that replace derived ones, by field of `Gains`.
+        actuators: its servos.
     """
 
     name: str
@@ -31,6 +33,7 @@ class Entry:
     verified: bool = False
     figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
     gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
+    actuators: Actuators = field(default_factory=Actuators)
 
 
 FIGURES = (

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache, lru_cache, partial
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
+from aircraft.actuators.actuator import CONTROLS, Actuator, Actuators, NormActuator
 from aircraft.airframe import FIGURES, Airframe, Entry
 from aircraft.autopilot import Gains
 from aircraft.card_cache import cached, figure, is_kept
@@ -23,12 +24,13 @@ def aircraft_names() -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=64)
-def airframe(name: str) -> Airframe:
+def airframe(name: str, actuators: Actuators | None = None) -> Airframe:
     """The airframe of a name or folder, surveyed by flying it unless that has been done before.
 
     Args:
         name: a name of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a
             JSBSim model.
+        actuators: its servos; None: those of the airframe table, or none.
 
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
@@ -39,6 +41,8 @@ def airframe(name: str) -> Airframe:
         known = ", ".join(aircraft_names())
         raise AircraftError(f"{error}; known are: {known}, or a folder with a JSBSim model") from None
     entry = _table().get(name) or Entry(found.name, f"JSBSim model of {found.model.parent}")
+    if real := (entry.actuators if actuators is None else actuators).real:
+        found = replace(found, actuators=_of_commands(found, real))
 
     def surveyed() -> dict[str, Any]:
         from aircraft.survey import survey
@@ -63,6 +67,31 @@ def is_surveyed(name: str) -> bool:
 
 def _title(found: ModelFiles) -> str:
     return f"{found.name}-airframe"
+
+
+def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple[str, NormActuator], ...]:
+    """Actuators in units of the command, by how far the surfaces of a model move.
+
+    Raises:
+        AircraftError: the model does not show how far, and it must be known.
+    """
+
+    def measured() -> dict[str, float]:
+        from aircraft.jsbsim_loading import surface_travel_deg  # loads JSBSim
+
+        return surface_travel_deg(found)
+
+    travels = cached(f"{found.name}-travel", found.digest(), measured, dict)
+    made = []
+    for control, actuator in real.items():
+        travel_deg = travels[control]
+        if travel_deg <= 0.0 and (actuator.rate_limit_degps is not None or actuator.deadband_deg):
+            raise AircraftError(
+                f"{found.name}: its model does not show how far the {control} moves, so a rate limit or a deadband in "
+                "degrees means nothing; leave both out"
+            )
+        made.append((control, actuator.of_command(travel_deg or 1.0)))
+    return tuple(made)
 
 
 def _of_survey(entry: Entry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
@@ -130,7 +159,7 @@ def parse_airframes(text: str) -> dict[str, Entry]:
 def _entry(name: str, keys: object) -> Entry:
     if not isinstance(keys, dict):
         raise ValueError(f"{name}: must be a mapping")
-    if unknown := sorted(set(keys) - {"summary", "cruise_mps", "verified", "gains", *FIGURES}):
+    if unknown := sorted(set(keys) - {"summary", "cruise_mps", "verified", "gains", "actuators", *FIGURES}):
         raise ValueError(f"{name}: unknown key {unknown[0]!r}")
     if missing := sorted({"summary", "cruise_mps", "verified"} - set(keys)):
         raise ValueError(f"{name}: missing key {missing[0]!r}")
@@ -144,6 +173,7 @@ def _entry(name: str, keys: object) -> Entry:
     for gain, value in gains.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise ValueError(f"{name}.gains.{gain}: must be a finite number; got {value!r}")
+    actuators = _actuators(name, keys.get("actuators", {}))
     for key in ("cruise_mps", *FIGURES):
         value = keys.get(key, 1.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
@@ -155,4 +185,28 @@ def _entry(name: str, keys: object) -> Entry:
         verified=keys["verified"],
         figures=MappingProxyType({key: float(keys[key]) for key in FIGURES if key in keys}),
         gains=MappingProxyType({key: float(value) for key, value in gains.items()}),
+        actuators=actuators,
     )
+
+
+def _actuators(name: str, keys: object) -> Actuators:
+    """The servos of an entry: `{aileron: {lag_s, rate_limit_degps, deadband_deg}, ...}`."""
+    if not isinstance(keys, dict):
+        raise ValueError(f"{name}.actuators: must be a mapping")
+    if unknown := sorted(set(keys) - set(CONTROLS)):
+        raise ValueError(f"{name}.actuators: unknown control {unknown[0]!r}")
+    made = {}
+    for control, figures in keys.items():
+        where = f"{name}.actuators.{control}"
+        if not isinstance(figures, dict):
+            raise ValueError(f"{where}: must be a mapping")
+        if unknown := sorted(set(figures) - {each.name for each in fields(Actuator)}):
+            raise ValueError(f"{where}: unknown key {unknown[0]!r}")
+        for key, value in figures.items():
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ValueError(f"{where}.{key}: must be a number; got {value!r}")
+        try:
+            made[control] = Actuator(**figures)
+        except ValueError as error:
+            raise ValueError(f"{where}.{error}") from None
+    return Actuators(**made)

@@ -2,7 +2,8 @@
 
 The structure is in systems/autopilot.xml; it is the same for every aircraft. What differs are the gains, and
 they follow from the stability derivatives at trim by rules that put each loop at a fixed place relative to
-the aircraft's own modes.
+the aircraft's own modes. Phase margins are read off the open loops of the same plants on a grid of frequencies (any
+text on control, such as Franklin, Powell and Emami-Naeini, chapter 6).
 """
 
 from __future__ import annotations
@@ -10,13 +11,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.interface import FloatArray
 
 GRAVITY_FPS2 = 32.174
 ROLL_RATE_LIMIT_RADPS = 1.05
+FREQUENCIES_RADPS = np.logspace(-1.0, 2.5, 4000)
+NEEDED_DEG = 45.0
+"""The least phase margin that loops keep behind servos; a margin of 45 degrees is what is usually asked of aircraft
+(MIL-F-9490D, 3.1.3.6.1, for modes of less than 1 Hz and up)."""
+
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
+
 ROLL_ERROR_SHARE = 0.8
 """Share of the steady roll rate at full aileron that roll errors may ask for."""
 
@@ -179,7 +189,7 @@ def derivatives(
     )
 
 
-def gains(at: Derivatives, pace: float = 1.0) -> Gains:
+def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     """Places the loops.
 
     Roll: the roll mode goes to lambda = max(1.4 |Lp|, 10) 1/s and roll to min(4, lambda/4). Yaw: the Dutch
@@ -192,6 +202,7 @@ def gains(at: Derivatives, pace: float = 1.0) -> Gains:
         at: the aircraft at trim.
         pace: share of the feedback in roll and yaw, for aircraft whose actuators or control laws, which the
             derivatives do not show, take a part of the phase.
+        pitch_pace: the same in pitch, climb and altitude.
 
     Raises:
         ValueError: if a control has no authority or the wrong sign, or the short period is not oscillatory.
@@ -226,7 +237,7 @@ def gains(at: Derivatives, pace: float = 1.0) -> Gains:
     rudder_r = pace * max(1.4 * dutch_roll + at.nr + at.yb, 0.0) / -at.ndr
 
     short_period = math.sqrt(short_period2)
-    pitch = min(3.5, 0.315 * short_period)
+    pitch = pitch_pace * min(3.5, 0.315 * short_period)
     alpha_per_load = GRAVITY_FPS2 / (speed * -at.za)
     throttle = min(1.5 / at.xdt, 0.05)
     return Gains(
@@ -247,8 +258,8 @@ def gains(at: Derivatives, pace: float = 1.0) -> Gains:
         climb_integral=0.29 * pitch,
         pitch=pitch,
         pitch_bank_forward=alpha_per_load - at.alpha_rad,
-        elevator_q=short_period / -at.mde,
-        elevator_q_integral=0.64 * short_period2 / -at.mde,
+        elevator_q=pitch_pace * short_period / -at.mde,
+        elevator_q_integral=pitch_pace**2 * 0.64 * short_period2 / -at.mde,
         elevator_q_forward=(at.ma / at.za - at.mq) / -at.mde,
         elevator_turn_forward=-at.mq / -at.mde,
         elevator_load_forward=-at.ma * alpha_per_load / -at.mde,
@@ -257,3 +268,50 @@ def gains(at: Derivatives, pace: float = 1.0) -> Gains:
         throttle_climb_forward=GRAVITY_FPS2 / (speed * at.xdt),
         throttle_load_forward=0.5 * at.xa * alpha_per_load / at.xdt,
     )
+
+
+def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float) -> float:
+    """The lesser of the phase margins of the roll rate loop and of the roll loop around it.
+
+    Args:
+        at: the aircraft at trim.
+        gains: of the autopilot.
+        lag_s: time constant of the aileron's servo.
+    """
+    s = 1j * FREQUENCIES_RADPS
+    plant = at.lda / (s - at.lp) / (1.0 + lag_s * s)
+    return _margin_deg(
+        plant, gains.aileron_p + gains.aileron_p_integral / s, gains.aileron_p_forward, gains.roll
+    )
+
+
+def pitch_margin_deg(at: Derivatives, gains: Gains, lag_s: float) -> float:
+    """The lesser of the phase margins of the pitch rate loop and of the pitch loop around it.
+
+    Args:
+        at: the aircraft at trim.
+        gains: of the autopilot.
+        lag_s: time constant of the elevator's servo.
+    """
+    s = 1j * FREQUENCIES_RADPS
+    short_period = s * s - (at.mq + at.za) * s + at.mq * at.za - at.ma
+    plant = -at.mde * (s - at.za) / short_period / (1.0 + lag_s * s)
+    return _margin_deg(
+        plant, gains.elevator_q + gains.elevator_q_integral / s, gains.elevator_q_forward, gains.pitch
+    )
+
+
+def _margin_deg(plant: ComplexArray, feedback: ComplexArray, forward: float, outer: float) -> float:
+    """The lesser margin of a rate loop and of the attitude loop around it, which has a feed-forward of the rate."""
+    inner = feedback * plant
+    rate = (forward * plant + inner) / (1.0 + inner)
+    return min(_phase_margin_deg(inner), _phase_margin_deg(outer / (1j * FREQUENCIES_RADPS) * rate))
+
+
+def _phase_margin_deg(loop: ComplexArray) -> float:
+    """Distance of an open loop's phase from -180 degrees where its gain is 1; infinite where it never is."""
+    above = np.abs(loop) >= 1.0
+    crossings = np.flatnonzero(above[1:] != above[:-1])
+    phase_deg = np.degrees(np.unwrap(np.angle(loop)))
+    margins = 180.0 + phase_deg[crossings]
+    return float(margins.min()) if len(margins) else math.inf

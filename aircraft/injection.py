@@ -11,17 +11,21 @@ from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from aircraft.actuators.actuator import NormActuator
+from aircraft.actuators.components import insert
+
 THROTTLE = "fcs/throttle-cmd-norm"
 
 
 @contextmanager
-def with_autopilot(model: Path) -> Iterator[Path]:
+def with_autopilot(model: Path, actuators: tuple[tuple[str, NormActuator], ...] = ()) -> Iterator[Path]:
     """Derives an aircraft folder whose model starts with the autopilot system.
 
     The other files of the model are linked, so that references from the model resolve as before.
 
     Args:
         model: the model's XML file, <folder>/<name>.xml.
+        actuators: controls, and what moves each.
 
     Yields:
         A folder that holds <name>/<name>.xml, gone when the context ends.
@@ -30,7 +34,7 @@ def with_autopilot(model: Path) -> Iterator[Path]:
         ValueError: if the model is not well-formed XML or not a JSBSim model.
     """
     try:
-        with_system = _with_system(model.read_bytes())
+        with_system = _with_system(model.read_bytes(), actuators)
     except ElementTree.ParseError as error:
         raise ValueError(f"{model} is not well-formed XML: {error}") from None
     except ValueError as error:
@@ -46,7 +50,7 @@ def with_autopilot(model: Path) -> Iterator[Path]:
 
 
 @lru_cache(maxsize=8)
-def _with_system(model: bytes) -> bytes:
+def _with_system(model: bytes, actuators: tuple[tuple[str, NormActuator], ...]) -> bytes:
     """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody."""
     root = ElementTree.fromstring(model)
     if root.tag != "fdm_config":
@@ -57,6 +61,7 @@ def _with_system(model: bytes) -> bytes:
         if any(output.text == THROTTLE for output in component.findall("output")):
             for index in range(1, engines):
                 ElementTree.SubElement(component, "output").text = f"{THROTTLE}[{index}]"
+    insert(system, dict(actuators))
     # A model's own output would leave files where the command was given; its input would listen on the network.
     for port in (*root.findall("output"), *root.findall("input")):
         root.remove(port)

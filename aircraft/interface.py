@@ -43,6 +43,8 @@ class AircraftState(NamedTuple):
     """Normal load factor, 1 in level flight."""
     throttle: float = math.nan
     """Throttle command, 0 to 1; NaN for a model without an engine."""
+    actuator_limited_s: float = 0.0
+    """Time since the start in which a servo was at its rate limit, each counted."""
 
     @property
     def groundspeed_mps(self) -> float:

@@ -14,6 +14,7 @@ from typing import Any
 import jsbsim
 import numpy as np
 
+from aircraft.actuators.actuator import CONTROLS, THROTTLE_TRAVEL_DEG
 from aircraft.autopilot import Derivatives, derivatives
 from aircraft.frames import LocalPlane
 from aircraft.injection import with_autopilot
@@ -24,6 +25,17 @@ from aircraft.start import StartConditions
 
 REFERENCE_ALTITUDE_M = 300.0
 FULL_TRIM = 1
+
+SURFACES = {
+    "aileron": ("fcs/left-aileron-pos-rad", "fcs/right-aileron-pos-rad"),
+    "elevator": ("fcs/elevator-pos-rad",),
+    "rudder": ("fcs/rudder-pos-rad",),
+}
+"""Properties by which models tell where a surface is, rad."""
+
+MOVING_STEPS = 120
+LEAST_DEG = 0.5
+"""A surface that moves by less is not moved by its command."""
 
 ROTATION = ("rate", "position")
 ADAMS_BASHFORTH_2 = 3
@@ -113,7 +125,7 @@ def _load(files: ModelFiles, step_rate_hz: int) -> Any:
     )  # before the model: its filters and integrators take their step when they are loaded
     with ExitStack() as stack:
         try:
-            derived = stack.enter_context(with_autopilot(files.model))
+            derived = stack.enter_context(with_autopilot(files.model, files.actuators))
             fdm.set_aircraft_path(str(derived))
             fdm.set_engine_path(str(files.engines))
             fdm.set_systems_path(str(files.systems))
@@ -206,3 +218,23 @@ def linearised(fdm: Any) -> Derivatives:
         alpha_rad=fdm["aero/alpha-rad"],
         qbar_psf=fdm["aero/qbar-psf"],
     )
+
+
+def surface_travel_deg(files: ModelFiles) -> dict[str, float]:
+    """Degrees that each surface moves for a command of 1, by control; 0 where the model does not show it.
+
+    The commands are given to the model at rest, its own flight controls running.
+    """
+    travel = {"throttle": THROTTLE_TRAVEL_DEG}
+    for control, properties in SURFACES.items():
+        ends = []
+        for command in (-1.0, 1.0):
+            fdm = load(files)
+            fdm.run_ic()
+            for _ in range(MOVING_STEPS):
+                fdm[f"fcs/{control}-cmd-norm"] = command
+                fdm.run()
+            ends.append([float(fdm[path]) for path in properties])
+        moved = max(abs(after - before) for before, after in zip(*ends, strict=True))
+        travel[control] = 0.5 * math.degrees(moved) if math.degrees(moved) >= LEAST_DEG else 0.0
+    return {control: round(travel[control], 3) for control in CONTROLS}

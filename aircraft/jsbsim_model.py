@@ -91,6 +91,8 @@ class JsbsimModel:
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
         self._enable = node(fdm, "wayproof/enable").set_double_value
         self._read_for_fault = tuple(node(fdm, path).get_double_value for path in FAULT_PROPERTIES)
+        servos = [name for name, servo in frame.files.actuators if servo.rate_limit_1ps is not None]
+        self._limited = tuple(node(fdm, f"wayproof/{name}-limited").get_double_value for name in servos)
         self._set_up_autopilot(climb_limit_mps)
         self.command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
         if self._windy:
@@ -139,6 +141,7 @@ class JsbsimModel:
             airspeed_fps * FOOT_M,
             load_factor,
             throttle,
+            sum(read() for read in self._limited) / self._step_rate_hz if self._limited else 0.0,
         )
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:

@@ -11,6 +11,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 
+from aircraft.actuators.actuator import NormActuator
 from aircraft.foreign_model import faults
 
 OWN = Path(__file__).parent
@@ -32,11 +33,13 @@ class ModelFiles:
         model: its main file, <folder>/<name>.xml.
         engines: folder that its engines and propellers are read from.
         systems: folder that its shared systems are read from.
+        actuators: controls, and what moves each where it does not do what it is told at once.
     """
 
     model: Path
     engines: Path
     systems: Path
+    actuators: tuple[tuple[str, NormActuator], ...] = ()
 
     @property
     def name(self) -> str:
@@ -47,9 +50,10 @@ class ModelFiles:
         """SHA-256 over the model, what it is flown with and what flies it.
 
         These are all files of its folder and of those of its engines and systems, JSBSim's version (it stands for
-        the files of its wheel) and this package, with autopilot, airframe table and guidance.
+        the files of its wheel), its actuators, and this package, with autopilot, airframe table and guidance.
         """
         sha = hashlib.sha256(version("jsbsim").encode())
+        sha.update(repr(self.actuators).encode() if self.actuators else b"")
         known = (self.model.parent, OWN, _wheel())
         shared = {each for each in (self.engines, self.systems) if not any(map(each.is_relative_to, known))}
         for folder in (self.model.parent, OWN, *sorted(shared)):

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from aircraft.airframe import FIGURES, Airframe, Entry
-from aircraft.autopilot import Derivatives, Gains, gains
+from aircraft.autopilot import NEEDED_DEG, Derivatives, Gains, gains, pitch_margin_deg, roll_margin_deg
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
@@ -116,8 +116,13 @@ def _held_at_cruise(entry: Entry, files: ModelFiles, cruise: float) -> Airframe:
     try:
         at = linearised(trimmed(files, cruise))
         reason: str | None = None
+        roll_lag_s = _lag_s(files, "aileron")
+        pitch_pace = _pitch_pace(at, _lag_s(files, "elevator"))
         for pace in PACES:
-            placed = replace(gains(at, pace).rounded(GAIN_DIGITS), **entry.gains)
+            placed = replace(gains(at, pace, pitch_pace).rounded(GAIN_DIGITS), **entry.gains)
+            if roll_lag_s and (margin_deg := roll_margin_deg(at, placed, roll_lag_s)) < NEEDED_DEG:
+                reason = _too_slow("aileron", roll_lag_s, "roll", margin_deg)
+                continue
             frame = _provisional(entry, files, cruise, at, placed)
             if reason := not_held(frame, cruise, REVERSALS):
                 continue
@@ -135,6 +140,31 @@ def _held_at_cruise(entry: Entry, files: ModelFiles, cruise: float) -> Airframe:
     return best
 
 
+def _lag_s(files: ModelFiles, control: str) -> float:
+    servos = dict(files.actuators)
+    return servos[control].lag_s if control in servos else 0.0
+
+
+def _pitch_pace(at: Derivatives, lag_s: float) -> float:
+    """The fastest pace in pitch whose loops keep their margin behind the elevator's servo.
+
+    Raises:
+        ValueError: they keep it at none.
+    """
+    margin_deg = math.inf
+    for pace in PACES if lag_s else PACES[:1]:
+        if not lag_s or (margin_deg := pitch_margin_deg(at, gains(at, 1.0, pace), lag_s)) >= NEEDED_DEG:
+            return pace
+    raise ValueError(_too_slow("elevator", lag_s, "pitch", margin_deg))
+
+
+def _too_slow(control: str, lag_s: float, loop: str, margin_deg: float) -> str:
+    return (
+        f"behind a lag of the {control} of {lag_s:g} s the slowest {loop} loop has a phase margin of {margin_deg:.0f} "
+        f"degrees; it must have {NEEDED_DEG:g}"
+    )
+
+
 def _provisional(entry: Entry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains) -> Airframe:
     """The airframe before its limits are known."""
     roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(1.0 / max(abs(placed.aileron_p_forward), 1e-6))
@@ -145,7 +175,7 @@ def _provisional(entry: Entry, files: ModelFiles, cruise: float, at: Derivatives
         "roll_rate_dps": roll_rate_dps,
         "stall_angle_deg": LOOSE_STALL_DEG,
         "roll_lag_s": round(1.0 / placed.roll, 3),
-        "roll_delay_s": round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p), 2),
+        "roll_delay_s": round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2),
         "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),
         **entry.figures,
     }

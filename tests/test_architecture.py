@@ -127,7 +127,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("envelope", "jsbsim_loading", "plane_patch"),
         ("airframe", "injection", "start"),
         ("autopilot", "frames", "guidance", "model_files", "properties"),
-        ("foreign_model", "kernels", "route"),
+        ("actuators", "foreign_model", "kernels", "route"),
         ("interface",),
     ),
     "harness": (

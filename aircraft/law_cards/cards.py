@@ -19,6 +19,7 @@ from aircraft.card_cache import cached, figure
 from aircraft.envelope import LawCard, WindPoint
 from aircraft.guidance.preview import PreviewConfig
 from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind, installed_kinds
+from aircraft.model_files import ModelFiles
 
 
 def law_card(
@@ -53,7 +54,7 @@ def law_card(
         )
         return survey.measured()
 
-    known = (frame.name, frame.files.model, kind, keys, limits.airspeed_mps)
+    known = (frame.name, frame.files, kind, keys, limits.airspeed_mps)
     if known not in _kept and installed_kinds().get(kind.kind) != kind:
         _kept[known] = _card(measured())  # nothing tells what it depends on
     if known not in _kept:
@@ -63,7 +64,7 @@ def law_card(
     return _kept[known]
 
 
-_kept: dict[tuple[str, Path, GuidanceKind, str, float], LawCard] = {}
+_kept: dict[tuple[str, ModelFiles, GuidanceKind, str, float], LawCard] = {}
 
 
 def _source(kind: GuidanceKind) -> str:

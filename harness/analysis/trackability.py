@@ -127,6 +127,7 @@ class Leg:
             off downwind in a cross-wind;
             "bank limit": the guidance asked for all the bank there is, for longer than the aircraft rolled as
             fast as it may;
+            "actuator": a servo was at its rate limit;
             "roll rate": the aircraft rolled as fast as it may;
             "load factor": it is larger than it may be;
             "tracking error": none of these.
@@ -315,6 +316,8 @@ def _cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: Fli
     drift = _wind_from_left_mps(lead)
     if abs(drift) >= WIND_SHARE * lead.airspeed_mps.mean() and drift * lead.cross_track_m[-1] > 0:
         return "wind drift"
+    if _actuator_share(lead) >= SATURATED_SHARE:
+        return "actuator"
     if rolling >= SATURATED_SHARE:
         return "roll rate"
     if _averaged(lead.load_factor, lead, LOAD_S).max() > limits.max_load_factor:
@@ -345,6 +348,13 @@ def _rolling(track: Track, roll_rate_radps: float) -> FloatArray:
     """(n - 1,) 1 where the aircraft rolls about as fast as it may, else 0."""
     rate = np.abs(np.diff(track.roll_deg)) / np.maximum(np.diff(track.time_s), 1e-9)
     return np.where(rate >= ROLL_RATE_SHARE * math.degrees(roll_rate_radps), 1.0, 0.0)
+
+
+def _actuator_share(track: Track) -> float:
+    """Share of the time for which servos were at their rate limits, each counted."""
+    assert track.actuator_limited_s is not None
+    limited_s = float(track.actuator_limited_s[-1] - track.actuator_limited_s[0])
+    return limited_s / max(float(track.time_s[-1] - track.time_s[0]), 1e-9)
 
 
 def _at_a_stop(track: Track) -> FloatArray:

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from aircraft.airframe import Airframe
-from aircraft.airframes import airframe
+from aircraft.airframes import AircraftError, airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
@@ -50,8 +50,7 @@ def bench_rates(
         and `position_m`, the largest at the same time; `cpu_ms`, processor time for a simulated second of both.
 
     Raises:
-        AircraftError: the aircraft cannot be flown.
-        ArithmeticError: control is lost on the way.
+        AircraftError: the aircraft cannot be flown, or control is lost on the way.
     """
     frame = airframe(name)
     finest = _flights(frame, RATES_HZ[-1], seeds)[0]
@@ -114,7 +113,7 @@ def _track(frame: Airframe, rate_hz: int, command: Command) -> FloatArray:
     rows = []
     while (roll_rad := command(state := model.state())) is not None:
         if fault := model.fault():
-            raise ArithmeticError(
+            raise AircraftError(
                 f"{frame.name} at {rate_hz} Hz: control is lost after {state.time_s:.0f} s: {fault}"
             )
         rows.append((state.east_m, state.north_m, state.velocity_east_mps, state.velocity_north_mps))

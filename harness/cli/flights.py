@@ -313,7 +313,7 @@ def bench_rates(name: str, seeds: int, as_json: bool) -> int:
     try:
         with step_bar() as report:
             result = rates.bench_rates(name, seeds, report)
-    except (AircraftError, ArithmeticError) as error:
+    except AircraftError as error:
         raise bad_input(error) from error
     if as_json:
         print_json(result)

@@ -86,8 +86,17 @@ class Track:
         FloatArray | None,
         Column("height above the true ground; NaN where that is not known, the default", in_digest=False),
     ] = None
+    actuator_limited_s: Annotated[
+        FloatArray | None,
+        Column(
+            "time since the start in which a servo was at its rate limit, each counted; 0 without such servos",
+            in_digest=False,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
+        if self.actuator_limited_s is None:
+            object.__setattr__(self, "actuator_limited_s", np.zeros(len(self.time_s)))
         if self.altitude_above_ground_m is None:
             object.__setattr__(self, "altitude_above_ground_m", np.full(len(self.time_s), math.nan))
         for name, column in TRACK_COLUMNS.items():

@@ -116,6 +116,7 @@ class TrackLog:
             plan_index=of["plan_index"],
             arc_length_m=of["arc_length_m"],
             throttle=of["throttle"],
+            actuator_limited_s=of["actuator_limited_s"],
             altitude_above_ground_m=(
                 None if self._ground is None else of["up_m"] - self._ground(of["east_m"], of["north_m"])
             ),

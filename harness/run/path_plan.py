@@ -10,7 +10,6 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from aircraft.airframe import Airframe
-from aircraft.airframes import airframe
 from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import VerticalProfile, flat
 from harness.files.input_file import InputError
@@ -18,6 +17,7 @@ from harness.run_files.given_path import FloatArray, FlyBy, fly_by
 from harness.run_files.mission.flying import Flying, Ground
 from harness.run_files.mission.route import mission_route
 from harness.run_files.path_files import GivenPath
+from harness.scenario.guidance_keys import airframe_of
 from harness.scenario.scenario import Scenario, performance_of
 from harness.scenario.sections import ALTITUDES_M
 from harness.scenario.validation import KeyFault
@@ -90,7 +90,7 @@ def planned(
         InputError: it cannot be made into a path: altitudes above a ground that is not known, an airspeed at which
             the wind is too strong.
     """
-    frame = airframe(scenario.aircraft.model)
+    frame = airframe_of(scenario.aircraft)
     free_m = FREE_SHARE * scenario.trackability.cross_track_m
     speed = scenario.aircraft.airspeed_mps
     if given.mission is None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from aircraft.airframes import airframe
 from aircraft.frames import LocalPlane
 from aircraft.guidance.altitude import LevelFlight
 from aircraft.guidance.interface import GuidanceLaw
@@ -31,7 +30,7 @@ from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
-from harness.scenario.guidance_keys import law_of
+from harness.scenario.guidance_keys import airframe_of, law_of
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario, mission_of, performance_of
 from harness.scenario.sections import Environment, Origin
@@ -150,14 +149,14 @@ def jsbsim_aircraft(
     origin = scenario.area.origin
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
     rate_hz = scenario.simulation.rate_hz
-    return JsbsimModel(airframe(scenario.aircraft.model), start, plane, air, rate_hz, climb_limit_mps)
+    return JsbsimModel(airframe_of(scenario.aircraft), start, plane, air, rate_hz, climb_limit_mps)
 
 
 def flight_limits(scenario: Scenario) -> FlightLimits:
     """What a scenario's flight is measured against."""
     performance, limits = performance_of(scenario), scenario.trackability
     calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
-    guidance = airframe(scenario.aircraft.model).guidance_limits()
+    guidance = airframe_of(scenario.aircraft).guidance_limits()
     speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
     wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
     sensor = scenario.sensor

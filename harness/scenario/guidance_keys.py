@@ -13,6 +13,7 @@ from harness.scenario.sections import AircraftSpec, GuidanceSpec
 from harness.scenario.validation import KeyFault
 
 if TYPE_CHECKING:
+    from aircraft.airframe import Airframe
     from aircraft.envelope import LawCard
     from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
 
@@ -35,11 +36,26 @@ def resolved(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceSpec:
         return spec.model_copy(update={each.name: getattr(config, each.name) for each in fields(kind.config)})
 
 
-def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
-    """What guidance may ask of an aircraft that flies at its airspeed."""
+def airframe_of(spec: AircraftSpec) -> Airframe:
+    """The airframe of a scenario, with its servos.
+
+    Raises:
+        AircraftError: there is none, or it cannot be flown.
+    """
+    from aircraft.actuators.actuator import Actuator, Actuators
     from aircraft.airframes import airframe
 
-    return airframe(aircraft.model).guidance_limits(aircraft.airspeed_mps)
+    servos = spec.actuators
+    if servos is None:
+        return airframe(spec.model)
+    return airframe(
+        spec.model, Actuators.alike(Actuator(servos.lag_s, servos.rate_limit_degps, servos.deadband_deg))
+    )
+
+
+def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
+    """What guidance may ask of an aircraft that flies at its airspeed."""
+    return airframe_of(aircraft).guidance_limits(aircraft.airspeed_mps)
 
 
 def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
@@ -59,13 +75,13 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     Raises:
         KeyFault: the law does not track with this aircraft, or raised an exception.
     """
-    from aircraft.airframes import AircraftError, airframe
+    from aircraft.airframes import AircraftError
     from aircraft.law_cards.cards import law_card
 
     kind, config = _made_of(spec)
     try:
         with PrintingAside():
-            return law_card(airframe(aircraft.model), kind, config, aircraft.airspeed_mps)
+            return law_card(airframe_of(aircraft), kind, config, aircraft.airspeed_mps)
     except AircraftError as error:
         raise KeyFault(("guidance", "kind"), str(error)) from error
     except KeyboardInterrupt:

@@ -285,7 +285,7 @@ def performance_of(scenario: Scenario) -> Performance:
         KeyFault: there is no such aircraft, it cannot hold the airspeed, the wind is too strong for it, or the guidance
             law does not track with it.
     """
-    from aircraft.airframes import AircraftError, airframe
+    from aircraft.airframes import AircraftError
     from aircraft.envelope import performance
 
     spec, air = scenario.aircraft, scenario.environment
@@ -298,7 +298,7 @@ def performance_of(scenario: Scenario) -> Performance:
     try:
         gusts = air.turbulence.intensity if air.turbulence else None
         front_mps = air.gust.speed_mps if air.gust else 0.0
-        frame = airframe(spec.model)
+        frame = guidance_keys.airframe_of(spec)
         frame.check_airspeed(spec.airspeed_mps)
         law = guidance_keys.card_of(scenario.guidance, spec)
         return performance(frame, spec.airspeed_mps, wind_mps, gusts, front_mps, law)
@@ -360,15 +360,17 @@ def _cruise_mps(spec: AircraftSpec) -> float:
     from aircraft.airframes import AircraftError, airframe
 
     try:
-        return airframe(spec.model).cruise_mps
+        airframe(spec.model)
     except AircraftError as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
+    try:
+        return guidance_keys.airframe_of(spec).cruise_mps
+    except AircraftError as error:
+        raise KeyFault(("aircraft", "actuators"), str(error)) from error
 
 
 def _limit_load_factor(spec: AircraftSpec) -> float:
-    from aircraft.airframes import airframe
-
-    weight_lb = airframe(spec.model).mass_kg / POUND_KG
+    weight_lb = guidance_keys.airframe_of(spec).mass_kg / POUND_KG
     return min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0))
 
 

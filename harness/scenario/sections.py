@@ -142,6 +142,24 @@ class MissionSpec(Section):
         return self
 
 
+class ActuatorsSpec(Section):
+    """Servos of the surfaces and the throttle, all alike; 60 degrees of a servo's arm are full throttle."""
+
+    lag_s: float = key(
+        "Time constant of the lag of a surface behind its command.", unit="s", default=0.0, ge=0, le=10
+    )
+    rate_limit_degps: float | None = key(
+        "Fastest motion of a surface. Default: no limit.", unit="deg/s", default=None, gt=0, le=100_000
+    )
+    deadband_deg: float = key(
+        "Width of the band about the trim in which a command moves nothing.",
+        unit="deg",
+        default=0.0,
+        ge=0,
+        le=90,
+    )
+
+
 class AircraftSpec(Section):
     """What flies, and how fast."""
 
@@ -157,6 +175,9 @@ class AircraftSpec(Section):
         derived="the aircraft's cruising speed",
         gt=0,
         le=1000,
+    )
+    actuators: ActuatorsSpec | None = key(
+        "Servos behind the autopilot. Default: those of the aircraft, or none.", default=None
     )
 
 

@@ -15,14 +15,14 @@ from aircraft.airframes import airframe
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw, GuidanceLimits, GuidanceOutput
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
 from aircraft.guidance.progress import route_rows
-from aircraft.interface import STEP_RATE_HZ, AircraftState, Route
+from aircraft.interface import AircraftState, Route
 from aircraft.route import arc_point, route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
 from tests.point_mass import PointMass
 
 AIRSPEED = 25.0
 ALTITUDE = 300.0
-STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ
+STEPS = 120 // UPDATE_RATE_HZ
 LIMITS = airframe("aerosonde").guidance_limits()
 Piece = tuple[float, float]
 

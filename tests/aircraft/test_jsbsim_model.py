@@ -345,7 +345,7 @@ air = Atmosphere(5.0, -2.0, "tustin", "moderate", 3)
 model = JsbsimModel(airframe({name!r}), StartConditions(1e3, 2e3, 300.0, 0.3, {airspeed}), LocalPlane(47.0, 8.0), air)
 for tick in range(600):
     model.command(0.4 if tick % 200 < 100 else -0.4, 300.0, {airspeed})
-    model.advance(SECOND // 20)
+    model.advance(3)
 state = model.state()
 open({out!r}, "w").write(" ".join(value.hex() for value in state))
 """

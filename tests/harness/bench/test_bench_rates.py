@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from harness.bench import rates
+from harness.bench.tracking import course
 from harness.cli.app import main
 
 
@@ -40,7 +41,7 @@ def test_distance_across_a_track_and_at_the_same_time() -> None:
 def test_prints_a_row_a_rate(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(rates, "RATES_HZ", (60, 120))
     monkeypatch.setattr(rates, "OPEN_LOOP_S", 5.0)
-    monkeypatch.setattr(rates, "course", lambda seed, radius_m, whole=rates.course: whole(seed, radius_m, 1))
+    monkeypatch.setattr(rates, "course", lambda seed, radius_m: course(seed, radius_m, 1))
     assert main(["bench", "rates", "--seeds", "1"]) == 0
     said = capsys.readouterr().out
     assert "from the flight at 120 Hz" in said

@@ -1,0 +1,1 @@
+"""Servos: what they do to a command, and how they get into a model."""

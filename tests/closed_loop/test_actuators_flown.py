@@ -1,0 +1,69 @@
+"""Flights with servos: the scenario's keys, the verdict's cause, and what a flight without them has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from harness.analysis.trackability import FlightLimits, legs
+from harness.files.strict_yaml import InputError
+from harness.flight.closed_loop import fly
+from harness.flight.record import Track
+from harness.run.scenario_flight import make_loop
+from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario, performance_of
+
+TEXT = """\
+schema: wayproof/scenario/1
+name: servos
+area: {bounds_m: [0, 0, 10000, 10000]}
+mission: {start_m: [1000, 1000], course_deg: 90, goal_m: [1000, 2500]}
+sensor: {range_m: 2000, rays: 90}
+"""
+SERVO = "aircraft: {actuators: {lag_s: 0.05, rate_limit_degps: 600, deadband_deg: 0.2}}\n"
+
+
+def scenario(aircraft: str = "") -> Scenario:
+    return parse_scenario(TEXT + aircraft)
+
+
+def test_servos_are_flown_and_planning_knows_of_them() -> None:
+    plain, real = scenario(), scenario(SERVO)
+    assert parse_scenario(dump_scenario(real)) == real
+    slow = plain.with_({"aircraft.actuators": {"lag_s": 0.3}})
+    assert performance_of(slow).tracking_error_m > performance_of(plain).tracking_error_m
+    flight = fly(make_loop(real))
+    assert flight.outcome.value == "reached"
+    assert flight.track.actuator_limited_s is not None
+    assert (np.diff(flight.track.actuator_limited_s) >= 0.0).all()
+    without = fly(make_loop(plain)).track.actuator_limited_s
+    assert without is not None
+    assert not without.any()
+
+
+@pytest.mark.parametrize(
+    ("aircraft", "said"),
+    [
+        ("aircraft: {actuators: {lag_s: -1}}", "6: aircraft.actuators.lag_s: is -1; must be at least 0"),
+        ("aircraft: {actuators: {rate: 3}}", "6: aircraft.actuators.rate"),
+        ("aircraft: {actuators: {lag_s: 3}}", "6: aircraft.actuators: aerosonde cannot be held at 25 m/s"),
+        (
+            "aircraft: {model: T38, actuators: {rate_limit_degps: 60}}",
+            "its model does not show how far the aileron",
+        ),
+    ],
+)
+def test_servos_that_cannot_be_flown_are_refused(aircraft: str, said: str) -> None:
+    with pytest.raises(InputError) as refused:
+        scenario(aircraft + "\n")
+    assert said in str(refused.value)
+
+
+def test_a_servo_at_its_rate_limit_is_the_cause() -> None:
+    flight = fly(make_loop(scenario()))
+    track, plans = flight.track, flight.plans
+    columns = {name: np.array(column) for name, column in vars(track).items()}
+    columns["cross_track_m"] = np.where(track.time_s > 30.0, 9.0, 0.0)
+    limits = FlightLimits(300.0, 100.0, 0.78, 110.0, 0.3, max_cross_track_m=5.0)
+    assert {leg.cause for leg in legs(Track(**columns), plans, limits)} >= {"tracking error"}
+    columns["actuator_limited_s"] = 0.5 * track.time_s
+    assert {leg.cause for leg in legs(Track(**columns), plans, limits)} >= {"actuator"}
