@@ -20,7 +20,7 @@ from harness.files.input_file import InputError as InputError
 from harness.files.input_file import read_text
 
 MAX_BYTES: Final = 32_000_000
-MAX_VALUES: Final = 2_000_000
+MAX_VALUES: Final = 3_000_000
 """Enough for 100,000 obstacles with four corners each."""
 MAX_DEPTH: Final = 20
 MAX_KEYS: Final = 1000

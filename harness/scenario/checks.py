@@ -117,6 +117,8 @@ def check_start_and_goal(
         at_start = name == "start_m"
         there = [o.fixed if not at_start else o.active_s is None or o.active_s[0] <= 0 for o in obstacles]
         for index in (index for index, present in enumerate(there) if present):
+            if _is_far(obstacles[index], point, clearance_m):
+                continue
             distance_m = distance_to(obstacles[index], point)
             if distance_m < clearance_m:
                 where = f"{distance_m:.6g} m from" if distance_m > 0 else "inside"
@@ -124,6 +126,16 @@ def check_start_and_goal(
                     ("mission", name),
                     f"lies {where} {names[index]}; must be {clearance_m:g} m (planner.clearance_m) away",
                 )
+
+
+def _is_far(obstacle: Obstacle, point: Point, distance_m: float) -> bool:
+    """Whether a polygon's upright box alone says that it is farther away: of 100,000 obstacles most are."""
+    if obstacle.polygon is None:
+        return False
+    east, north = zip(*obstacle.polygon.vertices_m, strict=True)
+    x, y = point
+    away = max(min(east) - x, x - max(east), min(north) - y, y - max(north))
+    return bool(away > distance_m)
 
 
 def distance_to(obstacle: Obstacle, point: Point) -> float:

@@ -98,7 +98,10 @@ def _joined(obstacles: Sequence[Obstacle], found: Expanded, ground: GroundSpec |
             names.append(f"obstacles[{index}]")
             continue
         source = next(sources)
-        parts = [obstacle_of(*part, each) for part in zip(source.polygons, source.heights_m, strict=True)]
+        parts = [
+            obstacle_of(rings, heights_m, each)
+            for rings, heights_m in zip(rings_of(source.polygons), source.heights_m, strict=True)
+        ]
         every += parts
         names += [f"what obstacles[{index}] has of {source.spec.path.name}"] * len(parts)
         told.append(
@@ -115,15 +118,33 @@ def _joined(obstacles: Sequence[Obstacle], found: Expanded, ground: GroundSpec |
     )
 
 
-def obstacle_of(shape: object, heights_m: tuple[float, float], like: Obstacle) -> Obstacle:
-    """A polygon of shapely, valid already, between two heights, as an obstacle."""
+Ring = tuple[Point, ...]
+
+
+def rings_of(polygons: Sequence[object]) -> list[list[Ring]]:
+    """Corners of each polygon of shapely: of its outline, then of its holes; no corner twice."""
+    import numpy as np
     import shapely
 
-    def ring(line: object) -> tuple[Point, ...]:
-        return tuple(map(tuple, shapely.get_coordinates(line)[:-1].tolist()))
+    rings, of = shapely.get_rings(np.array(polygons, dtype=object), return_index=True)
+    corners = list(map(tuple, shapely.get_coordinates(rings).tolist()))
+    found: list[list[Ring]] = [[] for _ in polygons]
+    end = 0
+    for index, count in zip(of.tolist(), shapely.get_num_coordinates(rings).tolist(), strict=True):
+        begin, end = end, end + count
+        found[index].append(tuple(corners[begin : end - 1]))
+    return found
 
-    holes = tuple(ring(each) for each in shape.interiors) or None  # type: ignore[attr-defined]
-    polygon = Polygon.model_construct(vertices_m=ring(shape.exterior), holes_m=holes)  # type: ignore[attr-defined]
+
+def obstacle_of(rings: Sequence[Ring], heights_m: tuple[float, float], like: Obstacle) -> Obstacle:
+    """A valid polygon between two heights as an obstacle.
+
+    Args:
+        rings: its outline, then its holes.
+        heights_m: bottom and top.
+        like: the obstacle that names the file.
+    """
+    polygon = Polygon.model_construct(vertices_m=rings[0], holes_m=tuple(rings[1:]) or None)
     return Obstacle.model_construct(
         circle=None,
         polygon=polygon,

@@ -105,15 +105,12 @@ def xml_events(data: bytes, ends_only: bool = True) -> Iterator[tuple[str, Eleme
         ) from error
 
 
-def xml_tags(
-    data: bytes, begin: Callable[[str, dict[str, str]], None], end: Callable[[str], None] | None = None
-) -> None:
+def xml_tags(data: bytes, begin: Callable[[str, dict[str, str]], None]) -> None:
     """Tells of the tags of an XML text in their order, without keeping anything: for files of millions of elements.
 
     Args:
         data: the text.
-        begin: told the name and the attributes of an element.
-        end: told its name where it ends.
+        begin: told the name and the attributes of each element.
 
     Raises:
         WorldFileError: it is not whole XML, or declares entities.
@@ -121,7 +118,6 @@ def xml_tags(
     parser = expat.ParserCreate()
     parser.EntityDeclHandler = _no_entities
     parser.StartElementHandler = begin
-    parser.EndElementHandler = end
     try:
         parser.Parse(data, True)
     except expat.ExpatError as error:

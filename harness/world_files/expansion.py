@@ -22,10 +22,12 @@ from harness.world_files.terrain import height_field
 
 MARGIN: Final = 0.02
 """What lies outside the area by more than this share of its longer side is left out."""
-GRID_M: Final = 0.001
-"""Corners are rounded to it."""
-MAX_CORNERS: Final = 600_000
+DECIMALS: Final = 3
+"""Of a corner's metres: it is rounded to a millimetre."""
+MAX_CORNERS: Final = 900_000
 """Of all files together: a scenario with more could not be read again."""
+MANY_CORNERS: Final = 20_000
+"""Of more corners those of their hull say what a file covers."""
 MAX_POLYGONS: Final = 150_000
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """Bottom and top of what has none."""
@@ -206,7 +208,7 @@ def _with_margin(bounds_m: Box) -> Box:
 
 
 def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
-    """X and y, in the file, of the corners of all that it holds; two empty arrays where it holds nothing."""
+    """X and y, in the file, of the corners of all that it holds, of many those of their hull; empty without any."""
     import shapely
 
     found = [np.zeros((0, 2))]
@@ -219,6 +221,8 @@ def corners_of(contents: Contents) -> tuple[FloatArray, FloatArray]:
         bounds = shapely.bounds(np.array([part.footprint for part in contents.parts], dtype=object))
         found += [bounds[:, [i, j]] for i in (0, 2) for j in (1, 3)]
     corners = np.concatenate(found)
+    if len(corners) > MANY_CORNERS and np.isfinite(corners).all():
+        corners = shapely.get_coordinates(shapely.convex_hull(shapely.linestrings(corners)))
     return corners[:, 0], corners[:, 1]
 
 
@@ -285,6 +289,8 @@ def _cut(
     final = [_with_holes(each, spec.holes, turn_room_m) for each in _rounded(grown)]
     if final:
         notes.append(f"outlines simplified by at most {tolerance_m:.3g} m, outwards only")
+    else:
+        notes.append(f"nothing of it is solid in the area between {band.low_m:g} and {band.high_m:g} m")
     heights = _heights(final, solids, None if contents.terrain is None else band.low_m)
     digest = _digest(spec.path.absolute(), (stamp.st_size, stamp.st_mtime_ns))
     return Source(spec, contents.kind, digest, tuple(final), tuple(heights), tuple(notes))
@@ -354,7 +360,11 @@ def _rounded(polygons: Sequence[Any]) -> list[Any]:
     """The same with corners on a fine grid, valid."""
     import shapely
 
-    placed = shapely.set_precision(np.array(polygons, dtype=object), GRID_M)
+    shapes = np.array(polygons, dtype=object)
+    placed = shapely.transform(shapes, lambda points: np.round(points, DECIMALS))
+    placed = shapely.remove_repeated_points(placed)
+    bad = ~shapely.is_valid(placed)
+    placed[bad] = shapely.set_precision(shapes[bad], 10.0**-DECIMALS)
     return [each for each in shapely.get_parts(placed) if each.geom_type == "Polygon" and each.area > 0]
 
 

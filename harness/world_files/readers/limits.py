@@ -126,6 +126,8 @@ def metres_of(value: Any) -> float | None:
     if isinstance(value, int | float):
         return float(value) if math.isfinite(value) else None
     text = str(value).strip().lower().replace(",", ".")
+    if text.isdecimal():
+        return float(text)
     if match := re.fullmatch(r"(\d+)'(?:(\d+)(?:''|\"))?", text):
         return (float(match[1]) + float(match[2] or 0) / 12.0) * FOOT_M
     if match := re.fullmatch(r"([-+]?\d+(?:\.\d+)?)\s*(|m|mtr|metres?|meters?|ft|foot|feet)\.?", text):

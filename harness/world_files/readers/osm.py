@@ -20,6 +20,7 @@ from harness.world_files.readers.osm_elements import (
 )
 
 MAX_BYTES: Final = 400_000_000
+MOST_NUMBER: Final = 1 << 62
 
 
 def read_xml(path: Path, reading: Reading) -> Contents:
@@ -29,87 +30,89 @@ def read_xml(path: Path, reading: Reading) -> Contents:
         WorldFileError: it is not whole, or has no building.
     """
     document = _Document()
-    xml_tags(read_bytes(path, MAX_BYTES), document.begin, document.end)
+    xml_tags(read_bytes(path, MAX_BYTES), document.begin)
+    document.finish()
     return document.elements.contents(reading)
 
 
 class _Document:
-    """Tags of an OpenStreetMap XML file made into elements."""
+    """Tags of an OpenStreetMap XML file made into elements; a way ends where the next element begins."""
 
     def __init__(self) -> None:
         self.elements = Elements()
-        self._kind, self._deleted, self._number = "", False, 0
+        self._kind, self._number = "", 0
         self._tags: dict[str, str] = {}
         self._refs: list[int] = []
         self._members: list[Member] = []
-        self._inline = 0
+        self._inline = FIRST_INLINE
 
     def begin(self, tag: str, attributes: dict[str, str]) -> None:
         """An element begins; what stands in a way or relation belongs to that."""
         if tag == "nd":
-            self._node_of_way(attributes)
+            if "lat" in attributes:
+                self._place_of_way(attributes)
+            else:
+                self._refs.append(_whole(tag, attributes, "ref"))
         elif tag == "tag":
             self._tags[attributes.get("k", "")] = attributes.get("v", "")
-        elif tag == "node":
-            if not _deleted(attributes):
-                self.elements.node(_whole(tag, attributes, "id"), *_place(attributes))
-        elif tag in ("way", "relation"):
-            self._kind, self._deleted, self._number = tag, _deleted(attributes), _whole(tag, attributes, "id")
+        elif tag == "member":
+            self._finish_member()
+            if attributes.get("type") == "way":
+                self._members.append((_whole(tag, attributes, "ref"), attributes.get("role") == "inner"))
+        elif tag in ("node", "way", "relation"):
+            if self._kind:
+                self.finish()
+            deleted = attributes.get("visible") == "false" or attributes.get("action") == "delete"
+            self._number, self._kind = _whole(tag, attributes, "id"), "" if deleted else tag
+            if tag == "node":
+                self._kind = ""
+                if not deleted:
+                    self.elements.node(self._number, *_place(attributes))
             self._tags, self._refs, self._members = {}, [], []
-        elif tag == "member" and attributes.get("type") == "way":
-            self._members.append((_whole(tag, attributes, "ref"), attributes.get("role") == "inner"))
-            self._refs = []
 
-    def end(self, tag: str) -> None:
-        """An element ends."""
-        if tag == "member" and self._members and self._refs:
+    def finish(self) -> None:
+        """The last element ends."""
+        if self._kind == "way":
+            self.elements.way(self._number, self._refs, self._tags)
+        elif self._kind == "relation":
+            self._finish_member()
+            self.elements.relation(self._number, self._members, self._tags)
+        self._kind = ""
+
+    def _finish_member(self) -> None:
+        """Overpass's `out geom` gives the line of a way as a member of a relation."""
+        if self._members and self._refs:
             self.elements.way(self._members[-1][0], self._refs, {})
-            self._refs = []
-        elif tag == self._kind:
-            if not self._deleted and tag == "way":
-                self.elements.way(self._number, self._refs, self._tags)
-            elif not self._deleted:
-                self.elements.relation(self._number, self._members, self._tags)
-            self._kind = ""
-        elif tag == "node":
-            self._tags = {}
+        self._refs = []
 
-    def _node_of_way(self, attributes: dict[str, str]) -> None:
-        """A node of a way; Overpass's `out geom` gives its place there, in a relation without its number."""
-        if "ref" in attributes:
-            number = _whole("nd", attributes, "ref")
-        else:
-            self._inline -= 1
-            number = FIRST_INLINE + self._inline
-        if "lat" in attributes:
-            self.elements.node(number, *_place(attributes))
+    def _place_of_way(self, attributes: dict[str, str]) -> None:
+        """A node with its place in a way, as `out geom` has it; in a relation it has no number."""
+        number = _whole("nd", attributes, "ref") if "ref" in attributes else self._inline
+        self._inline -= 1
+        self.elements.node(number, *_place(attributes))
         self._refs.append(number)
-
-
-def _deleted(attributes: Mapping[str, str]) -> bool:
-    return attributes.get("visible") == "false" or attributes.get("action") == "delete"
 
 
 def _whole(tag: str, attributes: Mapping[str, str], name: str) -> int:
     try:
-        number = int(attributes.get(name, ""))
-        if abs(number) < 1 << 62:
+        number = int(attributes[name])
+        if -MOST_NUMBER < number < MOST_NUMBER:
             return number
-    except ValueError:
+    except (KeyError, ValueError):
         pass
     raise WorldFileError(f"has a {tag} whose {name} is no number; must be OpenStreetMap XML")
 
 
 def _place(attributes: Mapping[str, Any]) -> tuple[float, float]:
     try:
-        longitude, latitude = float(attributes.get("lon", "nan")), float(attributes.get("lat", "nan"))
-    except (TypeError, ValueError) as error:
+        longitude, latitude = float(attributes["lon"]), float(attributes["lat"])
+    except (KeyError, TypeError, ValueError) as error:
         raise WorldFileError(f"has node {attributes.get('id')} whose lat or lon is no number") from error
-    if not (abs(longitude) <= 180.0 and abs(latitude) <= 90.0):
-        raise WorldFileError(
-            f"has node {attributes.get('id')} at lat {latitude:g}, lon {longitude:g}; must be degrees"
-        )
-    return longitude, latitude
+    if -180.0 <= longitude <= 180.0 and -90.0 <= latitude <= 90.0:
+        return longitude, latitude
+    raise WorldFileError(
+        f"has node {attributes.get('id')} at lat {latitude:g}, lon {longitude:g}; must be degrees"
+    )
 
 
 def read_json(path: Path, reading: Reading) -> Contents:
