@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from harness.api.look import campaign_html, comparison_html, flight_html
 from harness.api.metrics import Metrics
+from harness.api.recordings import Recording, recorded
 from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario
 
@@ -69,11 +70,11 @@ class FlightResult:
         return self.metrics.digest
 
     @property
-    def recording(self) -> Path | None:
-        """The rerun recording; None where none was made."""
+    def recording(self) -> Recording | None:
+        """The rerun recording, a path that can be asked for what was recorded; None where none was made."""
         from harness.run_files.run_folder import RECORDING
 
-        path = self.folder / RECORDING if self.folder else None
+        path = Recording(self.folder / RECORDING) if self.folder else None
         return path if path and path.is_file() else None
 
     def show(self, width_px: int = 1000, height_px: int = 600) -> Any:
@@ -168,6 +169,39 @@ class CampaignResult:
         from harness.campaign.summary import summarise
 
         return summarise(self.folder)
+
+    @property
+    def recordings(self) -> dict[int, Recording]:
+        """The recordings that the campaign kept, by the number of the run."""
+        from harness.campaign.folder import recordings_of
+
+        return {int(path.parent.name): Recording(path) for path in recordings_of(self.folder)}
+
+    def dataframe(
+        self,
+        contents: str | Sequence[str] = "/series/**",
+        index: str = "sim_time",
+        *,
+        filled: bool = False,
+        runs: Sequence[int] | None = None,
+    ) -> pa.Table:
+        """What the recordings hold of some entities, run below run; as `Recording.dataframe` of one.
+
+        Args:
+            contents: paths of entities as rerun writes them.
+            index: the timeline.
+            filled: a row has the last value of whatever has none at its time.
+            runs: numbers of runs; default: all that were kept.
+
+        Raises:
+            InputError: one of the runs has no recording, or the extra `wayproof[catalog]` is not installed.
+        """
+        kept = self.recordings
+        missing = [run for run in runs or () if run not in kept]
+        if missing:
+            raise InputError(f"wayproof: {self.folder} has no recording of run {missing[0]}")
+        files = [*kept.values()] if runs is None else [kept[run] for run in runs]
+        return recorded(files, contents, index, filled)
 
     @property
     def outcomes(self) -> dict[str, int]:

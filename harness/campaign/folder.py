@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -25,6 +25,7 @@ from harness.files.input_file import read_index
 from harness.files.versions import versions
 from harness.files.whole_file import PARTIAL, replace_text
 from harness.files.wording import counted
+from harness.recording.properties import severity
 from harness.run_files.run_folder import RECORDING
 from planner.registry import distribution_of
 
@@ -199,3 +200,28 @@ def recordings_of(folder: Path) -> list[Path]:
     """The recordings that a campaign's folder keeps, by the number of the run."""
     kept = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
     return sorted(kept, key=lambda path: int(path.parent.name))
+
+
+def worst_first(folder: Path, recordings: Sequence[Path]) -> list[Path]:
+    """Recordings of a campaign in the order of how badly their runs went, as far as its results tell.
+
+    Args:
+        folder: of the campaign.
+        recordings: some of it, by the number of the run; those that results tell nothing of come last.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = ["run", "outcome", "trackable", "min_clearance_m", "wanted_clearance_m"]
+    try:
+        rows = pq.read_table(folder / RESULTS, columns=columns).to_pylist()
+    except (OSError, pa.ArrowException):
+        return [*recordings]
+    bad = {row["run"]: _how_bad(row) for row in rows}
+    return sorted(recordings, key=lambda path: -bad.get(int(path.parent.name), -1.0))
+
+
+def _how_bad(row: Mapping[str, Any]) -> float:
+    least_m, wanted_m = row["min_clearance_m"], row["wanted_clearance_m"]
+    ratio = least_m / wanted_m if least_m is not None and wanted_m else None
+    return severity(str(row["outcome"]), bool(row["trackable"]), ratio)

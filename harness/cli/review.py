@@ -118,14 +118,16 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
 
 def open_campaign(folder: Path, web: bool = False) -> bool:
     """Shows the recordings of a campaign as a table until the viewer is closed; says why, if it cannot start."""
-    from harness.campaign.folder import recordings_of
+    from harness.campaign.folder import recordings_of, worst_first
     from harness.files.errors import RunFolderError
-    from harness.recording.catalog import open_table
+    from harness.recording.catalog import AT_ONCE, open_table
     from harness.recording.viewer import ViewerError
 
     try:
-        recordings = recordings_of(folder)
-        say(f"{len(recordings)} recordings", err=True)
+        recordings = worst_first(folder, recordings_of(folder))
+        many = len(recordings) > AT_ONCE
+        added = f", the worst {AT_ONCE} first; the circular arrow beside the name shows those that have been added"
+        say(f"{len(recordings)} recordings{added if many else ''}", err=True)
         open_table(
             folder.resolve().name,
             recordings,

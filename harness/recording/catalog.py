@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
+import threading
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -59,27 +60,36 @@ class Catalog:
     Attributes:
         url: of the dataset: what a viewer opens.
         dataset: rerun's handle of it, for queries.
+        all_there: set when all of the recordings are in it.
     """
 
     url: str
     dataset: Any
+    all_there: threading.Event
 
     def table(self) -> pa.Table:
-        """The runs as a table, one row a recording, worst first."""
+        """The runs as a table, one row a recording, worst first; waits until all are there."""
         from datafusion import col
 
+        self.all_there.wait()
         runs = self.dataset.segment_table()
         table: pa.Table = runs.sort(col(f'"{_figure("severity")}"').sort(ascending=False)).to_arrow_table()
         return table
+
+
+AT_ONCE: Final = 100
+"""Recordings that rerun's server reads together: about half a second's work."""
 
 
 @contextlib.contextmanager
 def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
     """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts.
 
+    The first of many are there when the block begins, the others follow: to read a thousand takes seconds.
+
     Args:
         name: of the campaign.
-        recordings: files of runs, each with an identity of its own.
+        recordings: files of runs, each with an identity of its own, those that matter most first.
 
     Raises:
         RunFolderError: there are none.
@@ -94,13 +104,37 @@ def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
     from rerun.server import Server
 
     try:
-        server = Server(host=LOCALHOST, datasets={name: [str(path.resolve()) for path in recordings]})
+        first = [str(path.resolve()) for path in recordings[:AT_ONCE]]
+        server = Server(host=LOCALHOST, datasets={name: first})
     except (RuntimeError, ValueError, OSError, ConnectionError) as error:
         raise ViewerError(f"rerun's server does not start: {error}") from error
     with server, tempfile.TemporaryDirectory(prefix="wayproof-table-") as scratch:
         dataset = server.client().get_dataset(name)
         _lay_out(dataset, Path(scratch) / "table.rbl")
-        yield Catalog(f"{server.url()}/entry/{dataset.id}", dataset)
+        with _followed_by(dataset, recordings[AT_ONCE:]) as all_there:
+            yield Catalog(f"{server.url()}/entry/{dataset.id}", dataset, all_there)
+
+
+@contextlib.contextmanager
+def _followed_by(dataset: Any, recordings: Sequence[Path]) -> Iterator[threading.Event]:
+    """Adds recordings while the block lasts; gives what is set when all are there."""
+    over, all_there = threading.Event(), threading.Event()
+
+    def add() -> None:
+        for first in range(0, len(recordings), AT_ONCE):
+            if over.is_set():
+                return
+            some = [path.resolve().as_uri() for path in recordings[first : first + AT_ONCE]]
+            dataset.register(some).wait()
+        all_there.set()
+
+    adder = threading.Thread(target=add, name="recordings", daemon=True)
+    adder.start()
+    try:
+        yield all_there
+    finally:
+        over.set()
+        adder.join()
 
 
 def _figure(name: str) -> str:
@@ -200,3 +234,63 @@ def properties_of(recording: Path) -> Mapping[str, Any]:
             row = chunk.to_record_batch().to_pylist()[0]
             return {name: value[0] for name, value in row.items() if isinstance(value, list)}
     return {}
+
+
+def series_table(
+    recordings: Sequence[Path], contents: str | Sequence[str], index: str, filled: bool = False
+) -> pa.Table:
+    """What recordings hold of some entities, row by row of a timeline.
+
+    Args:
+        recordings: files, each with an identity of its own.
+        contents: paths of entities as rerun writes them: `/series/**`, `-/series/bank/**` for what is left out.
+        index: the timeline.
+        filled: a row has the last value of whatever has none at its time.
+
+    Returns:
+        `recording`, its identity; the time, in seconds on a timeline of durations; a column for each component that
+        changes, of a scalar one number called after its entity, of anything else a list.
+
+    Raises:
+        RunFolderError: there are no recordings.
+        ViewerError: rerun's server is not installed or does not start.
+        ValueError: no recording has the timeline.
+    """
+    with catalog("recordings", recordings) as served:
+        served.all_there.wait()
+        selection = served.dataset.filter_contents(contents)
+        try:
+            rows = selection.reader(index=index, fill_latest_at=filled).to_arrow_table()
+        except Exception as error:
+            raise ValueError(f"no rows of {contents} on the timeline {index}: {error}") from error
+    return _plain(rows, index)
+
+
+def _plain(rows: pa.Table, index: str) -> pa.Table:
+    """Columns of rerun's as others read them, in the order of recording and time."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    columns: dict[str, Any] = {"recording": rows.column("rerun_segment_id")}
+    for field in rows.schema:
+        about = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
+        column = rows.column(field.name)
+        if field.name == index and pa.types.is_duration(field.type):
+            columns[f"{index}_s"] = pc.divide(pc.cast(pc.cast(column, pa.int64()), pa.float64()), 1e9)
+        elif field.name == index:
+            columns[index] = column
+        elif about.get("rerun:component") == "Scalars:scalars":
+            columns[about["rerun:entity_path"]] = pc.list_element(_one_each(column), 0)
+        elif about.get("rerun:kind") == "data" and about.get("rerun:is_static") != "true":
+            columns[field.name] = column
+    table = pa.table(columns)
+    return table.sort_by([("recording", "ascending"), (table.column_names[1], "ascending")])
+
+
+def _one_each(column: Any) -> Any:
+    """Lists of one number, those without any taken for missing."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    empty = pc.equal(pc.list_value_length(column), 0)
+    return pc.if_else(pc.fill_null(empty, True), pa.scalar(None, column.type), column)

@@ -46,7 +46,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
     wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
     found: dict[str, Value | None] = {
         "outcome": metrics["outcome"],
-        "severity": _severity(metrics["outcome"], bool(metrics["trackable"]), ratio),
+        "severity": severity(metrics["outcome"], bool(metrics["trackable"]), ratio),
         "trackable": bool(metrics["trackable"]),
         "causes": ", ".join(causes) or None,
         "min_clearance_m": clearance_m,
@@ -77,7 +77,14 @@ def _rounded(value: Value) -> Value:
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-def _severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> float:
+def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> float:
+    """How badly a run went: its outcome before the point, and behind it more the less clearance there was.
+
+    Args:
+        outcome: a value of `harness.flight.record.Outcome`.
+        trackable: whether all legs were tracked.
+        clearance_ratio: least clearance over the wanted one; None where there was nothing to keep clear of.
+    """
     whole = SEVERITY.get(outcome, 0.0 if trackable else 1.0)
     near = 0.0 if clearance_ratio is None else 1.0 / (1.0 + math.exp(min(clearance_ratio, 50.0)))
     return round(whole + near, 6)

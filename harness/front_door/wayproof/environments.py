@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import sys
-from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
-from importlib.util import find_spec
 
 TYPE_CHECKING = False  # as of `typing`, which takes longer to import than all of this
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from importlib.abc import Loader
+    from importlib.machinery import ModuleSpec
     from types import ModuleType
 
 GYMNASIUM = "gymnasium"
@@ -35,8 +34,8 @@ def _register() -> None:
             register(name, made_by)
 
 
-class _Watcher(MetaPathFinder):
-    """Waits for the import of gymnasium, once."""
+class _Watcher:
+    """Waits for the import of gymnasium, once. A finder, without its base class, which takes long to import."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
@@ -44,15 +43,17 @@ class _Watcher(MetaPathFinder):
         """The module as all others find it, with a loader that registers afterwards."""
         if fullname != GYMNASIUM:
             return None
+        from importlib.util import find_spec
+
         sys.meta_path.remove(self)
         spec = find_spec(fullname)
         if spec is not None and spec.loader is not None:
-            spec.loader = _Registers(spec.loader)
+            spec.loader = _Registers(spec.loader)  # type: ignore[assignment]
         return spec
 
 
-class _Registers(Loader):
-    """A loader that registers once its module is there."""
+class _Registers:
+    """A loader, likewise, that registers once its module is there."""
 
     def __init__(self, loader: Loader) -> None:
         self._loader = loader

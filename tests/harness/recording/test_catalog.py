@@ -11,9 +11,12 @@ import pytest
 import rerun as rr
 
 from harness.analysis.metrics import metrics
-from harness.campaign.folder import recordings_of
+from harness.api.results import CampaignResult
+from harness.campaign.folder import recordings_of, worst_first
 from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.recording import catalog as catalogs
 from harness.recording.catalog import catalog, properties_of, table_screenshot
 from harness.recording.properties import run_properties
 from harness.recording.thin import ThinLog
@@ -153,3 +156,59 @@ def test_the_table_is_drawn(campaign: Path, tmp_path: Path) -> None:
             raise
         pytest.skip(NO_DRIVER)
     assert png.stat().st_size > 20_000
+
+
+def test_many_recordings_follow_the_first(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(catalogs, "AT_ONCE", 1)
+    with catalog("windy", recordings_of(campaign)) as served:
+        assert len(served.table()) == 3
+    with catalog("windy", recordings_of(campaign)[:1]) as served:
+        assert served.all_there.wait(10.0)
+
+
+def test_recordings_are_asked_worst_first(campaign: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    recordings = recordings_of(campaign)
+    assert worst_first(campaign, recordings) == recordings
+    rows = {
+        "run": [0, 1, 2],
+        "outcome": ["reached", "collision", "reached"],
+        "trackable": [True, False, True],
+        "min_clearance_m": [250.0, -3.0, 120.0],
+        "wanted_clearance_m": [100.0, 100.0, 100.0],
+    }
+    pq.write_table(pa.table(rows), campaign / "results.parquet")
+    assert [path.parent.name for path in worst_first(campaign, recordings)] == ["1", "2", "0"]
+
+
+def test_what_was_recorded_is_a_table(campaign: Path) -> None:
+    kept = CampaignResult(campaign)
+    one = kept.recordings[1].dataframe("/series/clearance/**")
+    assert one.column_names == [
+        "recording",
+        "sim_time_s",
+        "/series/clearance/flown",
+        "/series/clearance/wanted",
+    ]
+    assert set(one["recording"].to_pylist()) == {"run 1"}
+    times = one["sim_time_s"].to_numpy()
+    assert (times[0], times[-1]) == (0.0, 100.0)
+    np.testing.assert_allclose(one["/series/clearance/flown"].to_numpy(), 500.0 - 5.03 * times)
+    assert one["/series/clearance/wanted"].to_pylist()[0] == 100.0
+    assert one["/series/clearance/wanted"].null_count > 0
+    assert (
+        kept.recordings[1]
+        .dataframe("/series/clearance/**", filled=True)["/series/clearance/wanted"]
+        .null_count
+        == 0
+    )
+    every = kept.dataframe(["/series/**", "-/series/bank/**"])
+    assert set(every["recording"].to_pylist()) == {"run 0", "run 1", "run 2"}
+    assert "/series/bank/flown" not in every.column_names
+    assert set(kept.dataframe(runs=[2])["recording"].to_pylist()) == {"run 2"}
+    with pytest.raises(InputError, match="no recording of run 7"):
+        kept.dataframe(runs=[7])
+    with pytest.raises(InputError, match=r"no rows of /series/\*\* on the timeline wall_time"):
+        kept.recordings[1].dataframe(index="wall_time")
