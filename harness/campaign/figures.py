@@ -1,4 +1,7 @@
-"""Figures of a campaign: success against a varied key, and how long the ways were. Drawn without a screen."""
+"""Figures of a campaign: success against a varied key, how long the ways were, where runs failed.
+
+Drawn without a screen.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +11,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.campaign.points import RunPoints
+from harness.campaign.points import Failure, RunPoints
 from harness.campaign.summary import CURVE_POINTS, Table
-from harness.report.figure_style import DASHES, colour, styled
+from harness.report.figure_style import DASHES, WIDTH_IN, colour, styled
+from harness.report.figures import draw_map, thinned
 
 HEIGHT_IN = 2.9
 LEGEND_LETTERS, KEY_LETTERS = 66, 6
@@ -21,6 +25,8 @@ ROTATED_FROM = 5
 """From so many groups on, their labels stand slanted."""
 PANEL_IN = 1.5
 """Height of a panel of small multiples."""
+MAPS_A_ROW, MAP_TITLE_IN = 3, 0.45
+"""Maps of failures beside one another, and what each has above and below it."""
 LABEL_LETTERS = 32
 """A longer label of a group loses its middle, for it takes room from what is drawn."""
 
@@ -98,6 +104,27 @@ def scatter(points: RunPoints) -> Figure | None:
                     axes.set_ylabel(label)
                 if row == rows - 1:
                     axes.set_xlabel(_short(key))
+    return figure
+
+
+def where_failed(failed: Sequence[Failure]) -> Figure:
+    """A map of each failure: its world, the track, and a cross where it ended."""
+    columns = min(MAPS_A_ROW, len(failed))
+    rows = math.ceil(len(failed) / columns)
+    bounds = [each.scene.bounds_m for each in failed]
+    shape = max((ymax - ymin) / (xmax - xmin) for xmin, ymin, xmax, ymax in bounds)
+    with styled(rows * (min(shape, 2.0) * WIDTH_IN / columns + MAP_TITLE_IN)) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False).flat
+        for each, axes in zip(failed, grid, strict=False):  # in this order: the other takes one axes too many
+            draw_map(axes, each.scene)
+            track_km = thinned(each.track_m, each.scene) / 1e3
+            axes.plot(*track_km.T, color=colour(0), lw=1.2, zorder=5)
+            axes.plot(*track_km[-1], "X", color=colour(1), ms=7, mec="white", mew=0.6, zorder=8)
+            axes.set_title(f"run {each.run}: {each.outcome.replace('_', ' ')}")
+            axes.set(xlabel="", ylabel="")
+            axes.tick_params(labelsize=6, length=2)
+        for axes in grid:
+            axes.set_visible(False)
     return figure
 
 

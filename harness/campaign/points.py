@@ -1,18 +1,26 @@
-"""The runs of a campaign as points: figures of each against the numbers that were varied."""
+"""The runs of a campaign as what is drawn of them: points of figures and varied numbers, and the ways of failures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.campaign.table import load_tables, runs_of, varied_keys
+from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 
+if TYPE_CHECKING:
+    from harness.campaign.summary import Summary
+    from harness.report.figures import Scene
+
+MOST_FAILURES: Final = 9
+"""Failures beyond these are not drawn."""
 MOST_KEYS: Final = 4
 """Numbers that were varied beyond these are not drawn."""
 
@@ -59,3 +67,61 @@ def _numeric(values: tuple[object, ...]) -> bool:
     return len(given) > 1 and all(
         isinstance(value, int | float) and not isinstance(value, bool) for value in given
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """A run that did not reach the goal.
+
+    Attributes:
+        run: its number.
+        outcome: how it ended.
+        scene: its world.
+        track_m: (n, 2) what was flown, east and north.
+    """
+
+    run: int
+    outcome: str
+    scene: Scene
+    track_m: FloatArray
+
+
+def failures(summary: Summary, folder: Path) -> list[Failure]:
+    """The worst of the runs that failed, as far as their run folders were kept.
+
+    Args:
+        summary: of the campaign.
+        folder: of the campaign.
+    """
+    kept = (each for each in summary.worst if each.outcome != "reached" and each.folder)
+    return list(_failures([(each.run, each.outcome, folder / each.folder) for each in kept]))[:MOST_FAILURES]
+
+
+def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
+    from harness.report.figures import Scene
+    from harness.run_files.run_folder import load_run
+    from harness.scenario.scenario import mission_of, parse_scenario
+    from harness.world.world import World
+
+    for number, outcome, folder in runs:
+        try:
+            run = load_run(folder)
+            scenario = parse_scenario(run.scenario_yaml, str(folder), ends_checked=False)
+        except (
+            RunFolderError,
+            InputError,
+        ):  # it broke off, or is of other versions: there is nothing to draw
+            continue
+        mission = mission_of(scenario)
+        scene = Scene(
+            name=scenario.name,
+            bounds_m=mission.bounds_m,
+            obstacles=World.from_scenario(scenario).obstacles,
+            start_m=scenario.mission.start_m,
+            goal_m=mission.goal_m,
+            goal_radius_m=mission.goal_radius_m,
+            clearance_m=mission.clearance_m,
+            turn_radius_m=mission.turn_radius_m,
+            optimum_m=np.zeros((0, 2)),
+        )
+        yield Failure(number, outcome, scene, np.column_stack((run.track.east_m, run.track.north_m)))

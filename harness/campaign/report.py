@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.analysis.rows import number
-from harness.campaign.points import run_points
+from harness.campaign.points import failures, run_points
 from harness.campaign.questions import QUESTIONS, difference, ratio, shade
 from harness.campaign.summary import Summary
 from harness.files.errors import WriteError
@@ -57,6 +57,7 @@ def summary_html(summary: Summary, folder: Path) -> str:
         summary=summary,
         questions=QUESTIONS,
         pictures=list(_pictures(summary, folder)) if summary.total.runs else [],
+        failures=_failure_maps(summary, folder),
         difference=difference,
         ratio=ratio,
         number=number,
@@ -88,3 +89,18 @@ def _pictures(summary: Summary, folder: Path) -> Iterator[Picture]:
             "Every run: clearance over the wanted one, largest cross-track error and length over the optimum, against "
             "each number that was varied. Crosses: the goal was not reached.",
         )
+
+
+def _failure_maps(summary: Summary, folder: Path) -> Picture | None:
+    """Where runs failed; None where none did, or no run folder was kept of any that did."""
+    failed = failures(summary, folder)
+    if not failed:
+        return None
+    from harness.campaign.figures import where_failed
+    from harness.report.figure_style import svg
+
+    return Picture(
+        svg(where_failed(failed)),
+        "Maps of the runs that failed",
+        "Where the worst of them ended (cross): track from S to G, obstacles with the wanted clearance; axes in km.",
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -129,11 +130,13 @@ class Frame:
         bounds_m: xmin, ymin, xmax, ymax of the area.
         altitude_m: altitude to be held, above mean sea level.
         clearance_m: wanted distance from every obstacle edge.
+        bank_limit_deg: largest bank command of the guidance; None where several flights are shown.
     """
 
     bounds_m: tuple[float, float, float, float]
     altitude_m: float
     clearance_m: float
+    bank_limit_deg: float | None = None
 
     @property
     def span_m(self) -> float:
@@ -187,7 +190,8 @@ class Scene:
     @property
     def frame(self) -> Frame:
         """What the views are framed on."""
-        return Frame(self.mission.bounds_m, self.altitude_m, self.mission.clearance_m)
+        limit_deg = round(math.degrees(self.limits.bank_limit_rad), 1)
+        return Frame(self.mission.bounds_m, self.altitude_m, self.mission.clearance_m, limit_deg)
 
     @property
     def obstacle_top_m(self) -> float:

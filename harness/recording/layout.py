@@ -85,8 +85,8 @@ def blueprint(
         *([rrb.Tabs(colours, attitude_view(), active_tab=0)] if len(runs) == 1 else []),
     ]
     lanes = 3 if len(runs) == 1 else 2 * len(runs)
-    # Shares of a window 768 pixels high: 700 of them are for rows, a lane takes 36 and the rest of the states 52.
-    states_share = min((52 + 36 * lanes) / 700, 0.45)
+    # Shares of a window 768 pixels high: 700 of them are for rows, a lane takes 40 and the rest of the states 52.
+    states_share = min((52 + 40 * lanes) / 700, 0.45)
     series = series_views(frame, runs, without=without)
     return Layout(
         rrb.Horizontal(
@@ -220,8 +220,12 @@ def series_views(
     one = len(runs) == 1
     rows: list[tuple[str, str, tuple[float, float] | None]] = [
         ("cross_track", "Cross-track error, m (right +)", None),
-        ("clearance", "Clearance, m; red: wanted" if one else "Clearance, m", (-0.5 * wanted, 6.0 * wanted)),
-        ("bank", "Bank, deg; blue: commanded, red: limit" if one else "Bank, deg (right +)", (-60.0, 60.0)),
+        (
+            "clearance",
+            f"Clearance, m; red: wanted {frame.clearance_m:g}" if one else "Clearance, m",
+            (-0.5 * wanted, 6.0 * wanted),
+        ),
+        ("bank", _bank_title(frame) if one else "Bank, deg (right +)", (-60.0, 60.0)),
         ("altitude_error", "Altitude error, m", None),
         ("speed", "Speed, m/s; blue: over ground" if one else "Airspeed, m/s", None),
         ("search", "Search time, ms", None),
@@ -238,6 +242,12 @@ def series_views(
         for entity, title, limits in rows
         if (only is None or entity in only) and entity not in without
     ]
+
+
+def _bank_title(frame: Frame) -> str:
+    """With the limit as a number: the axis of a low plot has none but 0."""
+    limit = "" if frame.bank_limit_deg is None else f" {frame.bank_limit_deg:g}"
+    return f"Bank, deg; blue: commanded, red: limit{limit}"
 
 
 def _whole_flight() -> rrb.TimeAxis:

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
-from harness.campaign.figures import LABEL_LETTERS, lengths, success
+from harness.campaign.figures import LABEL_LETTERS, lengths, success, where_failed
 from harness.campaign.groups import Axis
+from harness.campaign.points import MOST_FAILURES, failures
 from harness.campaign.summary import CURVE_POINTS, Cell, Table
 from harness.report.figure_style import svg
+from harness.run.scenario_flight import fly_to_folder, kinematic_loop
+from tests.closed_loop.conftest import world
 
 CELL = Cell(runs=3, reached=2, success=0.67, success_low=0.2, success_high=0.9)
 
@@ -60,3 +68,45 @@ def test_names_are_drawn_as_they_are_and_without_a_word() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         svg(success(table(labels, ("bug2",))))
+
+
+@pytest.fixture
+def failed(tmp_path: Path) -> tuple[Any, Path]:
+    """A campaign of which two runs failed; the folder of one was kept, beside that of a run that broke off."""
+    tree = {"circle": {"center_m": [3000.0, 3100.0], "radius_m": 300.0}}
+    scenario = world(tree, mission={"time_limit_s": 20.0})
+    fly_to_folder(scenario, tmp_path / "runs" / "3", recording=False, make=kinematic_loop)
+    (tmp_path / "runs" / "4").mkdir()
+    worst = [
+        SimpleNamespace(run=run, outcome=outcome, folder=folder)
+        for run, outcome, folder in (
+            (3, "timeout", "runs/3"),
+            (4, "error", "runs/4"),
+            (5, "collision", ""),
+            (6, "reached", "runs/3"),
+        )
+    ]
+    return SimpleNamespace(worst=worst), tmp_path
+
+
+def test_where_runs_failed_is_drawn_as_far_as_they_were_kept(failed: tuple[Any, Path]) -> None:
+    (one,) = failures(*failed)
+    assert (one.run, one.outcome, len(one.scene.obstacles)) == (3, "timeout", 1)
+    np.testing.assert_allclose(one.track_m[0], (300.0, 300.0), atol=0.01)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = where_failed([one])
+        svg(figure)
+        many = where_failed([replace(one, run=number) for number in range(5)])
+        svg(many)
+    (axes,) = figure.axes
+    assert axes.get_title() == "run 3: timeout"
+    end: Any = axes.lines[-1]
+    assert end.get_marker() == "X"
+    np.testing.assert_allclose(end.get_xydata()[0], one.track_m[-1] / 1e3)
+    assert [axes.get_visible() for axes in many.axes] == [True] * 5 + [False]
+
+
+def test_no_more_than_some_failures_are_drawn(failed: tuple[Any, Path]) -> None:
+    summary, folder = failed
+    assert len(failures(SimpleNamespace(worst=summary.worst[:1] * 12), folder)) == MOST_FAILURES  # type: ignore[arg-type]
