@@ -121,10 +121,14 @@ def fly(
 
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
     """The table of a flight, and where its files are."""
-    from harness.cli.terminal import flight_rows, print_table
+    from harness.cli.terminal import flight_rows, plain, print_table
+    from harness.world.motion_assumptions import scenario_outside_assumptions
 
     title = f"{scenario.name}: {scenario.planner.kind}, {scenario.aircraft.model}{_law(scenario)}"
-    print_table(title, flight_rows(metrics))
+    outside = scenario_outside_assumptions(scenario)
+    more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
+    not_covered = {"not covered": plain(outside[0] + more)} if outside else {}
+    print_table(title, flight_rows(metrics) | not_covered)
     if as_the_campaign:
         say("digest: as the campaign flew it")
     say(f"run folder: {folder}")

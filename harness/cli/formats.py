@@ -31,12 +31,14 @@ def validate(
             say(str(error), err=True)
             status = BAD_INPUT
         else:
-            say(f"{file}: {found}: valid")
+            say(f"{file}: {found[0]}: valid")
+            for sentence in found[1]:
+                say(f"  not covered by what the planner promises: {sentence}")
     return status
 
 
-def _found(file: str) -> str:
-    """What a valid file holds, in a few words."""
+def _found(file: str) -> tuple[str, tuple[str, ...]]:
+    """What a valid file holds, in a few words, and what of a scenario lies outside the planner's assumptions."""
     from harness.campaign.campaign_file import is_campaign
     from harness.files.wording import counted
     from harness.scenario.shipped import campaign_path, shipped_campaigns
@@ -45,9 +47,12 @@ def _found(file: str) -> str:
         from harness.cli.sweep import checked
 
         runs = checked(campaign_path(file))
-        return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}"
+        return f"{runs.campaign.name}, {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}", ()
     loaded = load(file)
-    return f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
+    from harness.world.motion_assumptions import scenario_outside_assumptions
+
+    held = f"{loaded.name}, {counted(len(loaded.obstacles), 'obstacle')}"
+    return held, scenario_outside_assumptions(loaded)
 
 
 def schema(

@@ -1,0 +1,102 @@
+"""Which moving obstacles lie outside the planner's assumptions, against positions at many times."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from harness.world.motion_assumptions import outside_assumptions
+from harness.world.obstacle import Circle, Obstacle, Polygon
+
+SQUARE = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+
+
+def told(*obstacles: Obstacle, until_s: float = 100.0) -> tuple[str, ...]:
+    return outside_assumptions(obstacles, 25.0, 1000.0, until_s)
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "airspeed_mps", "inside"),
+    [(0.4, 25.0, False), (0.5, 25.0, True), (19.9, 25.0, True), (20.1, 25.0, False), (30.1, 60.0, False)],
+)
+def test_speeds(speed_mps: float, airspeed_mps: float, inside: bool) -> None:
+    obstacle = Obstacle(Circle((0.0, 0.0), 10.0), (0.0, -speed_mps))
+    assert (outside_assumptions([obstacle], airspeed_mps, 1000.0, 100.0) == ()) is inside
+
+
+def test_the_width_is_that_across_the_motion() -> None:
+    wall = Polygon(((0.0, 0.0), (50.0, 0.0), (50.0, 3000.0), (0.0, 3000.0)))
+    (said,) = told(Obstacle(wall, (10.0, 0.0)))
+    assert said == (
+        "obstacles[0] is 3,000 m wide across its motion; assumed is no more than the sensing range, 1,000 m"
+    )
+    assert told(Obstacle(wall, (0.0, 10.0))) == ()
+    assert told(Obstacle(Circle((0.0, 0.0), 501.0), (0.0, 10.0))) != ()
+
+
+def test_what_stands_is_not_told() -> None:
+    assert told(Obstacle(Circle((0.0, 0.0), 900.0)), Obstacle(Circle((0.0, 0.0), 900.0))) == ()
+
+
+def test_times_at_which_both_are_there_count() -> None:
+    passing = Obstacle(Circle((-200.0, 5.0), 5.0), (10.0, 0.0))
+    assert told(passing, Obstacle(Polygon(SQUARE))) == (
+        "obstacles[0] and obstacles[1] touch or pass through each other; assumed is that moving obstacles do not",
+    )
+    assert told(passing, Obstacle(Polygon(SQUARE), active_s=(0.0, 19.0))) == ()
+    assert told(passing, Obstacle(Polygon(SQUARE), active_s=(22.0, 90.0))) == ()
+    assert told(passing, Obstacle(Polygon(SQUARE)), until_s=19.0) == ()
+
+
+def test_a_hole_is_free() -> None:
+    outer = ((-100.0, -100.0), (100.0, -100.0), (100.0, 100.0), (-100.0, 100.0))
+    hole = ((-90.0, -90.0), (-90.0, 90.0), (90.0, 90.0), (90.0, -90.0))
+    moving = Obstacle(Circle((-50.0, 0.0), 5.0), (1.0, 0.0))
+    assert told(Obstacle(Polygon(outer, (hole,))), moving) == ()
+    assert told(Obstacle(Polygon(outer)), moving) != ()
+
+
+def at(obstacle: Obstacle, time_s: float) -> shapely.Geometry:
+    east, north = obstacle.displacement_m(time_s)
+    if isinstance(obstacle.shape, Circle):
+        x, y = obstacle.shape.center_m
+        return shapely.Point(x + east, y + north).buffer(obstacle.shape.radius_m, quad_segs=64)
+    return shapely.transform(
+        shapely.Polygon(obstacle.shape.vertices_m), lambda xy: xy + np.array((east, north))
+    )
+
+
+def test_contacts_are_those_of_positions_at_many_times() -> None:
+    rng = np.random.default_rng(5)
+    seen = set()
+    for _ in range(60):
+        pair = []
+        for _ in range(2):
+            centre, size, speed = (
+                rng.uniform(-400.0, 400.0, 2),
+                rng.uniform(10.0, 60.0),
+                rng.uniform(1.0, 15.0),
+            )
+            turn = rng.uniform(0.0, math.tau)
+            velocity = (speed * math.cos(turn), speed * math.sin(turn))
+            corners = [tuple(centre + size * np.array((math.cos(a), math.sin(a)))) for a in (0.2, 2.0, 4.5)]
+            circle = rng.random() < 0.5
+            begins = float(rng.uniform(0.0, 20.0))
+            pair.append(
+                Obstacle(
+                    Circle((float(centre[0]), float(centre[1])), size) if circle else Polygon(tuple(corners)),
+                    velocity,
+                    (begins, begins + 60.0),
+                )
+            )
+        first, last = max(each.epoch_s for each in pair), min(each.interval_s[1] for each in pair)
+        apart = min(at(pair[0], t).distance(at(pair[1], t)) for t in np.linspace(first, last, 2000))
+        if 0.0 < apart < 0.5:
+            continue  # too near to be told by samples
+        said = told(*pair)
+        assert (len(said) == 1) is (apart == 0.0)
+        seen.add(apart == 0.0)
+    assert seen == {True, False}
