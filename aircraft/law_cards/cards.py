@@ -17,13 +17,20 @@ from typing import Any
 from aircraft.airframe import Airframe
 from aircraft.card_cache import cached, figure
 from aircraft.envelope import LawCard, WindPoint
+from aircraft.guidance.interface import GuidanceLaw
 from aircraft.guidance.preview import PreviewConfig
 from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind, installed_kinds
+from aircraft.guidance.waypoints import WaypointLaw, acceptance
 from aircraft.model_files import ModelFiles
 
 
 def law_card(
-    frame: Airframe, kind: GuidanceKind, config: Any, airspeed_mps: float | None = None
+    frame: Airframe,
+    kind: GuidanceKind,
+    config: Any,
+    airspeed_mps: float | None = None,
+    waypoints: bool = False,
+    acceptance_radius_m: float | None = None,
 ) -> LawCard | None:
     """The card of a law with its keys, flown unless that has been done before.
 
@@ -32,6 +39,8 @@ def law_card(
         kind: the law.
         config: its keys, resolved or not.
         airspeed_mps: true airspeed; default: cruise.
+        waypoints: it flies the legs between the corners of its routes, not the routes.
+        acceptance_radius_m: a waypoint then counts as reached from here; None: by the law's own rule.
 
     Returns:
         The card; None for `preview` at its defaults, which the survey of the aircraft has.
@@ -41,7 +50,7 @@ def law_card(
     """
     limits = frame.guidance_limits(airspeed_mps)
     resolved = config.resolved(limits)
-    if kind.kind == DEFAULT_KIND and resolved == PreviewConfig().resolved(limits):
+    if not waypoints and kind.kind == DEFAULT_KIND and resolved == PreviewConfig().resolved(limits):
         return None
     keys = json.dumps(asdict(resolved), sort_keys=True, default=repr)
 
@@ -49,22 +58,26 @@ def law_card(
         from aircraft.law_cards.law_survey import LawSurvey  # loads JSBSim
 
         # A copy: a law that was given as an object is flown as it was given.
-        survey = LawSurvey(
-            frame, kind.kind, limits.airspeed_mps, lambda: deepcopy(kind.make(resolved, limits))
-        )
-        return survey.measured()
+        def made() -> GuidanceLaw:
+            law = deepcopy(kind.make(resolved, limits))
+            if not waypoints:
+                return law
+            return WaypointLaw(law, acceptance(kind.kind, resolved, limits, acceptance_radius_m))
 
-    known = (frame.name, frame.files, kind, keys, limits.airspeed_mps)
+        return LawSurvey(frame, kind.kind, limits.airspeed_mps, made, waypoints).measured()
+
+    legs = f"waypoints {acceptance_radius_m!r}" if waypoints else ""
+    known = (frame.name, frame.files, kind, keys, legs, limits.airspeed_mps)
     if known not in _kept and installed_kinds().get(kind.kind) != kind:
         _kept[known] = _card(measured())  # nothing tells what it depends on
     if known not in _kept:
-        what = (frame.files.digest(), kind.kind, keys, repr(limits.airspeed_mps), _source(kind))
+        what = (frame.files.digest(), kind.kind, keys, repr(limits.airspeed_mps), _source(kind), legs)
         digest = sha256("\0".join(what).encode()).hexdigest()
         _kept[known] = cached(f"{frame.name}-{kind.kind}-law", digest, measured, _card)
     return _kept[known]
 
 
-_kept: dict[tuple[str, ModelFiles, GuidanceKind, str, float], LawCard] = {}
+_kept: dict[tuple[str, ModelFiles, GuidanceKind, str, str, float], LawCard] = {}
 
 
 def _source(kind: GuidanceKind) -> str:

@@ -29,6 +29,10 @@ RADIUS_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0)
 TRACKED_SHARE = 0.1
 """Cross-track error over turn radius up to which a law counts as tracking the turns."""
 
+WAYPOINTS_TRACKED_SHARE = 1.0
+"""The same where a law flies the legs between the corners of the turns. They are not widened then: the wider the arc,
+the further its corner lies outside."""
+
 CUT_SHARE = 0.05
 """Share of the time for which the bank may be cut meanwhile."""
 
@@ -45,12 +49,18 @@ class LawSurvey:
         kind: the law's name.
         airspeed_mps: true airspeed.
         make: makes the law for one flight.
+        waypoints: it flies the legs between the corners of the turns, with all the bank there is at each.
     """
 
     frame: Airframe
     kind: str
     airspeed_mps: float
     make: Callable[[], GuidanceLaw]
+    waypoints: bool = False
+
+    @property
+    def _tracked_share(self) -> float:
+        return WAYPOINTS_TRACKED_SHARE if self.waypoints else TRACKED_SHARE
 
     def measured(self) -> dict[str, Any]:
         """The law's name, and `points`: the attributes of a `WindPoint` in every wind.
@@ -61,7 +71,8 @@ class LawSurvey:
         points: list[dict[str, float]] = []
         for share in WIND_SHARES:
             least = points[-1]["radius_factor"] if points else RADIUS_FACTORS[0]
-            points.append(self._point(share, [factor for factor in RADIUS_FACTORS if factor >= least]))
+            factors = RADIUS_FACTORS[:1] if self.waypoints else RADIUS_FACTORS
+            points.append(self._point(share, [factor for factor in factors if factor >= least]))
         return {"kind": self.kind, "points": points}
 
     def _point(self, share: float, factors: Sequence[float]) -> dict[str, float]:
@@ -72,8 +83,8 @@ class LawSurvey:
         wind = f" in a wind of {share:.0%} of the airspeed" if share else ""
         raise AircraftError(
             f"the guidance law {self.kind} does not track with {self.frame.name}{wind}: on turns of "
-            f"{RADIUS_FACTORS[-1]:g} times the radius that the aircraft needs it is off by more than "
-            f"{TRACKED_SHARE:.0%} of the radius, or its bank is cut"
+            f"{factors[-1]:g} times the radius that the aircraft needs it is off by more than "
+            f"{self._tracked_share:.0%} of the radius, or its bank is cut"
         )
 
     def _error_m(self, wind_mps: float, factor: float) -> float | None:
@@ -82,7 +93,7 @@ class LawSurvey:
         worst_m = 0.0
         for north_mps in (wind_mps, -wind_mps) if wind_mps else (0.0,):
             error_m, cut = self._flown(weave(radius_m), north_mps)
-            if not error_m <= TRACKED_SHARE * radius_m or cut > CUT_SHARE:
+            if not error_m <= self._tracked_share * radius_m or (cut > CUT_SHARE and not self.waypoints):
                 return None
             worst_m = max(worst_m, error_m)
         return worst_m

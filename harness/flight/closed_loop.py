@@ -156,9 +156,11 @@ class ClosedLoop:
 
     def _log_row(self) -> None:
         """Logs where the aircraft is and what it was told last."""
-        self._log.add(self.true, self.steering, self.plans.index)
+        steered = not math.isnan(self.steering.cross_track_m)
+        index = self.plans.index if steered else -1  # a law may fail in its first update
+        self._log.add(self.true, self.steering, index)
         for observer in self._row_observers:
-            observer.on_row(self.true, self.steering, self.plans.index)
+            observer.on_row(self.true, self.steering, index)
 
     def _locate(self) -> None:
         """Reads the state, and what the aircraft believes of it."""
@@ -193,8 +195,7 @@ class ClosedLoop:
     def _guide(self) -> Verdict | None:
         """Steers along the plan in effect, and logs where the aircraft is and what it is told."""
         loop, plans, true, believed = self._loop, self.plans, self.true, self.believed
-        plans.take_effect(believed, loop.guidance)
-        verdict = self._steer()
+        verdict = plans.take_effect(believed, loop.guidance) or self._steer()
         if verdict is not None:
             return verdict
         altitude_m, airspeed_mps = loop.vertical.command(believed, self.steering.arc_length_m)
@@ -211,10 +212,20 @@ class ClosedLoop:
         """Asks the guidance law, if there is a plan; it may raise anything, which ends the flight."""
         if self.plans.index >= 0:
             try:
-                self.steering = self._loop.guidance.update(self.believed)
+                steering = self._loop.guidance.update(self.believed)
+                numbers = steering.roll_command_rad, steering.cross_track_m, steering.arc_length_m
+                finite = all(map(math.isfinite, numbers)) and not math.isinf(steering.airspeed_mps)
             except Exception as error:
                 self._law_error = trace(error)
                 return Verdict(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
+            if not finite:
+                return Verdict(
+                    Outcome.LOST_CONTROL,
+                    f"the guidance law asked for a roll of {steering.roll_command_rad} rad and an airspeed of "
+                    f"{steering.airspeed_mps} m/s, {steering.cross_track_m} m beside its route after "
+                    f"{steering.arc_length_m} m; all must be finite, the airspeed finite or NaN",
+                )
+            self.steering = steering
         if self._own_roll_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._own_roll_rad)
         return None

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
-from harness.files.crash import in_a_line
+from harness.files.crash import in_a_line, sentence, trace
 from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
 from harness.flight.observer import Observer
 from harness.flight.record import AcceptedPlan, Outcome
@@ -43,7 +43,7 @@ class Plans:
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
         self.error: str | None = None
-        """The traceback of what the planner raised."""
+        """The traceback of what the planner raised, or the guidance law when it was given a plan."""
         self._told, self._scanned = "", False
         self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
         self._stuck = ""  # the last of it
@@ -93,19 +93,28 @@ class Plans:
             self._due_s = state.time_s + self._latency_s - LATE_S
         return None
 
-    def take_effect(self, state: AircraftState, guidance: GuidanceLaw) -> None:
+    def take_effect(self, state: AircraftState, guidance: GuidanceLaw) -> Verdict | None:
         """Hands the plan on its way to the guidance, if it is due.
 
         Args:
             state: what the aircraft believes.
             guidance: follows it from now on.
+
+        Returns:
+            How the flight ends, if the guidance law raised an exception; the plan is then not in effect.
         """
         if self._coming is None or state.time_s < self._due_s:
-            return
+            return None
         compute_ms, plan, route = self._coming
         late_s = state.time_s - (self._due_s - self._latency_s)
         self._coming, self._due_s = None, math.inf
-        guidance.follow(route, arc_length_m=late_s * state.groundspeed_mps)
+        try:
+            guidance.follow(route, arc_length_m=late_s * state.groundspeed_mps)
+        except Exception as error:  # a law of somebody else's may raise anything
+            self.error = trace(error)
+            return Verdict(
+                Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)} when it was given a plan"
+            )
         accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
         self.accepted.append(accepted)
         self.index = accepted.plan_index
@@ -113,6 +122,7 @@ class Plans:
         self._arc_length_m, self._loiters_from_m = 0.0, route_length(route) - turn_m
         for observer in self._observers:
             observer.on_plan(accepted, state)
+        return None
 
     def last_word(self, outcome: Outcome) -> str:
         """What the planner has to say of an end that is not its own: why it never, or no longer, found anything."""

@@ -61,8 +61,14 @@ def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
 def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
     """The law for one flight, from a section that `resolved` returned."""
     kind, config = _made_of(spec)
+    limits = limits_of(aircraft)
     with PrintingAside():
-        return kind.make(config, limits_of(aircraft))
+        law = kind.make(config, limits)
+    if spec.follow == "path":
+        return law
+    from aircraft.guidance.waypoints import WaypointLaw, acceptance
+
+    return WaypointLaw(law, acceptance(spec.kind, config, limits, spec.acceptance_radius_m))
 
 
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
@@ -81,7 +87,14 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     kind, config = _made_of(spec)
     try:
         with PrintingAside():
-            return law_card(airframe_of(aircraft), kind, config, aircraft.airspeed_mps)
+            return law_card(
+                airframe_of(aircraft),
+                kind,
+                config,
+                aircraft.airspeed_mps,
+                waypoints=spec.follow == "waypoints",
+                acceptance_radius_m=spec.acceptance_radius_m,
+            )
     except AircraftError as error:
         raise KeyFault(("guidance", "kind"), str(error)) from error
     except KeyboardInterrupt:

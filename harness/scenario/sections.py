@@ -263,6 +263,18 @@ class GuidanceSpec(Section):
     model_config = ConfigDict(extra="allow")
 
     kind: str = key("A name that `wayproof list guidance` prints.", default="preview")
+    follow: Literal["path", "waypoints"] = key(
+        "path: the law follows the plan's lines and arcs; waypoints: straight legs between the corners of the plan, as "
+        "a mission on an autopilot.",
+        default="path",
+    )
+    acceptance_radius_m: float | None = key(
+        "A waypoint counts as reached from here, with follow: waypoints. Default: by the rule of the law's autopilot.",
+        unit="m",
+        default=None,
+        gt=0,
+        le=100_000,
+    )
 
     @property
     def own(self) -> dict[str, Any]:

@@ -1,0 +1,71 @@
+"""A guidance law that raises, or asks for what is no number, ends the flight with a sentence and a whole run folder."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aircraft.guidance.interface import GuidanceOutput
+from aircraft.interface import AircraftState, Route
+from harness.run.scenario_flight import fly_to_folder, make_loop
+from harness.scenario.scenario import parse_scenario
+
+TEXT = """\
+schema: wayproof/scenario/1
+name: short
+area: {bounds_m: [0, 0, 10000, 10000]}
+mission: {start_m: [1000, 1000], goal_m: [1000, 3000]}
+sensor: {range_m: 2000, rays: 90}
+"""
+
+
+class Broken:
+    """Flies straight on until it breaks."""
+
+    def __init__(self, follows: bool = True, then: Any = None, after: int = 30) -> None:
+        self._follows, self._then, self._after, self._updates = follows, then, after, 0
+
+    def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
+        if not self._follows:
+            raise ZeroDivisionError("no route for me")
+
+    def update(self, state: AircraftState) -> GuidanceOutput:
+        self._updates += 1
+        output = GuidanceOutput(0.0, 0.0, 25.0 * state.time_s, False, False)
+        return output if self._updates < self._after else self._then
+
+
+FINE = GuidanceOutput(0.0, 0.0, 0.0, False, False)
+
+
+@pytest.mark.parametrize("after", [1, 30])
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        (
+            {"follows": False},
+            "the guidance law raised ZeroDivisionError: no route for me when it was given a plan",
+        ),
+        ({"then": FINE._replace(roll_command_rad=math.nan)}, "asked for a roll of nan rad"),
+        ({"then": FINE._replace(roll_command_rad=math.inf)}, "asked for a roll of inf rad"),
+        ({"then": FINE._replace(airspeed_mps=math.inf)}, "an airspeed of inf m/s"),
+        ({"then": FINE._replace(cross_track_m=math.nan)}, "nan m beside its route"),
+        ({"then": "left"}, "the guidance law raised AttributeError"),
+    ],
+)
+def test_ends_as_lost_control(law: dict[str, Any], after: int, said: str, tmp_path: Path) -> None:
+    figures = fly_to_folder(
+        parse_scenario(TEXT),
+        tmp_path / "run",
+        recording=True,
+        make=lambda scenario: replace(make_loop(scenario), guidance=Broken(**law, after=after)),
+    )
+    assert figures["outcome"] == "lost_control"
+    assert said in figures["reason"]
+    assert json.loads((tmp_path / "run" / "manifest.json").read_text())["complete"] is True
+    assert (tmp_path / "run" / "track.parquet").exists()
