@@ -112,7 +112,9 @@ def _contents(kind: str, fences: list[tuple[Any, bool]], any_of: bool) -> Conten
     if any(shape is None for shape, _ in fences):
         raise WorldFileError("has a fence with fewer than three corners, or without an area")
     if not fences:
-        raise WorldFileError("has an empty fence; must have at least one polygon or circle")
+        raise WorldFileError(
+            "has an empty fence; must have at least one polygon or circle (a mission is flown by `wayproof check`)"
+        )
     inside = [shape for shape, inclusion in fences if inclusion]
     if any_of and len(inside) > 1:
         inside = [shapely.union_all(inside)]

@@ -46,6 +46,10 @@ def _read(path: Path, reading: Reading) -> Contents:
                     f"has more than {MAX_FEATURES:,} features; cut the area of interest out of it"
                 )
             meta, _, geometries, columns = pyogrio.raw.read(path, layer=layer, on_invalid="ignore")
+            if len(geometries) and crs is not None and meta["crs"] != crs:
+                raise WorldFileError(
+                    "has layers in different coordinate reference systems; put them into files of their own"
+                )
             crs = crs or meta["crs"]
             shapes = shapely.make_valid(
                 shapely.force_2d(shapely.from_wkb(geometries, on_invalid="ignore")), method="structure",

@@ -12,6 +12,7 @@ import pytest
 import shapely
 
 from aircraft.frames import LocalPlane
+from harness.scenario.files_resolved import rings_of
 from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
 from harness.world_files.growing import simplified
 from harness.world_files.plane import Mapping, Place, geodetic
@@ -307,3 +308,28 @@ def test_a_keep_in_fence_leaves_its_inside_free(tmp_path: Path) -> None:
     assert len(polygon.interiors) == 1
     assert shapely.Polygon(polygon.interiors[0]).area == pytest.approx(759.5 * 1111.9, rel=0.01)
     assert polygon.contains(shapely.Point(3000, 3000))
+
+
+def test_corners_are_rounded_to_a_millimetre_and_stay_valid(tmp_path: Path) -> None:
+    # Two corners nearer to each other than that, and a sliver that rounding would fold.
+    square = [(8.0, 47.0), (8.01, 47.0), (8.01, 47.01), (8.005, 47.01), (8.005 - 1e-10, 47.01), (8.0, 47.01)]
+    sliver = [(8.02, 47.0), (8.03, 47.0), (8.03, 47.000000001), (8.02, 47.0000000005)]
+    path = geojson(tmp_path / "a.geojson", *(feature({}, [*ring, ring[0]]) for ring in (square, sliver)))
+    (polygon,) = (
+        expanded([FileSpec(path)], Place(47.0, 8.0), (-2e3, -2e3, 5e3, 5e3), 100.0).sources[0].polygons
+    )
+    corners = shapely.get_coordinates(polygon)
+    assert polygon.is_valid
+    assert len(corners) == 5
+    assert np.array_equal(corners, np.round(corners, 3))
+
+
+def test_the_rings_of_many_polygons_are_those_of_each() -> None:
+    holes = [shapely.box(x, 1, x + 1, 2).exterior.coords[:-1] for x in (1, 3)]
+    with_holes = shapely.Polygon(shapely.box(0, 0, 5, 5).exterior.coords[:-1], holes)
+    plain = shapely.Polygon([(0, 0), (1, 0), (0, 1)])
+    outline, *inner = rings_of([plain, with_holes, plain])[1]
+    assert list(outline) == list(with_holes.exterior.coords)[:-1]
+    assert [list(ring) for ring in inner] == [list(ring.coords)[:-1] for ring in with_holes.interiors]
+    assert rings_of([plain, with_holes])[0] == [((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))]
+    assert rings_of([]) == []

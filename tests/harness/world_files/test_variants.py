@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 from pyproj import CRS
 
@@ -375,3 +376,17 @@ def test_geojson_in_an_older_files_own_system_with_several_polygons(tmp_path: Pa
     found = read_any(path)
     assert found.crs == "EPSG:3067"
     assert found.parts[0].footprint.area == pytest.approx(20_000.0)
+
+
+def test_layers_in_different_systems_are_refused(tmp_path: Path) -> None:
+    pyogrio = pytest.importorskip("pyogrio")
+    path = tmp_path / "a.gpkg"
+    for layer, crs in (("one", "EPSG:32632"), ("two", "EPSG:2154")):
+        square = np.array([shapely.to_wkb(shapely.box(4e5, 6.7e6, 4.1e5, 6.71e6))], dtype=object)
+        pyogrio.raw.write(
+            path, square, [np.array([12.0])], ["height"], layer=layer, crs=crs, geometry_type="Polygon"
+        )
+        if layer == "one":
+            assert read_any(path).parts[0].top == Limit(12.0, Datum.GROUND)
+    with pytest.raises(WorldFileError, match="different coordinate reference systems"):
+        read_any(path)
