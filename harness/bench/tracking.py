@@ -111,8 +111,10 @@ def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
     return Route(np.array(rows))
 
 
-def fly_course(frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Route) -> Tracking:
-    """Flies a route from its start to its end.
+def fly_course(
+    frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Route, guidance: str = DEFAULT_KIND
+) -> Tracking:
+    """Flies a route from its start to its end, under a guidance law at its defaults.
 
     Raises:
         AircraftError: the aircraft cannot start in this air.
@@ -126,7 +128,7 @@ def fly_course(frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Rou
         LocalPlane(47.0, 8.0),
         air,
     )
-    law = guidance_kinds()[DEFAULT_KIND].law(frame.guidance_limits(airspeed_mps))
+    law = guidance_kinds()[guidance].law(frame.guidance_limits(airspeed_mps))
     law.follow(route)
     steps = model.step_rate_hz // UPDATE_RATE_HZ
     cross, altitude, saturated = [], [], 0
@@ -150,20 +152,29 @@ def fly_course(frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Rou
     )
 
 
-def tracked(name: str, case: Case, seeds: Sequence[int], airspeed_mps: float | None = None) -> Tracking:
-    """The worst of the courses of some seeds, each at the radius that planning uses in the air of the case."""
+def tracked(
+    name: str,
+    case: Case,
+    seeds: Sequence[int],
+    airspeed_mps: float | None = None,
+    guidance: str = DEFAULT_KIND,
+) -> Tracking:
+    """The worst of the courses of some seeds, each at the radius that planning uses for `preview` in that air."""
     frame = airframe(name)
     speed = airspeed_mps or frame.cruise_mps
     worst = Tracking(0.0, 0.0, 0.0, 0.0)
     for seed in seeds:
         air = case.atmosphere(speed, seed)
         radius_m = performance(frame, speed, air.wind_mps, air.intensity).turn_radius_m
-        worst = worst.worse(fly_course(frame, speed, air, course(seed, radius_m)))
+        worst = worst.worse(fly_course(frame, speed, air, course(seed, radius_m), guidance))
     return worst
 
 
 def bench_tracking(
-    name: str, seeds: int, progress: Callable[[int, int, str], None] | None = None
+    name: str,
+    seeds: int,
+    progress: Callable[[int, int, str], None] | None = None,
+    guidance: str = DEFAULT_KIND,
 ) -> dict[str, Any]:
     """Flies every case.
 
@@ -171,21 +182,22 @@ def bench_tracking(
         name: an aircraft.
         seeds: courses per case, of seeds 1, 2 and so on.
         progress: told what is done, of how much, and the case at hand.
+        guidance: a law; limits are promised for `preview` alone.
 
     Returns:
-        `aircraft`, `airspeed_mps`, `seeds`, and `cases`: for each its name, the figures of `Tracking`, worst
-        over the seeds, its `limits` likewise (None where nothing is promised) and whether they are `kept`.
+        `aircraft`, `guidance`, `airspeed_mps`, `seeds`, and `cases`: for each its name, the figures of `Tracking`,
+        worst over the seeds, its `limits` likewise (None where nothing is promised) and whether they are `kept`.
 
     Raises:
         AircraftError: the aircraft cannot be flown in one of the cases.
         ArithmeticError: control is lost on the way.
     """
-    factor = LIMIT_FACTORS.get(name)
+    factor = LIMIT_FACTORS.get(name) if guidance == DEFAULT_KIND else None
     rows = []
     for done, case in enumerate(CASES):
         if progress is not None:
             progress(done, len(CASES), case.name)
-        flown = tracked(name, case, range(1, seeds + 1))
+        flown = tracked(name, case, range(1, seeds + 1), guidance=guidance)
         limits = case.limits.times(factor) if factor else None
         rows.append(
             {
@@ -195,4 +207,10 @@ def bench_tracking(
                 "kept": flown.within(limits) if limits else None,
             }
         )
-    return {"aircraft": name, "airspeed_mps": airframe(name).cruise_mps, "seeds": seeds, "cases": rows}
+    return {
+        "aircraft": name,
+        "guidance": guidance,
+        "airspeed_mps": airframe(name).cruise_mps,
+        "seeds": seeds,
+        "cases": rows,
+    }

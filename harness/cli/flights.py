@@ -246,6 +246,9 @@ def bench(
             help="With tracking: courses a case. Default: 20. With rates: courses. Default: 3.",
         ),
     ] = None,
+    guidance: Annotated[
+        str | None, typer.Option(metavar="KIND", help="With tracking: the guidance law. Default: preview.")
+    ] = None,
     most: Annotated[
         int | None,
         typer.Option(metavar="N", min=10, help="With worlds: no more obstacles. Default: 100000."),
@@ -264,7 +267,9 @@ def bench(
     if most and scenario != "worlds":
         raise typer.BadParameter("--most goes with `bench worlds`")
     if scenario == "tracking":
-        return bench_tracking(aircraft or "aerosonde", seeds or 20, as_json)
+        return bench_tracking(aircraft or "aerosonde", seeds or 20, as_json, guidance or "preview")
+    if guidance:
+        raise typer.BadParameter("--guidance goes with `bench tracking`")
     if scenario == "rates":
         return bench_rates(aircraft or "aerosonde", seeds or 3, as_json)
     if aircraft or seeds:
@@ -289,21 +294,26 @@ def bench(
     return 0
 
 
-def bench_tracking(name: str, seeds: int, as_json: bool) -> int:
+def bench_tracking(name: str, seeds: int, as_json: bool, guidance: str = "preview") -> int:
     """The table of tracking errors of an aircraft."""
     from aircraft.airframes import AircraftError
+    from aircraft.guidance.registry import guidance_kinds
     from harness.bench import tracking
     from harness.cli.terminal import print_grid, step_bar, tracking_rows
 
+    laws = sorted(guidance_kinds())
+    if guidance not in laws:
+        raise typer.BadParameter(f"there is no guidance law {guidance!r}; known are: {', '.join(laws)}")
     try:
         with step_bar() as report:
-            result = tracking.bench_tracking(name, seeds, report)
+            result = tracking.bench_tracking(name, seeds, report, guidance)
     except AircraftError as error:
         raise bad_input(error) from error
     if as_json:
         print_json(result)
     else:
-        title = f"{result['aircraft']} at {result['airspeed_mps']:g} m/s, worst of {seeds} courses a case"
+        flown = f"{result['aircraft']} under {guidance} at {result['airspeed_mps']:g} m/s"
+        title = f"{flown}, worst of {seeds} courses a case"
         print_grid(title, *tracking_rows(result))
     return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
 

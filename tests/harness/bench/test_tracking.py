@@ -136,3 +136,13 @@ def test_an_aircraft_of_which_nothing_is_promised_has_no_limits(monkeypatch: pyt
     (case,) = bench_tracking("J3Cub", 1)["cases"]
     assert (case["limits"], case["kept"]) == (None, None)
     assert case["cross_track_max_m"] < 2.0
+
+
+def test_other_laws_are_flown_and_promise_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harness.bench.tracking.CASES", CASES[:1])
+    (ours,), (theirs,) = (
+        bench_tracking("aerosonde", 1, guidance=kind)["cases"] for kind in ("preview", "l1")
+    )
+    assert ours["limits"] is not None
+    assert theirs["limits"] is theirs["kept"] is None
+    assert theirs["cross_track_p95_m"] > 5.0 * ours["cross_track_p95_m"]
