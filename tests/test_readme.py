@@ -227,7 +227,7 @@ def test_ones_own_planner_as_a_distribution_is_found_and_flown(tmp_path: Path) -
 
     run = tmp_path / "run"
     listed = wayproof("list planners", run.parent, path=tmp_path / "installed")
-    assert "beeline         straight on along its first course" in listed.stdout.splitlines()
+    assert "beeline: straight on along its first course" in listed.stdout.splitlines()
     fly = f"fly my_world.yaml --planner beeline --set planner.beyond_m=700 --out {run}"
     flown = wayproof(f"{fly} --no-recording --quiet", tmp_path, path=tmp_path / "installed")
     assert (flown.returncode, flown.stderr) == (1, "")
