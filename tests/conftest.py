@@ -6,8 +6,9 @@ import signal
 
 from hypothesis import settings
 
-# No test is timed: how long an example takes is the machine's affair.
-settings.register_profile("wayproof", deadline=None)
+# No test is timed: how long an example takes is the machine's affair. `pytest --hypothesis-profile all` tries more.
+settings.register_profile("wayproof", deadline=None, max_examples=30)
+settings.register_profile("all", deadline=None, max_examples=200)
 settings.load_profile("wayproof")
 
 

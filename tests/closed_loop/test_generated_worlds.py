@@ -23,7 +23,11 @@ SmallWorld = Callable[..., Scenario]
 FlyPointMass = Callable[[Scenario], Flight]
 
 
-BOUNDED = settings(derandomize=True, phases=(Phase.explicit, Phase.reuse, Phase.generate))
+BOUNDED = settings(
+    derandomize=True,
+    phases=(Phase.explicit, Phase.reuse, Phase.generate),
+    max_examples=settings().max_examples // 2,
+)
 """A flight takes a third of a second: a failure is shown as drawn, for shrinking it would take minutes."""
 
 
@@ -51,7 +55,7 @@ def fields(draw: st.DrawFn, most_corners: int = 7) -> list[dict[str, Any]]:
 
 
 @given(field=fields(most_corners=2))
-@settings(BOUNDED, max_examples=20)
+@BOUNDED
 def test_reaches_the_goal_among_circles_and_keeps_the_clearance(
     small_world: SmallWorld, flown_by_point_mass: FlyPointMass, field: list[dict[str, Any]]
 ) -> None:
@@ -64,7 +68,7 @@ def test_reaches_the_goal_among_circles_and_keeps_the_clearance(
 
 
 @given(field=fields(), wind_from_deg=st.none() | st.integers(0, 359))
-@settings(BOUNDED, max_examples=30)
+@BOUNDED
 def test_reaches_the_goal_among_corners_in_any_wind(
     small_world: SmallWorld,
     flown_by_point_mass: FlyPointMass,

@@ -27,12 +27,23 @@ def digest_of(folder: Path, scenario: str, *options: str, hash_seed: int = 0, st
     return digest
 
 
-@pytest.mark.parametrize("scenario", ["aerosonde_forest", "one_of_everything"])
-def test_three_processes_and_the_run_folder_agree(scenario: str, tmp_path: Path) -> None:
-    first = digest_of(tmp_path / "a", scenario, "--no-recording", hash_seed=1)
-    assert digest_of(tmp_path / "b", scenario, "--no-recording", hash_seed=2) == first
-    assert digest_of(tmp_path / "c", scenario, hash_seed=3) == first, "an observer changes the flight"
-    again = digest_of(tmp_path / "d", str(tmp_path / "a" / "scenario.yaml"), "--no-recording")
+@pytest.mark.parametrize(
+    ("scenario", "seconds"),
+    [
+        ("aerosonde_forest", None),
+        ("one_of_everything", 150),
+        pytest.param("one_of_everything", None, marks=pytest.mark.slow),
+    ],
+)
+def test_three_processes_and_the_run_folder_agree(scenario: str, seconds: int | None, tmp_path: Path) -> None:
+    """Whole flights, and the first seconds of one that everything random takes part in."""
+    short = () if seconds is None else ("--set", f"mission.time_limit_s={seconds}")
+    status = 0 if seconds is None else 1
+    first = digest_of(tmp_path / "a", scenario, *short, "--no-recording", hash_seed=1, status=status)
+    assert digest_of(tmp_path / "b", scenario, *short, "--no-recording", hash_seed=2, status=status) == first
+    observed = digest_of(tmp_path / "c", scenario, *short, hash_seed=3, status=status)
+    assert observed == first, "an observer changes the flight"
+    again = digest_of(tmp_path / "d", str(tmp_path / "a" / "scenario.yaml"), "--no-recording", status=status)
     assert again == first
     assert (tmp_path / "d" / "scenario.yaml").read_text() == (tmp_path / "a" / "scenario.yaml").read_text()
 
