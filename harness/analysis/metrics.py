@@ -18,7 +18,7 @@ from harness.analysis.smoothness import (
     window_m,
 )
 from harness.analysis.trackability import FlightLimits, legs, saturated
-from harness.flight.record import Flight, FloatArray, Outcome, digest
+from harness.flight.record import Flight, FloatArray, Outcome, Track, digest
 
 
 def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) -> dict[str, Any]:
@@ -27,7 +27,9 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     Distances are of the flown track as logged. `planned_length_m` is the curve length of those parts of the
     plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two;
     `min_altitude_above_ground_m` is over the true ground, None where that is not known. Cross-track
-    figures are of the rows flown under a plan, altitude figures of all rows. `clearance_violation_s` counts the
+    figures are of the rows flown under a plan, altitude figures of all rows, all of them of the true position.
+    `navigation_error_m`, how far from there the aircraft believed to be, and `navigation_margin_m`, what was planned
+    for it, are there unless navigation is perfect. `clearance_violation_s` counts the
     intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
     `replans` counts the plans accepted after the first. `compute_ms` is over all calls in which the planner searched,
     `smoothness` is defined in `harness.analysis.smoothness`, `trackability` in `harness.analysis.trackability`;
@@ -63,6 +65,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
         "cross_track_m": error_figures(followed),
+        **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
             "planned": dataclasses.asdict(smoothness(planned, window, planned_m)),
@@ -81,6 +84,16 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         },
         "digest": digest(track),
         "error": flight.error,
+    }
+
+
+def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:
+    """How far off the believed position was, and the margin for it; nothing where navigation was perfect."""
+    if not track.has_beliefs:
+        return {}
+    return {
+        "navigation_error_m": error_figures(track.navigation_error_m),
+        "navigation_margin_m": limits.navigation_margin_m,
     }
 
 

@@ -70,6 +70,7 @@ class FlightLimits:
         max_altitude_error_m: largest altitude error.
         max_airspeed_error_mps: largest error of the airspeed averaged over `SPEED_S`.
         max_load_factor: largest load factor averaged over `LOAD_S`.
+        navigation_margin_m: what the planner keeps from obstacles beyond the clearance, for the navigation error.
     """
 
     altitude_m: float
@@ -87,6 +88,7 @@ class FlightLimits:
     max_altitude_error_m: float = math.inf
     max_airspeed_error_mps: float = math.inf
     max_load_factor: float = math.inf
+    navigation_margin_m: float = 0.0
 
     @property
     def cross_track_threshold_m(self) -> float:
@@ -115,6 +117,8 @@ class Leg:
         trackable: whether all of them stayed within what they may be.
         cause: why not; None where trackable. The first that applies of:
             "lost control";
+            "navigation error": what is too large of the true cross-track or altitude error is not too large of the
+            believed one: the aircraft did what it was to do, elsewhere;
             "planner too late": the aircraft was off the plan already when it took effect;
             "sensor horizon": a turn too tight, near an obstacle that the sensor shows too late for any other;
             "turn radius too tight": the plan bends more than the bank limit allows in calm air, or is further from
@@ -225,7 +229,8 @@ def _judge(
 ) -> Leg:
     leg, rows = track.part(first, last + 1), slice(first, last + 1)
     off = np.nan_to_num(np.abs(leg.cross_track_m))
-    high = np.abs(leg.up_m - (given.altitude_m[rows] if given else limits.altitude_m))
+    wanted_m = given.altitude_m[rows] if given else limits.altitude_m
+    high = np.abs(leg.up_m - wanted_m)
     asked_mps = given.airspeed_mps[rows] if given else limits.airspeed_mps
     slow = np.abs(_averaged(leg.airspeed_mps - asked_mps, leg, SPEED_S))
     load = float(_averaged(leg.load_factor, leg, LOAD_S).max())
@@ -233,12 +238,18 @@ def _judge(
     cause = None
     if lost_control:
         cause = "lost control"
+    elif off.max() > threshold and _believed_within(leg.believed_cross_track_m, 0.0, threshold):
+        cause = "navigation error"
     elif off.max() > threshold:
         cause = _cause(track, _before_peak(track, first + int(off.argmax()), threshold), plans, limits)
     elif load > limits.max_load_factor:
         cause = "load factor"
     elif slow.max() > limits.max_airspeed_error_mps:
         cause = "speed or throttle saturation"
+    elif high.max() > limits.max_altitude_error_m and _believed_within(
+        leg.believed_up_m, wanted_m, limits.max_altitude_error_m
+    ):
+        cause = "navigation error"
     elif high.max() > limits.max_altitude_error_m:
         cause = _altitude_cause(track, first + int(high.argmax()), limits, given)
     return Leg(
@@ -255,6 +266,15 @@ def _judge(
         trackable=cause is None,
         cause=cause,
     )
+
+
+def _believed_within(believed: FloatArray | None, wanted: FloatArray | float, most: float) -> bool:
+    """Whether what the aircraft believed was never too far from what was wanted; not where that is not known."""
+    if believed is None:
+        return False
+    off = np.abs(believed - wanted)
+    known = off[np.isfinite(off)]
+    return bool(len(known)) and float(known.max()) <= most
 
 
 def _altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven | None) -> str:

@@ -169,6 +169,8 @@ class Metrics(Figures):
         min_altitude_above_ground_m: least height above the true ground; None where that is not known.
         clearance_violation_s: time below the wanted clearance.
         cross_track_m: distance from the plan being flown.
+        navigation_error_m: distance from the true position to the believed one; None where navigation is perfect.
+        navigation_margin_m: what the planner kept from obstacles beyond the clearance for it; likewise.
         altitude_error_m: distance from the mission's altitude.
         smoothness: of the path as planned and as flown.
         bank_saturation_fraction: share of the rows in which the bank was at its limit.
@@ -197,6 +199,8 @@ class Metrics(Figures):
     clearance_violation_s: float
     cross_track_m: Spread
     altitude_error_m: Spread
+    navigation_error_m: Spread | None = None
+    navigation_margin_m: float | None = None
     smoothness: PlannedAndFlown
     bank_saturation_fraction: float
     max_load_factor: float | None = None

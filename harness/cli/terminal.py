@@ -114,6 +114,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         f"below the wanted one for {_number(metrics['clearance_violation_s'])} s",
         **_over_ground(metrics),
         "cross-track error": f"{_spread(metrics['cross_track_m'])} m",
+        **_navigated(metrics),
         "altitude error": f"{_spread(metrics['altitude_error_m'])} m",
         "trackable": _tracked(metrics),
         "replans": f"{metrics['replans']}, p99 {_number(compute['p99'])} ms, max {_number(compute['max'])} ms",
@@ -125,6 +126,15 @@ def _over_ground(metrics: Mapping[str, Any]) -> dict[str, str]:
     """A row on the height above ground, where that is known."""
     least_m = metrics.get("min_altitude_above_ground_m")
     return {} if least_m is None else {"above ground": f"at least {_number(least_m)} m"}
+
+
+def _navigated(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """A row on how far off the believed position was, where it was not perfect."""
+    error = metrics.get("navigation_error_m")
+    if error is None:
+        return {}
+    margin = f"{_number(metrics['navigation_margin_m'])} m planned for it beyond the clearance"
+    return {"navigation error": f"{_spread(error)} m; {margin}"}
 
 
 def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput, VerticalLaw
-from aircraft.interface import FlightModel
+from aircraft.guidance.progress import RouteProgress
+from aircraft.interface import FlightModel, Route
 from harness.files.crash import sentence, trace
 from harness.flight.observer import PROGRESS_EVERY_S, Observer, Progress, RowObserver
 from harness.flight.plans import LATE_S, Plans
@@ -119,8 +120,12 @@ class ClosedLoop:
         )
         self._row_observers = [each for each in observers if isinstance(each, RowObserver)]
         self._own_roll_rad: float | None = None
+        # Where the true aircraft is on a plan, and on which; only where navigation is not perfect.
+        self._measured: RouteProgress | None = None
+        self._measured_index = -1
         self._law_error: str | None = None
         self._scans_on_their_way: deque[RangeScan] = deque()
+        self._jumps = 0
         scan_rate_hz = loop.scan_rate_hz if loop.sensor else 0.0
         timetable = intervals(loop.model.step_rate_hz, scan_rate_hz)
         self._intervals, self._first_steps = itertools.cycle(timetable), timetable[0][0].steps
@@ -158,7 +163,10 @@ class ClosedLoop:
         """Logs where the aircraft is and what it was told last."""
         steered = not math.isnan(self.steering.cross_track_m)
         index = self.plans.index if steered else -1  # a law may fail in its first update
-        self._log.add(self.true, self.steering, index)
+        if self.believed is self.true:
+            self._log.add(self.true, self.steering, index)
+        else:
+            self._log.add(self.true, self.steering, index, self.believed, self._true_cross_track_m(index))
         for observer in self._row_observers:
             observer.on_row(self.true, self.steering, index)
 
@@ -168,6 +176,21 @@ class ClosedLoop:
         """The state at the end of the last step."""
         self.believed = self._loop.navigator.believed(self.true)
         """What the aircraft believes it to be."""
+        if self._loop.navigator.jumps != self._jumps:
+            self._jump()
+
+    def _jump(self) -> None:
+        """Forgets the map and scans on their way, all entered from elsewhere, after the believed position has jumped.
+
+        The planner is asked with the next scan, and checks its plan against what that shows.
+        """
+        self._jumps = self._loop.navigator.jumps
+        self._scans_on_their_way.clear()
+        self._loop.seen.start_over(self.true.time_s)
+        for observer in self._observers:
+            observer.on_event(
+                self.true.time_s, "a fix again: the believed position jumps, the map is forgotten"
+            )
 
     def _sense(self) -> None:
         """Takes a scan of the true world; the map will have it from where the aircraft believes to be."""
@@ -229,6 +252,17 @@ class ClosedLoop:
         if self._own_roll_rad is not None:
             self.steering = self.steering._replace(roll_command_rad=self._own_roll_rad)
         return None
+
+    def _true_cross_track_m(self, index: int) -> float:
+        """Distance of the true position from the plan of an index; NaN before the first."""
+        if index < 0:
+            return math.nan
+        if index != self._measured_index:
+            plan, self._measured_index = self.plans.accepted[index], index
+            self._measured = RouteProgress(Route(plan.segments, plan.loiter), self.steering.arc_length_m)
+        if self._measured is None:
+            return math.nan
+        return self._measured.nearest(self.true.east_m, self.true.north_m).cross_track_m
 
     def _advance(self, steps: int) -> Verdict | None:
         """Flies on; a planner that wants more time is asked again half way, and may end the flight there."""

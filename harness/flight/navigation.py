@@ -22,8 +22,32 @@ AIRSPEED_CORRELATION_S: Final = 300.0
 _POSITION, _VELOCITY, _HEADING, _AIRSPEED, _ALTITUDE = slice(0, 2), slice(2, 5), 5, 6, 7
 
 
+LOOKS_APART_S: Final = 5.0
+"""What moves is told from looks at it that are about so far apart in time."""
+
+
+def pose_error_m(navigation: Navigation, range_m: float) -> float:
+    """Standard deviation of how far a return at some range is shifted from one look at it to a later one, in m.
+
+    That is what position and heading err differently at two times that are `LOOKS_APART_S` apart: of a first-order
+    Gauss-Markov process with size sigma sqrt(2 (1 - exp(-dt / tau))) sigma.
+
+    Args:
+        navigation: sizes of the errors.
+        range_m: distance of the return; the sensing range is the worst case.
+    """
+
+    def change(sigma: float, correlation_s: float) -> float:
+        return sigma * math.sqrt(-2.0 * math.expm1(-LOOKS_APART_S / correlation_s))
+
+    turned_rad = change(math.radians(navigation.heading_sigma_deg), HEADING_CORRELATION_S)
+    return math.hypot(
+        change(navigation.position_sigma_m, navigation.position_correlation_s), range_m * turned_rad
+    )
+
+
 class Navigator:
-    """Believed states of one flight.
+    """Believed states of one flight. Implements `StateEstimator`.
 
     Position (east, north), velocity (three components), heading, airspeed and altitude have errors that are
     independent first-order Gauss-Markov processes, stationary from the first call on. Over an interval dt a process
@@ -63,6 +87,8 @@ class Navigator:
             ]
         )
         self._perfect = navigation.kind == "perfect"
+        self.jumps = 0
+        """How often a fix has come back after an outage, and the believed position has jumped."""
         self._unit = np.zeros(8)  # the processes, over their sigmas
         self._time_s, self._place = math.nan, np.zeros(2)
         self._outage = -1
@@ -120,6 +146,7 @@ class Navigator:
             fix = (self._unit * self._sigmas)[_POSITION]
             self._fix_error = fix + np.array(self._navigation.position_bias_m)
         if outage != self._outage:
+            self.jumps += self._outage >= 0
             self._drift = np.zeros(2)
         if outage >= 0 and not first:
             begin_s = self._navigation.outages_s[outage][0]

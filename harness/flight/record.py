@@ -44,6 +44,8 @@ class Column(NamedTuple):
     """Of its values, as numpy writes it."""
     in_digest: bool = True
     """The digest covers it."""
+    believed: bool = False
+    """It is of what the aircraft believed; a track of perfect navigation does without it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +95,30 @@ class Track:
             in_digest=False,
         ),
     ] = None
+    believed_east_m: Annotated[
+        FloatArray | None, Column("where the aircraft believed to be", in_digest=False, believed=True)
+    ] = None
+    believed_north_m: Annotated[
+        FloatArray | None, Column("where the aircraft believed to be", in_digest=False, believed=True)
+    ] = None
+    believed_up_m: Annotated[
+        FloatArray | None, Column("altitude that it believed to have", in_digest=False, believed=True)
+    ] = None
+    believed_course_deg: Annotated[
+        FloatArray | None,
+        Column("direction of the ground velocity that it believed to have", in_digest=False, believed=True),
+    ] = None
+    believed_cross_track_m: Annotated[
+        FloatArray | None,
+        Column("distance from the plan being flown that guidance saw", in_digest=False, believed=True),
+    ] = None
 
     def __post_init__(self) -> None:
         if self.actuator_limited_s is None:
             object.__setattr__(self, "actuator_limited_s", np.zeros(len(self.time_s)))
-        if self.altitude_above_ground_m is None:
-            object.__setattr__(self, "altitude_above_ground_m", np.full(len(self.time_s), math.nan))
+        for name in UNKNOWN:
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full(len(self.time_s), math.nan))
         for name, column in TRACK_COLUMNS.items():
             values = np.array(getattr(self, name), dtype=column.dtype)
             if values.shape != (len(self.time_s),):
@@ -111,6 +131,24 @@ class Track:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    @property
+    def has_beliefs(self) -> bool:
+        """Whether it is known what the aircraft believed, which it did not know exactly."""
+        return self.believed_east_m is not None and bool(np.isfinite(self.believed_east_m).any())
+
+    @property
+    def believed_m(self) -> FloatArray:
+        """(n, 3) where the aircraft believed to be: east, north, up; NaN where that is not known."""
+        columns = (self.believed_east_m, self.believed_north_m, self.believed_up_m)
+        return np.column_stack([column for column in columns if column is not None])
+
+    @property
+    def navigation_error_m(self) -> FloatArray:
+        """(n,) distance in the plane from the true position to the believed one; NaN where that is not known."""
+        believed = self.believed_m
+        off: FloatArray = np.hypot(believed[:, 0] - self.east_m, believed[:, 1] - self.north_m)
+        return off
+
     def part(self, first: int, stop: int) -> Track:
         """Some of its rows."""
         part = object.__new__(Track)
@@ -121,7 +159,7 @@ class Track:
     def joined(blocks: Sequence[Track]) -> Track:
         """One track of consecutive blocks; an empty sequence gives an empty track."""
         return Track(
-            **{name: np.concatenate([[], *(getattr(b, name) for b in blocks)]) for name in TRACK_FIELDS}
+            **{name: np.concatenate([[], *(getattr(b, name) for b in blocks)]) for name in TRACK_COLUMNS}
         )
 
 
@@ -130,8 +168,17 @@ TRACK_COLUMNS: Mapping[str, Column] = MappingProxyType(
 )
 """All columns of `track.parquet`, in its order: the fields of `Track`."""
 
-TRACK_FIELDS = tuple(TRACK_COLUMNS)
-"""Their names."""
+TRACK_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if not column.believed)
+"""Names of those that every track has."""
+
+BELIEVED_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if column.believed)
+"""Names of those that a track has where navigation is not perfect."""
+
+UNKNOWN = ("altitude_above_ground_m", *BELIEVED_FIELDS)
+"""Names of those that are all NaN where they are left out."""
+
+TRACK_OPTIONAL = ("actuator_limited_s", *UNKNOWN)
+"""Names of those that may be left out."""
 
 COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)
 """Columns of `track.parquet` that the digest covers, in its order."""

@@ -14,6 +14,11 @@ from aircraft.interface import AircraftState
 class StateEstimator(Protocol):
     """Tells what the aircraft believes of its state. One object serves one flight."""
 
+    @property
+    def jumps(self) -> int:
+        """How often the believed position has jumped, which the aircraft notices: a fix came back after an outage."""
+        ...
+
     def believed(self, state: AircraftState) -> AircraftState:
         """What the aircraft believes its state to be.
 
@@ -28,6 +33,8 @@ class StateEstimator(Protocol):
 
 class PerfectEstimator:
     """The aircraft knows its state exactly. Implements `StateEstimator`."""
+
+    jumps = 0
 
     def believed(self, state: AircraftState) -> AircraftState:
         """The state itself."""

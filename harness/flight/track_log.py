@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +35,14 @@ PACKED = struct.Struct(f"{len(AircraftState._fields) + 3}dq")
 
 NAMES = tuple(LOGGED.fields or ())
 
+BELIEVED = np.dtype(
+    [
+        (name, np.float64)
+        for name in ("east_m", "north_m", "up_m", "velocity_east_mps", "velocity_north_mps", "cross_track_m")
+    ]
+)
+"""What is kept beside that of a tick at which the aircraft did not know its state exactly."""
+
 FINITE = [name for name in AircraftState._fields if name != "throttle"]
 """What is finite of a state while the aircraft is under control."""
 
@@ -58,9 +68,18 @@ class TrackLog:
         self._sinks = tuple(sinks)
         self._rows = np.zeros(block_rows, LOGGED)
         self._bytes, self._used = self._rows.data.cast("B"), 0
+        self._beliefs = np.full(block_rows, math.nan, BELIEVED)
+        self._believes = False
         self._blocks: list[Track] = []
 
-    def add(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
+    def add(
+        self,
+        state: AircraftState,
+        steering: GuidanceOutput,
+        plan_index: int,
+        believed: AircraftState | None = None,
+        true_cross_track_m: float = math.nan,
+    ) -> None:
         """Adds one row.
 
         A state that is not finite, with which control is lost, is no row of the track.
@@ -69,7 +88,21 @@ class TrackLog:
             state: the true state.
             steering: what guidance decided last; before the first plan its cross-track error and arc length are NaN.
             plan_index: row of `plans.parquet` being flown, -1 before the first.
+            believed: what the aircraft believes; None where it knows its state exactly.
+            true_cross_track_m: distance of the true position from the plan, where `believed` is given; `steering` has
+                that of the believed one.
         """
+        if believed is not None:
+            self._believes = True
+            self._beliefs[self._used] = (
+                believed.east_m,
+                believed.north_m,
+                believed.up_m,
+                believed.velocity_east_mps,
+                believed.velocity_north_mps,
+                steering.cross_track_m,
+            )
+            steering = steering._replace(cross_track_m=true_cross_track_m)
         PACKED.pack_into(  # numpy takes twice as long to fill a row
             self._bytes,
             self._used * PACKED.size,
@@ -92,7 +125,8 @@ class TrackLog:
     def hand_on(self) -> None:
         """Hands on the rows since the last block as a block; without any it does nothing."""
         rows = self._rows[: self._used]
-        rows = rows[np.all([np.isfinite(rows[name]) for name in FINITE], axis=0)]
+        kept = np.all([np.isfinite(rows[name]) for name in FINITE], axis=0)
+        rows, beliefs = rows[kept], self._beliefs[: self._used][kept]
         self._used = 0
         if not len(rows):
             return
@@ -120,7 +154,20 @@ class TrackLog:
             altitude_above_ground_m=(
                 None if self._ground is None else of["up_m"] - self._ground(of["east_m"], of["north_m"])
             ),
+            **(_believed(beliefs) if self._believes else {}),
         )
         self._blocks.append(block)
         for sink in self._sinks:
             sink(block)
+
+
+def _believed(rows: np.ndarray[Any, Any]) -> dict[str, FloatArray]:
+    """The columns of what the aircraft believed."""
+    course = np.degrees(np.arctan2(rows["velocity_east_mps"], rows["velocity_north_mps"])) % 360.0
+    return {
+        "believed_east_m": rows["east_m"].copy(),
+        "believed_north_m": rows["north_m"].copy(),
+        "believed_up_m": rows["up_m"].copy(),
+        "believed_course_deg": course,
+        "believed_cross_track_m": rows["cross_track_m"].copy(),
+    }

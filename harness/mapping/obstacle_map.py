@@ -48,6 +48,7 @@ class ObstacleMap:
             between them and are joined. Edge points lie about a quarter of it apart.
         range_m: sensing range.
         doubtful: the sensor may return what is not there: a single hit is not believed.
+        revision: to count from, where it follows another map.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class ObstacleMap:
         clearance_m: float,
         range_m: float,
         doubtful: bool = True,
+        revision: int = 0,
     ) -> None:
         grid = EdgeGrid.over(bounds_m, clearance_m)
         self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
@@ -72,9 +74,9 @@ class ObstacleMap:
         self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
         self._range = range_m
         self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED
-        self.revision = 0
+        self.revision = revision
         """Grows with every change of the set of edge points."""
-        self.last_removal_revision = 0
+        self.last_removal_revision = revision
         """The last revision at which edge points were taken away again."""
         self._scans = 0
         self._all_stands = True  # no point was looked through the last time

@@ -45,6 +45,7 @@ class ReflectionMap:
         clearance_m: wanted distance from obstacles; cells are a quarter of it wide.
         range_m: sensing range.
         noise_m: standard deviation of ranges, as the sensor's maker states it; positive.
+        revision: to count from, where it follows another map.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class ReflectionMap:
         clearance_m: float,
         range_m: float,
         noise_m: float,
+        revision: int = 0,
     ) -> None:
         grid = EdgeGrid.over(bounds_m, clearance_m)
         self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
@@ -68,7 +70,9 @@ class ReflectionMap:
         self._since = np.zeros(1024, dtype=np.int64)  # revision at which it last became an edge
         self._since_s = np.zeros(1024)  # and when
         self._time_s = 0.0
-        self.revision = self.last_removal_revision = 0  # as `harness.mapping.sensed_map.Edges` has them
+        self.revision = self.last_removal_revision = (
+            revision  # as `harness.mapping.sensed_map.Edges` has them
+        )
         self._near = np.zeros(0, dtype=np.int32)
         self._near_at = complex(math.inf, math.inf)
         self._near_count = 0

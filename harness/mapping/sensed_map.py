@@ -53,6 +53,8 @@ class SensedMap:
         false_returns: the sensor is known to return ranges where nothing is.
         lost: share of the returns that get lost or are false, likewise.
         least_width_m: as `harness.mapping.free_space.FreeSpace` has it.
+        pose_error_m: standard deviation of how far returns are shifted from one look at an obstacle to a later one,
+            because the poses of the scans are not known exactly. What moves less is not told to move.
     """
 
     def __init__(
@@ -65,20 +67,14 @@ class SensedMap:
         false_returns: bool = False,
         lost: float = 0.0,
         least_width_m: float | None = None,
+        pose_error_m: float = 0.0,
     ) -> None:
-        noisy = noise_m > NOISY * clearance_m
-        self._clearance = clearance_m
-        self._edges: Edges
-        self._free = FreeSpace(bounds_m, clearance_m, range_m, noise_m, lost, least_width_m)
-        self._noisy = noisy
-        if noisy:
-            self._edges = edges = ReflectionMap(bounds_m, clearance_m, range_m, noise_m)
-            self._moving = MovingObstacles(
-                clearance_m, ERR * noise_m, is_free=self._free.surrounds, stands=edges.stands
-            )
-        else:
-            self._edges = ObstacleMap(bounds_m, clearance_m, range_m, doubtful=false_returns)
-            self._moving = MovingObstacles(clearance_m, noise_m, false_returns)
+        self._area = bounds_m, clearance_m, range_m
+        self._noise, self._false_returns = noise_m, false_returns
+        self._lost, self._least_width = lost, least_width_m
+        self._pose_error, self._shifted = pose_error_m, math.hypot(noise_m, pose_error_m)
+        self._clearance, self._noisy = clearance_m, noise_m > NOISY * clearance_m
+        self._begin(revision=0)
         self.moving: tuple[MovingEdges, ...] = ()
         """What is known to move; its edges are not among the others."""
         self.last_contradiction_s = -math.inf
@@ -86,6 +82,31 @@ class SensedMap:
         self.revision = self._edges.revision
         """Grows with every change of the set of edge points."""
         self._asked: tuple[int, int, FloatArray] = (0, -1, np.zeros((0, 2)))
+
+    def _begin(self, revision: int) -> None:
+        """Makes everything empty."""
+        self._free = FreeSpace(*self._area, self._noise, self._lost, self._least_width)
+        self._edges: Edges
+        if self._noisy:
+            self._edges = edges = ReflectionMap(*self._area, self._noise, revision)
+            self._moving = MovingObstacles(
+                self._clearance,
+                max(ERR * self._noise, self._pose_error),
+                is_free=self._free.surrounds,
+                stands=edges.stands,
+            )
+        else:
+            self._edges = ObstacleMap(*self._area, self._false_returns, revision)
+            self._moving = MovingObstacles(self._clearance, self._shifted, self._false_returns)
+
+    def start_over(self, time_s: float) -> None:
+        """Forgets everything: the believed position has jumped, and what was entered before lies elsewhere.
+
+        Args:
+            time_s: now.
+        """
+        self._begin(self.revision + 1)
+        self.revision, self.moving, self.last_contradiction_s = self._edges.revision, (), time_s
 
     @property
     def spacing_m(self) -> float:

@@ -35,6 +35,10 @@ FRAME = "frame"
 WHOLE = "whole_track"
 FLOWN = "flown"
 """Below WORLD and PLAN: the trail, one piece a time stamp; the views show all pieces up to the cursor."""
+BELIEVED = "believed"
+"""Below WORLD and PLAN: where the aircraft believed to be, as the trail; only where navigation is not perfect."""
+NAVIGATION = "navigation_error"
+"""Below SERIES: likewise."""
 SENSED = "sensed"
 """Below WORLD and PLAN: places on edges, each when it was sensed first; shown up to the cursor as well."""
 TRUE = "true_obstacles"
@@ -96,6 +100,8 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "speed/ground": ("over the ground", CHOSEN, 1.0),
     "speed/flown": ("true airspeed", TRACK, 1.5),
     "altitude_error/flown": ("altitude error", TRACK, 1.5),
+    f"{NAVIGATION}/flown": ("navigation error", TRACK, 1.5),
+    "cross_track/believed": ("as believed", CHOSEN, 1.0),
 }
 """Name, colour and width of every line of the time series, by its entity below SERIES; of overlaid runs, only
 those called `flown` are drawn."""
@@ -159,6 +165,7 @@ class Scene:
         searches: whether a planner searches; not where a given path is flown.
         ground: heights of the true ground, where they are known.
         origin_deg: latitude and longitude of the plane's origin, where it was given.
+        believes: whether the aircraft does not know its state exactly.
     """
 
     name: str
@@ -170,6 +177,7 @@ class Scene:
     searches: bool = True
     ground: HeightField | None = None
     origin_deg: tuple[float, float] | None = None
+    believes: bool = False
 
     @property
     def base_m(self) -> float:
@@ -184,14 +192,14 @@ class Scene:
     @property
     def empty_series(self) -> tuple[str, ...]:
         """Time series that have nothing to show: clearance where there is no obstacle, search where nothing is."""
-        without = () if self.obstacles else ("clearance",)
-        return without if self.searches else (*without, "search")
+        shown = {"clearance": bool(self.obstacles), "search": self.searches, NAVIGATION: self.believes}
+        return tuple(name for name, has in shown.items() if not has)
 
     @property
     def frame(self) -> Frame:
         """What the views are framed on."""
         limit_deg = round(math.degrees(self.limits.bank_limit_rad), 1)
-        return Frame(self.mission.bounds_m, self.altitude_m, self.mission.clearance_m, limit_deg)
+        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg)
 
     @property
     def obstacle_top_m(self) -> float:

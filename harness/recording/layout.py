@@ -12,10 +12,12 @@ import rerun.blueprint as rrb
 from harness.recording.blueprint import (
     ATTITUDE,
     BACKGROUND,
+    BELIEVED,
     COLOURS,
     EVENTS,
     FLOWN,
     MAP,
+    NAVIGATION,
     PLAN,
     SENSED,
     SERIES,
@@ -51,7 +53,7 @@ class Layout(rrb.Blueprint):
 def blueprint(
     frame: Frame,
     runs: Sequence[str] = ("",),
-    without: Sequence[str] = (),
+    without: Sequence[str] = (NAVIGATION,),
     on_earth: bool = False,
     follows: bool = False,
 ) -> Layout:
@@ -156,7 +158,9 @@ def plan_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial2DView:
         visual_bounds=rrb.VisualBounds2D(
             x_range=[xmin - margin, xmax + margin], y_range=[-ymax - margin, -ymin + margin]
         ),
-        overrides={f"{PLAN}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, SENSED)},
+        overrides={
+            f"{PLAN}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, BELIEVED, SENSED)
+        },
     )
 
 
@@ -227,6 +231,7 @@ def series_views(
         ),
         ("bank", _bank_title(frame) if one else "Bank, deg (right +)", (-60.0, 60.0)),
         ("altitude_error", "Altitude error, m", None),
+        (NAVIGATION, "Navigation error, m", None),
         ("speed", "Speed, m/s; blue: over ground" if one else "Airspeed, m/s", None),
         ("search", "Search time, ms", None),
     ]

@@ -33,6 +33,7 @@ from harness.recording.scene import (
     log_scene,
     log_summary,
     quaternions,
+    send_believed,
 )
 from harness.recording.sensed import News, Sensed, returns_m
 from harness.recording.states import (
@@ -101,6 +102,7 @@ class RerunLog:
         self._sensed = Sensed(scene.obstacles, CELL_SHARE * span_m)
         self._states = States(math.degrees(scene.limits.bank_limit_rad))
         self._last_point: FloatArray = np.zeros((0, 3))
+        self._believed_point: FloatArray = np.zeros((0, 3))
         self._whole: list[FloatArray] = []
         self._last: Track | None = None
         self._shown_until_s = -math.inf
@@ -161,6 +163,8 @@ class RerunLog:
             send_changes(self._rec, lane, changes)
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
         self._send_series(block, times)
+        if block.has_beliefs:
+            self._believed_point = send_believed(self._rec, block, self._piece_rows, self._believed_point)
 
     def flush(self) -> None:
         """Writes out all that has been logged; a process killed afterwards leaves about that.
@@ -311,7 +315,7 @@ class RerunLog:
         limit_deg = math.degrees(self._scene.limits.bank_limit_rad)
         ends = [look.time_column(block.time_s[[0, -1]])]
         for entity, value in {
-            "clearance/wanted": self._scene.mission.clearance_m,
+            "clearance/wanted": self._scene.limits.clearance_m,
             "bank/limit_right": limit_deg,
             "bank/limit_left": -limit_deg,
         }.items():

@@ -17,7 +17,7 @@ from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
 from harness.recording.layout import THIN_SERIES
 from harness.recording.solids import CIRCLE_POINTS, circle, log_solids, outlines, rims
-from harness.recording.strips import strips_2d
+from harness.recording.strips import strips_2d, strips_3d
 from harness.recording.summary import colours, summary
 from harness.recording.terrain import log_ground
 
@@ -80,6 +80,43 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
     if not thin:
         log_colours_page(rec, scene)
         log_summary(rec, scene, None)
+
+
+def send_believed(rec: rr.RecordingStream, block: Track, piece_rows: int, last_m: FloatArray) -> FloatArray:
+    """Shows where the aircraft believed to be, piece by piece as the trail, and how far off that was.
+
+    Args:
+        rec: where to.
+        block: rows of the track.
+        piece_rows: rows a piece.
+        last_m: (1, 3) the point that the first piece goes on from; (0, 3): from none.
+
+    Returns:
+        The last point.
+    """
+    believed = block.believed_m
+    ends = np.append(np.arange(piece_rows - 1, len(block) - 1, piece_rows), len(block) - 1)
+    starts = np.append(0, ends[:-1] + 1)
+    pieces = [np.concatenate((last_m, believed[: ends[0] + 1]))]
+    pieces += [believed[start - 1 : end + 1] for start, end in zip(starts[1:], ends[1:], strict=True)]
+    times = [look.time_column(block.time_s[ends])]
+    colours = np.tile(np.array(look.CHOSEN, dtype=np.uint8), (len(pieces), 1))
+    for entity, strips in (
+        (
+            look.PLAN,
+            rr.LineStrips2D.columns(strips=strips_2d([each[:, :2] for each in pieces]), colors=colours),
+        ),
+        (look.WORLD, rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=colours)),
+    ):
+        rec.send_columns(f"{entity}/{look.BELIEVED}", times, strips)
+    every = [look.time_column(block.time_s)]
+    assert block.believed_cross_track_m is not None
+    for name, values in (
+        (f"{look.NAVIGATION}/flown", block.navigation_error_m),
+        ("cross_track/believed", block.believed_cross_track_m),
+    ):
+        rec.send_columns(f"{look.SERIES}/{name}", every, rr.Scalars.columns(scalars=values))
+    return believed[-1:]
 
 
 def log_obstacle(rec: rr.RecordingStream, scene: Scene, index: int) -> None:

@@ -68,6 +68,7 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
         "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
         "least clearance": _clearance(scene, metrics),
         "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
+        **_navigation(metrics),
         "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
         "trackable": "yes"
         if metrics["trackable"]
@@ -81,12 +82,24 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
+def _navigation(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """How far off the believed position was, where navigation was not perfect."""
+    error = metrics.get("navigation_error_m")
+    if error is None:
+        return {}
+    margin = f"{metrics['navigation_margin_m']:.1f} m beyond the clearance"
+    return {
+        "navigation error p95, max": f"{_text(error['p95'], 2)} m, {_text(error['max'], 2)} m",
+        "planned for it": margin,
+    }
+
+
 def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
     least = number(metrics["min_clearance_m"])
     if not least:
         return "no obstacle"
     below = _text(metrics["clearance_violation_s"], 1)
-    return f"{least} m of {scene.mission.clearance_m:g} m; {below} s below"
+    return f"{least} m of {scene.limits.clearance_m:g} m; {below} s below"
 
 
 def _text(value: float | None, digits: int) -> str:

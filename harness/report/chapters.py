@@ -147,6 +147,7 @@ def _scene(scenario: Scenario, optimum: Optimum) -> Scene:
         clearance_m=scenario.planner.clearance_m,
         turn_radius_m=performance_of(scenario).turn_radius_m,
         optimum_m=optimum.points_m,
+        navigation_margin_m=scenario.navigation.margin_m or 0.0,
     )
 
 
@@ -169,6 +170,13 @@ def _picture(stem: Path, figure: Any, caption: str) -> Picture:
     return Picture(content, caption, caption)
 
 
+def _kept(scene: Scene) -> str:
+    """The wanted clearance, and what is planned beyond it."""
+    margin = scene.navigation_margin_m
+    beyond = f" + {number(margin)} m for the navigation error" if margin > 0.0 else ""
+    return f"{number(scene.clearance_m)} m{beyond}"
+
+
 def _facts(scene: Scene, optimum: Optimum) -> dict[str, str]:
     def km(value_m: float | None) -> str:
         return f"{number(value_m, 1e-3)} km" if value_m is not None else "none"
@@ -178,6 +186,6 @@ def _facts(scene: Scene, optimum: Optimum) -> dict[str, str]:
         "straight line": km(((goal_east - east) ** 2 + (goal_north - north) ** 2) ** 0.5),
         "clairvoyant optimum": km(optimum.length_m),
         "obstacles": str(len(scene.obstacles)),
-        "wanted clearance": f"{number(scene.clearance_m)} m",
+        "wanted clearance": _kept(scene),
         "turn radius R": f"{number(scene.turn_radius_m)} m",
     }

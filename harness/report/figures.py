@@ -74,6 +74,7 @@ class Scene:
         clearance_m: wanted.
         turn_radius_m: smallest radius of the aircraft.
         optimum_m: (k, 2) the clairvoyant shortest path; empty where there is none.
+        navigation_margin_m: kept beyond the clearance, for the navigation error.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Scene:
     clearance_m: float
     turn_radius_m: float
     optimum_m: FloatArray
+    navigation_margin_m: float = 0.0
 
 
 Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]

@@ -24,6 +24,7 @@ from harness.analysis.metrics import metrics
 from harness.analysis.trackability import FlightLimits
 from harness.files.errors import WriteError
 from harness.flight.closed_loop import Loop, fly
+from harness.flight.navigation import Navigator, pose_error_m
 from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight
 from harness.flight.termination import MissionEnd
@@ -40,7 +41,7 @@ from harness.world.world import World
 if TYPE_CHECKING:
     from harness.recording.blueprint import Scene
 
-SENSOR_STREAM, TURBULENCE_STREAM = 1, 2
+SENSOR_STREAM, TURBULENCE_STREAM, NAVIGATION_STREAM = 1, 2, 3
 """Numbers of the random streams that derive from the scenario's seed."""
 
 INSIDE_M = 1e-3
@@ -77,6 +78,7 @@ def make_loop(
             false_returns=scenario.sensor.false_return > 0.0,
             lost=1.0 - (1.0 - scenario.sensor.dropout) * (1.0 - scenario.sensor.false_return),
             least_width_m=scenario.sensor.least_width_m,
+            pose_error_m=pose_error_m(scenario.navigation, mission.sensor_range_m),
         ),
         planner=planner_of(scenario.planner, mission),
         model=make_model(start, air) if make_model else jsbsim_aircraft(scenario, start, air),
@@ -85,6 +87,7 @@ def make_loop(
         mission=mission,
         vertical=LevelFlight(scenario.mission.altitude_m, mission.speed_mps),
         scan_rate_hz=scenario.sensor.rate_hz,
+        navigator=Navigator(scenario.navigation, _stream(scenario.seed, NAVIGATION_STREAM)),
     )
 
 
@@ -158,6 +161,7 @@ def flight_limits(scenario: Scenario) -> FlightLimits:
     calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
     guidance = airframe_of(scenario.aircraft).guidance_limits()
     speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
+    planned_m = clearance + _given(scenario.navigation.margin_m)
     wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
     sensor = scenario.sensor
     blind_s = scenario.planner.compute_latency_s + sensor.latency_s + 1.0 / sensor.rate_hz
@@ -172,11 +176,12 @@ def flight_limits(scenario: Scenario) -> FlightLimits:
         tightest_radius_m=speed * speed / (GRAVITY_MPS2 * math.tan(guidance.bank_limit_rad)),
         roll_rate_radps=guidance.roll_rate_radps,
         sensor_range_m=_given(sensor.range_m),
-        horizon_m=performance.turn_radius_m + clearance + (speed + wind) * (blind_s + performance.roll_in_s),
+        horizon_m=performance.turn_radius_m + planned_m + (speed + wind) * (blind_s + performance.roll_in_s),
         max_cross_track_m=_given(limits.cross_track_m),
         max_altitude_error_m=_given(limits.altitude_m),
         max_airspeed_error_mps=_given(limits.airspeed_mps),
         max_load_factor=_given(limits.load_factor),
+        navigation_margin_m=_given(scenario.navigation.margin_m),
     )
 
 
@@ -289,6 +294,7 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
         searches=pilot is None,
         ground=loop.world.ground.field if loop.world.ground else None,
         origin_deg=_origin_deg(scenario),
+        believes=scenario.navigation.kind != "perfect",
     )
 
 

@@ -26,7 +26,14 @@ from harness.files.folder_lock import FolderLock
 from harness.files.input_file import MAX_JSON_BYTES, read_index, read_text
 from harness.files.versions import FLOWN_WITH, versions
 from harness.files.whole_file import PARTIAL, replace_text
-from harness.flight.record import TRACK_COLUMNS, TRACK_FIELDS, AcceptedPlan, Track
+from harness.flight.record import (
+    BELIEVED_FIELDS,
+    TRACK_COLUMNS,
+    TRACK_FIELDS,
+    TRACK_OPTIONAL,
+    AcceptedPlan,
+    Track,
+)
 from harness.run_files.plans_table import PlanRow, plan_rows, plans_table
 
 if TYPE_CHECKING:
@@ -55,10 +62,8 @@ MAX_BYTES = 64_000_000
 SCHEMA = "wayproof/run/1"
 DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
 COMPRESSION = "lz4"
-ADDED = ("altitude_above_ground_m",)
-"""Columns that older runs lack."""
-SPLIT = [name for name in TRACK_FIELDS if name != "plan_index"]
-"""Columns whose bytes are written first bytes first: half the size and half the time."""
+WHOLE = "plan_index"
+"""The one column whose bytes are not written first bytes first: half the size and half the time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +160,10 @@ class RunFolder:
         text = _json(metrics)
         # At once: whatever is written while flying costs the flight its place in the caches.
         rows = track_table(track)
-        split = {"use_dictionary": False, "use_byte_stream_split": SPLIT}
+        split = {
+            "use_dictionary": False,
+            "use_byte_stream_split": [each for each in rows.column_names if each != WHOLE],
+        }
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
             pq.write_table(table, self.path / (name + PARTIAL), compression=COMPRESSION, **how)
             os.replace(self.path / (name + PARTIAL), self.path / name)
@@ -177,13 +185,18 @@ def track_table(track: Track) -> pa.Table:
     """A track as the table that `track.parquet` holds."""
     import pyarrow as pa
 
+    columns = {name: TRACK_COLUMNS[name] for name in _fields_of(track)}
     return pa.table(
-        [getattr(track, name) for name in TRACK_COLUMNS],
+        [getattr(track, name) for name in columns],
         pa.schema(
             pa.field(name, pa.from_numpy_dtype(column.dtype), metadata={"description": column.doc})
-            for name, column in TRACK_COLUMNS.items()
+            for name, column in columns.items()
         ),
     )
+
+
+def _fields_of(track: Track) -> tuple[str, ...]:
+    return (*TRACK_FIELDS, *BELIEVED_FIELDS) if track.has_beliefs else TRACK_FIELDS
 
 
 def tables(path: Path) -> tuple[pa.Table, pa.Table]:
@@ -214,8 +227,8 @@ def load_run(path: Path) -> Run:
         table = pq.read_table(path / TRACK)
         columns = {
             name: table[name].to_numpy()
-            for name in TRACK_FIELDS
-            if name not in ADDED or name in table.column_names
+            for name in TRACK_COLUMNS
+            if name not in TRACK_OPTIONAL or name in table.column_names
         }
         return Run(
             folder=path,

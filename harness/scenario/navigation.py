@@ -71,6 +71,9 @@ the KITTI benchmark (ORB-SLAM2, Mur-Artal and Tardos, 2017: 1.15 %)."""
 VISUAL_VELOCITY_SIGMA_MPS: Final = 0.1
 """1 sigma of each component of a velocity that is reckoned without GPS. Chosen: twice that of GPS."""
 
+SIGMAS: Final = 3.0
+"""The planner's margin covers so many sigma of the position error: 98.9 % of all errors in the plane are smaller."""
+
 _SENSORS: Final = {"heading_sigma_deg": COMPASS_SIGMA_DEG, "airspeed_sigma_mps": PITOT_SIGMA_MPS}
 
 PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
@@ -166,6 +169,14 @@ class Navigation(Section):
         max_length=1000,
     )
 
+    margin_m: float = key(
+        "What the planner keeps from obstacles beyond planner.clearance_m.",
+        unit="m",
+        derived="3 sigma, the bias, and the drift of the longest outage, or of half a turn where that is less",
+        ge=0,
+        le=MAX_ERROR_M,
+    )
+
     @model_validator(mode="after")
     def _filled_in(self) -> Navigation:
         """Fills in what the kind has, and holds the keys against each other."""
@@ -191,10 +202,18 @@ class Navigation(Section):
         return self
 
 
-def planning_margin_m(navigation: Navigation, speed_mps: float, time_limit_s: float, k: float = 3.0) -> float:
+def planning_margin_m(
+    navigation: Navigation,
+    speed_mps: float,
+    time_limit_s: float,
+    k: float = SIGMAS,
+    unseen_m: float = math.inf,
+) -> float:
     """What clearance must have on top, so that the true aircraft keeps it where the believed one does.
 
-    `k` sigma of the position error, its bias, and the drift of the longest outage: drift_share x speed x duration. For
+    `k` sigma of the position error, its bias, and the drift of the longest outage: drift_share x speed x duration. The
+    map drifts as the aircraft does, and is forgotten when a fix comes back: what stands in it is off only by what has
+    been drifted since it was last seen. For
     an error whose two components are normal with the same sigma, 1 - exp(-k^2 / 2) of all errors are within k sigma:
     98.9 % for 3.
 
@@ -203,6 +222,8 @@ def planning_margin_m(navigation: Navigation, speed_mps: float, time_limit_s: fl
         speed_mps: greatest speed over the ground, wind included.
         time_limit_s: when the flight ends at the latest; no outage lasts longer.
         k: sigmas.
+        unseen_m: what is passed was seen no longer ago than this distance flown; a scenario has half a turn, during
+            which a sensor that looks ahead may lose sight of it.
 
     Returns:
         The margin in metres; 0 for perfect navigation.
@@ -211,5 +232,5 @@ def planning_margin_m(navigation: Navigation, speed_mps: float, time_limit_s: fl
         (min(end_s, time_limit_s) - min(begin_s, time_limit_s) for begin_s, end_s in navigation.outages_s),
         default=0.0,
     )
-    drift_m = navigation.drift_share * speed_mps * longest_s
+    drift_m = navigation.drift_share * min(speed_mps * longest_s, unseen_m)
     return k * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m) + drift_m

@@ -22,7 +22,7 @@ from harness.scenario import guidance_keys, planner_keys
 from harness.scenario.checks import check_local_plane, check_start_and_goal
 from harness.scenario.files_resolved import plane_point, resolved
 from harness.scenario.ground import GroundSpec, SourceSpec
-from harness.scenario.navigation import Navigation
+from harness.scenario.navigation import Navigation, planning_margin_m
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.overrides import Given, changed, overridden
 from harness.scenario.sections import (
@@ -90,11 +90,6 @@ class Scenario(Section):
         folder = (info.context or {}).get("folder")
         given = Given({name: getattr(self, name) for name in self.model_fields_set}, folder)
         object.__setattr__(self, "_given", given)
-        if self.navigation.kind != "perfect":  # never flown as if it had not been asked for
-            raise KeyFault(
-                ("navigation", "kind"),
-                f"is {self.navigation.kind}, which no flight takes yet (all use the true state); must be perfect",
-            )
         self._set("simulation", rate_hz=step_rate_hz(self.simulation.rate_hz, self.sensor))
         self._place_ends()
         found = model_or_folder(self.aircraft.model, folder)
@@ -115,6 +110,7 @@ class Scenario(Section):
             time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
         )
         self._set("planner", clearance_m=_rounded_up(radius_m, 10))
+        self._set("navigation", margin_m=self._navigation_margin_m(wind_mps, radius_m))
         self._set("sensor", least_width_m=max(self.planner.clearance_m, LEAST_CLEARANCE * radius_m))
         self._set("trackability", cross_track_m=self._cross_track_m(performance.tracking_error_m))
         self._set(
@@ -147,6 +143,16 @@ class Scenario(Section):
             object.__setattr__(self, "ground", found.ground)
             object.__setattr__(self, "sources", (*(self.sources or ()), *found.sources))
         return found.names
+
+    def _navigation_margin_m(self, wind_mps: float, turn_radius_m: float) -> float:
+        assert self.aircraft.airspeed_mps is not None
+        assert self.mission.time_limit_s is not None
+        return planning_margin_m(
+            self.navigation,
+            self.aircraft.airspeed_mps + wind_mps,
+            self.mission.time_limit_s,
+            unseen_m=math.pi * turn_radius_m,
+        )
 
     def _cross_track_m(self, tracking_error_m: float) -> float:
         return max(0.1 * self.planner.clearance_m, 2.0 * tracking_error_m)
@@ -257,7 +263,8 @@ def unpacked(kept: bytes) -> Scenario:
 def mission_of(scenario: Scenario) -> Mission:
     """What a planner is told before the flight.
 
-    The clearance is no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size.
+    The clearance is that of `planner.clearance_m` and, on top, the margin for the error of the believed position. It is
+    no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size.
     """
     from planner.interface import Mission
 
@@ -266,7 +273,10 @@ def mission_of(scenario: Scenario) -> Mission:
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
         bounds_m=scenario.area.bounds_m,
-        clearance_m=max(scenario.planner.clearance_m, LEAST_CLEARANCE * performance.turn_radius_m),
+        clearance_m=max(
+            scenario.planner.clearance_m + (scenario.navigation.margin_m or 0.0),
+            LEAST_CLEARANCE * performance.turn_radius_m,
+        ),
         turn_radius_m=performance.turn_radius_m,
         speed_mps=performance.airspeed_mps,
         roll_in_s=performance.roll_in_s,

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Segment, onward
+from planner.geometry.curves import Point, Segment, onward, place_on
 from planner.geometry.path_samples import places_along
 from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
+from planner.plan_checks import start_tolerance_m
 from planner.rolling_window.certificate import CertificateBroken, Certifier
 from planner.rolling_window.committed_plan import CommittedPlan
 from planner.rolling_window.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
@@ -155,12 +156,16 @@ class Escapes:
         """
         left = left_of(committed, here, self._mission)
         ways: list[Path] = []  # made when they are first asked for: most plans in effect will do
+        path, from_m, to_m = committed.path, here, until_m
+        off_m = math.dist(place_on(path, here)[0][:2], request.position_m)
+        if off_m > start_tolerance_m(self._mission):  # as after a jump of the believed position
+            path, from_m, to_m = Path(np.array(prefix)), 0.0, sum(segment[5] for segment in prefix)
 
         def options(terrain: Terrain) -> Iterator[_Option]:
             if nearer is not None:
                 yield _Option(nearer.path, None, "", nearer)
             yield _Option(left, committed.left(here), GOES_ON)
-            turn = divert_to_loiter(committed.path, here, until_m, self._local.limits, terrain)
+            turn = divert_to_loiter(path, from_m, to_m, self._local.limits, terrain)
             if turn is not None:
                 yield _Option(turn, None, "no way on can be seen to be safe; turning away")
             if threats is not None:

@@ -31,9 +31,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 from planner.geometry.course import Course
-from planner.geometry.curves import Pose, Segment, along, on_loiter
+from planner.geometry.curves import Pose, Segment, along, on_loiter, place_on
 from planner.interface import FloatArray, Mission, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
+from planner.plan_checks import start_tolerance_m
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proofs
 from planner.rolling_window.commitment import Commitment
@@ -188,10 +189,19 @@ class RollingWindow:
         """Whether the window is to roll on now."""
         meets = self._threats is not None and self._meets_something(plan, now.here_m)
         self._monitor.broken |= meets
+        if self._left_behind(now):
+            return True
         since_m = now.request.arc_length_m - self._monitor.searched_at_m
         if self._giving_up.out_of_effort and self._search.up_to_date:
             return self._giving_up.whole_turn(since_m)
         return self._monitor.due(plan, now.here_m, since_m, newly_cut) or meets
+
+    def _left_behind(self, now: Situation) -> bool:
+        """Whether the plan in effect is so far off that none can go on from it, as after a jump of the position."""
+        if now.plan is None:
+            return False
+        off_m = math.dist(place_on(now.plan.path, now.here_m)[0][:2], now.request.position_m)
+        return off_m > start_tolerance_m(self._mission)
 
     def _meets_something(self, plan: CommittedPlan, here_m: float) -> bool:
         """Whether the plan in effect would come too near to what moves or has just appeared."""
@@ -200,7 +210,7 @@ class RollingWindow:
 
     def _roll(self, now: Situation) -> Plan:
         """One rolling step: search, certify, compare with the plan in effect."""
-        start, ahead = self._start(now), now.ahead
+        start, ahead = self._start(now), None if self._left_behind(now) else now.ahead
         serving = ahead if math.isinf(self._monitor.cut_m) and not self._monitor.broken else None
         self._search.nearer = None
         if serving is not None and (serving.shortest or self._search.up_to_date):

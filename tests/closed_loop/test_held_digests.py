@@ -18,9 +18,9 @@ from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
 
 HELD = {
-    "aerosonde_forest": "d151453eb5ac1667971738f38acd6cf14f2a98bd447119c4d4466066028e1cda",
-    "polygon_town": "2b7a09b4b850eb7a27b73a7924864b3bac1969fe7a7aee25addda8b67f83b6dd",
-    "one_of_everything": "98086263ed60ea3b946a9983fa0e74cabeeaf6040c022483619cf1487b13beef",
+    "aerosonde_forest": "f22ac2370b37a011f8057e1469936008a8df3f399dec19711e60cb3a75c10c8d",
+    "polygon_town": "cc9a18f79433c057b63a719a07ce2adeb5601f74c5d7ff783a9f2006afee39c1",
+    "one_of_everything": "bcc918ca0e2bcd7e3948a215cf08a236bea66f1628dc13003333d6936ffa4b09",
 }
 """SHA-256 of the first minute of each."""
 

@@ -34,7 +34,8 @@ def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
 
 def test_columns_are_those_of_the_contract() -> None:
     assert " ".join(COLUMNS) == CONTRACT
-    assert list(TRACK_FIELDS) == [*COLUMNS, "arc_length_m", "throttle", "altitude_above_ground_m"]
+    further = ["arc_length_m", "throttle", "altitude_above_ground_m", "actuator_limited_s"]
+    assert list(TRACK_FIELDS) == [*COLUMNS, *further]
 
 
 def test_row_holds_the_state_in_the_units_of_the_file() -> None:

@@ -23,7 +23,7 @@ mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
 def test_a_kind_fills_in_every_key(kind: str) -> None:
     found = Navigation.model_validate({"kind": kind})
     assert {name: getattr(found, name) for name in PRESETS[kind]} == PRESETS[kind]
-    assert set(PRESETS[kind]) == set(Navigation.model_fields) - {"kind"}
+    assert set(PRESETS[kind]) == set(Navigation.model_fields) - {"kind", "margin_m"}
 
 
 def test_what_is_given_goes_before_the_preset_and_only_that_counts_as_given() -> None:
@@ -71,7 +71,7 @@ def test_gps_is_as_large_as_what_drives_it_makes_it() -> None:
         ("position_sigma_m: 3", "navigation.position_sigma_m: is 3, but kind perfect has no error"),
         ("outages_s: [[5, 9]]", "navigation.outages_s: is given, but kind perfect has no error"),
         ("sigma_m: 3", "navigation.sigma_m: unknown key"),
-        ("kind: rtk", "navigation.kind: is rtk, which no flight takes yet"),
+        ("kind: rtk, margin_m: -1", "navigation.margin_m: is -1; must be at least 0"),
     ],
 )
 def test_faults_name_line_key_and_what_would_be_right(keys: str, sentence: str) -> None:

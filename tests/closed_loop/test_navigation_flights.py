@@ -1,0 +1,183 @@
+"""Flights of aircraft that do not know their state exactly."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from aircraft.guidance.progress import RouteProgress
+from aircraft.interface import AircraftState, Route
+from harness.analysis.metrics import metrics
+from harness.cli.terminal import flight_rows
+from harness.flight.closed_loop import Loop, fly
+from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest
+from harness.flight.state_estimator import PerfectEstimator
+from harness.mapping.sensed_map import SensedMap
+from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
+from harness.run_files.run_folder import load_run, tables
+from harness.scenario.scenario import Scenario, mission_of, parse_scenario
+from planner.interface import Plan, PlanRequest
+from tests.closed_loop.conftest import SmallWorld
+from tests.point_mass import PointMass
+
+TREE = {"circle": {"center_m": [3000.0, 3000.0], "radius_m": 300.0}}
+GNSS = {"kind": "gnss", "outages_s": [[40.0, 100.0]]}
+
+
+def flown(scenario: Scenario) -> Flight:
+    return fly(make_loop(scenario, PointMass))
+
+
+@pytest.fixture(scope="module")
+def scenario(small_world: SmallWorld) -> Scenario:
+    return small_world(TREE, navigation=GNSS)
+
+
+@pytest.fixture(scope="module")
+def flight(scenario: Scenario) -> Flight:
+    return flown(scenario)
+
+
+def test_perfect_navigation_changes_no_bit(small_world: SmallWorld) -> None:
+    scenario = small_world(TREE)
+    loop = make_loop(scenario, PointMass)
+    without = replace(make_loop(scenario, PointMass), navigator=PerfectEstimator())
+    flight = fly(loop)
+    assert digest(flight.track) == digest(fly(without).track)
+    assert not flight.track.has_beliefs
+    assert not {"navigation_error_m", "navigation_margin_m"} & set(metrics(flight, flight_limits(scenario)))
+
+
+def test_it_is_seeded(scenario: Scenario, flight: Flight) -> None:
+    assert digest(flown(scenario).track) == digest(flight.track)
+    other = flown(scenario.with_({"seed": scenario.seed + 1}))
+    assert digest(other.track) != digest(flight.track)
+
+
+def test_truth_and_belief_are_in_the_track(flight: Flight) -> None:
+    track = flight.track
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    assert track.has_beliefs
+    assert track.believed_cross_track_m is not None
+    off = track.navigation_error_m
+    assert 0.0 < off[0] < 30.0
+    in_outage = (track.time_s >= 40.0) & (track.time_s < 100.0)
+    grown = off[in_outage][-1]
+    assert grown > 0.03 * 25.0 * 60.0 - 30.0  # drift_share of the distance, about
+    assert off[np.flatnonzero(in_outage)[-1] + 1] < grown - 10.0  # and back with a jump
+    # Guidance keeps to the plan where it believes to be; the true aircraft is off by the error.
+    followed = track.plan_index == flight.plans[0].plan_index
+    progress = RouteProgress(Route(flight.plans[0].segments, flight.plans[0].loiter))
+    rows = np.flatnonzero(followed)[1:20]
+    for row in rows.tolist():
+        true = progress.nearest(float(track.east_m[row]), float(track.north_m[row])).cross_track_m
+        assert track.cross_track_m[row] == pytest.approx(true, abs=1e-6)
+    assert np.nanmedian(np.abs(track.believed_cross_track_m)) < np.nanmedian(np.abs(track.cross_track_m))
+
+
+def test_metrics_have_the_error_and_its_cause(scenario: Scenario, flight: Flight) -> None:
+    figures = metrics(flight, flight_limits(scenario))
+    off = flight.track.navigation_error_m
+    assert figures["navigation_error_m"]["max"] == pytest.approx(off.max())
+    assert figures["navigation_margin_m"] == scenario.navigation.margin_m
+    tight = replace(flight_limits(scenario), max_cross_track_m=2.0)
+    causes = [leg["cause"] for leg in metrics(flight, tight)["trackability"]]
+    assert causes[0] == "navigation error"
+    both = replace(flight.track, believed_cross_track_m=flight.track.cross_track_m)
+    told = [leg["cause"] for leg in metrics(replace(flight, track=both), tight)["trackability"]]
+    assert "navigation error" not in told  # guidance was off as well
+
+
+def test_the_plan_keeps_the_margin_beyond_the_clearance(scenario: Scenario) -> None:
+    wanted, margin = scenario.planner.clearance_m, scenario.navigation.margin_m
+    radius_m = mission_of(scenario).turn_radius_m
+    assert margin == pytest.approx(3.0 * 4.7 + 0.03 * min(25.0 * 60.0, math.pi * radius_m))
+    assert mission_of(scenario).clearance_m == pytest.approx(wanted + margin)
+    assert flight_limits(scenario).clearance_m == wanted
+    given = scenario.with_({"navigation.margin_m": 3.0})
+    assert mission_of(given).clearance_m == pytest.approx(wanted + 3.0)
+
+
+class Jumping:
+    """Believes to be 80 m to the east, until a fix comes at 30 s."""
+
+    jumps = 0
+
+    def believed(self, state: AircraftState) -> AircraftState:
+        if state.time_s >= 30.0:
+            self.jumps = 1
+            return state
+        return state._replace(east_m=state.east_m + 80.0)
+
+
+class Watched:
+    """A planner that notes what the map shows it."""
+
+    def __init__(self, planner: object) -> None:
+        self._plan = planner.plan  # type: ignore[attr-defined]
+        self.seen: list[tuple[float, np.ndarray]] = []
+
+    def plan(self, request: PlanRequest) -> Plan:
+        self.seen.append((request.time_s, request.seen.edges_since(-1).copy()))
+        return self._plan(request)  # type: ignore[no-any-return]
+
+
+def test_after_a_jump_the_plan_is_checked_against_the_shifted_world(small_world: SmallWorld) -> None:
+    loop = make_loop(small_world(TREE, sensor={"latency_s": 1.2}), PointMass)
+    watched = Watched(loop.planner)
+    flight = fly(replace(loop, planner=watched, navigator=Jumping()))
+    assert flight.outcome is Outcome.REACHED, flight.reason
+    before = [edges for time_s, edges in watched.seen if time_s < 30.0][-1]
+    assert np.hypot(*(before - (3080.0, 3000.0)).T) == pytest.approx(300.0, abs=5.0)
+    later = [edges for time_s, edges in watched.seen if time_s >= 30.0]
+    assert len(later) > 100
+    for edges in later:  # nothing of what was entered from elsewhere
+        assert np.hypot(*(edges - (3000.0, 3000.0)).T) == pytest.approx(300.0, abs=5.0)
+
+
+def test_a_map_that_starts_over_is_empty_and_goes_on_counting(small_world: SmallWorld) -> None:
+    loop = make_loop(small_world(TREE), PointMass)
+    seen = loop.seen
+    assert isinstance(seen, SensedMap)
+    assert loop.sensor is not None
+    scan = loop.sensor.scan(2000.0, 2000.0, 0.0, 0.0)
+    seen.update(scan)
+    edges, revision = seen.edges_since(-1), seen.revision
+    assert len(edges) > 10
+    assert seen.seen_free(np.array([[2100.0, 2100.0]])).all()
+    seen.start_over(7.0)
+    assert len(seen.edges_since(-1)) == 0
+    assert seen.revision > revision
+    assert seen.last_removal_revision > revision
+    assert seen.last_contradiction_s == 7.0
+    assert not seen.seen_free(np.array([[2100.0, 2100.0]])).any()
+    seen.update(scan)  # the same scan is news again
+    np.testing.assert_array_equal(seen.edges_since(revision), edges)
+
+
+def test_run_folder_and_recording_have_truth_and_belief(
+    scenario: Scenario, flight: Flight, tmp_path: Path
+) -> None:
+    def make(given: Scenario) -> Loop:
+        return make_loop(given, PointMass)
+
+    figures = fly_to_folder(scenario, tmp_path / "run", recording=True, make=make)
+    table, _ = tables(tmp_path / "run")
+    assert tuple(table.column_names) == (*TRACK_FIELDS, *BELIEVED_FIELDS)
+    run = load_run(tmp_path / "run")
+    assert digest(run.track) == digest(flight.track) == figures["digest"]
+    for name in BELIEVED_FIELDS:
+        np.testing.assert_array_equal(getattr(run.track, name), getattr(flight.track, name))
+    again = flown(parse_scenario(run.scenario_yaml))
+    assert digest(again.track) == digest(flight.track)
+    assert "m planned for it beyond the clearance" in flight_rows(figures)["navigation error"].replace(
+        "\n", " "
+    )
+    chunks = rr.chunk.RrdReader(str(tmp_path / "run" / "flight.rrd")).stream().to_chunks()
+    shown = {chunk.entity_path for chunk in chunks}
+    assert {"/plan/believed", "/world/believed", "/series/navigation_error/flown"} <= shown
