@@ -7,7 +7,6 @@ waits with it. So that happens in a process of its own, which can be ended.
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
@@ -37,7 +36,7 @@ def show(pipe: Connection) -> None:
     """Sends a flight to a viewer, as it is told of it, until the pipe is closed.
 
     Args:
-        pipe: gives an `Opening`, and then lists of `Call`, pickled. The viewer has each list before the next is read;
+        pipe: gives an `Opening`, and then lists of `Call`. The viewer has each list before the next is read;
             an answer of one byte says so.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -48,11 +47,11 @@ def show(pipe: Connection) -> None:
     moving: tuple[Any, ...] = ()
     log: Any = None
     try:
-        opening: Opening = pickle.loads(pipe.recv_bytes())
+        opening: Opening = pipe.recv()
         log = RerunLog(opening.url, opening.scene, opening.identity, moving=lambda: moving)
         pipe.send_bytes(b"+")
         while True:
-            for call in pickle.loads(pipe.recv_bytes()):
+            for call in pipe.recv():
                 moving = call.moving
                 getattr(log, call.method)(*call.arguments)
             log.flush()

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
-import pickle
 import queue
 import threading
 from collections.abc import Callable, Sequence
+from multiprocessing.reduction import ForkingPickler
 from typing import Any, Final
 
 from harness.files.spawning import without_main
@@ -44,13 +44,13 @@ class RelayProcess:
         ready = threading.Event()
         self._sender = threading.Thread(target=self._send, args=(ours, ready), daemon=True)
         self._sender.start()
-        self._waiting.put(pickle.dumps(opening))
+        self._waiting.put(bytes(ForkingPickler.dumps(opening)))
         ready.wait(READY_S)
 
     def hand_over(self, calls: Sequence[Call]) -> None:
         """Has some calls made, some time soon."""
         if not self.given_up:
-            self._waiting.put(pickle.dumps(list(calls)))
+            self._waiting.put(bytes(ForkingPickler.dumps(list(calls))))
 
     def end(self) -> None:
         """Waits for what has been handed over, not for long; the viewer stays open."""
