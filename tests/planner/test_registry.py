@@ -42,6 +42,12 @@ def install(monkeypatch: pytest.MonkeyPatch, *objects: str) -> None:
     monkeypatch.setattr(registry, "entry_points", entry_points)
 
 
+@pytest.fixture(autouse=True)
+def nothing_registered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other tests register planners in this process."""
+    monkeypatch.setattr(registry, "_registered", {})
+
+
 def test_the_planner_of_the_paper_is_built_in() -> None:
     assert "rolling_window" in planner_kinds()
     assert all(name == kind.kind for name, kind in planner_kinds().items())

@@ -331,7 +331,7 @@ def test_overrides_replace_keys_before_defaults_follow(tmp_path: Path) -> None:
         ),
         (
             ("guidance.rate", "1"),
-            "command line: guidance.rate: unknown key; known here: kind, bandwidth_radps",
+            "command line: guidance.rate: unknown key; known here: kind, follow, acceptance_radius_m, bandwidth_radps",
         ),
         (("guidance.damping", "0"), "command line: guidance.damping: is 0; must be greater than 0"),
         (("planner.kind", 2000 * "x"), f"command line: planner.kind: is '{40 * 'x'}'; must be one of"),
@@ -456,7 +456,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         "nodata",
         "unknown",
     }
-    words |= {"heights", "sha256", "notes"}
+    words |= {"heights", "sha256", "notes", "follow"}
     assert len(values) > 40
     for name, key in values:
         switch = key.get("type") == "boolean"
