@@ -14,13 +14,17 @@ from harness.campaign.results import ERROR
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import WorkerDiedError, Workers
 from harness.files.errors import RunFolderError
+from harness.flight.signals import held_back
 
 TABLES_EVERY_S: Final = 30.0
 TABLES_SHARE: Final = 0.01
 """Tables are made anew at least this far apart, and so seldom that it takes at most this share of the time."""
 
 LOOK_S: Final = 2.0
-"""How often it is looked whether there are more workers."""
+"""How often it is looked whether there are more workers, where there are none."""
+
+INTERRUPT_S: Final = 0.1
+"""How often it is looked whether the process was asked to end, at the least."""
 
 Progress = Callable[[Answer], None]
 
@@ -43,28 +47,40 @@ def fly_missing(
     ahead = next(jobs, None)
     flying: dict[Future[Answer], int] = {}
     tables_due = time.monotonic() + TABLES_EVERY_S
-    try:
-        while ahead is not None or flying:
-            while ahead is not None and workers.free() > 0:
-                flying[workers.start(ahead)] = ahead.run
-                ahead = next(jobs, None)
-            if not flying:
-                time.sleep(LOOK_S)
-            for future in wait(flying, timeout=LOOK_S, return_when=FIRST_COMPLETED).done:
-                answer = _answer(future, flying.pop(future))
-                if answer.row["outcome"] == ERROR:
-                    # What a crash has left is no whole run folder.
-                    shutil.rmtree(folder.path / RUNS / str(answer.run), ignore_errors=True)
-                folder.append(answer.run, _row(runs, answer), answer.times)
-                if progress is not None:
-                    progress(answer)
-            if time.monotonic() >= tables_due:
-                begun = time.monotonic()
-                folder.write_tables()
-                took_s = time.monotonic() - begun
-                tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
-    finally:
-        folder.write_tables()
+    # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
+    # it without end.
+    with held_back() as let_interrupt_through:
+        try:
+            while ahead is not None or flying:
+                let_interrupt_through()
+                while ahead is not None and workers.free() > 0:
+                    flying[workers.start(ahead)] = ahead.run
+                    ahead = next(jobs, None)
+                if not flying:
+                    _sleep(LOOK_S, let_interrupt_through)
+                for future in wait(flying, timeout=INTERRUPT_S, return_when=FIRST_COMPLETED).done:
+                    answer = _answer(future, flying.pop(future))
+                    if answer.row["outcome"] == ERROR:
+                        # What a crash has left is no whole run folder.
+                        shutil.rmtree(folder.path / RUNS / str(answer.run), ignore_errors=True)
+                    folder.append(answer.run, _row(runs, answer), answer.times)
+                    if progress is not None:
+                        progress(answer)
+                if time.monotonic() >= tables_due:
+                    begun = time.monotonic()
+                    folder.write_tables()
+                    took_s = time.monotonic() - begun
+                    tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
+        finally:
+            folder.write_tables()
+
+
+def _sleep(seconds: float, let_interrupt_through: Callable[[], None]) -> None:
+    """Waits, and lets an interrupt through meanwhile."""
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        time.sleep(INTERRUPT_S)
+        let_interrupt_through()
 
 
 def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:

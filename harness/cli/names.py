@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _AIRCRAFT_ROW: Final = "{:10} {:>7} {:>10} {:>6} {:>6} {:8} "
 _WIDTH: Final = 80
+_INTERRUPT_S: Final = 0.1
+"""How often it is looked whether the process was asked to end."""
 
 
 def list_names(
@@ -95,9 +97,10 @@ def _survey(names: Sequence[str], report: Callable[[int, int, str], None] | None
     """Flies aircraft for their figures, which are kept, in processes beside this one; returns why some cannot be."""
     import multiprocessing
     import os
-    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 
     from harness.files.spawning import without_main
+    from harness.flight.signals import held_back
 
     spawn = multiprocessing.get_context("spawn")
     workers = min(len(names), os.cpu_count() or 1)
@@ -106,11 +109,17 @@ def _survey(names: Sequence[str], report: Callable[[int, int, str], None] | None
     with without_main(), ProcessPoolExecutor(workers, mp_context=spawn, initializer=_begin) as pool:
         coming = {pool.submit(_fault, name): name for name in names}
         try:
-            for done, one in enumerate(as_completed(coming), start=1):
-                if fault := one.result():
-                    faults[coming[one]] = fault
-                if report is not None:
-                    report(done, len(names), f"{done} of {len(names)} flown, the last {coming[one]}")
+            # An interrupt that is raised inside `concurrent.futures` leaves a future locked.
+            with held_back() as let_interrupt_through:
+                flying = set(coming)
+                while flying:
+                    let_interrupt_through()
+                    ended, flying = wait(flying, timeout=_INTERRUPT_S, return_when=FIRST_COMPLETED)
+                    faults |= {coming[one]: fault for one in ended if (fault := one.result())}
+                    if ended and report is not None:
+                        done = len(names) - len(flying)
+                        last = ", ".join(coming[one] for one in ended)
+                        report(done, len(names), f"{done} of {len(names)} flown, the last {last}")
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for child in set(multiprocessing.active_children()) - before:

@@ -31,7 +31,7 @@ def test_a_signal_in_flight_is_said_in_a_line(
     process = start(tmp_path, *LONG, *recording)
     wait_until((tmp_path / "run" / "scenario.yaml").exists, process)
     process.send_signal(signum)
-    out, err = process.communicate(timeout=120)
+    out, err = process.communicate(timeout=30)
     assert process.returncode == 128 + signum
     assert out == ""
     assert err == "wayproof: interrupted; the run in run is marked incomplete\n"
@@ -56,7 +56,7 @@ def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
     runs = [tmp_path / "c" / "paper_circles" / kind / "manifest.json" for kind in ("bug2", "rolling_window")]
     wait_until(lambda: all(each.exists() for each in runs), process)
     process.send_signal(signal.SIGTERM)
-    _, err = process.communicate(timeout=120)
+    _, err = process.communicate(timeout=30)
     assert process.returncode == 143
     assert err == "wayproof: interrupted; the comparison in c is marked incomplete\n"
     assert json.loads((tmp_path / "c" / "comparison.json").read_text())["complete"] is False
@@ -120,7 +120,7 @@ def test_a_scenario_changed_and_deleted_while_it_is_flown(tmp_path: Path) -> Non
     wait_until((tmp_path / "run" / "scenario.yaml").exists, process)
     scenario.write_text("spoilt: [")
     scenario.unlink()
-    assert (process.wait(timeout=120), process.communicate()) == (0, ("", ""))
+    assert (process.wait(timeout=60), process.communicate()) == (0, ("", ""))
     assert run(tmp_path, "fly", str(FOREST), "--out", "same", "--quiet", "--no-recording")[0] == 0
     assert load_run(tmp_path / "run").metrics["digest"] == load_run(tmp_path / "same").metrics["digest"]
 

@@ -94,7 +94,7 @@ def test_two_sweeps_into_one_folder(place: Path, unbroken: bytes) -> None:
         "out: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended\n",
     )
     first.send_signal(signal.SIGCONT)
-    assert first.communicate(timeout=120) == ("", "")
+    assert first.communicate(timeout=60) == ("", "")
     assert first.returncode == 0
     assert results(place) == unbroken
 
@@ -106,7 +106,7 @@ def test_a_scenario_changed_and_deleted_in_mid_campaign(place: Path, unbroken: b
     scenario.write_text(CAMPAIGN_FILES["short.yaml"].replace("rays: 360", "rays: 720"))
     wait_until((place / "out" / "runs" / "1").exists, process)
     process.kill()
-    process.communicate(timeout=120)
+    process.communicate(timeout=60)
     journal = (place / "out" / "journal.jsonl").read_bytes()
     status, _, err = run(place, *SWEEP, "--resume")
     assert status == 2

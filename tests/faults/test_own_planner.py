@@ -208,7 +208,7 @@ def test_one_interrupt_ends_a_planner_that_hangs(arguments: tuple[str, ...], tol
     wait_until((place / "hanging").exists, process)
     process.send_signal(signal.SIGINT)
     try:
-        _, err = process.communicate(timeout=120)
+        _, err = process.communicate(timeout=30)
     finally:
         process.kill()
     assert process.returncode == 130

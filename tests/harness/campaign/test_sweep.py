@@ -511,7 +511,7 @@ def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(long_campaign: Pa
     flying = start(long_campaign, "--workers", "2")
     wait_for(lambda: journal_lines(out) >= 3)
     flying.send_signal(signal.SIGINT)
-    told, said = flying.communicate(timeout=120)
+    told, said = flying.communicate(timeout=30)
     assert flying.returncode == 130
     assert said == "wayproof: interrupted; what is done is in out, --resume goes on\n"
     assert told == ""
@@ -529,8 +529,8 @@ def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(long_campaign: Path) 
     wait_for(lambda: journal_lines(out) >= 2)
     children = psutil.Process(flying.pid).children(recursive=True)
     flying.kill()
-    flying.communicate(timeout=120)
-    _, alive = psutil.wait_procs(children, timeout=60)
+    flying.communicate(timeout=30)
+    _, alive = psutil.wait_procs(children, timeout=10)
     assert alive == []
     kept = journal_lines(out)
     assert sweep(long_campaign, "--resume", "--workers", "2", "--json") == 0
@@ -561,7 +561,7 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
     job = Job(0, runs.packed(0), place / "run", "none", optimum=False)
     with local_workers(1) as workers:
-        first = workers.start(job).result(timeout=120)
+        first = workers.start(job).result(timeout=60)
         for child in multiprocessing.active_children():
             child.kill()
             child.join()
@@ -570,7 +570,7 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
         assert workers.free() == 2
         second, third = workers.start(job), workers.start(job)
         assert workers.free() == 0
-        assert second.result(timeout=120).row == third.result(timeout=120).row == first.row
+        assert second.result(timeout=60).row == third.result(timeout=60).row == first.row
         assert workers.free() == 2
     wait_for(lambda: multiprocessing.active_children() == [])
 

@@ -1,0 +1,109 @@
+"""An interrupt of a campaign leaves no future locked: whoever ends the workers would wait for it without end."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+from concurrent.futures import Future, InvalidStateError
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from harness.campaign.flight import Answer
+from harness.campaign.sweep import fly_missing
+
+FLYING = 3000
+"""So many futures that most of the time goes to locking and unlocking them."""
+
+
+class Runs:
+    """A campaign of so many runs."""
+
+    campaign = SimpleNamespace(recordings="none", optimum=False)
+
+    def __len__(self) -> int:
+        return FLYING
+
+    def packed(self, number: int) -> bytes:
+        return b""
+
+    def run(self, number: int) -> SimpleNamespace:
+        return SimpleNamespace(varied={}, cells=dict)
+
+
+class Crowd:
+    """Workers whose answers come one by one, all the time."""
+
+    def __init__(self) -> None:
+        self.given: list[Future[Answer]] = []
+        self._over = threading.Event()
+        self._answering = threading.Thread(target=self._answer, daemon=True)
+
+    def free(self) -> int:
+        return FLYING - len(self.given)
+
+    def start(self, job: Any) -> Future[Answer]:
+        future: Future[Answer] = Future()
+        self.given.append(future)
+        if len(self.given) == FLYING:
+            self._answering.start()
+        return future
+
+    def _answer(self) -> None:
+        for number, future in enumerate(self.given):
+            if self._over.wait(0.001):
+                return
+            try:
+                future.set_result(Answer(number, {"outcome": "reached"}, {}))
+            except InvalidStateError:
+                return
+
+    def end(self) -> None:
+        self._over.set()
+
+
+def locked(futures: list[Future[Answer]]) -> int:
+    """How many futures nobody else can take: asked from another thread, since the locks are their holder's own."""
+    found = []
+
+    def look() -> None:
+        for future in futures:
+            if future._condition.acquire(blocking=False):
+                future._condition.release()
+            else:
+                found.append(future)
+
+    looking = threading.Thread(target=look)
+    looking.start()
+    looking.join()
+    return len(found)
+
+
+@pytest.mark.parametrize("delay_s", [0.05, 0.11, 0.17, 0.23, 0.31, 0.42])
+def test_an_interrupt_leaves_no_future_locked(delay_s: float, tmp_path: Path) -> None:
+    runs: Any = Runs()
+    tables: list[float] = []
+    folder: Any = SimpleNamespace(
+        done={},
+        path=tmp_path,
+        append=lambda *row: None,
+        write_tables=lambda: tables.append(time.monotonic()),
+    )
+    crowd = Crowd()
+
+    def interrupt() -> None:
+        while len(crowd.given) < FLYING:
+            time.sleep(0.001)
+        time.sleep(delay_s)
+        signal.pthread_kill(main, signal.SIGINT)
+
+    main = threading.get_ident()
+    threading.Thread(target=interrupt, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt):
+        fly_missing(runs, folder, crowd)
+    crowd.end()
+    assert locked(crowd.given) == 0
+    assert len(tables) == 1, "what is done is in the tables"
