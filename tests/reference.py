@@ -8,12 +8,13 @@ from __future__ import annotations
 import sys
 import warnings
 from pathlib import Path
+from types import ModuleType
 from typing import get_type_hints
 
 import pdoc
+import pdoc.extract
 
 import wayproof
-from planner.interface import PlanRequest
 
 MODULES = ("wayproof", "planner", "aircraft", "harness", "!harness.front_door")
 
@@ -22,12 +23,19 @@ def write(folder: Path) -> None:
     """Writes the reference into a folder; `index.html` leads to it."""
     for name in wayproof.__all__:
         getattr(wayproof, name)  # pdoc looks for names that are there already
-    # Where it was made, a NamedTuple does not know of classes below it.
-    PlanRequest.__new__.__annotations__ = get_type_hints(PlanRequest)
     pdoc.render.configure(docformat="google", search=True)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        for name in pdoc.extract.walk_specs(MODULES):
+            _resolve_rows(pdoc.extract.load_module(name))
         pdoc.pdoc(*MODULES, output_directory=folder)
+
+
+def _resolve_rows(module: ModuleType) -> None:
+    # The constructor of a NamedTuple keeps the text of its annotations, without the module that tells what they mean.
+    for row in vars(module).values():
+        if isinstance(row, type) and hasattr(row, "_fields"):
+            row.__new__.__annotations__ = get_type_hints(row)
 
 
 if __name__ == "__main__":
