@@ -10,9 +10,14 @@ from __future__ import annotations
 
 import functools
 import gc
+import importlib
+import os
+import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any, Generic, ParamSpec, TypeVar
 
@@ -51,6 +56,10 @@ class Compiled(Generic[P, R]):
         self._code: Callable[..., R] = self._compile_first
         self.anew = False
         """It was compiled by this process, not loaded."""
+        self.kept = True
+        """What was compiled is on disk."""
+        self.size = len(function.__code__.co_code)
+        """Length of its byte code, bytes: compiling takes about as long."""
         functools.update_wrapper(self, function)
 
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
@@ -74,6 +83,7 @@ class Compiled(Generic[P, R]):
             if isinstance(error, RuntimeError) and "cannot cache" not in str(error):
                 raise
             # There is no place to keep it, or no room there.
+            self.kept = False
             code = numba.njit(signature, error_model="numpy")(self._function)
         self.anew = not code.stats.cache_hits
         if self._unchecked:
@@ -119,23 +129,76 @@ def _learn_to_fuse() -> None:
 def compile_all() -> None:
     """Compiles all functions imported so far that are not yet: some seconds the first time, then some tenths.
 
-    The first time is told by one line on standard error, where that is a terminal.
+    The first time is told by one line on standard error, where that is a terminal. Where there are two processors, a
+    second process compiles half of them meanwhile.
     """
     with _compiling:
         if not _waiting:
             return
-        told = False
         while _waiting:
-            _waiting[0].compile()
-            if _waiting[0].anew and not told:
-                told = True
+            first = _waiting[0]
+            _compile([first])
+            if first.anew:
                 _tell("wayproof: compiling for this machine, once; this takes some seconds")
-            del _waiting[0]
+                elsewhere = _half(_waiting) if first.kept and os.cpu_count() != 1 else set()
+                with _compiled_elsewhere(elsewhere):
+                    _compile([each for each in _waiting if each.__module__ not in elsewhere])
+                _compile(list(_waiting))
         # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
         # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
         gc.collect()
         if _process_is_ours:
             gc.freeze()
+
+
+def compile_modules(names: Sequence[str]) -> None:
+    """Compiles the functions of some modules, so that they are on disk."""
+    for name in names:
+        importlib.import_module(name)
+    with _compiling:
+        _compile([each for each in _waiting if each.__module__ in names])
+
+
+def _compile(functions: Sequence[Compiled[..., Any]]) -> None:
+    for each in functions:
+        each.compile()
+        _waiting.remove(each)
+
+
+def _half(functions: Sequence[Compiled[..., Any]]) -> set[str]:
+    # Functions of one module call each other, so that a module stays whole.
+    sizes: Counter[str] = Counter()
+    for each in functions:
+        sizes[each.__module__] += each.size
+    here, there = 0, 0
+    names = set()
+    for name, size in sizes.most_common():
+        if here <= there:
+            here += size
+        else:
+            there += size
+            names.add(name)
+    return names
+
+
+@contextmanager
+def _compiled_elsewhere(names: set[str]) -> Iterator[None]:
+    """Has another process compile some modules; at the end they are on disk, unless that process failed."""
+    code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
+    command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r})"]
+    nobody = subprocess.DEVNULL
+    try:
+        process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody) if names else None
+    except OSError:
+        process = None  # All are then compiled here.
+    try:
+        yield
+        if process is not None:
+            process.wait()
+    finally:
+        if process is not None:
+            process.kill()
+            process.wait()
 
 
 _process_is_ours = False

@@ -72,4 +72,5 @@ def spread_wave(
                         end += 1
         if corners:
             cornered = begin
-    state[:] = (level, cornered, begin, end)
+    # One by one: a slice would have numba compile the text of an error that cannot be, for seconds.
+    state[0], state[1], state[2], state[3] = level, cornered, begin, end

@@ -172,6 +172,33 @@ print(made.anew)
     assert [ran(source, tmp_path, **paths) for _ in range(2)] == [["True"], ["False"]]
 
 
+@pytest.mark.parametrize(
+    ("before", "here"),
+    [
+        ("os.cpu_count = lambda: 2", 2),
+        ("os.cpu_count = lambda: 1", 3),
+        ("os.cpu_count = lambda: 2; sys.executable = '/bin/false'", 3),
+        ("os.cpu_count = lambda: 2; sys.executable = '/no/such/file'", 3),
+    ],
+)
+def test_another_process_compiles_some_of_them(before: str, here: int, tmp_path: Path) -> None:
+    """Of three modules one is compiled elsewhere; all are compiled here where that cannot be, or fails."""
+    source = f"""
+import os, sys
+import one, two, three
+from planner.compiled import compile_all
+{before}
+made = [one.it, two.it, three.it]
+compile_all()
+print(*(each(1.0) for each in made), sum(each.anew for each in made))
+"""
+    for number, name in enumerate(("one", "two", "three")):
+        text = f"from planner.compiled import compiled\n@compiled('float64')\ndef it(x):\n    return x + {number}\n"
+        (tmp_path / f"{name}.py").write_text(text)
+    paths = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{os.getcwd()}{os.pathsep}{tmp_path}"}
+    assert ran(source, tmp_path, **paths) == ["1.0", "2.0", "3.0", str(here)]
+
+
 def test_the_garbage_collector_of_a_callers_process_is_left_as_it_is(tmp_path: Path) -> None:
     source = """
 import gc

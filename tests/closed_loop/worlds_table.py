@@ -1,0 +1,104 @@
+"""The table of public worlds in planner/README.md: `python -m tests.closed_loop.worlds_table [MOST]`.
+
+Each world with a way to the goal, and each without one, is flown in calm air by the Aerosonde and judged by the
+independent referee, which knows the true obstacles. Prints a row for each group, then what the referee or the verdict
+found wrong, and exits with 1 where that is anything. MOST is how many worlds of a family are flown.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from harness.run.scenario_flight import fly_to_folder
+from harness.scenario.scenario import load_scenario
+
+SHARED: Final = Path(__file__).parents[3] / "shared"
+GROUPS: Final = {
+    "like the paper's": ("paper_like",),
+    "circles: few, more, many": ("circles_low", "circles_mid", "circles_high"),
+    "polygons": ("polygon_field",),
+    "U-shaped traps": ("u_trap",),
+    "mazes, corridors of 5 and 8 km": ("maze5", "maze8"),
+    "spirals, slots, dead ends": ("spiral", "slots", "dead_ends"),
+    "forest, CTU, OMPL, others": (
+        "faster_forest",
+        "ctu_dubins",
+        "ompl_circles",
+        ("mrpb", "pythonrobotics", "zhm_rrt2d"),
+    ),
+    "without a way": ("enclosed_goal", "enclosed_start", "wall_across"),
+    "BARN": ("barn",),
+}
+ENDS: Final = {"reach": "reached", "unreachable": "unreachable"}
+
+
+def judged(world: Path, folder: Path) -> dict[str, Any]:
+    """A world flown: how it ended, the faults that the referee and the verdict show, and what the row needs."""
+    facts = json.loads(world.read_text())
+    scenario, run = folder / f"{world.stem}.yaml", folder / world.stem
+    convert = [sys.executable, str(SHARED / "tools" / "world_to_scenario.py"), str(world)]
+    scenario.write_text(subprocess.run(convert, capture_output=True, text=True, check=True).stdout)
+    metrics = fly_to_folder(load_scenario(scenario), run, recording=False)
+    judge = [sys.executable, str(SHARED / "tools" / "referee.py"), str(run)]
+    verdict = subprocess.run(judge, capture_output=True, text=True)
+    faults = (
+        [] if verdict.returncode == 0 else [f"{verdict.stdout.strip()[-300:]}{verdict.stderr.strip()[-300:]}"]
+    )
+    if metrics["outcome"] != ENDS.get(facts["expect"], metrics["outcome"]):
+        faults.append(f"ended as {metrics['outcome']}, expected {facts['expect']}")
+    if metrics["clearance_violation_s"] > 0:
+        faults.append(f"{metrics['clearance_violation_s']} s below the wanted clearance")
+    reached = metrics["outcome"] == "reached" and facts.get("optimum_m")
+    return {
+        "end": metrics["outcome"],
+        "ratio": metrics["flown_length_m"] / facts["optimum_m"] if reached else None,
+        "p50_ms": metrics["compute_ms"]["p50"],
+        "p99_ms": metrics["compute_ms"]["p99"],
+        "faults": [f"{world.stem}: {fault}" for fault in faults],
+    }
+
+
+def families(group: tuple[str | tuple[str, ...], ...], most: int) -> Iterator[list[Path]]:
+    """The worlds of each family of a group."""
+    for family in group:
+        names = (family,) if isinstance(family, str) else family
+        every = sorted(path for name in names for path in (SHARED / "worlds" / name).glob("*.json"))
+        yield every[:: max(1, len(every) // most)][:most]
+
+
+def row(name: str, flown: list[list[dict[str, Any]]]) -> str:
+    """The row of a group, from what was flown of each family, and the outcomes."""
+    every = [world for family in flown for world in family]
+    ratios = [[each["ratio"] for each in family if each["ratio"] is not None] for family in flown]
+    lengths = [f"{np.median(some):.2f} / {np.percentile(some, 95):.2f}" if some else "-" for some in ratios]
+    half, tail = np.median([each["p50_ms"] for each in every]), max(each["p99_ms"] for each in every)
+    numbers = ", ".join(str(len(family)) for family in flown)
+    ends = ", ".join(f"{count} {end}" for end, count in Counter(each["end"] for each in every).most_common())
+    return f"| {name} | {numbers} | {', '.join(lengths)} | {half:.1f}, {tail:.0f} | ({ends})"
+
+
+def main(most: int) -> int:
+    wrong: list[str] = []
+    print(
+        "| worlds | number | length over the optimum: median / p95 | planner p50: median, p99: largest, ms |"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        for name, group in GROUPS.items():
+            flown = [[judged(world, Path(folder)) for world in family] for family in families(group, most)]
+            print(row(name, flown), flush=True)
+            wrong += [fault for family in flown for world in family for fault in world["faults"]]
+    print("\n".join(wrong) or "no fault")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000))
