@@ -15,6 +15,9 @@ FRAMES: Final = {0: SEA, 5: SEA, 3: HOME, 6: HOME, 10: GROUND, 11: GROUND, 4: HO
 LOCAL_ENU, LOCAL_NED = 4, 1
 LOCAL: Final = (LOCAL_ENU, LOCAL_NED)
 
+MOST: Final = {"command": 65_535, "frame": 255}
+"""The largest numbers that MAVLink's message of a mission item has room for."""
+
 NOWHERE: Final = 1e-7
 """Degrees, or metres: a position with less than this in both is none. ArduPilot writes zeros where none is meant."""
 
@@ -37,6 +40,13 @@ class Item:
     command: int
     frame: int
     params: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name, number in (("command", self.command), ("frame", self.frame)):
+            if not 0 <= number <= MOST[name]:
+                raise InputError(
+                    f"{self.place}: has the {name} {number:g}; those of MAVLink are 0 to {MOST[name]}"
+                )
 
     @property
     def position(self) -> tuple[float, float] | None:

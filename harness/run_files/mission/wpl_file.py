@@ -43,4 +43,9 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     if not items:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
     home, *others = items
+    again = next((item for item in others if item.number == home.number), None)
+    if again is not None:
+        raise InputError(
+            f"{again.place}: item {home.number} is there twice, first as home; numbers must differ"
+        )
     return MissionAsRead(source, tuple(others), home.position, home.params[6], Fences())
