@@ -109,7 +109,12 @@ def _image(path: Path) -> tuple[FloatArray, BoolArray]:
     """Grey from 0 to 255, of colours their mean as map_server has it, and where the image is opaque."""
     from PIL import Image
 
-    data = read_bytes(path)
+    try:
+        data = read_bytes(path)
+    except WorldFileError as error:
+        raise WorldFileError(
+            f"names the image {path.name}, which {str(error).partition(';')[0]}; lay it there"
+        ) from error
     try:
         with Image.open(_stream(data), formats=["PPM", "PNG", "BMP", "JPEG"]) as image:
             check_cells(image.height, image.width)

@@ -329,6 +329,10 @@ def test_a_ros_map_of_raw_numbers_and_one_that_is_turned(tmp_path: Path) -> None
         np.array([6.0]), np.array([1.0])
     )  # the lower right corner, 12 m along the lower edge
     assert (x[0], y[0]) == pytest.approx((10.0, 32.0))
+    (tmp_path / "m.png").rename(tmp_path / "elsewhere.png")
+    with pytest.raises(WorldFileError, match=r"names the image m\.png, which cannot be read \(No such file"):
+        read_any(written(tmp_path / "m.yaml", text.format("raw", 0.0)))
+    (tmp_path / "elsewhere.png").rename(tmp_path / "m.png")
     with pytest.raises(WorldFileError, match="trinary, scale, raw"):
         read_any(written(tmp_path / "m.yaml", text.format("octal", 0)))
 
