@@ -42,6 +42,7 @@ from harness.recording.states import (
     TRACKABLE,
     States,
     log_colours,
+    over,
     send_changes,
     tracking_changes,
 )
@@ -206,7 +207,9 @@ class RerunLog:
             changes = tracking_changes(metrics["trackability"])
             send_changes(self._rec, look.TRACKING_LANE, changes)
             causes = dict.fromkeys((state for _, state in changes), look.HIT)
-            log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM})
+            ended = {over(metrics): look.CALM}
+            log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM} | ended)
+            log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours() | ended)
             log_summary(self._rec, self._scene, metrics)
             if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):
                 log_end(self._rec, self._last, metrics["outcome"])

@@ -16,6 +16,7 @@ from harness.files.errors import RunFolderError
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import blueprint
+from harness.recording.states import over, send_changes
 
 SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
 """Below PLAN and WORLD: what all runs of a scenario have in common."""
@@ -52,7 +53,9 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             rec.send_chunks(_renamed(own, run, place, rr.escape_entity_path_part(name)))
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
-        summary = _summary(names, [_metrics(own) for own in chunks])
+        figures = [_metrics(own) for own in chunks]
+        _end_lanes(rec, names, figures)
+        summary = _summary(names, figures)
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
 
@@ -161,6 +164,14 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
             rec.log(f"{look.SERIES}/{line}/{place}", style, static=True)
     points = rr.SeriesPoints(names=[name], colors=[colour], marker_sizes=[2.0])
     rec.log(f"{look.SERIES}/{look.SEARCH}/{place}", points, static=True)
+
+
+def _end_lanes(rec: rr.RecordingStream, names: Sequence[str], figures: Sequence[Mapping[str, Any]]) -> None:
+    """Says in the lanes of each run from when on its flight is over, for the others go on."""
+    for place, (name, each) in enumerate(zip(names, figures, strict=True)):
+        for lane in (look.PLANNER_LANE, look.TRACKING_LANE) if each else ():
+            own = f"{place + 1}-{rr.escape_entity_path_part(name)}/{lane}"
+            send_changes(rec, own, [(each["flight_time_s"], over(each))])
 
 
 def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:

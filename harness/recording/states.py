@@ -24,6 +24,11 @@ AT_LIMIT, FREE = "bank command at its limit", "bank command below its limit"
 TRACKABLE = "trackable"
 
 
+def over(metrics: Mapping[str, Any]) -> str:
+    """The state of a flight that has ended; an overlay shows it while other flights go on."""
+    return f"over: {metrics['outcome']}"
+
+
 class States:
     """Finds the changes of state, block by block.
 

@@ -485,7 +485,9 @@ def test_overlay_keeps_every_track_and_one_world(
     assert "second, t = 100 s: goal reached" in told
     (((summary,),)) = (column(entities, "/summary", "text")[-1],)
     assert "| outcome | reached | reached |" in str(summary)
-    assert "/states/1-first/planner" in entities
+    for lane in ("planner", "tracking"):
+        assert column(entities, f"/states/1-first/{lane}", "state")[-1] == ["over: reached"]
+        assert "over: reached" in column(entities, f"/states/1-first/{lane}", "values")[-1]
     colours = [column(entities, f"/plan/runs/{number}/flown", "colors")[-1] for number in (0, 1)]
     assert colours[0] != colours[1]
 
