@@ -198,6 +198,14 @@ def test_scenarios_are_told_apart_where_each_is_flown_in_every_world(tmp_path: P
     assert summary.worst[0].name == "calm, forest, rolling_window, aerosonde"
 
 
+def test_worlds_that_were_flown_once_each_make_no_table(tmp_path: Path) -> None:
+    rows = [row(run, world=f"field_{run}.yaml", scenario=f"field_{run}", case=run) for run in range(6)]
+    twice = [row(6 + each["run"], **{key: each[key] for key in ("world", "scenario")}) for each in rows]
+    for name, flown, expected in (("alone", rows, False), ("twice", rows + twice, True)):
+        tables = summarise(campaign(tmp_path / name, flown)).tables
+        assert ("world" in {table.rows.key for table in tables}) == expected
+
+
 def test_the_bootstrap_interval_is_that_of_the_binomial_where_it_is_known() -> None:
     differences = np.array([1.0] * 300 + [0.0] * 700)
     estimate = mean_estimate(differences, np.arange(1000))
