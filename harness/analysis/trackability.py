@@ -17,6 +17,7 @@ import numpy as np
 from harness.analysis.as_given import AsGiven
 from harness.analysis.smoothness import planned_profile, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
+from planner.geometry.margin import tolerance_m
 
 SHORTEST_LEG_S = 5.0
 """A plan flown for less time is judged together with its successor."""
@@ -95,7 +96,7 @@ class FlightLimits:
         """What the cross-track error may be."""
         if self.max_cross_track_m is not None:
             return self.max_cross_track_m
-        return max(0.1 * self.clearance_m, 2.0 * self.tracking_error_m)
+        return tolerance_m(self.clearance_m, self.tracking_error_m)
 
 
 @dataclass(frozen=True)

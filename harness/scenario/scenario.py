@@ -40,6 +40,7 @@ from harness.scenario.sections import (
 from harness.scenario.shipped import scenario_path
 from harness.scenario.simulation import Simulation, step_rate_hz
 from harness.scenario.validation import KeyFault, input_error
+from planner.geometry.margin import tolerance_m
 
 if TYPE_CHECKING:
     from aircraft.interface import Performance
@@ -112,7 +113,8 @@ class Scenario(Section):
         self._set("planner", clearance_m=_rounded_up(radius_m, 10))
         self._set("navigation", margin_m=self._navigation_margin_m(wind_mps, radius_m))
         self._set("sensor", least_width_m=max(self.planner.clearance_m, LEAST_CLEARANCE * radius_m))
-        self._set("trackability", cross_track_m=self._cross_track_m(performance.tracking_error_m))
+        allowed_m = tolerance_m(self.planner.clearance_m, performance.tracking_error_m)
+        self._set("trackability", cross_track_m=allowed_m)
         self._set(
             "trackability",
             altitude_m=max(10.0, self.trackability.cross_track_m),
@@ -153,9 +155,6 @@ class Scenario(Section):
             self.mission.time_limit_s,
             unseen_m=math.pi * turn_radius_m,
         )
-
-    def _cross_track_m(self, tracking_error_m: float) -> float:
-        return max(0.1 * self.planner.clearance_m, 2.0 * tracking_error_m)
 
     def _set(self, name: str, **defaults: float) -> None:
         """Fills in those keys of a section that the file leaves out."""
