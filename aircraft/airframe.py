@@ -14,7 +14,7 @@ from aircraft.model_files import AircraftError, ModelFiles
 
 
 @dataclass(frozen=True)
-class Entry:
+class AirframeEntry:
     """One entry of airframes.yaml: what is known of an airframe before it flies.
 
     Attributes:

@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from aircraft.actuators.actuator import CONTROLS, Actuator, Actuators, NormActuator
-from aircraft.airframe import FIGURES, Airframe, Entry
+from aircraft.airframe import FIGURES, Airframe, AirframeEntry
 from aircraft.autopilot import Gains
 from aircraft.card_cache import cached, figure, is_kept
 from aircraft.model_files import AircraftError as AircraftError
@@ -40,7 +40,7 @@ def airframe(name: str, actuators: Actuators | None = None) -> Airframe:
     except AircraftError as error:
         known = ", ".join(aircraft_names())
         raise AircraftError(f"{error}; known are: {known}, or a folder with a JSBSim model") from None
-    entry = _table().get(name) or Entry(found.name, f"JSBSim model of {found.model.parent}")
+    entry = _table().get(name) or AirframeEntry(found.name, f"JSBSim model of {found.model.parent}")
     if real := (entry.actuators if actuators is None else actuators).real:
         found = replace(found, actuators=_of_commands(found, real))
 
@@ -94,7 +94,7 @@ def _of_commands(found: ModelFiles, real: Mapping[str, Actuator]) -> tuple[tuple
     return tuple(made)
 
 
-def _of_survey(entry: Entry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
+def _of_survey(entry: AirframeEntry, found: ModelFiles, measured: Mapping[str, Any]) -> Airframe:
     """The airframe that a survey measured.
 
     Raises:
@@ -123,11 +123,11 @@ _MEASURED = ("mass_kg", "cruise_mps", "roll_in_s", "weave_error_m", *FIGURES)
 
 
 @cache
-def _table() -> Mapping[str, Entry]:
+def _table() -> Mapping[str, AirframeEntry]:
     return MappingProxyType(parse_airframes(files("aircraft").joinpath("airframes.yaml").read_text("utf-8")))
 
 
-def parse_airframes(text: str) -> dict[str, Entry]:
+def parse_airframes(text: str) -> dict[str, AirframeEntry]:
     """Reads an airframe table.
 
     Args:
@@ -156,7 +156,7 @@ def parse_airframes(text: str) -> dict[str, Entry]:
     return {str(name): _entry(str(name), keys) for name, keys in table.items()}
 
 
-def _entry(name: str, keys: object) -> Entry:
+def _entry(name: str, keys: object) -> AirframeEntry:
     if not isinstance(keys, dict):
         raise ValueError(f"{name}: must be a mapping")
     if unknown := sorted(set(keys) - {"summary", "cruise_mps", "verified", "gains", "actuators", *FIGURES}):
@@ -178,7 +178,7 @@ def _entry(name: str, keys: object) -> Entry:
         value = keys.get(key, 1.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise ValueError(f"{name}.{key}: must be a positive number; got {value!r}")
-    return Entry(
+    return AirframeEntry(
         name=name,
         summary=str(keys["summary"]),
         cruise_mps=float(keys["cruise_mps"]),

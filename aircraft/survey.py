@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from aircraft.airframe import FIGURES, Airframe, Entry
+from aircraft.airframe import FIGURES, Airframe, AirframeEntry
 from aircraft.autopilot import NEEDED_DEG, Derivatives, Gains, gains, pitch_margin_deg, roll_margin_deg
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
@@ -74,7 +74,7 @@ KEPT_ROLL_DEG = 1.5
 UPDATE_STEPS = STEP_RATE_HZ // UPDATE_RATE_HZ
 
 
-def survey(entry: Entry, files: ModelFiles) -> dict[str, Any]:
+def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
     """Everything measured of `Airframe`, by attribute.
 
     Args:
@@ -104,7 +104,7 @@ def survey(entry: Entry, files: ModelFiles) -> dict[str, Any]:
     }
 
 
-def _held_at_cruise(entry: Entry, files: ModelFiles, cruise: float) -> Airframe:
+def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> Airframe:
     """The airframe as far as its cruise tells, its loops as fast as they can be to track a weave well.
 
     If they do so at no pace, the pace at which they do it best.
@@ -165,7 +165,9 @@ def _too_slow(control: str, lag_s: float, loop: str, margin_deg: float) -> str:
     )
 
 
-def _provisional(entry: Entry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains) -> Airframe:
+def _provisional(
+    entry: AirframeEntry, files: ModelFiles, cruise: float, at: Derivatives, placed: Gains
+) -> Airframe:
     """The airframe before its limits are known."""
     roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(1.0 / max(abs(placed.aileron_p_forward), 1e-6))
     roll_rate_dps = float(math.floor(min(roll_rate_dps, ROLL_RATE_DPS)))

@@ -11,7 +11,7 @@ from harness.api.errors import as_input_errors
 from harness.api.metrics import Metrics
 from harness.api.results import FlightResult
 from harness.files.input_file import InputError
-from harness.scenario.given import GUIDANCE, PLANNER, Part, registered
+from harness.scenario.given import GUIDANCE, PLANNER, LoopPart, registered
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def in_python(what: str) -> str:
     return f"{what} in {Path(script).name}" if script else f"{what} in Python"
 
 
-def _name_of(given: object, part: Part) -> str:
+def _name_of(given: object, part: LoopPart) -> str:
     try:
         return registered(given, part)
     except ValueError as error:

@@ -12,7 +12,7 @@ from harness.files.strict_yaml import Scalar
 
 
 @dataclass(frozen=True)
-class Run:
+class PlannedRun:
     """One run of a campaign, before it is flown.
 
     Attributes:

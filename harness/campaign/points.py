@@ -17,7 +17,7 @@ from harness.flight.record import FloatArray
 
 if TYPE_CHECKING:
     from harness.campaign.summary import Summary
-    from harness.report.figures import Scene
+    from harness.report.figures import FigureScene
 
 MOST_FAILURES: Final = 9
 """Failures beyond these are not drawn."""
@@ -82,7 +82,7 @@ class Failure:
 
     run: int
     outcome: str
-    scene: Scene
+    scene: FigureScene
     track_m: FloatArray
 
 
@@ -98,7 +98,7 @@ def failures(summary: Summary, folder: Path) -> list[Failure]:
 
 
 def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
-    from harness.report.figures import Scene
+    from harness.report.figures import FigureScene
     from harness.run_files.run_folder import load_run
     from harness.scenario.scenario import mission_of, parse_scenario
     from harness.world.world import World
@@ -113,7 +113,7 @@ def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
         ):  # it broke off, or is of other versions: there is nothing to draw
             continue
         mission = mission_of(scenario)
-        scene = Scene(
+        scene = FigureScene(
             name=scenario.name,
             bounds_m=mission.bounds_m,
             obstacles=World.from_scenario(scenario).obstacles,

@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
-from harness.campaign.cells import Run, cell_of, entry_columns, kind_of
+from harness.campaign.cells import PlannedRun, cell_of, entry_columns, kind_of
 from harness.campaign.key_types import takes_whole_numbers
 from harness.campaign.sampling import FloatArray, design
 from harness.files.strict_yaml import (
@@ -153,7 +153,7 @@ class CampaignRuns:
     def _of_entries(self) -> dict[str, tuple[Scalar, ...]]:
         return entry_columns(self.file)
 
-    def run(self, number: int) -> Run:
+    def run(self, number: int) -> PlannedRun:
         """Run `number`, from 0."""
         place = self._place(number)
         base = self.file.bases[place.base]
@@ -161,7 +161,7 @@ class CampaignRuns:
         given = {key_path(each.loc): each.node.plain() for each in changes}
         for name, values in self._of_entries.items():
             given[name] = values[place.planner if name.startswith("planner.") else place.aircraft]
-        return Run(
+        return PlannedRun(
             number,
             place.case,
             base.name,

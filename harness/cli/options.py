@@ -13,7 +13,7 @@ from harness.cli.standard_output import say
 from harness.files.wording import printable
 
 if TYPE_CHECKING:
-    from harness.scenario.given import Part
+    from harness.scenario.given import LoopPart
     from harness.scenario.scenario import Scenario
 
 FAILED: Final = 1
@@ -170,7 +170,7 @@ def law_kind(text: str) -> str:
     return _kind(text, GUIDANCE, "--guidance")
 
 
-def _kind(text: str, part: Part, option: str) -> str:
+def _kind(text: str, part: LoopPart, option: str) -> str:
     from harness.scenario.given import registered
 
     try:

@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.analysis.rows import CRASHED, Row, to_csv, to_markdown
-from harness.comparison.flights import Answer, Job, Progress, fly_all
+from harness.comparison.flights import ComparedAnswer, ComparedFlight, Progress, fly_all
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
-from harness.report.chapters import Entry, chapter, entry, optimum_of
+from harness.report.chapters import ReportedFlight, chapter, entry, optimum_of
 from harness.run_files.run_folder import RECORDING, REPORT, load_run
 from harness.scenario.scenario import Scenario
 from harness.world.optimum import Optimum
@@ -93,7 +93,9 @@ def fly_and_compare(
         RunFolderError: the folder holds something else or cannot be written.
     """
     jobs = [
-        Job(each, out / each.name / _folder_of(each, scenarios), recording, kinematic, tuple(sources))
+        ComparedFlight(
+            each, out / each.name / _folder_of(each, scenarios), recording, kinematic, tuple(sources)
+        )
         for each in _distinct(scenarios)
     ]
     called = command or shlex.join(["wayproof", *sys.argv[1:]])
@@ -106,7 +108,7 @@ def fly_and_compare(
 
 
 def _compared(
-    jobs: Sequence[Job],
+    jobs: Sequence[ComparedFlight],
     scenarios: Sequence[Scenario],
     out: Path,
     begun: Comparison,
@@ -195,15 +197,17 @@ def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
     replace_text(out / INDEX, json.dumps(comparison.plain(complete), indent=2, allow_nan=False) + "\n")
 
 
-def _entry(job: Job, answer: Answer, optima: Mapping[str, Optimum], law: str) -> Entry:
+def _entry(
+    job: ComparedFlight, answer: ComparedAnswer, optima: Mapping[str, Optimum], law: str
+) -> ReportedFlight:
     name, planner = job.scenario.name, job.scenario.planner.kind
     if answer.crash:
         row = Row(name, planner, CRASHED, answer.crash, optimum_m=optima[name].length_m, guidance=law)
-        return Entry(row)
+        return ReportedFlight(row)
     return entry(job.scenario, load_run(job.folder), optima[name], job.kinematic, law)
 
 
-def _overlay(folder: Path, entries: Sequence[Entry]) -> None:
+def _overlay(folder: Path, entries: Sequence[ReportedFlight]) -> None:
     recorded = [each for each in entries if each.run and (each.run.folder / RECORDING).exists()]
     (folder / OVERLAY).unlink(missing_ok=True)
     if recorded:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Job:
+class ComparedFlight:
     """One flight to be made.
 
     Attributes:
@@ -40,7 +40,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Answer:
+class ComparedAnswer:
     """What a flight's process sent back.
 
     Attributes:
@@ -53,10 +53,12 @@ class Answer:
 Progress: TypeAlias = Callable[[int, float, float, str], None]
 """Takes a job's index, its simulated time (s), its distance to go (m) and a word on its state."""
 
-Message: TypeAlias = Answer | tuple[float, float, str]
+Message: TypeAlias = ComparedAnswer | tuple[float, float, str]
 
 
-def fly_all(jobs: Sequence[Job], workers: int, progress: Progress | None = None) -> list[Answer]:
+def fly_all(
+    jobs: Sequence[ComparedFlight], workers: int, progress: Progress | None = None
+) -> list[ComparedAnswer]:
     """Makes all flights, some at a time.
 
     Args:
@@ -68,7 +70,7 @@ def fly_all(jobs: Sequence[Job], workers: int, progress: Progress | None = None)
         The answers, in the order of the jobs.
     """
     context = multiprocessing.get_context("spawn")
-    answers: list[Answer] = [Answer()] * len(jobs)
+    answers: list[ComparedAnswer] = [ComparedAnswer()] * len(jobs)
     waiting = deque(range(len(jobs)))
     flying: dict[Connection, tuple[int, SpawnProcess]] = {}
     try:
@@ -86,7 +88,7 @@ def fly_all(jobs: Sequence[Job], workers: int, progress: Progress | None = None)
             for ours in [each for each in flying if each in ready]:
                 index, process = flying[ours]
                 message = _receive(ours, process)
-                if isinstance(message, Answer):
+                if isinstance(message, ComparedAnswer):
                     answers[index] = message
                     process.join()
                     ours.close()
@@ -106,7 +108,9 @@ def _receive(ours: Connection, process: SpawnProcess) -> Message:
         message: Message = ours.recv()
     except (EOFError, OSError):
         process.join()
-        return Answer(f"its process ended with {_ending(process.exitcode or 0)} before the flight did")
+        return ComparedAnswer(
+            f"its process ended with {_ending(process.exitcode or 0)} before the flight did"
+        )
     return message
 
 
@@ -116,7 +120,7 @@ def _ending(exitcode: int) -> str:
     return f"signal {-exitcode} ({signal.strsignal(-exitcode) or 'unknown'})"
 
 
-def _fly(job: Job, theirs: Connection) -> None:
+def _fly(job: ComparedFlight, theirs: Connection) -> None:
     """One flight, in the child."""
     # An interrupt reaches the whole process group; the parent decides what it means.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -124,14 +128,14 @@ def _fly(job: Job, theirs: Connection) -> None:
     os.dup2(2, 1)
     try:
         _write(job, theirs)
-        theirs.send(Answer())
+        theirs.send(ComparedAnswer())
     except Exception as error:
-        theirs.send(Answer(sentence(error)))
+        theirs.send(ComparedAnswer(sentence(error)))
     finally:
         theirs.close()
 
 
-def _write(job: Job, theirs: Connection) -> None:
+def _write(job: ComparedFlight, theirs: Connection) -> None:
     from harness.run.scenario_flight import fly_to_folder, kinematic_loop, make_loop
     from harness.scenario.given import registered_source
     from planner.compiled import own_this_process

@@ -29,7 +29,7 @@ Flown: TypeAlias = Callable[[Scenario], Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class Band:
+class TriedBand:
     """Conditions of one key that were tried one beside the other and had the same outcome.
 
     Attributes:
@@ -94,7 +94,7 @@ class Breaking:
     trials: tuple[Trial, ...]
 
     @property
-    def bands(self) -> tuple[Band, ...]:
+    def bands(self) -> tuple[TriedBand, ...]:
         """With one key, every condition tried: neighbours with the same outcome make a band, mild ones first."""
         verdicts: dict[tuple[Point, float], bool] = {}
         for each in self.trials:
@@ -103,7 +103,7 @@ class Breaking:
         bands = []
         for failed, group in itertools.groupby(sorted(verdicts.items()), key=lambda item: item[1]):
             values = [value for (_, value), _ in group]
-            bands.append(Band(failed, values[0], values[-1], len(values)))
+            bands.append(TriedBand(failed, values[0], values[-1], len(values)))
         return tuple(bands)
 
     def plain(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from harness.flight.plans import LATE_S, Plans
 from harness.flight.record import Flight, Outcome
 from harness.flight.signals import held_back
 from harness.flight.state_estimator import PerfectEstimator, StateEstimator
-from harness.flight.termination import Termination, Verdict
+from harness.flight.termination import Ending, Termination
 from harness.flight.timetable import intervals
 from harness.flight.track_log import TrackLog
 from harness.mapping.scan import RangeScan
@@ -105,7 +105,7 @@ class ClosedLoop:
     """
 
     def __init__(self, loop: Loop, observers: Sequence[Observer] = ()) -> None:
-        self.verdict: Verdict | None = None
+        self.verdict: Ending | None = None
         """How the flight ended; None while it goes on."""
         self.steering = NOT_STEERED
         """What guidance decided last."""
@@ -211,11 +211,11 @@ class ClosedLoop:
         self._loop.seen.update(scans.popleft())
         return True
 
-    def _plan(self, mapped: bool) -> Verdict | None:
+    def _plan(self, mapped: bool) -> Ending | None:
         """Asks the planner; returns how the flight ends, if that is its answer."""
         return self.plans.ask(self.believed, self.steering.arc_length_m, mapped)
 
-    def _guide(self) -> Verdict | None:
+    def _guide(self) -> Ending | None:
         """Steers along the plan in effect, and logs where the aircraft is and what it is told."""
         loop, plans, true, believed = self._loop, self.plans, self.true, self.believed
         verdict = plans.take_effect(believed, loop.guidance) or self._steer()
@@ -231,7 +231,7 @@ class ClosedLoop:
         self._log_row()
         return None
 
-    def _steer(self) -> Verdict | None:
+    def _steer(self) -> Ending | None:
         """Asks the guidance law, if there is a plan; it may raise anything, which ends the flight."""
         if self.plans.index >= 0:
             try:
@@ -240,9 +240,9 @@ class ClosedLoop:
                 finite = all(map(math.isfinite, numbers)) and not math.isinf(steering.airspeed_mps)
             except Exception as error:
                 self._law_error = trace(error)
-                return Verdict(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
+                return Ending(Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)}")
             if not finite:
-                return Verdict(
+                return Ending(
                     Outcome.LOST_CONTROL,
                     f"the guidance law asked for a roll of {steering.roll_command_rad} rad and an airspeed of "
                     f"{steering.airspeed_mps} m/s, {steering.cross_track_m} m beside its route after "
@@ -264,7 +264,7 @@ class ClosedLoop:
             return math.nan
         return self._measured.nearest(self.true.east_m, self.true.north_m).cross_track_m
 
-    def _advance(self, steps: int) -> Verdict | None:
+    def _advance(self, steps: int) -> Ending | None:
         """Flies on; a planner that wants more time is asked again half way, and may end the flight there."""
         model = self._loop.model
         if self.plans.wants_more_time:
@@ -277,7 +277,7 @@ class ClosedLoop:
         model.advance(steps)
         return None
 
-    def _over(self, verdict: Verdict | None) -> bool:
+    def _over(self, verdict: Ending | None) -> bool:
         """Ends the flight if there is a verdict; returns whether it is over."""
         if verdict is None:
             return False
@@ -288,7 +288,7 @@ class ClosedLoop:
         if verdict.outcome is not Outcome.LOST_CONTROL:
             self._steer()  # the last row is of the end of the flight, not of the update before
         self._log_row()
-        self.verdict = Verdict(verdict.outcome, verdict.reason + self.plans.last_word(verdict.outcome))
+        self.verdict = Ending(verdict.outcome, verdict.reason + self.plans.last_word(verdict.outcome))
         for observer in self._observers:
             observer.on_event(self.true.time_s, f"{self.verdict.outcome.value}: {self.verdict.reason}")
         return True

@@ -12,7 +12,7 @@ from harness.files.crash import in_a_line, sentence, trace
 from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
 from harness.flight.observer import Observer
 from harness.flight.record import AcceptedPlan, Outcome
-from harness.flight.termination import Verdict
+from harness.flight.termination import Ending
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
 
 LATE_S = 1e-9
@@ -56,7 +56,7 @@ class Plans:
             return "waiting"
         return "holding" if self._arc_length_m > self._loiters_from_m else "following"
 
-    def ask(self, state: AircraftState, arc_length_m: float, scanned: bool) -> Verdict | None:
+    def ask(self, state: AircraftState, arc_length_m: float, scanned: bool) -> Ending | None:
         """Asks the planner, unless a plan of its is still on its way.
 
         Args:
@@ -77,13 +77,13 @@ class Plans:
             plan = self._planner.plan(request)
         except PlannerFailedError as error:
             self.error = error.trace
-            return Verdict(Outcome.PLANNER_FAILED, str(error))
+            return Ending(Outcome.PLANNER_FAILED, str(error))
         self._told, self.wants_more_time = plan.reason, plan.wants_more_time
         if plan.status is PlanStatus.KEPT:
             return None
         self.compute_ms.append(self._planner.compute_ms)
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
-            return Verdict(Outcome.UNREACHABLE, in_a_line(plan.reason))
+            return Ending(Outcome.UNREACHABLE, in_a_line(plan.reason))
         if plan.status is PlanStatus.NO_PATH:
             self._note_failure(state.time_s, plan.reason)
         if plan.status is PlanStatus.FOUND:
@@ -93,7 +93,7 @@ class Plans:
             self._due_s = state.time_s + self._latency_s - LATE_S
         return None
 
-    def take_effect(self, state: AircraftState, guidance: GuidanceLaw) -> Verdict | None:
+    def take_effect(self, state: AircraftState, guidance: GuidanceLaw) -> Ending | None:
         """Hands the plan on its way to the guidance, if it is due.
 
         Args:
@@ -112,7 +112,7 @@ class Plans:
             guidance.follow(route, arc_length_m=late_s * state.groundspeed_mps)
         except Exception as error:  # a law of somebody else's may raise anything
             self.error = trace(error)
-            return Verdict(
+            return Ending(
                 Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)} when it was given a plan"
             )
         accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)

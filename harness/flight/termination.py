@@ -15,7 +15,7 @@ LONGEST_UNCHECKED_S = 5.0
 """Contact is looked for at least this often, and sooner where an obstacle could be reached sooner."""
 
 
-class Verdict(NamedTuple):
+class Ending(NamedTuple):
     """How a flight ended."""
 
     outcome: Outcome
@@ -33,7 +33,7 @@ class Termination(Protocol):
         """Distance that is left."""
         ...
 
-    def verdict(self, state: AircraftState, fault: str | None) -> Verdict | None:
+    def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
         """How the flight ends now; None while it goes on.
 
         Args:
@@ -67,28 +67,28 @@ class MissionEnd:
         east, north = self._mission.goal_m
         return math.hypot(state.east_m - east, state.north_m - north)
 
-    def verdict(self, state: AircraftState, fault: str | None) -> Verdict | None:
+    def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
         """How the flight ends now; None while it goes on."""
         if fault is not None:
-            return Verdict(Outcome.LOST_CONTROL, fault)
+            return Ending(Outcome.LOST_CONTROL, fault)
         if state.time_s < self._next_look_s:
             return None
         world, mission = self._world, self._mission
         east, north = state.east_m, state.north_m
         clearance = self._surely_clear_m(east, north, state.time_s)
         if clearance < 0.0:
-            return Verdict(Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m")
+            return Ending(Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m")
         if self.contact_m < 0.0:
-            return Verdict(Outcome.COLLISION, "touched an obstacle between two steps")
+            return Ending(Outcome.COLLISION, "touched an obstacle between two steps")
         if world.ground is not None and (hit := self._ground_hit(world.ground, state)):
-            return Verdict(Outcome.COLLISION, hit)
+            return Ending(Outcome.COLLISION, hit)
         if not world.inside_bounds(east, north):
-            return Verdict(Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m")
+            return Ending(Outcome.OUT_OF_BOUNDS, f"left the area at ({east:.0f}, {north:.0f}) m")
         to_go = self.to_go_m(state)
         if to_go <= mission.goal_radius_m:
-            return Verdict(Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s")
+            return Ending(Outcome.REACHED, f"inside the goal circle after {state.time_s:.0f} s")
         if state.time_s >= self._time_limit_s:
-            return Verdict(
+            return Ending(
                 Outcome.TIMEOUT, f"time limit {self._time_limit_s:g} s, {to_go:.0f} m from the goal"
             )
         xmin, ymin, xmax, ymax = world.bounds_m

@@ -16,12 +16,12 @@ from harness.world.optimum import Optimum, shortest_path
 from harness.world.world import World
 
 if TYPE_CHECKING:
-    from harness.report.figures import DrawnRun, Scene
+    from harness.report.figures import DrawnRun, FigureScene
     from harness.report.page import Chapter, Picture
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class ReportedFlight:
     """One planner on one scenario and what came of it.
 
     Attributes:
@@ -37,7 +37,7 @@ class Entry:
 
 def entry(
     scenario: Scenario, run: Run, optimum: Optimum, kinematic: bool = False, guidance: str = ""
-) -> Entry:
+) -> ReportedFlight:
     """A flight that came to an end.
 
     Args:
@@ -58,7 +58,7 @@ def entry(
         kinematic=kinematic,
         guidance=guidance,
     )
-    return Entry(row, run, planned)
+    return ReportedFlight(row, run, planned)
 
 
 def optimum_of(scenario: Scenario) -> Optimum:
@@ -69,7 +69,7 @@ def optimum_of(scenario: Scenario) -> Optimum:
     )
 
 
-def chapter(folder: Path, scenario: Scenario, entries: Sequence[Entry], optimum: Optimum) -> Chapter:
+def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight], optimum: Optimum) -> Chapter:
     """Writes the figures of planners side by side; returns the scenario's part of the report.
 
     Args:
@@ -103,7 +103,7 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[Entry], optimum:
     return Chapter(scene.name, _facts(scene, optimum), rows, pictures, optimum.reason)
 
 
-def run_chapter(scenario: Scenario, flight: Entry, optimum: Optimum) -> Chapter:
+def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) -> Chapter:
     """Writes the figures of a single run into its folder; returns its part of the report."""
     from harness.report import figures
     from harness.report.page import Chapter
@@ -133,11 +133,11 @@ def run_chapter(scenario: Scenario, flight: Entry, optimum: Optimum) -> Chapter:
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
 
 
-def _scene(scenario: Scenario, optimum: Optimum) -> Scene:
-    from harness.report.figures import Scene
+def _scene(scenario: Scenario, optimum: Optimum) -> FigureScene:
+    from harness.report.figures import FigureScene
 
     mission = scenario.mission
-    return Scene(
+    return FigureScene(
         name=scenario.name,
         bounds_m=scenario.area.bounds_m,
         obstacles=World.from_scenario(scenario).obstacles,
@@ -151,7 +151,7 @@ def _scene(scenario: Scenario, optimum: Optimum) -> Scene:
     )
 
 
-def _drawn(flight: Entry) -> DrawnRun | None:
+def _drawn(flight: ReportedFlight) -> DrawnRun | None:
     from harness.report.figures import DrawnRun
 
     if flight.run is None or flight.planned is None:
@@ -170,14 +170,14 @@ def _picture(stem: Path, figure: Any, caption: str) -> Picture:
     return Picture(content, caption, caption)
 
 
-def _kept(scene: Scene) -> str:
+def _kept(scene: FigureScene) -> str:
     """The wanted clearance, and what is planned beyond it."""
     margin = scene.navigation_margin_m
     beyond = f" + {number(margin)} m for the navigation error" if margin > 0.0 else ""
     return f"{number(scene.clearance_m)} m{beyond}"
 
 
-def _facts(scene: Scene, optimum: Optimum) -> dict[str, str]:
+def _facts(scene: FigureScene, optimum: Optimum) -> dict[str, str]:
     def km(value_m: float | None) -> str:
         return f"{number(value_m, 1e-3)} km" if value_m is not None else "none"
 

@@ -61,7 +61,7 @@ class DrawnRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class FigureScene:
     """What all flights of a scenario have in common.
 
     Attributes:
@@ -93,7 +93,7 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 """Flights with the numbers of their planners, which give their colours in every figure."""
 
 
-def overview(scene: Scene, runs: Numbered) -> Figure:
+def overview(scene: FigureScene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
     keys = _keys(scene, [run for _, run in runs])
     with styled(map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(keys)) / 2)) as figure:
@@ -106,7 +106,7 @@ def overview(scene: Scene, runs: Numbered) -> Figure:
     return figure
 
 
-def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
+def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
     """One planner's path as in the paper's Figures 2 and 3, and the place where its plan bends most.
 
     Args:
@@ -133,7 +133,7 @@ def planner_figure(scene: Scene, run: DrawnRun, index: int) -> Figure:
     return figure
 
 
-def profiles(scene: Scene, runs: Numbered) -> Figure:
+def profiles(scene: FigureScene, runs: Numbered) -> Figure:
     """Curvature and cross-track error along the way, two strips a planner."""
     with styled(0.9 + 2.1 * len(runs)) as figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
@@ -157,13 +157,13 @@ def profiles(scene: Scene, runs: Numbered) -> Figure:
     return figure
 
 
-def map_height_in(scene: Scene) -> float:
+def map_height_in(scene: FigureScene) -> float:
     """What a map as wide as a figure needs, title and axis labels included."""
     xmin, ymin, xmax, ymax = scene.bounds_m
     return 0.8 + min((WIDTH_IN - 0.6) * (ymax - ymin) / (xmax - xmin), TALLEST_MAP_IN)
 
 
-def draw_map(axes: Axes, scene: Scene, ends: bool = True) -> list[Any]:
+def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
     """Obstacles and area, and start, goal, straight line and optimum where wanted; returns the legend's begin."""
     xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
     for obstacle in scene.obstacles:
@@ -211,7 +211,7 @@ def outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
     return patches.PathPatch(Path.make_compound_path(*rings), **style)
 
 
-def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
+def _flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
     """Draws a track and the place of its tightest planned turn; the first planner's lies on top."""
     points = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
     style: dict[str, Any] = {"color": colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
@@ -225,7 +225,7 @@ def _flown(axes: Axes, scene: Scene, run: DrawnRun, index: int, dashes: Any = "-
     return line
 
 
-def _keys(scene: Scene, runs: Sequence[DrawnRun]) -> list[Any]:
+def _keys(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
     """What the legend says of marks that are there for some flights only."""
     keys: list[Any] = []
     if not all(obstacle.stands_for_ever for obstacle in scene.obstacles):
@@ -240,7 +240,7 @@ def _keys(scene: Scene, runs: Sequence[DrawnRun]) -> list[Any]:
     return keys
 
 
-def thinned(points: FloatArray, scene: Scene) -> FloatArray:
+def thinned(points: FloatArray, scene: FigureScene) -> FloatArray:
     """A track without the points that no one could see on the map."""
     import shapely
 
@@ -251,7 +251,7 @@ def thinned(points: FloatArray, scene: Scene) -> FloatArray:
     return drawn
 
 
-def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> None:
+def _close_up(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: int) -> None:
     """Planned and flown path round the tightest planned turn."""
     half = CLOSE_UP_RADII * scene.turn_radius_m
     middle = np.array((run.planned.east_m[row], run.planned.north_m[row]))
@@ -281,7 +281,7 @@ def _close_up(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> 
     axes.set_title("its tightest planned turn")
 
 
-def _curvature_near(axes: Axes, scene: Scene, run: DrawnRun, index: int, row: int) -> None:
+def _curvature_near(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: int) -> None:
     """Planned and flown curvature a few turn radii before and behind a row."""
     distance = _distance_m(run.track)
     near = np.abs(distance - distance[row]) < 2 * CLOSE_UP_RADII * scene.turn_radius_m

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from harness.report.figure_style import colour, styled
-from harness.report.figures import LEGEND_ROW_IN, DrawnRun, Scene, draw_map, map_height_in, thinned
+from harness.report.figures import LEGEND_ROW_IN, DrawnRun, FigureScene, draw_map, map_height_in, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +50,7 @@ ABOUT = 0.15
 """The figure reaches this share of the path's span beyond it."""
 
 
-def path_figure(scene: Scene, run: DrawnRun, given_m: FloatArray, metrics: Mapping[str, Any]) -> Figure:
+def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics: Mapping[str, Any]) -> Figure:
     """Draws a checked path.
 
     Args:
@@ -96,7 +96,7 @@ def _corners(corners: Sequence[Mapping[str, Any]], *, kept: bool) -> list[tuple[
     return [(corner["east_m"], corner["north_m"]) for corner in corners if corner["kept"] is kept]
 
 
-def _about(scene: Scene, points_m: FloatArray) -> Scene:
+def _about(scene: FigureScene, points_m: FloatArray) -> FigureScene:
     """The scene, its frame drawn close about a path."""
     from dataclasses import replace
 

@@ -20,7 +20,7 @@ from harness.run.path_plan import PathPlan, planned
 from harness.run.path_scenario import files_of, has_bounds, scenario_for
 from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_aircraft, make_loop
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
-from harness.run_files.path_files import GivenPath, given_points, read_path
+from harness.run_files.path_files import PathAsGiven, given_points, read_path
 from harness.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class PathCheck:
         files: among the obstacles, for a path that is not flown at one altitude.
     """
 
-    given: GivenPath
+    given: PathAsGiven
     scenario: Scenario
     plan: PathPlan
     bounded: bool = False
@@ -166,7 +166,7 @@ def origin_of(world: FilePath | None) -> tuple[float, float] | None:
 
 
 def asked(
-    given: GivenPath,
+    given: PathAsGiven,
     sections: dict[str, dict[str, Any]],
     settings: Sequence[tuple[str, str]] = (),
     *,

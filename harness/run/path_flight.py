@@ -13,7 +13,7 @@ from aircraft.route import route_length
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight, Outcome
-from harness.flight.termination import Verdict
+from harness.flight.termination import Ending
 from harness.run.path_plan import PathPlan
 from planner.interface import FloatArray, Path, Plan, PlanRequest, PlanStatus
 
@@ -73,20 +73,20 @@ class PathEnd:
         """Length of the path that is left."""
         return self._length_m - self._progress.nearest(state.east_m, state.north_m).arc_length_m
 
-    def verdict(self, state: AircraftState, fault: str | None) -> Verdict | None:
+    def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
         """How the flight ends now; None while it goes on."""
         if fault is not None:
-            return Verdict(Outcome.LOST_CONTROL, fault)
+            return Ending(Outcome.LOST_CONTROL, fault)
         time_s, nearest = state.time_s, self._progress.nearest(state.east_m, state.north_m)
         off_m = abs(nearest.cross_track_m)
         if nearest.past_end and off_m > self._near_m:
-            return Verdict(
+            return Ending(
                 Outcome.TIMEOUT, f"passed the end of the path {off_m:,.0f} m beside it after {time_s:.0f} s"
             )
         if nearest.past_end:
-            return Verdict(Outcome.REACHED, f"at the end of the path after {time_s:.0f} s")
+            return Ending(Outcome.REACHED, f"at the end of the path after {time_s:.0f} s")
         if time_s >= self._limit_s:
-            return Verdict(
+            return Ending(
                 Outcome.TIMEOUT,
                 f"not at the end of the path after {time_s:.0f} s, twice what it should take",
             )

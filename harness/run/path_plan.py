@@ -16,7 +16,7 @@ from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray, FlyBy, fly_by
 from harness.run_files.mission.flying import Flying, Ground
 from harness.run_files.mission.route import mission_route
-from harness.run_files.path_files import GivenPath
+from harness.run_files.path_files import PathAsGiven
 from harness.scenario.guidance_keys import airframe_of
 from harness.scenario.scenario import Scenario, performance_of
 from harness.scenario.sections import ALTITUDES_M
@@ -76,7 +76,7 @@ class PathPlan:
 
 
 def planned(
-    given: GivenPath, scenario: Scenario, altitude_m: float | None, ground: Ground | None
+    given: PathAsGiven, scenario: Scenario, altitude_m: float | None, ground: Ground | None
 ) -> PathPlan:
     """Makes of a path what is flown.
 
@@ -134,7 +134,7 @@ def _no_lower(profile: VerticalProfile) -> tuple[VerticalProfile, tuple[str, ...
 
 
 def _drawn_profile(
-    given: GivenPath, way: FlyBy, scenario: Scenario, altitude_m: float | None, ground: Ground | None
+    given: PathAsGiven, way: FlyBy, scenario: Scenario, altitude_m: float | None, ground: Ground | None
 ) -> VerticalProfile:
     """Altitudes along a drawn line."""
     speed = scenario.aircraft.airspeed_mps
@@ -188,7 +188,7 @@ def _climb_of(frame: Airframe) -> Callable[[float], tuple[float, float]]:
     return lru_cache(maxsize=1000)(climb_mps)
 
 
-def _turn_radius_of(given: GivenPath, scenario: Scenario) -> Callable[[float], float]:
+def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float], float]:
     def turn_radius_m(airspeed_mps: float) -> float:
         spec = scenario.aircraft.model_copy(update={"airspeed_mps": airspeed_mps})
         try:

@@ -38,7 +38,7 @@ MAX_SPAN_M: Final = 500e3
 
 
 @dataclass(frozen=True, eq=False)
-class GivenPath:
+class PathAsGiven:
     """A path as it was given.
 
     Attributes:
@@ -72,7 +72,7 @@ def read_path(
     any_altitude: bool = False,
     origin_deg: Place | None = None,
     polygons: str | None = None,
-) -> GivenPath:
+) -> PathAsGiven:
     """Reads a path; the name's ending says how it is written.
 
     Args:
@@ -104,7 +104,7 @@ def read_path(
     altitudes = () if any_altitude else found.altitudes_m
     if not found.above_ground:
         _check_altitudes(altitudes, str(path))
-    return GivenPath(
+    return PathAsGiven(
         source=str(path),
         points_m=points,
         origin_deg=origin,
@@ -115,7 +115,7 @@ def read_path(
     )
 
 
-def _mission(found: MissionAsRead, origin_deg: Place | None) -> GivenPath:
+def _mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
     """A mission in the local plane."""
     source, flown = found.source, program(found)
     positions = [step.position for step in flown.steps]
@@ -126,7 +126,7 @@ def _mission(found: MissionAsRead, origin_deg: Place | None) -> GivenPath:
     _check_span(points, source)
     each = iter(points.tolist())
     places = tuple(None if position is None else complex(*next(each)) for position in positions)
-    return GivenPath(
+    return PathAsGiven(
         source=source,
         points_m=points,
         origin_deg=origin,
@@ -136,7 +136,7 @@ def _mission(found: MissionAsRead, origin_deg: Place | None) -> GivenPath:
     )
 
 
-def given_points(points: Any) -> GivenPath:
+def given_points(points: Any) -> PathAsGiven:
     """A drawn path from points in the local plane.
 
     Args:
@@ -158,7 +158,7 @@ def given_points(points: Any) -> GivenPath:
     _check_places(points, "path")
     altitudes = array[:, 2:].ravel()
     _check_altitudes(altitudes.tolist(), "path")
-    return GivenPath("path", points, None, altitudes)
+    return PathAsGiven("path", points, None, altitudes)
 
 
 def _check_span(points: FloatArray, source: str) -> None:

@@ -26,7 +26,7 @@ from planner.registry import PlannerKind
 Kind = PlannerKind | GuidanceKind
 
 
-class Part(NamedTuple):
+class LoopPart(NamedTuple):
     """A part of the loop that may be given.
 
     Attributes:
@@ -46,7 +46,7 @@ class Part(NamedTuple):
     register: Callable[[Any], None]
 
 
-PLANNER = Part(
+PLANNER = LoopPart(
     "a planner",
     ("plan(request)",),
     "mission",
@@ -54,7 +54,7 @@ PLANNER = Part(
     planner.registry.planner_kinds,
     planner.registry.register,
 )
-GUIDANCE = Part(
+GUIDANCE = LoopPart(
     "a guidance law",
     ("update(state)", "follow(route, arc_length_m)"),
     "limits",
@@ -78,7 +78,7 @@ def is_source(name: str) -> bool:
     return ":" in name
 
 
-def registered(given: object, part: Part = PLANNER) -> str:
+def registered(given: object, part: LoopPart = PLANNER) -> str:
     """Registers what was given, unless it has been; returns the name by which scenarios of this process know it.
 
     Args:
@@ -99,7 +99,7 @@ def registered(given: object, part: Part = PLANNER) -> str:
     return kind.kind
 
 
-def registered_source(source: str, part: Part = PLANNER) -> str:
+def registered_source(source: str, part: LoopPart = PLANNER) -> str:
     """Imports what FILE.py:NAME or MODULE:NAME names and registers it under that name, without the file's folder.
 
     Raises:
@@ -118,12 +118,12 @@ def registered_source(source: str, part: Part = PLANNER) -> str:
 
 
 @functools.lru_cache(maxsize=64)
-def _same_kind_of(given: object, part: Part) -> Kind:
+def _same_kind_of(given: object, part: LoopPart) -> Kind:
     """The same kind for the same object: what was measured of it holds on."""
     return kind_of(given, part)
 
 
-def kind_of(given: object, part: Part = PLANNER) -> Kind:
+def kind_of(given: object, part: LoopPart = PLANNER) -> Kind:
     """What was given, as the registry of its part has it.
 
     Raises:
@@ -144,7 +144,7 @@ def kind_of(given: object, part: Part = PLANNER) -> Kind:
     )
 
 
-def _is_part(given: object, part: Part) -> bool:
+def _is_part(given: object, part: LoopPart) -> bool:
     return all(callable(getattr(given, each.partition("(")[0], None)) for each in part.methods)
 
 
@@ -154,11 +154,11 @@ def _name(given: Any) -> str:
     return name if module == "__main__" else f"{module}:{name}"
 
 
-def _summary(given: object, part: Part) -> str:
+def _summary(given: object, part: LoopPart) -> str:
     return (inspect.getdoc(given) or f"{part.noun} given in Python").splitlines()[0]
 
 
-def _maker(given: Callable[..., Any], part: Part) -> Callable[[Any, Any], Any]:
+def _maker(given: Callable[..., Any], part: LoopPart) -> Callable[[Any, Any], Any]:
     """Calls what was given with what it may know, where it takes that; else with nothing."""
     try:
         parameters = inspect.signature(given).parameters

@@ -39,7 +39,7 @@ _NOWHERE: Final = AircraftState(math.inf, *[0.0] * 11)
 
 
 @dataclass(frozen=True)
-class Place:
+class EarthPosition:
     """Where the flight is on earth.
 
     Attributes:
@@ -72,7 +72,7 @@ class GroundStationLink(Onlooker):
             raise InputError(NEEDS_PYMAVLINK) from error
         self._m: Any = common
         self._mav: Any = common.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=1)
-        self._place = Place(LocalPlane(0.0, 0.0), (0.0, 0.0))
+        self._place = EarthPosition(LocalPlane(0.0, 0.0), (0.0, 0.0))
         try:
             family, kind, *_, target = socket.getaddrinfo(to.host, to.port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind)
@@ -86,7 +86,7 @@ class GroundStationLink(Onlooker):
         self._fast_s = self._slow_s = -math.inf
         self._over = False
 
-    def begin(self, place: Place) -> None:
+    def begin(self, place: EarthPosition) -> None:
         """Takes where the flight is on earth."""
         self._place = place
 

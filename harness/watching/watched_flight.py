@@ -19,7 +19,7 @@ from harness.run.scenario_flight import fly_to_folder, make_loop, scene_of
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.watching.address import Address
 from harness.watching.live import LiveLog
-from harness.watching.mavlink import GroundStationLink, Place
+from harness.watching.mavlink import EarthPosition, GroundStationLink
 from harness.watching.pace import Pace
 from harness.watching.relay_process import RelayProcess
 
@@ -94,10 +94,10 @@ def fly_watched(
     return figures
 
 
-def _place(scenario: Scenario, loop: Loop) -> Place:
+def _place(scenario: Scenario, loop: Loop) -> EarthPosition:
     """Where a flight is on earth; its ground is mean sea level where it is not known."""
     origin, heights = scenario.area.origin, loop.world.ground_heights
     east, north = scenario.mission.start_m
     ground_m = math.nan if heights is None else float(heights(np.array([east]), np.array([north]))[0])
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
-    return Place(plane, (east, north), ground_m if math.isfinite(ground_m) else 0.0)
+    return EarthPosition(plane, (east, north), ground_m if math.isfinite(ground_m) else 0.0)

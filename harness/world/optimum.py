@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.world.obstacle import Obstacle
-from harness.world.tangent_graph import ANGLE_SLACK_RAD, Scene, Tangents
+from harness.world.tangent_graph import ANGLE_SLACK_RAD, Tangents, TangentScene
 from planner.interface import FloatArray
 
 DRAWN_STEP_RAD = math.radians(1.0)
@@ -60,7 +60,7 @@ def shortest_path(
     """
     if any(each.velocity_mps != (0.0, 0.0) or each.active_s is not None for each in obstacles):
         return _none("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
-    scene = Scene([each.shape for each in obstacles], bounds_m, start_m, goal_m, clearance_m)
+    scene = TangentScene([each.shape for each in obstacles], bounds_m, start_m, goal_m, clearance_m)
     free = scene.free_points(np.array([start_m, goal_m]))
     if not free.all():
         end = "goal" if free[0] else "start"
@@ -83,7 +83,7 @@ class _Arrival(NamedTuple):
     """Angle at which it left the disc before."""
 
 
-def _search(scene: Scene) -> Optimum:
+def _search(scene: TangentScene) -> Optimum:
     """A* over arrivals; the straight distance to the goal never exceeds the way that is left."""
     tangents: dict[tuple[int, int], Tangents] = {}
     blocked: dict[int, FloatArray] = {}
@@ -128,7 +128,7 @@ def _free_sweep(arrival: _Arrival, blocked: FloatArray) -> float:
     return float(np.where(into < width / 2, 0.0, math.tau - into).min(initial=math.inf))
 
 
-def _drawn(scene: Scene, last: _Arrival) -> FloatArray:
+def _drawn(scene: TangentScene, last: _Arrival) -> FloatArray:
     """Points along the path that ends with an arrival at the goal."""
     pieces = [scene.centres[[scene.goal]]]
     here = last

@@ -61,7 +61,7 @@ class Tangents(NamedTuple):
     """(k,) shortest way found so far to the end of each; changes during the search."""
 
 
-class Scene:
+class TangentScene:
     """Discs that a path may bend on, and all that blocks it. The last two discs are start and goal."""
 
     def __init__(

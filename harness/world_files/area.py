@@ -28,7 +28,7 @@ TRIES: Final = 6
 
 
 @dataclass(frozen=True)
-class Area:
+class PlaneArea:
     """A part of the plane.
 
     Attributes:
@@ -84,7 +84,7 @@ def about_origin(bounds: Box, contents: Sequence[Contents], mappings: Sequence[M
 
 def area_about(
     chosen: Ends | None, contents: Sequence[Contents], mappings: Sequence[Mapping], turn_radius_m: float
-) -> Area:
+) -> PlaneArea:
     """The area about a start and a goal that are given, within rasters and fences."""
     assert chosen is not None
     rasters, vectors = _boxes(contents, mappings)
@@ -94,12 +94,12 @@ def area_about(
     box = (min(x0, x1) - reach, min(y0, y1) - reach, max(x0, x1) + reach, max(y0, y1) + reach)
     if rasters:
         box = _common([*rasters, box]) or box
-    return Area(box, ())
+    return PlaneArea(box, ())
 
 
 def areas_of(
     contents: Sequence[Contents], mappings: Sequence[Mapping], altitude_m: float, turn_radius_m: float
-) -> list[Area]:
+) -> list[PlaneArea]:
     """The area that some files cover; or of large ones several parts, the most crowded first.
 
     Raises:
@@ -114,7 +114,7 @@ def areas_of(
     largest = min(LARGEST_TURNS * turn_radius_m, LARGEST_M)
     sides = whole[2] - whole[0], whole[3] - whole[1]
     if max(sides) <= largest:
-        return [Area(whole, notes)]
+        return [PlaneArea(whole, notes)]
     notes = (
         f"the files reach over {sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km; the area is a part of that",
     )
@@ -122,7 +122,7 @@ def areas_of(
     areas = []
     for x, y in _foci(contents, mappings, whole, altitude_m, largest):
         x, y = (min(max(v, whole[k] + half[k]), whole[k + 2] - half[k]) for k, v in enumerate((x, y)))
-        areas.append(Area((x - half[0], y - half[1], x + half[0], y + half[1]), notes))
+        areas.append(PlaneArea((x - half[0], y - half[1], x + half[0], y + half[1]), notes))
     return areas
 
 

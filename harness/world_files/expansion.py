@@ -17,7 +17,7 @@ from harness.world_files.growing import simplified
 from harness.world_files.height_field import HeightField
 from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError, counted
 from harness.world_files.plane import Mapping, Place
-from harness.world_files.slicing import Band, Box, Ground, Solid, sliced_cells, sliced_parts
+from harness.world_files.slicing import Box, HeightBand, KnownGround, Solid, sliced_cells, sliced_parts
 from harness.world_files.terrain import height_field
 
 MARGIN: Final = 0.02
@@ -261,7 +261,7 @@ def _cut(
     import shapely
 
     stamp, box = spec.path.stat(), _with_margin(bounds_m)
-    band = Band(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
+    band = HeightBand(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
     notes = list(contents.notes)
     flat_m = spec.ground_m
     if flat_m is None and field is None and any(part.rigid for part in contents.parts):
@@ -270,7 +270,7 @@ def _cut(
             "no terrain: the ground is taken as flat at 0 m, so altitude_m counts from it (ground_m)"
         )
     parts = contents.parts
-    solids = sliced_parts(parts, mapping, band, Ground(field, flat_m, bounds_m), box)
+    solids = sliced_parts(parts, mapping, band, KnownGround(field, flat_m, bounds_m), box)
     polygons = [each.shape for each in solids]
     tolerance_m = 0.1 if spec.tolerance_m is None else spec.tolerance_m
     for raster, solid in _solid_cells(contents, spec, band, notes):
@@ -323,7 +323,7 @@ def _heights(
 
 
 def _solid_cells(
-    contents: Contents, spec: FileSpec, band: Band, notes: list[str]
+    contents: Contents, spec: FileSpec, band: HeightBand, notes: list[str]
 ) -> list[tuple[Raster, Any]]:
     """Rasters of a file with those of their cells that are solid."""
     found: list[tuple[Raster, Any]] = []

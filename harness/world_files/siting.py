@@ -15,8 +15,8 @@ import numpy as np
 
 from harness.world_files.area import (
     FAR_M,
-    Area,
     Ends,
+    PlaneArea,
     about_origin,
     area_about,
     areas_of,
@@ -144,7 +144,7 @@ def _mappings(contents: Sequence[Contents], specs: Sequence[FileSpec], place: Pl
 
 
 def _in_area(
-    area: Area,
+    area: PlaneArea,
     specs: Sequence[FileSpec],
     contents: Sequence[Contents],
     place: Place | None,

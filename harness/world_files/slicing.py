@@ -45,7 +45,7 @@ class Solid(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Band:
+class HeightBand:
     """The heights in which the aircraft may be.
 
     Attributes:
@@ -58,7 +58,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Ground:
+class KnownGround:
     """What is known of the ground.
 
     Attributes:
@@ -73,7 +73,7 @@ class Ground:
 
 
 def sliced_parts(
-    parts: Sequence[Part], mapping: Mapping, band: Band, ground: Ground, box: Box
+    parts: Sequence[Part], mapping: Mapping, band: HeightBand, ground: KnownGround, box: Box
 ) -> list[Solid]:
     """Pieces, in the plane and cut to a box, of what is solid in a band.
 
@@ -138,7 +138,7 @@ def _clipped(solids: Sequence[Solid], window: Any) -> list[Solid]:
     ]
 
 
-def _solid(part: Part, shape: Any, band: Band, ground: Ground) -> list[Solid]:
+def _solid(part: Part, shape: Any, band: HeightBand, ground: KnownGround) -> list[Solid]:
     """A part as far as it reaches into the band."""
     low, high = part.bottom, part.top
     above_ground = [limit for limit in (low, high) if limit.datum is Datum.GROUND]
@@ -162,7 +162,9 @@ def _height(limit: Limit, ground_m: float) -> float:
     return limit.height_m + (ground_m if limit.datum is Datum.GROUND else 0.0)
 
 
-def _on_terrain(part: Part, shape: Any, band: Band, ground: Ground, field: HeightField) -> list[Solid]:
+def _on_terrain(
+    part: Part, shape: Any, band: HeightBand, ground: KnownGround, field: HeightField
+) -> list[Solid]:
     """A part that stands on, or follows, terrain; limits are taken where they make it largest."""
     import shapely
 

@@ -50,7 +50,7 @@ from planner.rolling_window.rolling_search import (
     WORK_WHILE_SERVING,
     WORK_WHILE_UNSAFE,
     RollingSearch,
-    Step,
+    RollingStep,
     Work,
 )
 
@@ -217,7 +217,9 @@ class RollingWindow:
             self._search.stop()
             return self._prolong(now, start, serving)
         work = self._work(now, serving is not None)
-        found = self._search.go_on(Step(now.request, start, ahead, serving is not None, work, self._threats))
+        found = self._search.go_on(
+            RollingStep(now.request, start, ahead, serving is not None, work, self._threats)
+        )
         if found is not None:
             return self._follow(found)
         if serving is not None:

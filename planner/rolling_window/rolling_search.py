@@ -44,7 +44,7 @@ WORK_WHILE_UNSAFE = Work(12_000.0, 12_000.0)
 """No safe plan is flown, or something moves. Most searches are done within this."""
 
 
-class Step(NamedTuple):
+class RollingStep(NamedTuple):
     """What a rolling step begins with.
 
     Attributes:
@@ -116,7 +116,7 @@ class RollingSearch:
         """Arc length at which a course comes too near to an edge point that it was not found with."""
         return self._monitor.cut_at(course, self._memory.standing_m, self._memory.cleared - self.gone)
 
-    def go_on(self, step: Step) -> CommittedPlan | None:
+    def go_on(self, step: RollingStep) -> CommittedPlan | None:
         """Searches with one portion of work, and returns the first certified plan that may be flown."""
         begins = self.running is None
         search = self.last = self.running or self._begun(step.request.position_m)

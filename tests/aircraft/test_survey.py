@@ -12,7 +12,7 @@ import pytest
 
 import aircraft
 import aircraft.survey
-from aircraft.airframe import Entry
+from aircraft.airframe import AirframeEntry
 from aircraft.airframes import AircraftError, aircraft_names, airframe
 from aircraft.autopilot import gains
 from aircraft.interface import AircraftState
@@ -97,7 +97,7 @@ def test_a_model_that_loses_control_says_how(tmp_path: Path) -> None:
     """Its centre of gravity far aft, it is unstable in pitch."""
     home = own_model(tmp_path, "tail_heavy", ("-2.74", "2.74"))
     with pytest.raises(AircraftError, match="tail_heavy cannot be held at 25 m/s: unstable in pitch"):
-        survey(Entry("tail_heavy", "", 25.0), model_files(str(home)))
+        survey(AirframeEntry("tail_heavy", "", 25.0), model_files(str(home)))
 
 
 @pytest.mark.parametrize(

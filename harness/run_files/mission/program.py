@@ -48,7 +48,7 @@ class Loiter:
 
 
 @dataclass(frozen=True)
-class Step:
+class MissionStep:
     """One thing that is flown.
 
     Attributes:
@@ -105,7 +105,7 @@ class Program:
     """
 
     local: bool
-    steps: tuple[Step, ...]
+    steps: tuple[MissionStep, ...]
     items: tuple[Told, ...]
 
     @property
@@ -144,7 +144,7 @@ class _Run:
     """A mission while it is gone through."""
 
     mission: MissionAsRead
-    steps: list[Step] = field(default_factory=list)
+    steps: list[MissionStep] = field(default_factory=list)
     told: dict[int, Told] = field(default_factory=dict)
     taken: dict[int, int] = field(default_factory=dict)  # how often each jump has been taken
     airspeed_mps: float | None = None
@@ -238,7 +238,7 @@ class _Run:
             self._tell(item, NOT_FLOWN, f"a {told} of {speed:g} m/s is not held")
 
     def _fly(self, item: Item) -> None:
-        fly: dict[int, Callable[[Item], Step | None]] = {
+        fly: dict[int, Callable[[Item], MissionStep | None]] = {
             commands.RETURN_TO_LAUNCH: self._home,
             commands.CONTINUE_AND_CHANGE_ALTITUDE: self._straight,
             **dict.fromkeys(commands.LOITERS, self._loiter),
@@ -257,7 +257,7 @@ class _Run:
         ):
             self.over = True
 
-    def _step(self, item: Item, **more: object) -> Step:
+    def _step(self, item: Item, **more: object) -> MissionStep:
         """A step to where an item says, at its altitude.
 
         ArduPilot takes a position of zeros as the present one, and an altitude of 0 with it as the present one, too.
@@ -267,7 +267,7 @@ class _Run:
         if position is None and height == 0.0:
             height = None
         above = item.above if height is not None else HOME
-        return Step(
+        return MissionStep(
             item.number,
             commands.name_of(item.command),
             position,
@@ -277,7 +277,7 @@ class _Run:
             **more,  # type: ignore[arg-type]
         )
 
-    def _waypoint(self, item: Item) -> Step | None:
+    def _waypoint(self, item: Item) -> MissionStep | None:
         if item.position is None and not self.steps:
             self._tell(item, NOT_FLOWN, "has no position, and nothing is before it")
             return None
@@ -288,7 +288,7 @@ class _Run:
         self._tell(item, FLOWN, why)
         return self._step(item, acceptance_m=max(item.params[1], 0.0))
 
-    def _takeoff(self, item: Item) -> Step | None:
+    def _takeoff(self, item: Item) -> MissionStep | None:
         if self.steps:
             self._tell(item, NOT_FLOWN, "in the air already")
             return None
@@ -298,11 +298,11 @@ class _Run:
             self._tell(item, NOT_FLOWN, "neither it nor home has a position")
             return None
         self._tell(item, FLOWN, commands.TAKEOFFS[item.command])
-        return Step(
+        return MissionStep(
             item.number, step.name, position, item.height_m, item.above, airspeed_mps=self.airspeed_mps
         )
 
-    def _loiter(self, item: Item) -> Step | None:
+    def _loiter(self, item: Item) -> MissionStep | None:
         if item.position is None and not self.steps:
             self._tell(item, NOT_FLOWN, "has no position, and nothing is before it")
             return None
@@ -323,7 +323,7 @@ class _Run:
         self._tell(item, FLOWN, why)
         return self._step(item, loiter=Loiter(radius, signed >= 0.0, turns, time_s))
 
-    def _land(self, item: Item) -> Step | None:
+    def _land(self, item: Item) -> MissionStep | None:
         if item.position is None:
             self._tell(item, NOT_FLOWN, "has no position: where it lands is left to the autopilot")
             self.over = True
@@ -331,23 +331,23 @@ class _Run:
         self._tell(item, FLOWN, "the approach, not the touchdown")
         return self._step(item, landing=True)
 
-    def _home(self, item: Item) -> Step | None:
+    def _home(self, item: Item) -> MissionStep | None:
         if self.home is None or not self.steps:
             self._tell(item, NOT_FLOWN, "home has no position" if self.steps else "nothing is before it")
             self.over = True
             return None
         self._tell(item, FLOWN, "to home at the altitude before; what follows there is not flown")
         name = commands.name_of(item.command)
-        return Step(item.number, name, self.home, None, HOME, airspeed_mps=self.airspeed_mps)
+        return MissionStep(item.number, name, self.home, None, HOME, airspeed_mps=self.airspeed_mps)
 
-    def _straight(self, item: Item) -> Step | None:
+    def _straight(self, item: Item) -> MissionStep | None:
         if not self.steps:
             self._tell(item, NOT_FLOWN, "nothing is before it")
             return None
         self._tell(item, FLOWN, "straight on until the altitude is reached")
         name = commands.name_of(item.command)
         height = _bounded(item, "is at", item.height_m, MOST_HEIGHT_M, "m")
-        return Step(
+        return MissionStep(
             item.number, name, None, height, item.above, airspeed_mps=self.airspeed_mps, straight=True
         )
 
@@ -364,7 +364,7 @@ def _bounded(item: Item, verb: str, value: float, most: float, unit: str) -> flo
     return value
 
 
-def altitude_m(step: Step, home_altitude_m: float, ground_m: float, before_m: float) -> float:
+def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, before_m: float) -> float:
     """Altitude of a step above mean sea level.
 
     Args:

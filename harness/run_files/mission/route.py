@@ -30,7 +30,7 @@ from harness.run_files.mission.circle import (
 )
 from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute
 from harness.run_files.mission.items import GROUND
-from harness.run_files.mission.program import Step, altitude_m
+from harness.run_files.mission.program import MissionStep, altitude_m
 
 LANDING_HEIGHT_M: Final = 15.0
 """A landing is flown down to this height above its place; flare and touchdown are not."""
@@ -152,7 +152,7 @@ class _Build:
                 return (after.place - before.place) / abs(after.place - before.place)
         return self._pose[1] if self._pose else None
 
-    def _straight(self, step: Step) -> None:
+    def _straight(self, step: MissionStep) -> None:
         heading, here = self._heading(), self._here()
         if heading is None or here is None:
             self._notes.append(f"item {step.item}: not flown, there is no course before it")
@@ -167,7 +167,7 @@ class _Build:
         rate = CLIMB_SHARE * (up if rise > 0.0 else down)
         return max(abs(rise) / max(rate, 1e-3 * self._mps) * self._mps, 1.0)
 
-    def _land(self, step: Step, place: complex, altitude: float) -> None:
+    def _land(self, step: MissionStep, place: complex, altitude: float) -> None:
         here, above = self._here(), altitude + LANDING_HEIGHT_M
         if here is None or not self._altitude_m > above:
             self._add(_Vertex(place, max(altitude, min(above, self._altitude_m)), step.item))
@@ -205,7 +205,7 @@ class _Build:
         self._add(_Vertex(self._pose[0], altitude, None))
 
     def _join(
-        self, step: Step, center: complex, radius: float, side: int, turn_m: float, altitude: float
+        self, step: MissionStep, center: complex, radius: float, side: int, turn_m: float, altitude: float
     ) -> None:
         """Gets onto a circle."""
         here, heading = self._here(), self._heading()

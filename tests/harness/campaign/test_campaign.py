@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from harness.campaign import runs as campaign_runs
 from harness.campaign.campaign_file import CampaignFile, campaign_schema, is_campaign, load_campaign
-from harness.campaign.cells import Run
+from harness.campaign.cells import PlannedRun
 from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
 from harness.files.strict_yaml import InputError, dump
@@ -70,7 +70,7 @@ def runs_of(place: Path, text: str = CAMPAIGN) -> CampaignRuns:
     return CampaignRuns(load_campaign(file))
 
 
-def all_of(runs: CampaignRuns) -> list[Run]:
+def all_of(runs: CampaignRuns) -> list[PlannedRun]:
     return [runs.run(number) for number in range(len(runs))]
 
 
@@ -118,7 +118,7 @@ def test_a_list_of_one_entry_is_text_and_nothing_in_the_others(place: Path) -> N
 
 
 def test_runs_of_a_case_fly_the_same_and_cases_do_not(place: Path) -> None:
-    by_case: dict[int, list[Run]] = {}
+    by_case: dict[int, list[PlannedRun]] = {}
     for run in all_of(runs_of(place)):
         by_case.setdefault(run.case, []).append(run)
     for own in by_case.values():

@@ -488,17 +488,19 @@ def test_of_equal_turns_the_longest_is_the_tightest() -> None:
 @pytest.fixture
 def drawn(
     make_circle: Callable[..., Track], circle_plan: AcceptedPlan
-) -> tuple[figures.Scene, figures.DrawnRun]:
+) -> tuple[figures.FigureScene, figures.DrawnRun]:
     track = make_circle(500.0, 60.0)
     obstacle = Obstacle(Circle((3000.0, 3000.0), 400.0))
-    scene = figures.Scene(
+    scene = figures.FigureScene(
         name="a_world", bounds_m=(-1000.0, -1000.0, 5000.0, 5000.0), obstacles=(obstacle,), start_m=(500.0, 0.0),
         goal_m=(4000.0, 4500.0), goal_radius_m=60.0, clearance_m=50.0, turn_radius_m=100.0, optimum_m=np.zeros((0, 2)),
     )  # fmt: skip
     return scene, figures.DrawnRun("round", "timeout", track, planned_rows(track, [circle_plan]))
 
 
-def test_the_map_shows_the_track_and_the_tightest_turn(drawn: tuple[figures.Scene, figures.DrawnRun]) -> None:
+def test_the_map_shows_the_track_and_the_tightest_turn(
+    drawn: tuple[figures.FigureScene, figures.DrawnRun],
+) -> None:
     scene, run = drawn
     (axes,) = figures.overview(scene, [(2, run)]).axes
     lines = {str(line.get_label()): line for line in axes.get_lines()}
@@ -518,7 +520,7 @@ def test_the_map_shows_the_track_and_the_tightest_turn(drawn: tuple[figures.Scen
 @pytest.mark.parametrize("changes", [False, True])
 @pytest.mark.parametrize("outcome", ["reached", "timeout"])
 def test_the_legend_explains_every_mark_that_is_there_and_no_other(
-    drawn: tuple[figures.Scene, figures.DrawnRun], changes: bool, outcome: str
+    drawn: tuple[figures.FigureScene, figures.DrawnRun], changes: bool, outcome: str
 ) -> None:
     scene, run = drawn[0], replace(drawn[1], outcome=outcome)
     if changes:
@@ -533,7 +535,7 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
 
 @pytest.mark.parametrize("kind", ["overview", "planner_figure", "profiles"])
 def test_figures_are_the_same_bytes_every_time(
-    drawn: tuple[figures.Scene, figures.DrawnRun], kind: str
+    drawn: tuple[figures.FigureScene, figures.DrawnRun], kind: str
 ) -> None:
     scene, run = drawn
     draw: dict[str, Callable[[], Any]] = {
@@ -548,7 +550,7 @@ def test_figures_are_the_same_bytes_every_time(
 
 
 def test_a_curve_of_many_rows_keeps_its_peaks(
-    make_track: MakeTrack, straight_plan: AcceptedPlan, drawn: tuple[figures.Scene, figures.DrawnRun]
+    make_track: MakeTrack, straight_plan: AcceptedPlan, drawn: tuple[figures.FigureScene, figures.DrawnRun]
 ) -> None:
     error = np.zeros(50_000)
     error[31_234], error[44_321] = 7.0, -3.0

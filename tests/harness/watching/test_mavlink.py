@@ -23,7 +23,7 @@ from harness.flight.closed_loop import NOT_STEERED, fly
 from harness.flight.record import digest
 from harness.run.scenario_flight import make_loop
 from harness.watching.address import Address
-from harness.watching.mavlink import GroundStationLink, Place, body_rates_radps
+from harness.watching.mavlink import EarthPosition, GroundStationLink, body_rates_radps
 from harness.watching.mavlink_mission import PlanAsMission
 from harness.watching.onlooker import Onlooker
 from harness.watching.pace import Pace
@@ -81,7 +81,7 @@ def station() -> Iterator[GroundStation]:
 def link(station: GroundStation, make_plan: MakePlan) -> Iterator[GroundStationLink]:
     """A vehicle with a mission along a line of 600 m to the east, that has flown a row."""
     link = GroundStationLink(station.address)
-    link.begin(Place(PLANE, (0.0, 0.0), ground_m=100.0))
+    link.begin(EarthPosition(PLANE, (0.0, 0.0), ground_m=100.0))
     link.on_plan(
         make_plan([(0.0, 0.0, 1.0, 0.0, 0.0, 300.0), (300.0, 0.0, 1.0, 0.0, 0.0, 300.0)]), state(0.0)
     )
@@ -222,7 +222,7 @@ def test_a_whole_flight_is_shown_and_stays_the_same(station: GroundStation) -> N
     scenario = world(TREE, mission={"goal_m": [2700.0, 2700.0]})
     alone = fly(make_loop(scenario, PointMass))
     link = GroundStationLink(station.address)
-    link.begin(Place(PLANE, (300.0, 300.0)))
+    link.begin(EarthPosition(PLANE, (300.0, 300.0)))
     watched = fly(make_loop(scenario, PointMass), [link, Listens(station), Pace(40.0)])
     link.close()
     time.sleep(0.05)

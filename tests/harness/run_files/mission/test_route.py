@@ -12,7 +12,7 @@ from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray
 from harness.run_files.mission.circle import end_of
 from harness.run_files.mission.flying import Flying, GivenMission, Ground, MissionRoute
-from harness.run_files.mission.program import Loiter, Program, Step
+from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.route import LANDING_HEIGHT_M, mission_route
 
 TURN_M = 100.0
@@ -24,11 +24,11 @@ def flying(ground: Ground | None = None) -> Flying:
     )
 
 
-def step(number: int, height: float | None = 100.0, above: str = "home", **more: object) -> Step:
-    return Step(number, "an item", (0.0, 0.0), height, above, **more)  # type: ignore[arg-type]
+def step(number: int, height: float | None = 100.0, above: str = "home", **more: object) -> MissionStep:
+    return MissionStep(number, "an item", (0.0, 0.0), height, above, **more)  # type: ignore[arg-type]
 
 
-def route(*steps: tuple[Step, complex | None], ground: Ground | None = None) -> MissionRoute:
+def route(*steps: tuple[MissionStep, complex | None], ground: Ground | None = None) -> MissionRoute:
     """The route of steps at places, home at 400 m; every joint of it is held against a kink."""
     program = Program(True, tuple(each for each, _ in steps), ())
     made = mission_route(
