@@ -28,6 +28,7 @@ from harness.scenario.overrides import Given, changed, overridden
 from harness.scenario.sections import (
     AircraftSpec,
     Area,
+    Bounds,
     Environment,
     GuidanceSpec,
     MissionSpec,
@@ -263,17 +264,18 @@ def mission_of(scenario: Scenario) -> Mission:
     """What a planner is told before the flight.
 
     The clearance is that of `planner.clearance_m` and, on top, the margin for the error of the believed position. It is
-    no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size.
+    no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept
+    from the border of the area, as far as start and goal lie within it.
     """
     from planner.interface import Mission
 
-    performance = performance_of(scenario)
+    performance, margin_m = performance_of(scenario), scenario.navigation.margin_m or 0.0
     return Mission(
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
-        bounds_m=scenario.area.bounds_m,
+        bounds_m=_inside(scenario.area.bounds_m, margin_m, scenario.mission.start_m, scenario.mission.goal_m),
         clearance_m=max(
-            scenario.planner.clearance_m + (scenario.navigation.margin_m or 0.0),
+            scenario.planner.clearance_m + margin_m,
             LEAST_CLEARANCE * performance.turn_radius_m,
         ),
         turn_radius_m=performance.turn_radius_m,
@@ -284,6 +286,17 @@ def mission_of(scenario: Scenario) -> Mission:
         compute_latency_s=scenario.planner.compute_latency_s,
         sensor_latency_s=scenario.sensor.latency_s,
         wind_mps=_wind_mps(scenario.environment),
+    )
+
+
+def _inside(bounds_m: Bounds, margin_m: float, *places_m: tuple[float, float]) -> Bounds:
+    """Bounds that are smaller by a margin on each side, but hold some places."""
+    xmin, ymin, xmax, ymax = bounds_m
+    return (
+        min(xmin + margin_m, *(east for east, _ in places_m)),
+        min(ymin + margin_m, *(north for _, north in places_m)),
+        max(xmax - margin_m, *(east for east, _ in places_m)),
+        max(ymax - margin_m, *(north for _, north in places_m)),
     )
 
 

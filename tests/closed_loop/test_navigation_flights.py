@@ -103,6 +103,17 @@ def test_the_plan_keeps_the_margin_beyond_the_clearance(scenario: Scenario) -> N
     assert mission_of(given).clearance_m == pytest.approx(wanted + 3.0)
 
 
+def test_the_plan_keeps_the_margin_from_the_border_of_the_area(scenario: Scenario) -> None:
+    given = scenario.with_({"navigation.margin_m": 30.0})
+    xmin, ymin, xmax, ymax = given.area.bounds_m
+    assert mission_of(given).bounds_m == (xmin + 30.0, ymin + 30.0, xmax - 30.0, ymax - 30.0)
+    east, north = xmin + 10.0, ymax - 20.0
+    near = given.with_({"mission.start_m": [east, ymin + 200.0], "mission.goal_m": [xmax - 200.0, north]})
+    assert mission_of(near).bounds_m == (east, ymin + 30.0, xmax - 30.0, north)
+    exact = near.with_({"navigation": {"kind": "perfect"}})
+    assert mission_of(exact).bounds_m == exact.area.bounds_m
+
+
 class Jumping:
     """Believes to be 80 m to the east, until a fix comes at 30 s."""
 
