@@ -75,6 +75,7 @@ def test_an_editable_installation_copies_no_source(tmp_path: Path) -> None:
         assert archive.read(path).decode().split() == [str(ROOT), str(ROOT / "harness" / "front_door")]
 
 
+@pytest.mark.flights
 def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")

@@ -17,6 +17,7 @@ import pytest
 
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
+from tests.longer import longer
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("planner", "aircraft", "harness", "scenarios")
@@ -49,6 +50,13 @@ COMMANDS = [
 ]
 
 
+def quick(command: str) -> bool:
+    """Whether a command shown neither flies, nor surveys aircraft, nor reads a campaign."""
+    return command.startswith(("wayproof --help", "wayproof list scenarios", "wayproof list planners")) or (
+        command in ("wayproof schema", "wayproof validate scenarios/paper_circles.yaml")
+    )
+
+
 def wayproof(
     arguments: str, folder: Path, *, path: Path = ROOT, timeout_s: float = 600
 ) -> subprocess.CompletedProcess[str]:
@@ -78,6 +86,7 @@ def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.flights
 def test_the_first_command_flies_the_papers_scenario_and_prints_what_readme_shows(tmp_path: Path) -> None:
     arguments = FLY.removeprefix(f"{SET_UP}. && .venv/bin/wayproof ")
     assert arguments == "fly scenarios/paper_circles.yaml"
@@ -97,15 +106,21 @@ def test_the_second_command_runs_these_tests_and_is_what_ci_runs() -> None:
     ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     assert "tests=$(grep -m1 '^python3 -m venv .*pytest' README.md)" in ci
     assert 'bash -c "$tests"' in ci
+    longer_ones = "pytest -n 2 -m flights"
+    assert f"\n.venv/bin/{longer_ones}\n" in ci
+    assert f"| `{longer_ones}` |" in README
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    "command", [command if quick(command) else longer([command])[0] for command in COMMANDS]
+)
 def test_a_command_shown_ends_well(command: str, tmp_path: Path) -> None:
     shown = wayproof(command.removeprefix("wayproof "), tmp_path)
     assert shown.returncode == 0, shown.stderr
 
 
+@pytest.mark.flights
 def test_the_tour_can_be_gone_in_order(tmp_path: Path) -> None:
     (tour,) = blocks("bash")
     commands = [line.partition("#")[0].removeprefix("wayproof ").split() for line in tour.splitlines()]
@@ -133,6 +148,7 @@ def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_pat
     assert refused.stderr in blocks("text")
 
 
+@pytest.mark.flights
 def test_ones_own_campaign_is_flown_and_a_row_of_it_flown_again(tmp_path: Path) -> None:
     (scenario,), (campaign,) = blocks("yaml"), blocks("yml", CAMPAIGNS)
     (tmp_path / "my_world.yaml").write_text(scenario)
@@ -149,6 +165,7 @@ def test_ones_own_campaign_is_flown_and_a_row_of_it_flown_again(tmp_path: Path) 
     assert [name for name in ("case", "cross_track_m.p95", "length_ratio") if name not in rows[7]] == []
 
 
+@pytest.mark.flights
 def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tmp_path: Path) -> None:
     (text,), (scenario,) = blocks("csv"), blocks("yaml")
     (tmp_path / "my_path.csv").write_text(text)
@@ -171,6 +188,7 @@ def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tm
         assert wayproof(command, tmp_path).returncode == 0
 
 
+@pytest.mark.flights
 def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
     (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", HARNESS)
     (shown,) = (block for block in blocks("text", HARNESS) if "mildest found" in block)
@@ -213,6 +231,7 @@ def test_python_shown_runs(name: str, tmp_path: Path) -> None:
         assert (ran.returncode, ran.stderr) == (0, "")
 
 
+@pytest.mark.flights
 def test_ones_own_planner_as_a_distribution_is_found_and_flown(tmp_path: Path) -> None:
     text = READMES["planner/README.md"]
     (planner,), (project,), (scenario,) = blocks("python", text), blocks("toml", text), blocks("yaml")

@@ -62,6 +62,7 @@ def test_a_lag_is_of_first_order() -> None:
     assert abs(rows[-1][1]) < 0.6 * abs(rows[-1][0])
 
 
+@pytest.mark.flights
 def test_a_deadband_lies_about_the_trim() -> None:
     """About no throttle it would take a tenth of it away."""
     model = flown(Actuators(throttle=Actuator(deadband_deg=12.0)))
@@ -79,6 +80,7 @@ def test_an_ideal_servo_changes_nothing() -> None:
     assert airframe("aerosonde").files.actuators == ()
 
 
+@pytest.mark.flights
 def test_figures_are_flown_anew_with_servos_and_the_cache_tells_them_apart() -> None:
     plain, real = airframe("aerosonde"), airframe("aerosonde", Actuators.alike(SERVO))
     assert plain.files.digest() != real.files.digest()

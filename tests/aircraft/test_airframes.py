@@ -79,6 +79,7 @@ def test_turn_radius_of_the_aerosonde() -> None:
     assert windy.turn_radius_m == pytest.approx(calm.turn_radius_m * 1.3**2)
 
 
+@pytest.mark.flights
 @given(st.sampled_from(VERIFIED), st.floats(0.0, 1.0), st.floats(0.0, 0.9))
 def test_more_wind_or_turbulence_never_tightens_the_turn(name: str, share: float, wind_share: float) -> None:
     frame = airframe(name)

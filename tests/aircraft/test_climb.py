@@ -14,6 +14,7 @@ from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat, 
 from aircraft.interface import AircraftState
 
 
+@pytest.mark.flights
 def test_a_rate_that_is_promised_is_flown_and_a_faster_one_is_not() -> None:
     frame = airframe("aerosonde")
     rates = climb_rates(frame)

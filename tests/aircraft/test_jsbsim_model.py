@@ -106,6 +106,7 @@ def test_an_interrupt_waits_until_jsbsim_is_left(monkeypatch: pytest.MonkeyPatch
     assert model_of("aerosonde").state().time_s == 0.0
 
 
+@pytest.mark.flights
 def test_threads_that_end_fly_too() -> None:
     """They have loggers of their own, of which JSBSim lets go after them, and compile what is to be compiled."""
     code = (
@@ -351,6 +352,7 @@ open({out!r}, "w").write(" ".join(value.hex() for value in state))
 """
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("name", VERIFIED)
 def test_two_processes_fly_the_same_bits_in_silence(name: str, tmp_path: Path) -> None:
     root = Path(__file__).resolve().parents[2]

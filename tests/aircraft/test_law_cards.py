@@ -17,6 +17,7 @@ from aircraft.interface import AircraftState, Route
 from aircraft.law_cards import cards, law_survey
 from aircraft.law_cards.cards import law_card
 from aircraft.model_files import AircraftError
+from tests.longer import longer
 
 AEROSONDE = airframe("aerosonde")
 
@@ -62,7 +63,7 @@ def test_preview_at_its_defaults_has_the_card_of_the_survey() -> None:
     assert slow.points[0].error_m > AEROSONDE.weave_error_m
 
 
-@pytest.mark.parametrize("kind", ["npfg", "l1", "vector_field", "pure_pursuit"])
+@pytest.mark.parametrize("kind", ["pure_pursuit", *longer(["npfg", "l1", "vector_field"])])
 def test_laws_that_autopilots_fly_track_and_their_error_is_kept_from_obstacles(kind: str) -> None:
     law = guidance_kinds()[kind]
     card = law_card(AEROSONDE, law, law.config())
@@ -95,6 +96,7 @@ def test_a_slow_law_gets_wider_turns() -> None:
     assert slow.points[0].radius_factor > usual.points[0].radius_factor
 
 
+@pytest.mark.flights
 @pytest.mark.usefixtures("_calm_only")
 def test_a_law_that_does_not_track_is_refused() -> None:
     kind = GuidanceKind("straight", "never turns at all", NoKeys, Straight)

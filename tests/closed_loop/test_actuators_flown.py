@@ -26,6 +26,7 @@ def scenario(aircraft: str = "") -> Scenario:
     return parse_scenario(TEXT + aircraft)
 
 
+@pytest.mark.flights
 def test_servos_are_flown_and_planning_knows_of_them() -> None:
     plain, real = scenario(), scenario(SERVO)
     assert parse_scenario(dump_scenario(real)) == real

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -67,6 +68,7 @@ def test_reaches_the_goal_among_circles_and_keeps_the_clearance(
     assert flight.sim_s * 25.0 <= 1.1 * math.dist(scenario.mission.start_m, scenario.mission.goal_m)
 
 
+@pytest.mark.flights
 @given(field=fields(), wind_from_deg=st.none() | st.integers(0, 359))
 @BOUNDED
 def test_reaches_the_goal_among_corners_in_any_wind(

@@ -180,6 +180,7 @@ def scenario_with(small_world: SmallWorld, obstacles: Obstacles, **mission: Any)
     )
 
 
+@pytest.mark.flights
 @given(obstacles=separate() | mazes(), course_deg=st.integers(0, 359))
 @settings(BOUNDED, max_examples=12)
 def test_every_plan_in_effect_is_safe_for_ever(

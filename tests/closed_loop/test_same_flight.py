@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.longer import longer
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -31,7 +33,7 @@ def digest_of(folder: Path, scenario: str, *options: str, hash_seed: int = 0, st
     ("scenario", "seconds"),
     [
         ("aerosonde_forest", None),
-        ("one_of_everything", 150),
+        *longer([("one_of_everything", 150)]),
         pytest.param("one_of_everything", None, marks=pytest.mark.slow),
     ],
 )
@@ -48,6 +50,7 @@ def test_three_processes_and_the_run_folder_agree(scenario: str, seconds: int | 
     assert (tmp_path / "d" / "scenario.yaml").read_text() == (tmp_path / "a" / "scenario.yaml").read_text()
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("scenario", "random"), [("one_of_everything", True), ("aerosonde_forest", False)])
 def test_the_seed_counts_where_something_is_random(scenario: str, random: bool, tmp_path: Path) -> None:
     short = ("--no-recording", "--set", "mission.time_limit_s=20")

@@ -16,6 +16,7 @@ from harness.run.scenario_flight import fly_to_folder
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 from harness.scenario.shipped import scenario_path
+from tests.longer import longer
 
 TOOLS = Path(__file__).parents[2].parent / "shared" / "tools"
 OPTIMUM_M = 94_318.0
@@ -69,6 +70,7 @@ def optimum_m(scenario: Scenario, folder: Path) -> float:
     return length
 
 
+@pytest.mark.flights
 def test_the_papers_world_is_flown_as_promised(flown: Flown) -> None:
     metrics = flown("paper_circles").metrics
     assert metrics["outcome"] == "reached"
@@ -82,6 +84,7 @@ def test_the_papers_world_is_flown_as_promised(flown: Flown) -> None:
 
 
 @needs_the_judge
+@pytest.mark.flights
 def test_the_papers_world_is_near_its_optimum(flown: Flown, tmp_path: Path) -> None:
     run = flown("paper_circles")
     optimum = optimum_m(parse_scenario(run.scenario_yaml), tmp_path)
@@ -91,7 +94,11 @@ def test_the_papers_world_is_near_its_optimum(flown: Flown, tmp_path: Path) -> N
 
 @needs_the_judge
 @pytest.mark.parametrize(
-    "name", ["paper_circles", "aerosonde_forest", "polygon_town", "one_of_everything", "jacksboro_terrain"]
+    "name",
+    [
+        "aerosonde_forest",
+        *longer(["paper_circles", "polygon_town", "one_of_everything", "jacksboro_terrain"]),
+    ],
 )
 def test_the_judge_finds_no_fault(name: str, flown: Flown) -> None:
     assert judged(flown(name)) == []
@@ -125,6 +132,7 @@ def test_real_terrain_is_never_touched(flown: Flown) -> None:
     assert source["path"].endswith("jacksboro_fault_dem.npz")
 
 
+@pytest.mark.flights
 def test_another_aircraft_flies_the_papers_world(flown: Flown) -> None:
     run = flown("paper_circles", ("aircraft.model", "c172p"), ("aircraft.airspeed_mps", "50"))
     assert run.metrics["outcome"] == "reached"

@@ -64,6 +64,7 @@ def test_an_obstacle_ahead_changes_nothing_before_it_is_in_range(
     assert first_in_range <= rows_alike(without, with_it) < len(with_it.track)
 
 
+@pytest.mark.flights
 @given(
     east=st.integers(500, 5500), north=st.integers(500, 5500), radius=st.integers(30, 400), side=st.booleans()
 )

@@ -14,6 +14,7 @@ import pytest
 from harness.cli.app import main
 from harness.run_files.run_folder import load_run
 from tests.faults.command import FOREST, start
+from tests.longer import longer
 
 GIB = 2**30
 HEAD = """\
@@ -141,14 +142,18 @@ def test_a_value_beyond_reason_is_refused(
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("obstacles[0].circle.radius_m", "1e-9"),
-        ("area.bounds_m", "[-3e5, -3e5, 3e5, 3e5]"),
         ("sensor.rays", "100000"),
-        ("sensor.rate_hz", "120"),
-        ("sensor.rate_hz", "0.01"),
-        ("sensor.range_m", "1e6"),
-        ("planner.clearance_m", "0"),
-        ("seed", "9007199254740992"),
+        *longer(
+            [
+                ("obstacles[0].circle.radius_m", "1e-9"),
+                ("area.bounds_m", "[-3e5, -3e5, 3e5, 3e5]"),
+                ("sensor.rate_hz", "120"),
+                ("sensor.rate_hz", "0.01"),
+                ("sensor.range_m", "1e6"),
+                ("planner.clearance_m", "0"),
+                ("seed", "9007199254740992"),
+            ]
+        ),
     ],
 )
 def test_the_outermost_values_are_flown(key: str, value: str, tmp_path: Path) -> None:

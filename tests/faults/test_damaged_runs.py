@@ -18,6 +18,7 @@ from harness.recording.file import end_of_whole
 from harness.recording.overlay import write_overlay
 from harness.run_files.run_folder import recording_of
 from tests.faults.hostile import JSON_SNIPPETS, KEYS, as_json, spoilt, spoilt_bytes
+from tests.longer import longer
 
 FILES = ("track.parquet", "plans.parquet", "metrics.json", "manifest.json", "scenario.yaml")
 INDICES = {
@@ -47,7 +48,7 @@ def damage(draw: st.DrawFn, whole: Path, name: str) -> bytes:
     )
 
 
-@pytest.mark.parametrize("cases", [8, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cases", [*longer([8]), pytest.param(150, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", FILES)
 def test_export_and_report_of_a_damaged_run(
     name: str, cases: int, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -42,6 +42,7 @@ from tests.faults.hostile import (
     spoilt,
     spoilt_bytes,
 )
+from tests.longer import longer
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 LONGEST_S = 10.0
@@ -314,7 +315,7 @@ def _dotted(place: tuple[Any, ...]) -> str:
     return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in place).lstrip(".")
 
 
-@pytest.mark.parametrize("cases", [25, pytest.param(1500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cases", [10, *longer([25]), pytest.param(1500, marks=pytest.mark.slow)])
 def test_keys_set_on_the_command_line(cases: int, tmp_path: Path) -> None:
     path = tmp_path / "s.yaml"
     path.write_text(as_yaml(EVERYTHING))

@@ -17,14 +17,21 @@ from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.run_files.run_folder import load_run
 from tests.faults.command import FOREST, ROOT, run, start, wait_until
+from tests.longer import longer
 
 FLY = ("fly", str(FOREST), "--out", "run")
 SHORT = ("--set", "mission.time_limit_s=15")
 LONG = ("fly", "paper_circles", "--out", "run", "--quiet")
 
 
-@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("recording", [(), ("--no-recording",)], ids=["recording", "no recording"])
+@pytest.mark.parametrize(
+    ("signum", "recording"),
+    [
+        (signal.SIGINT, ()),
+        *longer((signum, ()) for signum in (signal.SIGTERM, signal.SIGHUP)),
+        *longer((signum, ("--no-recording",)) for signum in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)),
+    ],
+)
 def test_a_signal_in_flight_is_said_in_a_line(
     signum: signal.Signals, recording: tuple[str, ...], tmp_path: Path
 ) -> None:
@@ -41,6 +48,7 @@ def test_a_signal_in_flight_is_said_in_a_line(
     assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
 
 
+@pytest.mark.flights
 def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
     process = start(
         tmp_path,
@@ -64,6 +72,7 @@ def test_a_comparison_is_ended_with_its_flights(tmp_path: Path) -> None:
         FolderLock(each.parent).release()
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("size", [60_000, 300_000])
 def test_a_full_disk(size: int, tmp_path: Path) -> None:
     """No file may grow beyond some bytes, which a write finds out as it would a full disk."""
@@ -82,6 +91,7 @@ def test_a_disk_that_is_full_for_the_track_alone(tmp_path: Path) -> None:
     assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
 
 
+@pytest.mark.flights
 def test_a_disk_that_is_full_for_a_report(a_run: Path, tmp_path: Path) -> None:
     shutil.copytree(a_run, tmp_path / "run")
     status, _, err = run(tmp_path, "report", "run", file_bytes=20_000)
@@ -90,6 +100,7 @@ def test_a_disk_that_is_full_for_a_report(a_run: Path, tmp_path: Path) -> None:
     assert run(tmp_path, "report", "run")[0] == 0
 
 
+@pytest.mark.flights
 def test_two_flights_into_one_folder(tmp_path: Path) -> None:
     first = start(tmp_path, *LONG)
     wait_until((tmp_path / "run" / "scenario.yaml").exists, first)
@@ -113,6 +124,7 @@ def test_two_comparisons_into_one_folder(tmp_path: Path, capsys: pytest.CaptureF
     assert list((tmp_path / "c").iterdir()) == []
 
 
+@pytest.mark.flights
 def test_a_scenario_changed_and_deleted_while_it_is_flown(tmp_path: Path) -> None:
     scenario = tmp_path / "mine.yaml"
     scenario.write_text(FOREST.read_text())
@@ -125,6 +137,7 @@ def test_a_scenario_changed_and_deleted_while_it_is_flown(tmp_path: Path) -> Non
     assert load_run(tmp_path / "run").metrics["digest"] == load_run(tmp_path / "same").metrics["digest"]
 
 
+@pytest.mark.flights
 def test_output_that_nobody_takes(tmp_path: Path) -> None:
     reader, writer = os.pipe()
     os.close(reader)
@@ -134,6 +147,7 @@ def test_output_that_nobody_takes(tmp_path: Path) -> None:
     assert load_run(tmp_path / "run").manifest["complete"] is True
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("words", [("list", "planners"), ("fly", "my.yaml", "--no-recording")])
 def test_the_status_is_that_of_what_was_done_though_nobody_reads_of_it(
     words: tuple[str, ...], tmp_path: Path
@@ -155,6 +169,7 @@ def test_output_onto_a_full_disk(tmp_path: Path) -> None:
     assert (status, err) == (1, "wayproof: [Errno 28] No space left on device\n")
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("closed", ["<&-", ">&-", "2>&-", "<&- >&- 2>&-"])
 def test_streams_that_are_closed(closed: str, tmp_path: Path) -> None:
     words = [sys.executable, "-m", "harness", *FLY, *SHORT, "--no-recording"]

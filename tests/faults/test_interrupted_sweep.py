@@ -36,6 +36,7 @@ def results(place: Path) -> bytes:
     return (place / "out" / "results.parquet").read_bytes()
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("size", "status", "said"),
     [
@@ -58,6 +59,7 @@ def test_a_full_disk(size: int, status: int, said: str, place: Path, unbroken: b
     assert results(place) == unbroken
 
 
+@pytest.mark.flights
 def test_a_disk_that_is_full_for_the_summary_alone(place: Path, unbroken: bytes) -> None:
     assert run(place, *SWEEP) == (0, "", "")
     (place / "out" / "summary.html").unlink()
@@ -79,6 +81,7 @@ def test_a_file_system_that_takes_nothing(folder: str, place: Path) -> None:
     assert len(err.splitlines()) == 1
 
 
+@pytest.mark.flights
 def test_two_sweeps_into_one_folder(place: Path, unbroken: bytes) -> None:
     first = start(place, *SWEEP)
     wait_until((place / "out" / "campaign.json").exists, first)
@@ -99,6 +102,7 @@ def test_two_sweeps_into_one_folder(place: Path, unbroken: bytes) -> None:
     assert results(place) == unbroken
 
 
+@pytest.mark.flights
 def test_a_scenario_changed_and_deleted_in_mid_campaign(place: Path, unbroken: bytes) -> None:
     scenario = place / "short.yaml"
     process = start(place, *SWEEP)

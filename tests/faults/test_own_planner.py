@@ -14,6 +14,7 @@ import pytest
 from harness.files.errors import RunFolderError
 from harness.run_files.run_folder import load_run
 from tests.faults.command import ROOT, TIMEOUT_S, wait_until
+from tests.longer import longer
 
 PLUGIN = '''
 import atexit
@@ -152,6 +153,7 @@ def test_nothing_that_a_planner_prints_gets_into_the_result(place: Path) -> None
         assert f"{way}\n" in err, way
 
 
+@pytest.mark.flights
 def test_an_error_that_exits_when_it_is_told_is_a_planner_that_failed(place: Path) -> None:
     status, _, _ = flown(place, "exits", "--quiet")
     assert status == 1
@@ -174,6 +176,7 @@ def test_a_module_that_exits_when_it_is_loaded_is_no_success(place: Path) -> Non
     assert err == "wayproof: code that was loaded, a planner's perhaps, called sys.exit; nothing is done\n"
 
 
+@pytest.mark.flights
 def test_a_planner_that_ends_the_process_leaves_a_folder_that_is_marked(place: Path) -> None:
     flown(place, "gone", "--quiet")
     with pytest.raises(RunFolderError, match="incomplete"):
@@ -194,11 +197,15 @@ def test_a_sweep_survives_a_planner_that_ends_its_process(place: Path) -> None:
             ("fly", "short.yaml", "--planner", "hangs", "--no-recording"),
             "the run in out is marked incomplete",
         ),
-        (
-            ("compare", "short.yaml", "--planners", "hangs", "--no-recording"),
-            "the comparison in out is marked",
+        *longer(
+            [
+                (
+                    ("compare", "short.yaml", "--planners", "hangs", "--no-recording"),
+                    "the comparison in out is marked",
+                ),
+                (("sweep", "hangs.yaml", "--workers", "1"), "what is done is in out, --resume goes on"),
+            ]
         ),
-        (("sweep", "hangs.yaml", "--workers", "1"), "what is done is in out, --resume goes on"),
     ],
     ids=["fly", "compare", "sweep"],
 )

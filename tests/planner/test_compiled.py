@@ -81,6 +81,7 @@ print(made(21.0))
     assert ran(source, tmp_path, HOME="/nonexistent") == ["42.0"]
 
 
+@pytest.mark.flights
 def test_where_the_disk_is_full_functions_are_compiled_all_the_same(tmp_path: Path) -> None:
     source = """
 import resource

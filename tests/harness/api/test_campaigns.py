@@ -48,6 +48,7 @@ def test_a_campaign_is_flown_and_read_back(tmp_path: Path) -> None:
         wayproof.load_campaign(tmp_path / "two.yaml")
 
 
+@pytest.mark.flights
 def test_planners_are_compared_and_one_of_them_comes_from_a_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -62,6 +63,7 @@ def test_planners_are_compared_and_one_of_them_comes_from_a_file(
     assert index["command"].startswith("wayproof.compare(['short'], ['vfh_plus', 'planner.py:Beeline'])")
 
 
+@pytest.mark.flights
 def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     (tmp_path / "short.yaml").write_text(SCENARIO)
     (tmp_path / "two.yaml").write_text(CAMPAIGN)

@@ -120,6 +120,7 @@ def test_a_planner_is_given_as_an_object(how: str) -> None:
     assert flown.plans["path"][0].as_py()[-1] == [1200.0, 1000.0]
 
 
+@pytest.mark.flights
 def test_a_guidance_law_is_given_as_a_class(run: wayproof.FlightResult, tmp_path: Path) -> None:
     class Gentle:
         """The default law at half the bank."""
@@ -148,6 +149,7 @@ def test_a_guidance_law_is_given_as_a_class(run: wayproof.FlightResult, tmp_path
             wayproof.fly(small(), guidance=given)
 
 
+@pytest.mark.flights
 def test_a_law_that_is_defined_anew_is_measured_anew() -> None:
     def define(share: float) -> type:
         class Weak:

@@ -21,6 +21,7 @@ def result() -> dict[str, Any]:
         return rates.bench_rates("aerosonde", 1)
 
 
+@pytest.mark.flights
 def test_the_default_rate_is_as_true_as_it_is_said_to_be(result: dict[str, Any]) -> None:
     """Within 0.05 m of 480 steps a second on 14 turns."""
     coarse, middle, finest = result["rates"]

@@ -38,6 +38,7 @@ def test_what_lies_far_off_changes_nothing_of_the_flight() -> None:
     assert digest(flights[0].track) == digest(flights[1].track)
 
 
+@pytest.mark.flights
 def test_every_field_up_to_the_most_is_measured() -> None:
     told: list[tuple[int, int, str]] = []
     rows = worlds.bench_worlds(150, lambda *step: told.append(step))

@@ -38,6 +38,7 @@ def test_a_turn_in_which_control_is_lost_has_no_radius() -> None:
     assert turn["altitude_lost_m"] is not None
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("wind", [0.0, 7.5])
 def test_planning_keeps_a_margin_over_the_tightest_path(wind: float) -> None:
     found = tightest(airframe("aerosonde"), 25.0, wind)
@@ -58,6 +59,7 @@ def test_where_not_even_the_planned_path_is_tracked_there_is_no_tightest(
     assert tightest(airframe("aerosonde"), 25.0, 0.0)["tightest_radius_m"] is None
 
 
+@pytest.mark.flights
 def test_the_command_prints_the_card_and_measures_once(
     cache: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -78,6 +80,7 @@ def test_the_command_prints_the_card_and_measures_once(
     assert envelope_card("aerosonde", winds_mps=[5.0]) == card
 
 
+@pytest.mark.flights
 def test_the_table_fits_and_names_the_figures(cache: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["envelope", "aerosonde", "--airspeed-mps", "20", "--wind", "0"]) == 0
     shown = capsys.readouterr().out

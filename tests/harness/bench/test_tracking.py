@@ -45,6 +45,7 @@ def test_two_courses_are_flown_no_better_than_the_worse_one() -> None:
     assert both.within(CALM.limits)
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("name", ["c172p", "T38"])
 def test_others_keep_their_multiple_of_it(name: str) -> None:
     limits = CASES[1].limits.times(LIMIT_FACTORS[name])
@@ -60,6 +61,7 @@ def test_twenty_courses_of_every_verified_aircraft(name: str, case: Case) -> Non
     assert flown.within(case.limits.times(LIMIT_FACTORS[name])), flown
 
 
+@pytest.mark.flights
 def test_verified_are_those_that_have_limits() -> None:
     assert {name for name in aircraft_names() if airframe(name).verified} == set(LIMIT_FACTORS)
 

@@ -30,6 +30,7 @@ def table(rows: tuple[str, ...], columns: tuple[str, ...]) -> Table:
     return Table(Axis("digest", rows), Axis("planner", columns), ((CELL,) * len(columns),) * len(rows))
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("rows", "columns"),
     [
@@ -89,6 +90,7 @@ def failed(tmp_path: Path) -> tuple[Any, Path]:
     return SimpleNamespace(worst=worst), tmp_path
 
 
+@pytest.mark.flights
 def test_where_runs_failed_is_drawn_as_far_as_they_were_kept(failed: tuple[Any, Path]) -> None:
     (one,) = failures(*failed)
     assert (one.run, one.outcome, len(one.scene.obstacles)) == (3, "timeout", 1)

@@ -512,6 +512,7 @@ def test_a_key_drawn_at_random_is_always_grouped() -> None:
     assert axis.edges
 
 
+@pytest.mark.flights
 def test_a_browser_shows_the_page_on_phone_and_screen(tmp_path: Path, chromium: Any) -> None:
     folder = by_two(tmp_path / "c")
     summary: Summary = summarise(folder)

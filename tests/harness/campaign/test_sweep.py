@@ -29,6 +29,7 @@ from harness.cli.app import main
 from harness.files.errors import RunFolderError
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import load_scenario
+from tests.longer import longer
 
 ROOT = Path(__file__).parents[3]
 SCENARIO = """\
@@ -201,6 +202,7 @@ def test_columns_are_what_metrics_json_has(place: Path) -> None:
     assert hit["length_ratio"] is None
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("workers", ["2", "4"])
 def test_the_bytes_are_the_same_at_any_number_of_workers(place: Path, unbroken: Path, workers: str) -> None:
     assert sweep(place, "--workers", workers) == 0
@@ -285,6 +287,7 @@ def with_plugin(place: Path, monkeypatch: pytest.MonkeyPatch, version: str = "1.
     monkeypatch.syspath_prepend(site)
 
 
+@pytest.mark.flights
 def test_crashes_are_rows_with_their_tracebacks_and_end_nothing(
     place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -318,6 +321,7 @@ def test_crashes_are_rows_with_their_tracebacks_and_end_nothing(
     )
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("torn", [b'{"run": 99, "row": {"outc', b"\n", b"\x00\xff"])
 def test_resume_flies_only_what_is_missing_and_drops_a_torn_line(
     place: Path, unbroken: Path, torn: bytes, capsys: pytest.CaptureFixture[str]
@@ -506,6 +510,7 @@ def long_campaign(place: Path) -> Path:
     return place
 
 
+@pytest.mark.flights
 def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(long_campaign: Path) -> None:
     out = long_campaign / "out"
     flying = start(long_campaign, "--workers", "2")
@@ -521,6 +526,7 @@ def test_an_interrupt_keeps_what_is_done_and_says_how_to_go_on(long_campaign: Pa
     assert [row["run"] for row in rows_of(out)] == list(range(24))
 
 
+@pytest.mark.flights
 def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(long_campaign: Path) -> None:
     import psutil
 
@@ -540,6 +546,7 @@ def test_a_kill_leaves_no_lock_no_process_and_nothing_lost(long_campaign: Path) 
     assert broken == results(long_campaign / "whole")
 
 
+@pytest.mark.flights
 def test_a_worker_killed_in_mid_run_costs_nothing(long_campaign: Path) -> None:
     import psutil
 
@@ -557,6 +564,7 @@ def test_a_worker_killed_in_mid_run_costs_nothing(long_campaign: Path) -> None:
     assert len(rows_of(out)) == 24
 
 
+@pytest.mark.flights
 def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
     runs = CampaignRuns(load_campaign(place / "campaign.yaml"))
     job = Job(0, runs.packed(0), place / "run", "none", optimum=False)
@@ -575,6 +583,7 @@ def test_a_worker_killed_between_runs_is_replaced(place: Path) -> None:
     wait_for(lambda: multiprocessing.active_children() == [])
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("which", "kept"), [("all", {0, 1}), ("failures", {1}), ("none", set())])
 def test_recordings_are_kept_of_all_of_failures_or_of_none(place: Path, which: str, kept: set[int]) -> None:
     text = CAMPAIGN.replace("[rolling_window, vfh_plus]", "[{kind: rolling_window}]").replace(
@@ -593,12 +602,14 @@ def test_recordings_are_kept_of_all_of_failures_or_of_none(place: Path, which: s
         assert (folder / "flight.rrd").stat().st_size > 10_000
 
 
+@pytest.mark.flights
 def test_the_optimum_can_be_left_out(place: Path) -> None:
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", "draws: 1\noptimum: false"))
     assert sweep(place) == 0
     assert {(row["optimum_m"], row["length_ratio"]) for row in rows_of(place / "out")} == {(None, None)}
 
 
+@pytest.mark.flights
 def test_a_full_disk_is_told_and_what_is_done_stays(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -642,7 +653,7 @@ sys.stdout.write(json.dumps(grown))
 
 @pytest.mark.parametrize(
     ("recordings", "draws", "flights"),
-    [pytest.param("none", 128, 512, marks=pytest.mark.slow), ("all", 16, 64)],
+    [pytest.param("none", 128, 512, marks=pytest.mark.slow), *longer([("all", 16, 64)])],
 )
 def test_a_worker_does_not_grow(place: Path, recordings: str, draws: int, flights: int) -> None:
     (place / "campaign.yaml").write_text(CAMPAIGN.replace("draws: 2", f"draws: {draws}"))

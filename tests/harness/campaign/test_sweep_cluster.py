@@ -90,6 +90,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
         yield made
 
 
+@pytest.mark.flights
 def test_a_cluster_gives_the_same_bytes_with_a_worker_killed_in_mid_run(
     place: Path, whole: bytes, cluster: Cluster
 ) -> None:
@@ -104,6 +105,7 @@ def test_a_cluster_gives_the_same_bytes_with_a_worker_killed_in_mid_run(
     assert results(place / "out") == whole
 
 
+@pytest.mark.flights
 def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
     whole: bytes, cluster: Cluster, tmp_path: Path, place: Path
 ) -> None:
@@ -134,6 +136,7 @@ def test_whatever_stops_it_what_is_done_is_kept_and_gone_on_with(
     assert results(out) == whole
 
 
+@pytest.mark.flights
 def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -165,6 +168,7 @@ def test_beyond_this_machine_a_scheduler_needs_tls_or_a_word(
     assert "--unencrypted goes with --scheduler" in said("--unencrypted")
 
 
+@pytest.mark.flights
 def test_without_a_scheduler_nothing_is_flown(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     begun = time.monotonic()
     address = f"tcp://{LOCAL}:{free_port()}"

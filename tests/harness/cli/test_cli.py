@@ -155,6 +155,7 @@ print(sorted({SLOW!r} & set(sys.modules)), file=sys.stderr)
     assert run.stderr == "[]\n"
 
 
+@pytest.mark.flights
 def test_validating_imports_nothing_of_the_flight(tmp_path: Path) -> None:
     code = """
 import sys
@@ -315,6 +316,7 @@ def test_schema_prints_the_json_schema(capsys: pytest.CaptureFixture[str]) -> No
     assert printed["$defs"]["Sensor"]["properties"]["range_m"]["exclusiveMinimum"] == 0
 
 
+@pytest.mark.flights
 def test_a_flight_of_a_model_that_cannot_be_flown_ends_before_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -356,6 +358,7 @@ def test_bench_refuses_what_makes_no_sense(
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.flights
 def test_bench_worlds_prints_a_row_a_world(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "worlds", "--most", "10"]) == 0
     lines = capsys.readouterr().out.splitlines()

@@ -78,6 +78,7 @@ def test_json_is_the_metrics_file(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert said.err == ""
 
 
+@pytest.mark.flights
 def test_killed_while_flying_leaves_an_incomplete_run_and_a_readable_recording(tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start(tmp_path, "fly", "paper_circles", "--out", str(out))

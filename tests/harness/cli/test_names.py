@@ -49,6 +49,7 @@ def test_planners_and_guidance_are_listed_with_their_keys_and_defaults(
         assert all(len(line) <= 80 for line in lines)
 
 
+@pytest.mark.flights
 def test_aircraft_are_listed_with_their_figures(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -61,6 +62,7 @@ def test_aircraft_are_listed_with_their_figures(
     assert glider.startswith("SGS        cannot be flown: SGS cannot be trimmed for level flight")
 
 
+@pytest.mark.flights
 def test_new_aircraft_are_flown_beside_this_process_and_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -141,6 +141,7 @@ def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.flights
 def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path) -> None:
     assert files(flown) == {"comparison.csv", "comparison.json", "comparison.md", "report.html", "ring"}
     drawn = {
@@ -240,6 +241,7 @@ def test_the_report_needs_nothing_but_itself_and_escapes_what_it_is_told(flown: 
         assert row["digest"] in page.text
 
 
+@pytest.mark.flights
 def test_a_browser_shows_the_report_on_phone_and_screen(flown: Path, chromium: Any) -> None:
     for width_px in (390, 1280):
         page = shown(chromium, flown / "report.html", width_px)
@@ -261,6 +263,7 @@ def test_the_report_says_how_to_repeat_it(
     assert files(out / "ring") == set()
 
 
+@pytest.mark.flights
 def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
     place: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -343,6 +346,7 @@ def alive(group: int) -> bool:
     return True
 
 
+@pytest.mark.flights
 def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place: Path) -> None:
     out = place / "interrupted"
     arguments = [

@@ -47,6 +47,7 @@ def test_the_time_that_is_too_short_is_found(to_break: Path) -> None:
     assert flown(again)["digest"] == result.found.digest
 
 
+@pytest.mark.flights
 def test_two_keys_are_brought_to_the_edge_between_passing_and_failing(to_break: Path) -> None:
     keys = ("mission.time_limit_s", 100.0, 40.0), ("aircraft.airspeed_mps", 28.0, 18.0)
     result = broken(to_break, *keys, tolerance=0.02, conditions=80)
@@ -163,6 +164,7 @@ def test_what_is_not_monotone_is_reported(to_break: Path) -> None:
     }
 
 
+@pytest.mark.flights
 @given(st.floats(0.3, 7.7))
 @settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_value_that_is_printed_fails_when_it_is_typed_in(to_break: Path, edge: float) -> None:

@@ -70,6 +70,7 @@ def test_an_earlier_search_stays_until_the_new_one_has_ended(to_break: Path) -> 
     assert sorted(content(to_break.parent / "out")) == [TRIALS, INDEX]
 
 
+@pytest.mark.flights
 def test_what_a_killed_search_has_left_is_in_no_way(to_break: Path) -> None:
     (to_break.parent / "out").mkdir()
     (to_break.parent / "out" / f"{TRIALS}.partial").write_text("a killed process")
@@ -77,6 +78,7 @@ def test_what_a_killed_search_has_left_is_in_no_way(to_break: Path) -> None:
     assert f"{TRIALS}.partial" not in content(to_break.parent / "out")
 
 
+@pytest.mark.flights
 def test_two_searches_into_one_folder(to_break: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def second(scenario: Scenario) -> dict[str, Any]:
         vary = "mission.time_limit_s=300:20"

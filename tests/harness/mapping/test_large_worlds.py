@@ -108,6 +108,7 @@ def test_what_a_scan_shows_of_a_crowd_is_told_by_the_nearest_edge(seed: int) -> 
         assert shown[tuple(point)] in news.first
 
 
+@pytest.mark.flights
 def test_what_a_scan_shows_of_a_large_crowd_takes_little_memory() -> None:
     obstacles, scans = crowd(20_000, 20_000.0, 1), looks(np.random.default_rng(1), 5000.0, 15_000.0)
     sensed = Sensed(obstacles, CELL_M)

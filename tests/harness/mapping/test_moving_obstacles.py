@@ -66,6 +66,7 @@ def passing(
     return world_of(Obstacle(shape, velocity_mps=(velocity.real, velocity.imag))), velocity
 
 
+@pytest.mark.flights
 @settings(max_examples=40, derandomize=True)  # of a thousand passes three are told worse
 @given(
     speed=st.floats(1.0, 10.0),
@@ -248,6 +249,7 @@ STILL: list[dict[str, Any]] = [
 ]
 
 
+@pytest.mark.flights
 @settings(max_examples=60)
 @given(
     seed=SEEDS,

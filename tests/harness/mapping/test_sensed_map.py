@@ -29,6 +29,7 @@ from tests.harness.sensing import (
     sensor,
     world_of,
 )
+from tests.longer import longer
 
 FREE_CELL = CLEARANCE / 2.0
 START = (3000.0, 1500.0)
@@ -293,6 +294,7 @@ def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_f
     assert np.abs(off(world_of(pops.shape), seen.edges_since(-1))).min() < 0.5 * NOISE
 
 
+@pytest.mark.flights
 @settings(max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1), fov_deg=st.sampled_from([360.0, 180.0]))
 def test_with_much_noise_nothing_is_taken_to_move_that_stands(seed: int, fov_deg: float) -> None:
@@ -327,7 +329,7 @@ def test_free_space_beyond_the_range_of_the_scan_stays() -> None:
 
 @pytest.mark.parametrize("noise_m", [15.0, 30.0, 60.0])
 @pytest.mark.parametrize("false_return", [0.1, 0.4])
-@pytest.mark.parametrize("clearance_m", [10.0, CLEARANCE])
+@pytest.mark.parametrize("clearance_m", [CLEARANCE, *longer([10.0])])
 def test_whatever_a_bad_sensor_returns_is_taken_in(
     noise_m: float, false_return: float, clearance_m: float
 ) -> None:

@@ -420,6 +420,7 @@ os._exit(9)
     assert rerun("rrd", "verify", str(shown)).returncode == 0
 
 
+@pytest.mark.flights
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
 @pytest.mark.parametrize("ended", [True, False])
 def test_the_fork_of_a_process_that_records_can_record(tmp_path: Path, ended: bool) -> None:

@@ -110,6 +110,7 @@ def test_corners_have_the_numbers_of_the_points_given() -> None:
     assert len(way.waypoints_m) == 4
 
 
+@pytest.mark.flights
 def test_a_zigzag_of_any_length_becomes_a_path() -> None:
     count = 100_000
     points = np.column_stack((4.0 * np.arange(count), np.arange(count) % 2))

@@ -90,6 +90,7 @@ def test_a_world_is_a_function_of_its_seed_and_has_room_about_start_and_goal(
     assert all(each.is_valid and each.area > 0 for each in shapes)
 
 
+@pytest.mark.flights
 @BOUNDED
 @given(st.sampled_from(("circles", "polygons", "forest", "u_traps")), st.integers(0, 2**53), st.data())
 def test_the_gap_is_kept_between_all_that_lies_about(name: str, seed: int, data: st.DataObject) -> None:

@@ -72,6 +72,7 @@ class KillsAt(Onlooker):
             time.sleep(0.5)
 
 
+@pytest.mark.flights
 def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     server: tuple[subprocess.Popen[str], str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -111,6 +112,7 @@ class Kept:
         self.handed.append(pickle.loads(pickle.dumps(list(calls))))
 
 
+@pytest.mark.flights
 def test_what_is_handed_over_is_the_flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The calls, made on a file here: every row of the track and every plan is in it, as soon as it was flown."""
     monkeypatch.setattr(live, "HAND_OVER_S", 0.0)

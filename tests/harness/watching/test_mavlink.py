@@ -242,6 +242,7 @@ def test_a_whole_flight_is_shown_and_stays_the_same(station: GroundStation) -> N
     assert texts[-1].startswith("reached: ")
 
 
+@pytest.mark.flights
 def test_fly_is_paced_at_real_time_or_faster(
     station: GroundStation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -17,6 +17,7 @@ from harness.scenario.sections import Sensor
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
+from tests.longer import longer
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
 RANGE = 1000.0
@@ -66,7 +67,7 @@ def nearest_within(obstacle: Obstacle, low: float, high: float, larger: bool) ->
     return math.inf if met.is_empty else shapely.Point(0.0, 0.0).distance(met)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.3, 1.6])
+@pytest.mark.parametrize("share", [1.0, *longer([0.3, 1.6])])
 @settings(max_examples=15, deadline=None)
 @given(
     seed=SEED,

@@ -69,6 +69,7 @@ def at(obstacle: Obstacle, time_s: float) -> shapely.Geometry:
     )
 
 
+@pytest.mark.flights
 def test_contacts_are_those_of_positions_at_many_times() -> None:
     rng = np.random.default_rng(5)
     seen = set()

@@ -207,6 +207,7 @@ def test_agrees_with_the_shared_worlds(family: str) -> None:
         assert found.length_m == pytest.approx(world["optimum_m"], rel=1e-6, abs=ROUNDING_M)
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("corners", "waves"), [(4000, 0), (16_000, 40)])
 def test_round_a_polygon_of_thousands_of_corners_in_seconds(corners: int, waves: int) -> None:
     """One that is convex can be touched at every corner, a coast with bays at few. Both ways follow a convex hull."""

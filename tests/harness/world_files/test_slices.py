@@ -17,6 +17,7 @@ from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners
 from harness.world_files.growing import simplified
 from harness.world_files.plane import Mapping, Place, geodetic
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
+from tests.longer import longer
 
 ALPS = Place(46.82, 9.83)
 AROUND = (-4000.0, -4000.0, 4000.0, 4000.0)
@@ -53,7 +54,11 @@ def check_covers(found: Expanded, expected: Any, share: float = 0.01) -> None:
 @real
 @pytest.mark.parametrize(
     ("name", "altitude_m"),
-    [("davosdorf.tif", 2000), ("davosdorf.tif", 1700), ("sertig_valley.tif", 2200), ("S36E149.hgt.zip", 900)],
+    [
+        ("davosdorf.tif", 2000),
+        ("davosdorf.tif", 1700),
+        *longer([("sertig_valley.tif", 2200), ("S36E149.hgt.zip", 900)]),
+    ],
 )
 def test_terrain_is_what_rasterio_outlines(name: str, altitude_m: float) -> None:
     rasterio = pytest.importorskip("rasterio")
@@ -135,6 +140,7 @@ def test_buildings_are_what_gdal_reads(name: str, altitude_m: float) -> None:
     assert len(solid) > 15
 
 
+@pytest.mark.flights
 @real
 def test_city_objects_are_the_unions_of_their_surfaces() -> None:
     path = SHARED / "buildings" / "delft.city.json"
@@ -162,6 +168,7 @@ def flat(boundaries: Any) -> list[list[int]]:
     return [ring for each in boundaries for ring in flat(each)]
 
 
+@pytest.mark.flights
 @real
 @pytest.mark.parametrize("altitude_m", [150.0, 500.0, 3000.0])
 def test_airspace_is_what_aerofiles_reads(altitude_m: float) -> None:

@@ -32,6 +32,7 @@ from planner.interface import (
     PlanStatus,
 )
 from planner.world_stability import SETTLED_S
+from tests.longer import longer
 
 MakePoints = Callable[..., FloatArray]
 
@@ -56,6 +57,7 @@ MAKE: dict[str, Callable[[Mission], Planner]] = {
     "tangent_bug": lambda mission: TangentBug(TangentBugConfig(), mission),
 }
 KINDS = tuple(MAKE)
+OF_CONTACT = ("bug1", "bug2")
 
 
 class Range:
@@ -258,6 +260,7 @@ def test_a_trap_open_to_the_start_is_left(kind: str, wall: MakePoints) -> None:
     assert flight.length_m > 14_000.0 + 4000.0
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("enclosed", ["goal", "start"])
 def test_an_enclosure_is_proved_by_going_round_it(kind: str, enclosed: str, ring: MakePoints) -> None:
@@ -270,7 +273,7 @@ def test_an_enclosure_is_proved_by_going_round_it(kind: str, enclosed: str, ring
     assert flight.length_m > (0.8 if enclosed == "start" and kind == "tangent_bug" else 0.98) * round_m
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*OF_CONTACT, *longer(["tangent_bug"])])
 @pytest.mark.parametrize("enclosed", ["goal", "start"])
 def test_no_enclosure_is_proved_soon_after_something_appeared(
     kind: str, enclosed: str, ring: MakePoints
@@ -283,7 +286,7 @@ def test_no_enclosure_is_proved_soon_after_something_appeared(
     assert later.length_m / MISSION.speed_mps > Unsettled.last_contradiction_s + SETTLED_S
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [*OF_CONTACT, *longer(["tangent_bug"])])
 @pytest.mark.parametrize("share", [0.8, 0.95, 1.0])
 def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: float, ring: MakePoints) -> None:
     """At the end of the round as well as where it has been passed by."""
@@ -296,6 +299,7 @@ def test_a_way_that_was_taken_to_be_closed_is_tried_again(kind: str, share: floa
     assert looks < len(again.track_m) < 3 * len(flight.track_m)
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_wall_across_the_area_is_proved_along_the_bounds(kind: str, wall: MakePoints) -> None:
     flight = walk(kind, wall((10_000.0, 0.0), (10_000.0, 10_000.0), SPACING))
@@ -305,9 +309,13 @@ def test_a_wall_across_the_area_is_proved_along_the_bounds(kind: str, wall: Make
     assert ((y >= 0.0) & (y <= 10_000.0)).all()
 
 
-@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(
-    ("gap_m", "status"), [(2.2 * KEEP, PlanStatus.FOUND), (1.8 * KEEP, PlanStatus.UNREACHABLE)]
+    ("kind", "gap_m", "status"),
+    [
+        *((kind, 2.2 * KEEP, PlanStatus.FOUND) for kind in KINDS),
+        *((kind, 1.8 * KEEP, PlanStatus.UNREACHABLE) for kind in OF_CONTACT),
+        *longer([("tangent_bug", 1.8 * KEEP, PlanStatus.UNREACHABLE)]),
+    ],
 )
 def test_a_gap_is_taken_where_it_is_wide_enough(
     kind: str, gap_m: float, status: PlanStatus, wall: MakePoints
@@ -382,6 +390,7 @@ def test_an_obstacle_that_the_line_grazes_encloses_nothing(
     assert walk(kind, ring(middle, y - 1500.0 - KEEP + depth_m, 1500.0, SPACING)).reason == "reached"
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_plan_begins_at_the_aircraft_and_is_in_one_piece(kind: str, ring: MakePoints) -> None:
     flight = walk(
@@ -405,6 +414,7 @@ circles = st.lists(
 )
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("kind", KINDS)
 @settings(max_examples=8, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(world=circles)

@@ -52,6 +52,7 @@ def circle_of(x: float, y: float, radius: float, spacing: float, gap_m: float = 
     return np.column_stack((x + radius * np.cos(angle), y + radius * np.sin(angle)))
 
 
+@pytest.mark.flights
 @settings(max_examples=150)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(0, 220))
 def test_random_points_close_it_where_their_discs_part_the_area(seed: int, count: int) -> None:

@@ -174,6 +174,7 @@ def test_two_circles_one_behind_the_other(ring: MakePoints) -> None:
     assert_near_the_optimum(window)
 
 
+@pytest.mark.flights
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 4))
 def test_fields_of_circles(seed: int, count: int, ring: MakePoints) -> None:
@@ -245,6 +246,7 @@ def connected(points: FloatArray, keep_m: float) -> bool:
     return any(all(part.contains(shapely.Point(end)) for end in (START, CORNER)) for part in parts)
 
 
+@pytest.mark.flights
 @settings(max_examples=40)
 @given(
     walls=st.lists(st.booleans(), min_size=2 * CELLS * (CELLS - 1), max_size=2 * CELLS * (CELLS - 1)),

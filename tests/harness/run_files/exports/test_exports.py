@@ -82,7 +82,11 @@ def line_of(run: Run, what: str) -> shapely.LineString:
 def assert_same_line(points: FloatArray, line: shapely.LineString) -> None:
     """Neither is anywhere further than a metre from the other."""
     assert len(points) > 10
-    assert shapely.hausdorff_distance(shapely.LineString(points), line, densify=0.01) < 1.0
+    lines = (shapely.LineString(points), line)
+    for one, other in (lines, lines[::-1]):
+        every_metre = shapely.points(shapely.get_coordinates(shapely.segmentize(one, 1.0)))
+        shapely.prepare(other)
+        assert shapely.dwithin(every_metre, other, 1.0).all()
 
 
 class PlanItem(BaseModel):
