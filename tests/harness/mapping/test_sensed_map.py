@@ -346,3 +346,29 @@ def test_whatever_a_bad_sensor_returns_is_taken_in(
             assert np.isfinite(each.points_m).all()
             assert math.hypot(*each.velocity_mps) <= 30.0 + 1e-9
     assert np.isfinite(seen.edges_since(-1)).all()
+
+
+def test_walls_that_are_seen_from_a_shifted_pose_stay_one_and_their_gap_opens_again() -> None:
+    """The error of the pose goes to and fro by 15 m and 0.6 degrees; in the last minute it is gone."""
+    west, east = block(2000.0, 2600.0, 2920.0, 2700.0), block(3080.0, 2600.0, 4000.0, 2700.0)
+    world, shift_m = world_of(west, east), 15.0
+    seen = SensedMap(BOUNDS, CLEARANCE, RANGE, pose_error_m=0.5 * shift_m)
+    numbers, narrowest_m = [], math.inf
+    for scan in flight(sensor(world), 300.0, (3000.0, 1300.0), speed=4.0):
+        wrong = 1.0 if scan.time_s < 240.0 else 0.0
+        off_m = wrong * shift_m * np.array([math.sin(scan.time_s / 20.0), math.cos(scan.time_s / 27.0)])
+        turned_rad = wrong * 0.01 * math.sin(scan.time_s / 7.0)
+        seen.update(
+            scan.taken_from(scan.east_m + off_m[0], scan.north_m + off_m[1], scan.heading_rad + turned_rad)
+        )
+        edges = seen.edges_since(-1)
+        numbers.append(len(edges))
+        if len(edges):
+            narrowest_m = min(narrowest_m, 2.0 * float(np.abs(edges[:, 0] - 3000.0).min()))
+        assert not seen.moving
+    # A band of twice the error's size, however long it is looked at, not a new wall with each look.
+    assert np.abs(off(world, seen.edges_since(-1))).max() < 1.5 * shift_m + 0.01 * RANGE
+    assert max(numbers[400:]) < 1.1 * max(numbers[:250])
+    assert narrowest_m > 160.0 - 2.0 * shift_m - 0.02 * RANGE
+    assert 2.0 * float(np.abs(seen.edges_since(-1)[:, 0] - 3000.0).min()) > max(narrowest_m, 130.0)
+    assert seen.seen_free(np.array([[3000.0, 2500.0], [3000.0, 2650.0]])).all()
