@@ -46,6 +46,8 @@ METRICS: Final = {
     "clearance_violation_s": "number",
     **{f"cross_track_m.{name}": "number" for name in _SPREAD},
     **{f"altitude_error_m.{name}": "number" for name in _SPREAD},
+    **{f"navigation_error_m.{name}": "number" for name in _SPREAD},
+    "navigation_margin_m": "number",
     "min_altitude_above_ground_m": "number",
     **{f"smoothness.{of}.{f.name}": "number" for of in ("planned", "flown") for f in fields(Smoothness)},
     "bank_saturation_fraction": "number",
@@ -63,6 +65,7 @@ METRICS: Final = {
 }
 """Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
 
+Of what is there only with terrain or with navigation errors the other runs have nothing.
 Of the legs of `trackability` there are their number, that of those not trackable, and their causes, each once;
 `wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the
 world and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a

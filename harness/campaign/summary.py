@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,22 @@ from numpy.typing import NDArray
 from harness.campaign.groups import Axis, grouped
 from harness.campaign.paired import CONFIDENCE, Duel, duels
 from harness.campaign.results import ERROR, RESULTS
-from harness.campaign.table import NAMED, Runs, drawn_keys, load_tables, planned_runs, runs_of, varied_keys
+from harness.campaign.table import (
+    NAMED,
+    Runs,
+    column,
+    drawn_keys,
+    load_tables,
+    planned_runs,
+    runs_of,
+    varied_keys,
+)
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
 from harness.run_files.run_folder import RECORDING
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 WORST: Final = 10
 CLOSEST: Final = 3
@@ -32,6 +44,16 @@ BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of so many varied keys, the first ones."""
 
 CURVE_POINTS: Final = 201
+EXTREMES: Final = {
+    "cross_track_m.max": "cross-track error, m",
+    "altitude_error_m.max": "altitude error, m",
+    "navigation_error_m.max": "navigation error, m",
+    "max_load_factor": "load factor",
+    "bank_saturation_fraction": "share of the time at the bank limit",
+    "smoothness.flown.heading_change_deg": "heading change, deg",
+    "length_ratio": "length over the optimum",
+}
+"""Figures whose largest value is named with its run, by their column of the results."""
 SEVERITY: Final = tuple(
     f"collision lost_control out_of_bounds planner_failed {ERROR} timeout unreachable".split()
 )
@@ -122,6 +144,25 @@ class WorstRun:
 
 
 @dataclass(frozen=True)
+class Extreme:
+    """The run in which a figure is largest.
+
+    Attributes:
+        figure: what it is of, with its unit.
+        run: its number.
+        name: of its world, planner and aircraft.
+        value: the figure.
+        median: of all runs that have one.
+    """
+
+    figure: str
+    run: int
+    name: str
+    value: float
+    median: float
+
+
+@dataclass(frozen=True)
 class Summary:
     """The answers.
 
@@ -134,6 +175,8 @@ class Summary:
         curves: one for each key that a table has, by planner.
         lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
+        extremes: the run in which each of some figures is largest.
+        untracked: the first runs that were not tracked: number, name, and why.
         duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
     """
@@ -146,6 +189,8 @@ class Summary:
     curves: tuple[Table, ...]
     lengths: Mapping[str, tuple[float, ...]]
     worst: tuple[WorstRun, ...]
+    extremes: tuple[Extreme, ...]
+    untracked: tuple[tuple[int, str, str], ...]
     duels: tuple[Duel, ...]
     planned: int | None = None
 
@@ -183,6 +228,8 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         curves=tuple(table(runs, [key, "planner"], drawn) for key in singles if key != "planner"),
         lengths=_lengths(runs),
         worst=_worst(runs, folder, keys),
+        extremes=_extremes(results, runs),
+        untracked=_untracked(results, runs),
         duels=duels(runs),
         planned=planned_runs(results),
     )
@@ -270,6 +317,33 @@ def _lengths(runs: Runs) -> dict[str, tuple[float, ...]]:
     return curves
 
 
+def _extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
+    found = []
+    for name, figure in EXTREMES.items():
+        values = column(results, name)
+        known = _finite(values)
+        if len(known) and known.max() > (median := float(np.median(known))):
+            row = int(np.nanargmax(values))
+            found.append(Extreme(figure, int(runs.run[row]), _name(runs, row), float(values[row]), median))
+    return tuple(found)
+
+
+def _untracked(results: pa.Table, runs: Runs) -> tuple[tuple[int, str, str], ...]:
+    column_of = "trackability.causes"
+    causes = results[column_of].to_pylist() if column_of in results.column_names else [None] * len(runs)
+    rows = np.flatnonzero(runs.trackable == 0.0)[:WORST].tolist()
+    return tuple((int(runs.run[row]), _name(runs, row), causes[row] or "") for row in rows)
+
+
+def _name(runs: Runs, row: int) -> str:
+    """World, planner and aircraft of a run."""
+    names = runs.names
+    world, scenario = names["world"][row], names["scenario"][row]
+    crossed = world and _are_crossed(names["world"], names["scenario"])
+    place = (scenario, world) if crossed else (world or scenario,)
+    return ", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row])))
+
+
 def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...]:
     """Failures by severity, then by clearance over the wanted one, or by clearance where that is unknown.
 
@@ -295,13 +369,10 @@ def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...
 def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[str]) -> WorstRun:
     number, names = int(runs.run[row]), runs.names
     kept, clearance = Path("runs") / str(number), float(runs.min_clearance_m[row])
-    world, scenario = names["world"][row], names["scenario"][row]
-    crossed = world and _are_crossed(names["world"], names["scenario"])
-    place = (scenario, world) if crossed else (world or scenario,)
     recording = (folder / kept / RECORDING).is_file()
     return WorstRun(
         run=number,
-        name=", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row]))),
+        name=_name(runs, row),
         seed=int(runs.seed[row]),
         outcome=names["outcome"][row],
         reason=names["reason"][row],

@@ -160,7 +160,7 @@ def runs_of(results: pa.Table, timings: pa.Table | None, keys: Sequence[str]) ->
         if name not in results.column_names:
             known = ", ".join(varied_keys(results)) or "none"
             raise InputError(f"wayproof: {RESULTS} has no column {name!r}; varied there: {known}")
-    rows = {int(run): row for row, run in enumerate(_column(timings, "run"))} if timings is not None else {}
+    rows = {int(run): row for row, run in enumerate(column(timings, "run"))} if timings is not None else {}
     own = [rows.get(int(run), -1) for run in results["run"].to_pylist()]
     return Runs(
         run=_integers(results, "run"),
@@ -168,21 +168,21 @@ def runs_of(results: pa.Table, timings: pa.Table | None, keys: Sequence[str]) ->
         seed=_integers(results, "seed"),
         names={name: _texts(results, name) for name in (*NAMED, "outcome", "reason")},
         varied={key: _values(results, key) for key in keys},
-        flown_length_m=_column(results, "flown_length_m"),
-        length_ratio=_column(results, "length_ratio"),
-        cross_track_max_m=_column(results, "cross_track_m.max"),
-        min_clearance_m=_column(results, "min_clearance_m"),
-        wanted_clearance_m=_column(results, "wanted_clearance_m"),
-        clearance_violation_s=_column(results, "clearance_violation_s"),
-        trackable=_column(results, "trackable"),
+        flown_length_m=column(results, "flown_length_m"),
+        length_ratio=column(results, "length_ratio"),
+        cross_track_max_m=column(results, "cross_track_m.max"),
+        min_clearance_m=column(results, "min_clearance_m"),
+        wanted_clearance_m=column(results, "wanted_clearance_m"),
+        clearance_violation_s=column(results, "clearance_violation_s"),
+        trackable=column(results, "trackable"),
         planner_ms={
-            name: np.append(_column(timings, f"compute_ms.{name}"), np.nan)[own]
+            name: np.append(column(timings, f"compute_ms.{name}"), np.nan)[own]
             for name in ("p50", "p99", "max")
         },
     )
 
 
-def _column(table: pa.Table | None, name: str) -> FloatArray:
+def column(table: pa.Table | None, name: str) -> FloatArray:
     """A column of numbers, NaN where there is none."""
     if table is None:
         return np.zeros(0)

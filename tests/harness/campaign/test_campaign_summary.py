@@ -37,6 +37,7 @@ SCHEMA = pa.schema(
     + [(name, pa.float64()) for name in ("flown_length_m", "min_clearance_m", "clearance_violation_s")]
     + [("cross_track_m.p95", pa.float64()), ("trackability.legs", pa.int64()), ("trackable", pa.bool_())]
     + [("optimum_m", pa.float64()), ("length_ratio", pa.float64()), ("wanted_clearance_m", pa.float64())]
+    + [("max_load_factor", pa.float64()), ("trackability.causes", pa.string())]
 )
 WIND = "environment.wind.speed_mps"
 
@@ -358,10 +359,10 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     page = write_summary(summarise(folder), folder).read_text()
     assert 'href="runs/6/flight.rrd"' in page
     assert 'href="runs/5/flight.rrd"' not in page
-    assert ', -0.18 of the wanted. <a href="runs/6">Run folder</a>' in page
+    assert '</strong> the wanted 50 m. <a href="runs/6">Run folder</a>' in page
     assert worst[-1].clearance_ratio is not None
     assert worst[-1].clearance_ratio > 1.0
-    assert f", {worst[-1].clearance_ratio:.2f} of the wanted." in page
+    assert "100 m; wanted 50 m." in page
 
 
 def test_without_the_wanted_clearance_the_nearest_run_is_the_worst(tmp_path: Path) -> None:
@@ -502,6 +503,24 @@ def test_where_nothing_failed_the_three_closest_are_shown(tmp_path: Path) -> Non
     summary = summarise(folder)
     assert [run.run for run in summary.worst] == [5, 4, 3]
     assert "No run failed" in write_summary(summary, folder).read_text()
+
+
+def test_runs_that_stand_out_are_named(tmp_path: Path) -> None:
+    rows = [
+        row(run, min_clearance_m=60.0, **{"max_load_factor": 1.0, "trackability.causes": ""})
+        for run in range(5)
+    ]
+    rows[2] |= {"max_load_factor": 1.6}
+    rows[3] |= {"trackable": False, "trackability.causes": "bank limit", "min_clearance_m": 49.9}
+    folder = campaign(tmp_path / "c", rows)
+    summary = summarise(folder)
+    (load,) = summary.extremes
+    assert (load.figure, load.run, load.value, load.median) == ("load factor", 2, 1.6, 1.0)
+    assert [(run, why) for run, _, why in summary.untracked] == [(3, "bank limit")]
+    page = write_summary(summary, folder).read_text()
+    assert "Runs that stand out" in page
+    assert "49.9 m; <strong class='bad'>below</strong> the wanted 50 m" in page
+    assert "60 m; wanted 50 m" in page
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:

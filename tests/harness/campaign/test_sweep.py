@@ -185,9 +185,11 @@ def test_results_have_a_row_a_run_and_every_metric(unbroken: Path) -> None:
 
 
 def test_columns_are_what_metrics_json_has(place: Path) -> None:
-    assert main(["fly", str(place / "short.yaml"), "--out", str(place / "run"), "--no-recording"]) == 0
+    fly = ["fly", str(place / "short.yaml"), "--out", str(place / "run"), "--no-recording"]
+    assert main([*fly, "--set", "navigation.kind=rtk"]) == 0
     metrics = load_run(place / "run").metrics
     cells = metric_cells(metrics, 60.0, 1500.0)
+    assert cells["navigation_error_m.max"] == metrics["navigation_error_m"]["max"] > 0.0
     assert cells.keys() | {"error"} == METRICS.keys()
     assert cells["cross_track_m.p95"] == metrics["cross_track_m"]["p95"]
     assert cells["trackability.legs"] == len(metrics["trackability"])
