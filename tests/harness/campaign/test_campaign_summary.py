@@ -362,7 +362,7 @@ def test_the_worst_runs_come_first_with_what_to_do(tmp_path: Path) -> None:
     assert '</strong> the wanted 50 m. <a href="runs/6">Run folder</a>' in page
     assert worst[-1].clearance_ratio is not None
     assert worst[-1].clearance_ratio > 1.0
-    assert "100 m; wanted 50 m." in page
+    assert "100.0 m; wanted 50 m." in page
 
 
 def test_without_the_wanted_clearance_the_nearest_run_is_the_worst(tmp_path: Path) -> None:
