@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -211,3 +212,19 @@ class Scene:
 def time_column(time_s: FloatArray) -> rr.TimeColumn:
     """Simulated time, rounded to nanoseconds (rerun truncates floats)."""
     return rr.TimeColumn(TIMELINE, duration=np.round(time_s * 1e9).astype("timedelta64[ns]"))
+
+
+def apart(times_s: Sequence[float], after_s: float = -math.inf) -> FloatArray:
+    """Rising times, none of them twice: of several at once each is a nanosecond later.
+
+    A table by time keeps one event of each time.
+
+    Args:
+        times_s: simulated times in order.
+        after_s: the last one before them.
+    """
+    rising = []
+    for at_s in times_s:
+        after_s = max(at_s, after_s + 1e-9)
+        rising.append(after_s)
+    return np.array(rising)

@@ -101,6 +101,7 @@ class RerunLog:
         self._plans: list[AcceptedPlan] = []
         self._events: list[tuple[float, str, look.Colour]] = []
         self._sensed = Sensed(scene.obstacles, CELL_SHARE * span_m)
+        self._told_s = -math.inf
         self._states = States(math.degrees(scene.limits.bank_limit_rad))
         self._last_point: FloatArray = np.zeros((0, 3))
         self._believed_point: FloatArray = np.zeros((0, 3))
@@ -266,9 +267,11 @@ class RerunLog:
         events, self._events = sorted(self._events, key=lambda event: event[0]), []
         if events:
             times, texts, colours = zip(*events, strict=True)
+            apart_s = look.apart(times, self._told_s)
+            self._told_s = float(apart_s[-1])
             self._rec.send_columns(
                 look.EVENTS,
-                [look.time_column(np.array(times))],
+                [look.time_column(apart_s)],
                 rr.TextLog.columns(
                     text=[f"t = {at:.0f} s: {text}" for at, text in zip(times, texts, strict=True)],
                     level=[rr.TextLogLevel.INFO] * len(events),

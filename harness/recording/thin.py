@@ -134,7 +134,7 @@ class ThinLog:
             text = [f"t = {at:.0f} s: {told}" for at, told in self._events]
             self._rec.send_columns(
                 look.EVENTS,
-                [look.time_column(np.array(times))],
+                [look.time_column(look.apart(times))],
                 rr.TextLog.columns(text=text, level=[rr.TextLogLevel.INFO] * len(texts)),
             )
         log_summary(self._rec, replace(self._scene, scenario_yaml=""), metrics)

@@ -22,7 +22,7 @@ from harness.analysis.trackability import FlightLimits
 from harness.files.errors import RunFolderError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
-from harness.recording.blueprint import ERROR_COLOURS, Scene
+from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
 from harness.recording.log import RerunLog
 from harness.recording.overlay import write_overlay
 from harness.recording.scene import quaternions
@@ -341,6 +341,13 @@ def test_what_the_map_takes_to_move_is_shown_until_it_is_lost(
     np.testing.assert_array_equal(column(entities, "/plan/tracked/velocity", "vectors")[3], [(300.0, -30.0)])
     for entity, part in (("tracked", "strips"), ("tracked/velocity", "vectors")):
         assert column(entities, f"/plan/{entity}", part)[-1] == [], "cleared when it is lost"
+
+
+def test_events_of_one_time_have_times_of_their_own() -> None:
+    times = apart([0.0, 5.0, 5.0, 5.0, 6.0])
+    assert times[[0, 1, 4]].tolist() == [0.0, 5.0, 6.0]
+    assert np.diff(np.round(times * 1e9)).min() == 1.0
+    assert np.round((apart([6.0], after_s=6.0)[0] - 6.0) * 1e9) == 1.0
 
 
 def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
