@@ -80,6 +80,9 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
     (tmp_path / "empty").mkdir()
+    (tmp_path / "empty" / "one.yaml").write_text(
+        "schema: wayproof/campaign/1\nname: one\nseed: 1\nscenarios: [aerosonde_forest]\n"
+    )
     where = "import harness, sys; sys.stdout.write(harness.__file__)"
     front_door = "import wayproof, sys; sys.stdout.write(wayproof.__file__ + wayproof.fly.__name__)"
     command = "from harness.cli.app import main; raise SystemExit(main())"
@@ -87,7 +90,8 @@ def test_unpacked_wheel_flies_from_an_empty_folder(wheel: Path, tmp_path: Path) 
         (where, [], str(tmp_path / "site")),
         (front_door, [], str(tmp_path / "site" / "wayproof" / "__init__.pyfly")),
         (command, ["fly", "aerosonde_forest", "--no-recording"], "reached: inside the goal circle"),
-        (command, ["sweep", "forest_planners"], "results: runs/forest_planners/results.parquet"),
+        (command, ["sweep", "forest_planners", "--dry-run"], "forest_planners"),
+        (command, ["sweep", "one.yaml"], "results: runs/one/results.parquet"),
     ):
         run = subprocess.run(
             [sys.executable, "-c", code, *arguments],

@@ -23,7 +23,7 @@ from harness.run_files.run_folder import load_run
 from tests.faults.command import CAMPAIGN_FILES, FOREST, run, start
 from tests.longer import longer
 
-KILLS = [*longer([3]), pytest.param(50, marks=pytest.mark.slow)]
+KILLS = [*longer([2]), pytest.param(50, marks=pytest.mark.slow)]
 ORPHANS_LIVE_S = 20.0
 """How long processes of a killed command may live on: one that has just been started imports everything before it sees
 that nobody waits for it, which takes its time on a busy machine."""

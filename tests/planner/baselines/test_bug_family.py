@@ -414,11 +414,20 @@ circles = st.lists(
 )
 
 
-@pytest.mark.flights
+@pytest.mark.parametrize("cases", [*longer([3]), pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=8, derandomize=True, suppress_health_check=list(HealthCheck))
-@given(world=circles)
 def test_the_goal_is_reached_where_there_is_a_way_and_only_there(
+    kind: str, cases: int, ring: MakePoints
+) -> None:
+    @settings(max_examples=cases, derandomize=True, suppress_health_check=list(HealthCheck))
+    @given(world=circles)
+    def each(world: list[tuple[float, float, float]]) -> None:
+        assert_reached_where_there_is_a_way(kind, ring, world)
+
+    each()
+
+
+def assert_reached_where_there_is_a_way(
     kind: str, ring: MakePoints, world: list[tuple[float, float, float]]
 ) -> None:
     points = np.concatenate([ring(x, y, radius, SPACING) for x, y, radius in world])
