@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pyarrow as pa
@@ -8,7 +9,7 @@ import pytest
 
 from aircraft.guidance.l1 import follow_circle
 from tests.aircraft import guidance_reference
-from tests.aircraft.guidance_reference import compared, main
+from tests.aircraft.guidance_reference import circle_columns, compared, main
 
 REFERENCE = Path(__file__).parents[2].parent / "shared" / "guidance"
 FILES = ("npfg_states", "l1_waypoint_states", "l1_loiter_states", "npfg_tracks", "l1_tracks")
@@ -35,7 +36,8 @@ def a_circle() -> dict[str, float]:
         "p_tecs_target_airspeed": 0.0,
         "eas2tas": 1.0,
     }
-    return row | {"ambiguous": 0}
+    row["ambiguous"] = 0
+    return row | circle_columns(row)
 
 
 def write(folder: Path, rows: list[dict[str, float]]) -> None:
@@ -69,6 +71,71 @@ def test_ambiguous_rows_are_left_out(tmp_path: Path) -> None:
 def test_no_reference_data_is_bad_usage(tmp_path: Path) -> None:
     assert main([str(tmp_path)]) == 2
     assert main([]) == 2
+
+
+def test_columns_may_stand_in_any_order(tmp_path: Path) -> None:
+    write(tmp_path, [dict(reversed(a_circle().items()))])
+    assert main([str(tmp_path)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda table: table.drop_columns(["radius"]), "has no column radius"),
+        (lambda table: table.drop_columns(["lat_acc"]), "has no column lat_acc"),
+        (lambda table: table.slice(0, 0), "has no rows"),
+        (lambda table: with_yaw(table, pa.array([None], pa.float64())), "column yaw must have a number"),
+        (lambda table: with_yaw(table, pa.array(["north"])), "column yaw must have a number"),
+    ],
+)
+def test_data_of_another_format_are_refused_in_a_line(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    change: Callable[[pa.Table], pa.Table],
+    said: str,
+) -> None:
+    path = tmp_path / "l1_loiter_states.parquet"
+    pq.write_table(change(pa.Table.from_pylist([a_circle()])), path)
+    assert main([str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith(f"{path}: {said}")
+    assert error.count("\n") == 1
+
+
+def with_yaw(table: pa.Table, column: pa.Array) -> pa.Table:
+    return table.set_column(table.column_names.index("yaw"), "yaw", column)
+
+
+def test_a_file_that_is_not_parquet_is_refused_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "l1_loiter_states.parquet").write_text("pos_n,pos_e\r\n1,2\r\n\r\n")
+    assert main([str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert "cannot be read as parquet" in error
+    assert error.count("\n") == 1
+
+
+@needs_reference
+def test_a_few_rows_of_a_few_runs_are_replayed(tmp_path: Path) -> None:
+    runs = pq.read_table(REFERENCE / "l1_runs.parquet").slice(3, 1)
+    (number,) = runs["run"].to_pylist()
+    rows = pq.read_table(REFERENCE / "l1_tracks.parquet", filters=[("run", "=", number)]).slice(40, 30)
+    pq.write_table(runs.select(runs.column_names[::-1]), tmp_path / "l1_runs.parquet")
+    pq.write_table(rows, tmp_path / "l1_tracks.parquet")
+    assert main([str(tmp_path)]) == 0
+
+
+@needs_reference
+def test_tracks_need_their_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = pq.read_table(REFERENCE / "npfg_tracks.parquet").slice(0, 2)
+    pq.write_table(rows, tmp_path / "npfg_tracks.parquet")
+    assert main([str(tmp_path)]) == 2
+    assert "npfg_runs.parquet: cannot be read as parquet" in capsys.readouterr().err
+    runs = pq.read_table(REFERENCE / "npfg_runs.parquet").slice(5, 3)
+    pq.write_table(runs, tmp_path / "npfg_runs.parquet")
+    assert main([str(tmp_path)]) == 2
+    assert "which npfg_runs.parquet has not" in capsys.readouterr().err
 
 
 def test_it_is_the_law_that_is_compared(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
