@@ -78,7 +78,8 @@ def hard(world: dict[str, Any], condition: dict[str, Any], seed: int = 1) -> Sce
             "aircraft": {"model": "aerosonde", "airspeed_mps": SPEED_MPS},
             "sensor": sensor,
             "planner": {"clearance_m": clearance} | condition.get("planner", {}),
-            "environment": WIND | TURBULENCE,
+            "guidance": condition.get("guidance", {}),
+            "environment": condition.get("environment", WIND | TURBULENCE),
         }
     )
 
