@@ -50,7 +50,8 @@ def cell(paths: list[Path], kind: str) -> str:
         flight = fly(make_loop(scenario))
         reached += flight.outcome is Outcome.REACHED
         hit += flight.outcome is Outcome.COLLISION
-        least = min(least, float(flight.track.clearance_m.min()) / (scenario.planner.clearance_m or math.nan))
+        nearest_m = min(float(flight.track.clearance_m.min()), flight.contact_m)
+        least = min(least, nearest_m / (scenario.planner.clearance_m or math.nan))
     return f"{reached}/{len(paths)}, {hit}, {least:.2f}"
 
 
