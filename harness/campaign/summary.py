@@ -244,7 +244,11 @@ def _default_choice(keys: Sequence[str], runs: Runs) -> list[tuple[str, ...]]:
     """Every two of the first keys, but for one by which nearly every run would be a row of its own."""
     crossed = _are_crossed(runs.names["world"], runs.names["scenario"])
     useful = [key for key in keys if key != "scenario" or crossed or "world" not in keys]
-    useful = [key for key in useful if key not in NAMED or 2 * len(set(runs.varied[key])) <= len(runs)]
+    useful = [
+        key
+        for key in useful
+        if key not in ("world", "scenario") or 2 * len(set(runs.varied[key])) <= len(runs)
+    ]
     first = useful[:BY_DEFAULT]
     return [tuple(first)] if len(first) == 1 else list(itertools.combinations(first, 2))
 
