@@ -8,6 +8,7 @@ and truncated by the scenario's time limit.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -37,7 +38,7 @@ MOST_BEAMS: Final = 72
 BAD: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
 
 
-class FlightEnv(gymnasium.Env[Observation, Action]):
+class FlightEnv(gymnasium.Env[Observation, Action], ABC):
     """A scenario's flight, steered from outside.
 
     The first interval after a reset is flown straight ahead, so that there is a scan to be observed. `reset(seed=k)`
@@ -117,17 +118,17 @@ class FlightEnv(gymnasium.Env[Observation, Action]):
         return self._observed(status), reward, status.done and not truncated, truncated, self._info(status)
 
     @property
+    @abstractmethod
     def episode(self) -> Episode:
         """What has been flown so far, to be flown again."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _steered(self, loop: Loop) -> Loop:
         """The parts of a flight with ours among them."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _act(self, action: NDArray[np.float64], status: Status) -> None:
         """Tells our part what to do."""
-        raise NotImplementedError
 
     def _advanced(self, status: Status) -> Status:
         assert self._loop is not None
