@@ -268,7 +268,10 @@ def follow_circle(
     if inwards < 0.0 and around < 0.0:
         # Away from the centre and the wrong way round: never turn away from the circle.
         correction = max(correction, 0.0)
-    centripetal = around * around / max(0.5 * radius, radius + error)
+    bend_m = max(0.5 * radius, radius + error)
+    centripetal = (
+        around * around / bend_m if bend_m > 0.0 else 0.0
+    )  # at a centre without a circle: straight on
     hold = circle.direction * (correction + centripetal)
     circling = not (error > 0.0 and circle.direction * capture < circle.direction * hold)
     acceleration = hold if circling else capture

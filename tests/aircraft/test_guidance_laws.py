@@ -5,6 +5,7 @@ import math
 import pytest
 
 from aircraft.guidance.interface import GuidanceLimits
+from aircraft.guidance.l1 import L1Circle, L1Config, L1Memory, L1Motion, follow_circle
 from aircraft.guidance.npfg import NpfgConfig, NpfgInput, npfg
 from aircraft.guidance.pure_pursuit import (
     PurePursuitConfig,
@@ -53,6 +54,18 @@ def test_the_integrator_waits_while_the_roll_is_cut() -> None:
     assert output.saturated
     assert output.integral_rad == 0.01
     assert output.roll_rad == pytest.approx(-math.radians(45.0))
+
+
+@pytest.mark.parametrize("speed_mps", [25.0, 0.05])
+def test_l1_flies_straight_on_at_the_centre_of_a_circle_without_a_radius(speed_mps: float) -> None:
+    has = L1Config().parameters()
+    at = L1Motion(7.0, -3.0, speed_mps, 0.0, 0.0, 0, 1.0)
+    output, memory = follow_circle(at, L1Circle(7.0, -3.0, 0.0, 1.0), L1Memory(), has)
+    assert all(map(math.isfinite, (*output, *memory)))
+    assert output.crosstrack_m == 0.0
+    beside, _ = follow_circle(at._replace(east_m=8.0), L1Circle(7.0, -3.0, 0.0, 1.0), L1Memory(), has)
+    assert beside.crosstrack_m == 1.0
+    assert math.isfinite(beside.lateral_acceleration_mps2)
 
 
 def test_pure_pursuit_turns_on_the_arc_through_the_goal() -> None:
