@@ -9,19 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 
+from aircraft.actuators.actuator import Actuators
 from aircraft.airframe import Airframe
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.guidance.progress import RouteProgress
 from aircraft.guidance.registry import DEFAULT_KIND, guidance_kinds
 from aircraft.interface import Route
 from aircraft.route import arc_point
 from aircraft.start import Atmosphere, StartConditions
+from harness.flight.navigation import Navigator
+from harness.flight.state_estimator import PerfectEstimator, StateEstimator
+from harness.scenario.navigation import Navigation
 
 ALTITUDE_M: Final = 300.0
 COURSE_RAD: Final = 0.3
@@ -60,20 +65,22 @@ class Tracking:
 
 @dataclass(frozen=True)
 class Case:
-    """One kind of air.
+    """One kind of air, or of navigation.
 
     Attributes:
         name: for the table.
+        limits: promised for the Aerosonde; None where nothing is.
         wind_share: steady wind over airspeed; its direction is drawn.
         turbulence, intensity: as `Atmosphere` has them.
-        limits: promised for the Aerosonde.
+        navigation: a preset of the scenario's section; its errors are drawn.
     """
 
     name: str
-    limits: Tracking
+    limits: Tracking | None
     wind_share: float = 0.0
     turbulence: str | None = None
     intensity: str | None = None
+    navigation: Literal["perfect", "gnss", "rtk", "dead_reckoning"] = "perfect"
 
     def atmosphere(self, airspeed_mps: float, seed: int) -> Atmosphere:
         """The air of a seed."""
@@ -81,6 +88,12 @@ class Case:
         wind = self.wind_share * airspeed_mps
         east, north = wind * math.sin(towards), wind * math.cos(towards)
         return Atmosphere(east, north, self.turbulence, self.intensity, seed)
+
+    def navigator(self, seed: int) -> StateEstimator:
+        """What the aircraft believes of its state, for a seed."""
+        if self.navigation == "perfect":
+            return PerfectEstimator()
+        return Navigator(Navigation(kind=self.navigation), np.random.SeedSequence((seed, 3)))
 
 
 CASES: Final = (
@@ -90,6 +103,7 @@ CASES: Final = (
     Case("moderate Tustin", Tracking(0.50, 2.0, 1.0, 0.0), 0.0, "tustin", "moderate"),
     Case("moderate Milspec", Tracking(0.50, 2.0, 1.0, 0.0), 0.0, "milspec", "moderate"),
     Case("severe, wind 30 %", Tracking(1.0, 4.0, 2.0, 0.05), 0.3, "tustin", "severe"),
+    Case("gnss", None, navigation="gnss"),
 )
 LIMIT_FACTORS: Final = {"aerosonde": 1.0, "c172p": 4.0, "T38": 8.0}
 """By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified."""
@@ -112,9 +126,24 @@ def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
 
 
 def fly_course(
-    frame: Airframe, airspeed_mps: float, air: Atmosphere, route: Route, guidance: str = DEFAULT_KIND
+    frame: Airframe,
+    airspeed_mps: float,
+    air: Atmosphere,
+    route: Route,
+    guidance: str = DEFAULT_KIND,
+    navigator: StateEstimator | None = None,
+    as_believed: bool = False,
 ) -> Tracking:
     """Flies a route from its start to its end, under a guidance law at its defaults.
+
+    Args:
+        frame: the aircraft.
+        airspeed_mps: true airspeed.
+        air: what it flies in.
+        route: from (0, 0) along `COURSE_RAD`; it is moved to where the aircraft believes that it begins, as a plan is.
+        guidance: the law.
+        navigator: what the aircraft believes of its state; None: the truth.
+        as_believed: the errors are those that the aircraft believes it has, not the true ones.
 
     Raises:
         AircraftError: the aircraft cannot start in this air.
@@ -129,20 +158,33 @@ def fly_course(
         air,
     )
     law = guidance_kinds()[guidance].law(frame.guidance_limits(airspeed_mps))
+    navigator = navigator or PerfectEstimator()
+    if not isinstance(navigator, PerfectEstimator):
+        start = navigator.believed(model.state())
+        route = _moved(route, start.east_m, start.north_m)
     law.follow(route)
+    progress = RouteProgress(route)
     steps = model.step_rate_hz // UPDATE_RATE_HZ
     cross, altitude, saturated = [], [], 0
     while True:
-        state = model.state()
+        true = model.state()
         if fault := model.fault():
-            raise ArithmeticError(f"{frame.name}: control is lost after {state.time_s:.0f} s: {fault}")
-        output = law.update(state)
+            raise ArithmeticError(f"{frame.name}: control is lost after {true.time_s:.0f} s: {fault}")
+        believed = navigator.believed(true)
+        output = law.update(believed)
         if output.past_end:
             break
-        cross.append(abs(output.cross_track_m))
-        altitude.append(abs(state.up_m - ALTITUDE_M))
+        if as_believed or believed is true:
+            cross.append(abs(output.cross_track_m))
+        else:
+            cross.append(abs(progress.nearest(true.east_m, true.north_m).cross_track_m))
+        altitude.append(abs((believed if as_believed else true).up_m - ALTITUDE_M))
         saturated += output.bank_saturated
-        model.command(output.roll_command_rad, ALTITUDE_M, airspeed_mps)
+        model.command(
+            output.roll_command_rad,
+            ALTITUDE_M + (true.up_m - believed.up_m),  # the model holds true values
+            output.airspeed_or(airspeed_mps) + (true.airspeed_mps - believed.airspeed_mps),
+        )
         model.advance(steps)
     return Tracking(
         float(np.percentile(cross, 95)),
@@ -152,21 +194,33 @@ def fly_course(
     )
 
 
+def _moved(route: Route, east_m: float, north_m: float) -> Route:
+    segments = route.segments.copy()
+    segments[:, :2] += east_m, north_m
+    return Route(segments, route.loiter)
+
+
 def tracked(
     name: str,
     case: Case,
     seeds: Sequence[int],
     airspeed_mps: float | None = None,
     guidance: str = DEFAULT_KIND,
+    actuators: Actuators | None = None,
+    as_believed: bool = False,
 ) -> Tracking:
-    """The worst of the courses of some seeds, each at the radius that planning uses for `preview` in that air."""
-    frame = airframe(name)
+    """The worst of the courses of some seeds, each at the radius that planning uses for `preview` in that air.
+
+    `actuators` are its servos, None: those of the airframe table; `as_believed` as `fly_course` has it.
+    """
+    frame = airframe(name, actuators)
     speed = airspeed_mps or frame.cruise_mps
     worst = Tracking(0.0, 0.0, 0.0, 0.0)
     for seed in seeds:
         air = case.atmosphere(speed, seed)
         radius_m = performance(frame, speed, air.wind_mps, air.intensity).turn_radius_m
-        worst = worst.worse(fly_course(frame, speed, air, course(seed, radius_m), guidance))
+        route, navigator = course(seed, radius_m), case.navigator(seed)
+        worst = worst.worse(fly_course(frame, speed, air, route, guidance, navigator, as_believed))
     return worst
 
 
@@ -198,7 +252,7 @@ def bench_tracking(
         if progress is not None:
             progress(done, len(CASES), case.name)
         flown = tracked(name, case, range(1, seeds + 1), guidance=guidance)
-        limits = case.limits.times(factor) if factor else None
+        limits = case.limits.times(factor) if factor and case.limits else None
         rows.append(
             {
                 "case": case.name,
