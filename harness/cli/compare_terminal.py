@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -14,11 +15,12 @@ from rich.table import Table
 from harness.analysis.rows import CRASHED, DASH, FIGURES, ON_TERMINAL, Row
 from harness.cli.terminal import plain
 from harness.comparison.flights import Progress as Report
+from harness.files.wording import printable
 from harness.scenario.scenario import Scenario
 
 WIDTH = 80
 NAME_WIDTH = 14
-"""A longer name of a planner goes on in the next line."""
+"""A longer name goes on in the next line."""
 
 _STYLE = {"reached": "bold green", "unreachable": "bold yellow"}
 
@@ -52,27 +54,60 @@ def comparison_bar(scenarios: Sequence[Scenario]) -> Iterator[Report | None]:
 
 
 def print_comparison(rows: Sequence[Row]) -> None:
-    """One table a scenario on standard output, and why those that crashed did."""
+    """One table a scenario on standard output, and why those that crashed did.
+
+    Where one planner flew under several guidance laws, the rows are called after the laws, and the planner is in the
+    title.
+    """
     console = Console()
     shown = [next(figure for figure in FIGURES if figure.short == short) for short in ON_TERMINAL]
     for name in dict.fromkeys(row.scenario for row in rows):
+        own = [row for row in rows if row.scenario == name]
+        by_law = all(row.guidance for row in own) and len({row.planner for row in own}) == 1
         table = Table(
-            title=plain(name), box=box.SIMPLE, title_justify="left", padding=(0, 1, 0, 0), pad_edge=False
+            title=plain(f"{name}, {own[0].planner}" if by_law else name),
+            box=box.SIMPLE,
+            show_edge=False,
+            title_justify="left",
+            padding=0,
         )
-        table.add_column("planner", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
+        heading = "guidance" if by_law else "planner"
+        table.add_column(heading, min_width=NAME_WIDTH, max_width=NAME_WIDTH, no_wrap=True)
         for figure in shown:
             table.add_column(
                 figure.short, justify="left" if figure.short == "outcome" else "right", no_wrap=True
             )
-        own = [row for row in rows if row.scenario == name]
         for row in own:
             style = _STYLE.get(row.outcome, "bold red")
             cells = [plain(figure.text(row)) or DASH for figure in shown]
             cells[0] = f"[{style}]{cells[0]}[/]"
-            table.add_row(plain(row.label), *cells)
+            table.add_row(plain("\n".join(_name_lines(row, by_law))), *cells)
         console.print(table, width=min(WIDTH, console.width))
+        console.print()
         for row in own:
             if row.outcome == CRASHED:
                 console.print(
                     f"{plain(row.label)} crashed: {plain(row.reason)}", highlight=False, soft_wrap=True
                 )
+
+
+def _name_lines(row: Row, by_law: bool) -> list[str]:
+    """The name of a row in lines of `NAME_WIDTH`: planner and law never share one."""
+    if by_law:
+        return _folded(row.guidance)
+    if not row.guidance:
+        return _folded(row.planner)
+    return [*_folded(row.planner), *(f" {line}" for line in _folded(row.guidance, NAME_WIDTH - 1))]
+
+
+def _folded(name: str, width: int = NAME_WIDTH) -> list[str]:
+    """A name in lines, each as long as can be, broken between its words: after `_`, `-`, `.` or `:`.
+
+    A word that is too long for a line is cut.
+    """
+    lines = [""]
+    for word in re.findall(r"[^_.:-]*[_.:-]+|[^_.:-]+", printable(name)):
+        if len(lines[-1]) + len(word) > width:
+            lines.append("")
+        lines[-1] += word
+    return [line[at : at + width] for line in lines if line for at in range(0, len(line), width)]
