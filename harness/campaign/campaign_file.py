@@ -13,11 +13,11 @@ from pydantic import BeforeValidator, Field, Strict, ValidationError, model_vali
 from harness.campaign.sampling import Distribution, Sampler
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, fault_line, node_of
-from harness.scenario.scenario import model_or_folder
+from harness.scenario.generators.generators import WorldSpec
+from harness.scenario.resolving import model_or_folder
 from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
 from harness.scenario.shipped import shipped_scenarios
 from harness.scenario.validation import KeyFault, input_error, shown
-from harness.scenario.world_generators import WorldSpec
 
 SCHEMA: Final = "wayproof/campaign/1"
 MAX_RUNS: Final = 1_000_000

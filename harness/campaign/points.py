@@ -100,7 +100,8 @@ def failures(summary: Summary, folder: Path) -> list[Failure]:
 def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
     from harness.report.figures import FigureScene
     from harness.run_files.run_folder import load_run
-    from harness.scenario.scenario import mission_of, parse_scenario
+    from harness.scenario.performance import mission_of
+    from harness.scenario.scenario import parse_scenario
     from harness.world.world import World
 
     for number, outcome, folder in runs:

@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from pydantic import ValidationError
 
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.cells import PlannedRun, cell_of, entry_columns, kind_of
@@ -33,10 +32,10 @@ from harness.files.strict_yaml import (
     node_of,
     replaced,
 )
+from harness.scenario.generators.generators import generated
 from harness.scenario.overrides import overridden, with_key
-from harness.scenario.scenario import Scenario, packed, unpacked
-from harness.scenario.validation import faults, in_lines
-from harness.scenario.world_generators import generated
+from harness.scenario.scenario import Scenario, packed, scenario_from, unpacked
+from harness.scenario.validation import KeyFaults, in_lines
 
 SEED, WORLD, DRAW, DESIGN = range(4)
 """Random streams of a case; DESIGN is one of a combination."""
@@ -197,9 +196,9 @@ class CampaignRuns:
                 raise InputError(self._line(origin, sentence)) from error
         root = overridden(root, overrides)
         try:
-            return Scenario.model_validate(root.plain())
-        except ValidationError as error:
-            lines = [self._fault(number, root, changes, *fault) for fault in faults(error, Scenario)]
+            return scenario_from(root.plain())
+        except KeyFaults as error:
+            lines = [self._fault(number, root, changes, *fault) for fault in error.every]
             raise in_lines(lines, self.file.source) from error
 
     def packed(self, number: int) -> bytes:

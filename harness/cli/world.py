@@ -122,7 +122,8 @@ def _pair(text: str, option: str) -> Pair:
 
 def _craft(name: str, clearance_m: float | None) -> Craft:
     """What the aircraft asks of the area, by the scenario's own defaults."""
-    from harness.scenario.scenario import performance_of, scenario_of
+    from harness.scenario.performance import performance_of
+    from harness.scenario.scenario import scenario_of
     from harness.world_files.siting import Craft
 
     keys: dict[str, Any] = {

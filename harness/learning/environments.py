@@ -27,7 +27,8 @@ from harness.learning.episode import Episode
 from harness.learning.observation import LEAST, MOST, ScanKeeper, state_of
 from harness.learning.pilots import LinePilot, RollPilot, WaypointPilot
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, load_scenario, mission_of
+from harness.scenario.performance import mission_of
+from harness.scenario.scenario import Scenario, load_scenario
 from harness.scenario.shipped import scenario_path
 
 Observation = dict[str, NDArray[Any]]

@@ -11,7 +11,8 @@ from harness.analysis.planned import PlannedRows, planned_rows
 from harness.analysis.rows import Row, number, row_of
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
-from harness.scenario.scenario import Scenario, performance_of
+from harness.scenario.performance import performance_of
+from harness.scenario.scenario import Scenario
 from harness.world.optimum import Optimum, shortest_path
 from harness.world.world import World
 

@@ -18,7 +18,8 @@ from harness.run_files.mission.flying import Flying, Ground
 from harness.run_files.mission.route import mission_route
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.guidance_keys import airframe_of
-from harness.scenario.scenario import Scenario, performance_of
+from harness.scenario.performance import performance_of
+from harness.scenario.scenario import Scenario
 from harness.scenario.sections import ALTITUDES_M
 from harness.scenario.validation import KeyFault
 

@@ -32,8 +32,9 @@ from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
 from harness.scenario.guidance_keys import airframe_of, law_of
+from harness.scenario.performance import mission_of, performance_of
 from harness.scenario.planner_keys import planner_of
-from harness.scenario.scenario import Scenario, dump_scenario, mission_of, performance_of
+from harness.scenario.scenario import Scenario, dump_scenario
 from harness.scenario.sections import Environment, Origin
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World

@@ -50,6 +50,18 @@ class KeyFault(ValueError):
         self.loc = loc
 
 
+class KeyFaults(ValueError):
+    """What is wrong with the keys of a file.
+
+    Attributes:
+        every: key and sentence of each fault.
+    """
+
+    def __init__(self, every: Sequence[tuple[Loc, str]]) -> None:
+        super().__init__("; ".join(sentence for _, sentence in every))
+        self.every = tuple(every)
+
+
 def input_error(error: ValidationError, model: type[BaseModel], root: Node, source: str) -> InputError:
     """What is wrong with a file, at most MAX_FAULTS lines of it.
 
@@ -59,8 +71,13 @@ def input_error(error: ValidationError, model: type[BaseModel], root: Node, sour
         root: the file.
         source: its name.
     """
-    found = faults(error, model)
-    return in_lines([fault_line(source, root.line_of(loc), loc, sentence) for loc, sentence in found], source)
+    return fault_error(KeyFaults(faults(error, model)), root, source)
+
+
+def fault_error(found: KeyFaults, root: Node, source: str) -> InputError:
+    """The same of faults that are told already."""
+    lines = [fault_line(source, root.line_of(loc), loc, sentence) for loc, sentence in found.every]
+    return in_lines(lines, source)
 
 
 def faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[Loc, str]]:

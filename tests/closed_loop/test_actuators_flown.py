@@ -10,7 +10,8 @@ from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.flight.record import Track
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario, performance_of
+from harness.scenario.performance import performance_of
+from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
 
 TEXT = """\
 schema: wayproof/scenario/1

@@ -22,7 +22,8 @@ from harness.files.strict_yaml import dump
 from harness.flight.closed_loop import fly
 from harness.flight.record import FloatArray, Outcome
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import Scenario, dump_scenario, mission_of, parse_scenario
+from harness.scenario.performance import mission_of
+from harness.scenario.scenario import Scenario, dump_scenario, parse_scenario
 from tests.longer import longer
 from tests.point_mass import PointMass
 

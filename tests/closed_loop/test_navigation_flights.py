@@ -20,7 +20,8 @@ from harness.flight.state_estimator import PerfectEstimator
 from harness.mapping.sensed_map import SensedMap
 from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
-from harness.scenario.scenario import Scenario, mission_of, parse_scenario
+from harness.scenario.performance import mission_of
+from harness.scenario.scenario import Scenario, parse_scenario
 from planner.interface import Plan, PlanRequest
 from tests.closed_loop.conftest import SmallWorld
 from tests.point_mass import PointMass

@@ -8,7 +8,8 @@ from aircraft.guidance.waypoints import WaypointLaw
 from harness.files.strict_yaml import InputError
 from harness.flight.closed_loop import fly
 from harness.run.scenario_flight import make_loop
-from harness.scenario.scenario import dump_scenario, parse_scenario, performance_of
+from harness.scenario.performance import performance_of
+from harness.scenario.scenario import dump_scenario, parse_scenario
 
 TEXT = """\
 schema: wayproof/scenario/1

@@ -18,7 +18,7 @@ from aircraft.guidance.registry import guidance_kinds
 from harness.api.metrics import Figures, Metrics
 from harness.cli.app import main
 from harness.flight.record import TRACK_FIELDS
-from harness.scenario.scenario import mission_of
+from harness.scenario.performance import mission_of
 from tests.harness.api.worlds import SCENARIO, Beeline, small, source_file
 
 

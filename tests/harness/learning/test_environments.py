@@ -19,7 +19,8 @@ import wayproof
 from harness.cli.app import main
 from harness.learning.observation import STATE, ScanKeeper, state_of
 from harness.mapping.scan import RangeScan
-from harness.scenario.scenario import Scenario, dump_scenario, mission_of
+from harness.scenario.performance import mission_of
+from harness.scenario.scenario import Scenario, dump_scenario
 from tests.closed_loop.conftest import world
 from tests.harness.learning.steering import flown
 

@@ -16,7 +16,8 @@ from aircraft.start import Atmosphere, StartConditions
 from harness.run import scenario_flight as run
 from harness.run.scenario_flight import atmosphere, flight_limits, fly_to_folder, make_loop, start_conditions
 from harness.run_files.run_folder import load_run
-from harness.scenario.scenario import Scenario, load_scenario, performance_of
+from harness.scenario.performance import performance_of
+from harness.scenario.scenario import Scenario, load_scenario
 from harness.scenario.shipped import scenario_path
 from tests.point_mass import PointMass
 

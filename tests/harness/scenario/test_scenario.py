@@ -21,15 +21,17 @@ import aircraft
 from aircraft.airframes import airframe
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
+from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError
+from harness.scenario.keys import ScenarioKeys
+from harness.scenario.performance import LEAST_CLEARANCE, mission_of, performance_of
+from harness.scenario.resolving import resolve
 from harness.scenario.scenario import (
-    LEAST_CLEARANCE,
     Scenario,
     dump_scenario,
     load_scenario,
-    mission_of,
     parse_scenario,
-    performance_of,
+    scenario_from,
     scenario_schema,
 )
 from harness.scenario.shipped import scenario_path
@@ -247,7 +249,7 @@ def test_is_frozen() -> None:
 @pytest.mark.parametrize("name", ["on", "1e3", "0.1", "null", "0x1f", "yes", "-", "_", "2001-01-01", "1.-"])
 def test_dumped_text_stays_text(name: str) -> None:
     data = {**yaml.safe_load(LEAST), "name": name}
-    scenario = Scenario.model_validate(data)
+    scenario = scenario_from(data)
     text = dump_scenario(scenario)
     assert parse_scenario(text) == scenario
     assert yaml.safe_load(text)["name"] == name
@@ -281,7 +283,7 @@ def test_a_dump_loads_back_bit_for_bit(
 ) -> None:
     data = yaml.safe_load(LEAST)
     data["mission"]["altitude_m"] = altitude_m
-    scenario = Scenario.model_validate({**data, "obstacles": obstacles, "seed": seed, "sensor": sensor})
+    scenario = scenario_from({**data, "obstacles": obstacles, "seed": seed, "sensor": sensor})
     text = dump_scenario(scenario)
     again = parse_scenario(text)
     assert again == scenario
@@ -560,3 +562,21 @@ def test_obstacles_from_a_file_are_cut_anew_at_another_altitude(tmp_path: Path) 
     high = low.with_({"mission.altitude_m": 900})
     assert (len(high.obstacles), high.mission.altitude_m) == (0, 900)
     assert high.with_({"mission.altitude_m": 80}) == low
+
+
+def test_reading_a_file_flies_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def flown(*_: object) -> None:
+        raise AssertionError("an aircraft was flown")
+
+    monkeypatch.setattr("harness.scenario.resolving.performance_of", flown)
+    keys = ScenarioKeys.model_validate(strict_yaml.parse(LEAST, "least").plain())
+    assert "clearance_m" not in keys.planner.model_dump(exclude_none=True)
+    with pytest.raises(AssertionError, match="flown"):
+        resolve(keys)
+
+
+def test_resolving_leaves_what_was_read_as_it_is() -> None:
+    keys = ScenarioKeys.model_validate(strict_yaml.parse(LEAST, "least").plain())
+    complete = resolve(keys)
+    assert "clearance_m" not in keys.planner.model_dump(exclude_none=True)
+    assert complete.planner.clearance_m == parse_scenario(LEAST).planner.clearance_m

@@ -14,10 +14,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from harness.files.strict_yaml import dump
-from harness.scenario import worlds_scattered
-from harness.scenario.generated_world import GeneratedWorld
+from harness.scenario.generators import scattered as scattered_worlds
+from harness.scenario.generators.generated_world import GeneratedWorld
+from harness.scenario.generators.generators import GENERATORS, WorldSpec, generated
 from harness.scenario.scenario import parse_scenario
-from harness.scenario.world_generators import GENERATORS, WorldSpec, generated
 
 ROUNDING_M = 0.2
 BOUNDED = settings(derandomize=True, max_examples=25, suppress_health_check=[HealthCheck.too_slow])
@@ -222,14 +222,14 @@ def test_small_obstacles_are_looked_for_among_those_near_by_however_much_room_st
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     made: list[Any] = []
-    taken = worlds_scattered._Taken
+    taken = scattered_worlds._Taken
 
     def kept(*arguments: Any) -> Any:
         made.append(taken(*arguments))
         return made[-1]
 
-    monkeypatch.setattr(worlds_scattered, "_Taken", kept)
+    monkeypatch.setattr(scattered_worlds, "_Taken", kept)
     keys = {"size_m": [1600, 1600], "density_1pkm2": 1500, "radius_m": [1, 2], "gap_m": 0, "room_m": 400}
-    world = worlds_scattered.circles(worlds_scattered.Circles.model_validate(keys), np.random.default_rng(1))
+    world = scattered_worlds.circles(scattered_worlds.Circles.model_validate(keys), np.random.default_rng(1))
     assert len(world.obstacles) > 3000
     assert max(map(len, made[0]._near.values())) < 100

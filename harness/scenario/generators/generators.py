@@ -8,9 +8,8 @@ from typing import Any, Final
 import numpy as np
 from pydantic import ConfigDict, model_validator
 
-from harness.scenario import worlds_scattered as scattered
-from harness.scenario import worlds_walled as walled
-from harness.scenario.generated_world import GeneratedWorld
+from harness.scenario.generators import scattered, walled
+from harness.scenario.generators.generated_world import GeneratedWorld
 from harness.scenario.sections import Section, key
 
 GENERATORS: Final[dict[str, Callable[[Any, np.random.Generator], GeneratedWorld]]] = {

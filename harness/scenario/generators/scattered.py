@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
-from harness.scenario.generated_world import (
+from harness.scenario.generators.generated_world import (
     MAX_CORNERS,
     MAX_OBSTACLES,
     GeneratedWorld,

@@ -11,7 +11,13 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from harness.scenario.generated_world import MAX_OBSTACLES, GeneratedWorld, ObstacleKeys, Span, polygon
+from harness.scenario.generators.generated_world import (
+    MAX_OBSTACLES,
+    GeneratedWorld,
+    ObstacleKeys,
+    Span,
+    polygon,
+)
 from harness.scenario.sections import MAX_COORDINATE_M, Section, key
 
 SPIRAL_STEP_RAD: Final = math.radians(10.0)

@@ -1,0 +1,1 @@
+"""Worlds drawn from a seed: what a campaign file names under `worlds`."""

@@ -1,0 +1,69 @@
+"""What a scenario file says: its sections as they were read. `resolving.resolve` fills in what follows from others."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, FailFast, Strict
+
+from harness.scenario.ground import GroundSpec, SourceSpec
+from harness.scenario.navigation import Navigation
+from harness.scenario.obstacles import Obstacle
+from harness.scenario.sections import (
+    AircraftSpec,
+    Area,
+    Environment,
+    GuidanceSpec,
+    MissionSpec,
+    PlannerSpec,
+    Section,
+    Sensor,
+    TrackabilitySpec,
+    key,
+)
+from harness.scenario.simulation import Simulation
+
+
+class ScenarioKeys(Section):
+    """One flight as a file describes it; flying it twice gives the same track bit for bit.
+
+    Attributes equal the keys of the file, except `schema_`, which is `schema` there.
+    """
+
+    model_config = ConfigDict(title="Scenario")
+
+    schema_: Literal["wayproof/scenario/1"] = key("Format and version.", alias="schema")
+    name: str = key("Names the run folder.", pattern=r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$", max_length=100)
+    seed: int = key("Root seed; every random stream derives from it.", unit="1", default=1, ge=0, le=2**53)
+    area: Area = key("The area of operations.")
+    obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(
+        "Unknown to the planner until sensed.", default=()
+    )
+    ground: GroundSpec | None = key(
+        "The true ground. Default: that of terrain files among the obstacles.", default=None
+    )
+    sources: Annotated[tuple[SourceSpec, ...], Strict(False)] | None = key(
+        "Files that obstacles and ground were made of. Default: none.", default=None
+    )
+    mission: MissionSpec = key("From where to where.")
+    aircraft: AircraftSpec = key("What flies.", default_factory=AircraftSpec)
+    sensor: Sensor = key("What it senses with.", default_factory=Sensor)
+    planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
+    guidance: GuidanceSpec = key("What steers along the plan.", default_factory=GuidanceSpec)
+    navigation: Navigation = key("What it believes of its state.", default_factory=Navigation)
+    simulation: Simulation = key("How finely it is integrated.", default_factory=Simulation)
+    environment: Environment = key("The air.", default_factory=Environment)
+    trackability: TrackabilitySpec = key(
+        "What a leg may be off before it counts as not trackable.", default_factory=TrackabilitySpec
+    )
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What the file has, by attribute."""
+        return {
+            name: getattr(self, name) for name in type(self).model_fields if name in self.model_fields_set
+        }
+
+    def updated(self, **sections: Any) -> ScenarioKeys:
+        """The same with some sections replaced."""
+        return self.model_copy(update=sections)

@@ -1,0 +1,107 @@
+"""What a scenario's aircraft can do, and what its planner is told of it and of the mission."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from harness.scenario import guidance_keys
+from harness.scenario.keys import ScenarioKeys
+from harness.scenario.sections import Bounds
+from harness.scenario.validation import KeyFault
+
+if TYPE_CHECKING:
+    from aircraft.interface import Performance
+    from planner.interface import Mission
+
+LEAST_CLEARANCE: Final = 0.02
+"""Share of the turn radius that planners keep from obstacles at the least, where less is wanted."""
+MAX_WIND_FRACTION: Final = 0.9
+"""Wind from this fraction of the airspeed on is refused: against it an aircraft makes hardly any way."""
+
+
+def performance_of(scenario: ScenarioKeys) -> Performance:
+    """What the scenario's aircraft can do at its airspeed under its guidance, in its wind, gust and turbulence.
+
+    Args:
+        scenario: its airspeed and the keys of its guidance law filled in.
+
+    Raises:
+        KeyFault: there is no such aircraft, it cannot hold the airspeed, the wind is too strong for it, or the guidance
+            law does not track with it.
+    """
+    from aircraft.airframes import AircraftError
+    from aircraft.envelope import performance
+
+    spec, air = scenario.aircraft, scenario.environment
+    wind_mps = wind_mps_of(scenario)
+    if wind_mps >= MAX_WIND_FRACTION * spec.airspeed_mps:
+        raise KeyFault(
+            ("environment", "wind", "speed_mps"),
+            f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s",
+        )
+    try:
+        gusts = air.turbulence.intensity if air.turbulence else None
+        front_mps = air.gust.speed_mps if air.gust else 0.0
+        frame = guidance_keys.airframe_of(spec)
+        frame.check_airspeed(spec.airspeed_mps)
+        law = guidance_keys.card_of(scenario.guidance, spec)
+        return performance(frame, spec.airspeed_mps, wind_mps, gusts, front_mps, law)
+    except AircraftError as error:
+        raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
+
+
+def wind_mps_of(scenario: ScenarioKeys) -> float:
+    """Speed of the steady wind (m/s)."""
+    wind = scenario.environment.wind
+    return wind.speed_mps if wind else 0.0
+
+
+def mission_of(scenario: ScenarioKeys) -> Mission:
+    """What a planner is told before the flight.
+
+    The clearance is that of `planner.clearance_m` and, on top, the margin for the error of the believed position. It is
+    no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept
+    from the border of the area, as far as start and goal lie within it.
+
+    Args:
+        scenario: all but the own keys of its planner filled in.
+
+    Raises:
+        KeyFault: as `performance_of` has it.
+    """
+    return mission_with(scenario, performance_of(scenario))
+
+
+def mission_with(scenario: ScenarioKeys, performance: Performance) -> Mission:
+    """The same as `mission_of`, where it is known what the aircraft can do."""
+    from planner.interface import Mission
+
+    margin_m = scenario.navigation.margin_m or 0.0
+    return Mission(
+        goal_m=scenario.mission.goal_m,
+        goal_radius_m=scenario.mission.goal_radius_m,
+        bounds_m=_inside(scenario.area.bounds_m, margin_m, scenario.mission.start_m, scenario.mission.goal_m),
+        clearance_m=max(
+            scenario.planner.clearance_m + margin_m,
+            LEAST_CLEARANCE * performance.turn_radius_m,
+        ),
+        turn_radius_m=performance.turn_radius_m,
+        speed_mps=performance.airspeed_mps,
+        roll_in_s=performance.roll_in_s,
+        tracking_error_m=performance.tracking_error_m,
+        sensor_range_m=scenario.sensor.range_m,
+        compute_latency_s=scenario.planner.compute_latency_s,
+        sensor_latency_s=scenario.sensor.latency_s,
+        wind_mps=wind_mps_of(scenario),
+    )
+
+
+def _inside(bounds_m: Bounds, margin_m: float, *places_m: tuple[float, float]) -> Bounds:
+    """Bounds that are smaller by a margin on each side, but hold some places."""
+    xmin, ymin, xmax, ymax = bounds_m
+    return (
+        min(xmin + margin_m, *(east for east, _ in places_m)),
+        min(ymin + margin_m, *(north for _, north in places_m)),
+        max(xmax - margin_m, *(east for east, _ in places_m)),
+        max(ymax - margin_m, *(north for _, north in places_m)),
+    )

@@ -1,0 +1,153 @@
+"""From what a scenario file says to a complete scenario: defaults that follow from other keys or from the aircraft.
+
+`resolve` reads top to bottom in the order in which defaults depend on one another. To learn what an aircraft can do
+under a guidance law it may have to be flown, which is then kept on disk; reading a file (`ScenarioKeys`) never does.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Final, TypeVar
+
+from harness.scenario import guidance_keys, planner_keys
+from harness.scenario.checks import check_local_plane, check_start_and_goal
+from harness.scenario.files_resolved import plane_point
+from harness.scenario.files_resolved import resolved as files_expanded
+from harness.scenario.keys import ScenarioKeys
+from harness.scenario.navigation import planning_margin_m
+from harness.scenario.performance import LEAST_CLEARANCE, mission_with, performance_of, wind_mps_of
+from harness.scenario.sections import AircraftSpec, Area, MissionSpec, Section
+from harness.scenario.simulation import step_rate_hz
+from harness.scenario.validation import KeyFault
+from planner.geometry.margin import tolerance_m
+
+POUND_KG: Final = 0.45359237
+
+Part = TypeVar("Part", bound=Section)
+
+
+def resolve(keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True) -> ScenarioKeys:
+    """The same flight with every default filled in and every file of obstacles expanded.
+
+    Args:
+        keys: as they were read.
+        folder: where the folder of an aircraft, and files of obstacles, are sought first.
+        ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
+
+    Raises:
+        KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
+    """
+    sensor = keys.sensor
+    simulation = _filled(keys.simulation, rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
+    mission = _ends_in_plane(keys.mission, keys.area)
+    aircraft = keys.aircraft.model_copy(update={"model": model_or_folder(keys.aircraft.model, folder)})
+    aircraft = _filled(aircraft, airspeed_mps=_cruise_mps(aircraft))
+    guidance = guidance_keys.resolved(keys.guidance, aircraft)
+    scenario = keys.updated(simulation=simulation, mission=mission, aircraft=aircraft, guidance=guidance)
+
+    performance = performance_of(scenario)
+    radius_m, wind_mps = performance.turn_radius_m, wind_mps_of(scenario)
+    (x0, y0), (x1, y1) = mission.start_m, mission.goal_m
+    slowest_s = math.hypot(x1 - x0, y1 - y0) / (aircraft.airspeed_mps - wind_mps)
+    mission = _filled(
+        mission,
+        course_deg=math.degrees(math.atan2(x1 - x0, y1 - y0)) % 360,
+        goal_radius_m=_rounded_up(radius_m, 10),
+        time_limit_s=_rounded_up(10 * slowest_s + 60, 60),
+    )
+    planner = _filled(keys.planner, clearance_m=_rounded_up(radius_m, 10))
+    sensor = _filled(
+        sensor,
+        range_m=_rounded_up(10 * radius_m, 100),
+        beam_deg=sensor.field_of_view_deg / sensor.rays,
+        least_width_m=max(planner.clearance_m, LEAST_CLEARANCE * radius_m),
+    )
+    fastest_mps, unseen_m = aircraft.airspeed_mps + wind_mps, math.pi * radius_m
+    margin_m = planning_margin_m(keys.navigation, fastest_mps, mission.time_limit_s, unseen_m=unseen_m)
+    navigation = _filled(keys.navigation, margin_m=margin_m)
+    limits = _filled(
+        keys.trackability, cross_track_m=tolerance_m(planner.clearance_m, performance.tracking_error_m)
+    )
+    limits = _filled(
+        limits,
+        altitude_m=max(10.0, limits.cross_track_m),
+        airspeed_mps=0.1 * aircraft.airspeed_mps,
+        load_factor=_limit_load_factor(aircraft),
+    )
+    scenario = scenario.updated(
+        mission=mission, sensor=sensor, planner=planner, navigation=navigation, trackability=limits
+    )
+
+    check_local_plane(scenario.area)
+    scenario, names = _with_files_expanded(scenario, radius_m, folder)
+    if ends_checked:
+        check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
+    return scenario.updated(planner=planner_keys.resolved(planner, mission_with(scenario, performance)))
+
+
+def _filled(section: Part, **defaults: float) -> Part:
+    """A section with those of its keys filled in that the file leaves out."""
+    missing = {key: value for key, value in defaults.items() if getattr(section, key) is None}
+    return section.model_copy(update=missing)
+
+
+def _ends_in_plane(mission: MissionSpec, area: Area) -> MissionSpec:
+    """A mission whose start and goal are in metres, where they were given in degrees."""
+    ends = {name: getattr(mission, name) for name in ("start", "goal")}
+    given = {f"{name}_m": plane_point(place, area) for name, place in ends.items() if place}
+    return mission.model_copy(update={"start": None, "goal": None, **given}) if given else mission
+
+
+def _with_files_expanded(
+    scenario: ScenarioKeys, turn_radius_m: float, folder: Path | None
+) -> tuple[ScenarioKeys, tuple[str, ...]]:
+    """A scenario whose files are made into obstacles and ground, and what messages call each obstacle."""
+    room_m = turn_radius_m + scenario.planner.clearance_m
+    altitude_m = scenario.mission.altitude_m
+    found = files_expanded(scenario.obstacles, scenario.area, scenario.ground, altitude_m, room_m, folder)
+    if found.sources:
+        sources = (*(scenario.sources or ()), *found.sources)
+        scenario = scenario.updated(obstacles=found.obstacles, ground=found.ground, sources=sources)
+    return scenario, found.names
+
+
+def model_or_folder(model: str, folder: Path | None) -> str:
+    """The aircraft's name, or the absolute path of its folder: beside the scenario file, or from here."""
+    if "/" not in model and model in _aircraft_names():
+        return model
+    for place in (Path() if folder is None else folder, Path()):
+        try:
+            if (place / model).expanduser().is_dir():
+                return str((place / model).expanduser().resolve())
+        except (OSError, RuntimeError):  # too long, not allowed, or the home of nobody: no folder
+            continue
+    return model
+
+
+def _aircraft_names() -> tuple[str, ...]:
+    from aircraft.airframes import aircraft_names
+
+    return aircraft_names()
+
+
+def _cruise_mps(spec: AircraftSpec) -> float:
+    from aircraft.airframes import AircraftError, airframe
+
+    try:
+        airframe(spec.model)
+    except AircraftError as error:
+        raise KeyFault(("aircraft", "model"), str(error)) from error
+    try:
+        return guidance_keys.airframe_of(spec).cruise_mps
+    except AircraftError as error:
+        raise KeyFault(("aircraft", "actuators"), str(error)) from error
+
+
+def _limit_load_factor(spec: AircraftSpec) -> float:
+    weight_lb = guidance_keys.airframe_of(spec).mass_kg / POUND_KG
+    return min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0))
+
+
+def _rounded_up(value: float, step: int) -> float:
+    return float(math.ceil(value / step) * step)
