@@ -362,9 +362,9 @@ def _rounded(polygons: Sequence[Any]) -> list[Any]:
 
     shapes = np.array(polygons, dtype=object)
     placed = shapely.transform(shapes, lambda points: np.round(points, DECIMALS))
-    placed = shapely.remove_repeated_points(placed)
-    bad = ~shapely.is_valid(placed)
+    bad = ~shapely.is_valid(placed)  # a sliver that the grid makes a line, too: of it nothing is left
     placed[bad] = shapely.set_precision(shapes[bad], 10.0**-DECIMALS)
+    placed = shapely.remove_repeated_points(placed)
     return [each for each in shapely.get_parts(placed) if each.geom_type == "Polygon" and each.area > 0]
 
 

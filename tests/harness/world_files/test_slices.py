@@ -13,7 +13,15 @@ import shapely
 
 from aircraft.frames import LocalPlane
 from harness.scenario.files_resolved import rings_of
-from harness.world_files.expansion import Expanded, FileFault, FileSpec, corners_of, expanded, loaded_file
+from harness.world_files.expansion import (
+    Expanded,
+    FileFault,
+    FileSpec,
+    _rounded,
+    corners_of,
+    expanded,
+    loaded_file,
+)
 from harness.world_files.growing import simplified
 from harness.world_files.plane import Mapping, Place, geodetic
 from tests.harness.world_files.making import SHARED, SQUARE, feature, geojson, geotiff
@@ -329,6 +337,17 @@ def test_corners_are_rounded_to_a_millimetre_and_stay_valid(tmp_path: Path) -> N
     assert polygon.is_valid
     assert len(corners) == 5
     assert np.array_equal(corners, np.round(corners, 3))
+
+
+def test_slivers_that_the_grid_makes_lines_are_left_out() -> None:
+    square = shapely.box(0.0, 0.0, 10.0, 10.0)
+    sliver = shapely.Polygon([(20.0001, 0.0), (20.0002, 0.0), (20.0004, 5.0)])
+    point = shapely.Polygon([(30.0001, 0.0001), (30.0002, 0.0), (30.0004, 0.0004)])
+    hole = square.difference(shapely.Polygon([(5.0001, 5.0), (5.0002, 5.0), (5.0004, 7.0)]))
+    assert [each.area for each in _rounded([sliver, square, point])] == [100.0]
+    (filled,) = _rounded([hole])
+    assert filled.is_valid
+    assert filled.area == pytest.approx(100.0, abs=1e-2)
 
 
 def test_the_rings_of_many_polygons_are_those_of_each() -> None:
