@@ -20,6 +20,9 @@ ACROSS: Final = 0.5
 """A world is large enough where start and goal lie so far apart, as a share of what a point could have."""
 TURNS: Final = (2.5, 2.0, 1.5, 1.2)
 """Room round start and goal beyond the clearance, in turn radii, as much as there is: 2 hold a circle to a side."""
+CORRIDORS: Final = (1.0, 0.5, 0.0)
+"""Room on the way from start to goal beyond the clearance, in turn radii, the widest that there is: 1 holds a circle,
+so that an aircraft can turn round anywhere on it."""
 LEAST_WAY: Final = 8.0
 """Start and goal are at least so many turn radii apart."""
 DIRECTIONS: Final = 24
@@ -111,21 +114,22 @@ def _span(low: float, high: float, size: int) -> tuple[int, int]:
 
 
 def ends(
-    room: FreeRoom, turn_radius_m: float, clearance_m: float
+    room: FreeRoom, turn_radius_m: float, clearance_m: float, corridor_turns: float = CORRIDORS[0]
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Start and goal: two places far apart with room to turn, joined by a corridor that keeps the clearance.
+    """Start and goal: two places far apart with room to turn, joined by a corridor.
 
     Args:
         room: of the area.
         turn_radius_m: of the aircraft.
         clearance_m: that its planner keeps.
+        corridor_turns: room to both sides of the middle of the corridor beyond the clearance, in turn radii.
 
     Returns:
         East and north of each; None where there are no two such places.
     """
     from scipy import ndimage
 
-    corridors, _ = ndimage.label(room.room_m >= clearance_m)
+    corridors, _ = ndimage.label(room.room_m >= clearance_m + corridor_turns * turn_radius_m)
     for turns in TURNS:
         fits = (room.room_m >= clearance_m + turns * turn_radius_m) & (corridors > 0) & room.allowed
         best: tuple[float, tuple[int, int], tuple[int, int]] | None = None

@@ -26,7 +26,15 @@ from harness.world_files.area import (
     whole_metres,
 )
 from harness.world_files.expansion import Expanded, FileFault, FileSpec, expanded, loaded_file
-from harness.world_files.free_room import LEAST_WAY, TURNS, ends, free_room, scale_that_fits
+from harness.world_files.free_room import (
+    CORRIDORS,
+    LEAST_WAY,
+    TURNS,
+    FreeRoom,
+    ends,
+    free_room,
+    scale_that_fits,
+)
 from harness.world_files.parts import Contents, WorldFileError
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.slicing import Box, sliced_cells
@@ -170,10 +178,12 @@ def _in_area(
     found = expanded(
         specs, place or ANY_PLACE, bounds, altitude_m, craft.turn_radius_m + craft.clearance_m, tell
     )
+    notes = area.notes
     if chosen is None:
-        chosen = _ends(found, contents, specs, place, bounds, craft)
+        chosen, told = _ends(found, contents, specs, place, bounds, craft)
+        notes += told
     start, goal = ((round(x, 1), round(y, 1)) for x, y in chosen)
-    return Site(tuple(specs), place, bounds, start, goal, found, area.notes)
+    return Site(tuple(specs), place, bounds, start, goal, found, notes)
 
 
 def _placed_ends(given: Ends | None, place: Place | None) -> Ends | None:
@@ -191,8 +201,8 @@ def _ends(
     place: Place | None,
     bounds: Box,
     craft: Craft,
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Start and goal in free room, or a sentence with the numbers that say why not."""
+) -> tuple[Ends, tuple[str, ...]]:
+    """Start and goal in free room, and what is to be said of the way; or the numbers that say why there are none."""
     solid = [each for source in found.sources for each in source.polygons]
     forbidden: list[Any] = []
     for each, spec in zip(contents, specs, strict=True):
@@ -200,9 +210,20 @@ def _ends(
             mapping = Mapping(each.crs, place or ANY_PLACE, spec.shift_m)
             forbidden += sliced_cells(each.occupied, np.isnan(each.occupied.values), mapping, bounds)[0]
     room = free_room(solid, bounds, forbidden)
-    chosen = ends(room, craft.turn_radius_m, craft.clearance_m)
-    if chosen is not None:
-        return chosen
+    cell_m = None
+    for turns in CORRIDORS:
+        chosen = ends(room, craft.turn_radius_m, craft.clearance_m, turns)
+        if chosen is None:
+            cell_m = cell_m or _cell_that_fits(room, contents, specs, craft)
+            continue
+        if turns == CORRIDORS[0]:
+            return chosen, ()
+        wide_m = 2.0 * (craft.clearance_m + CORRIDORS[0] * craft.turn_radius_m)
+        more = "" if cell_m is None else f"; with --metres-per-cell {cell_m:g} it can"
+        return chosen, (
+            f"every way from start to goal is somewhere narrower than {wide_m:,.0f} m, where {craft.name} cannot turn "
+            f"round: the goal may be proved unreachable{more}",
+        )
     width, height = bounds[2] - bounds[0], bounds[3] - bounds[1]
     needs = craft.clearance_m + TURNS[-1] * craft.turn_radius_m
     text = (
@@ -210,14 +231,21 @@ def _ends(
         f"goal need {needs:,.0f} m of free room around and {LEAST_WAY * craft.turn_radius_m:,.0f} m between them, the "
         f"widest free disc has {room.widest_m:,.0f} m"
     )
-    if any(each.crs is None and each.kind in SCALABLE for each in contents):
-        scale = scale_that_fits(room, craft.turn_radius_m, craft.clearance_m)
-        if scale is not None:
-            cell = _cell_m(contents, specs) * scale
-            raise WorldFileError(f"{text}; --metres-per-cell {_rounded_up(cell):g} would do")
+    if cell_m is not None:
+        raise WorldFileError(f"{text}; --metres-per-cell {cell_m:g} would do")
     raise WorldFileError(
         f"{text}; another altitude, a smaller clearance or aircraft, or a larger file would do"
     )
+
+
+def _cell_that_fits(
+    room: FreeRoom, contents: Sequence[Contents], specs: Sequence[FileSpec], craft: Craft
+) -> float | None:
+    """Side of a cell, in metres, with which the aircraft has room; None of files whose scale is given."""
+    if not any(each.crs is None and each.kind in SCALABLE for each in contents):
+        return None
+    scale = scale_that_fits(room, craft.turn_radius_m, craft.clearance_m)
+    return None if scale is None else _rounded_up(_cell_m(contents, specs) * scale)
 
 
 def _cell_m(contents: Sequence[Contents], specs: Sequence[FileSpec]) -> float:

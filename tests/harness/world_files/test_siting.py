@@ -58,3 +58,42 @@ def test_another_part_is_taken_where_the_most_crowded_has_no_room(tmp_path: Path
 def test_where_no_part_has_room_the_first_is_named(tmp_path: Path) -> None:
     with pytest.raises(WorldFileError, match="0% free, are too small for aerosonde"):
         sited(tmp_path / "a.geojson", *(zone(8.0 + 6 * k, 47.0, 0.8) for k in range(2)))
+
+
+def two_halls(path: Path, door: int) -> Path:
+    """A MovingAI map of 60 by 30 cells: two halls, a long and a short one, with a door of some cells between them."""
+    rows = [["."] * 60 for _ in range(30)]
+    for row in range(30):
+        rows[row][38] = "." if 15 - door / 2 <= row < 15 + door / 2 else "@"
+    path.write_text("type octile\nheight 30\nwidth 60\nmap\n" + "\n".join(map("".join, rows)) + "\n")
+    return path
+
+
+def occupancy(path: Path, metres_per_cell: float) -> Site:
+    return site([FileSpec(path, metres_per_cell=metres_per_cell)], 100.0, CRAFT)
+
+
+def test_start_and_goal_are_joined_by_a_way_on_which_the_aircraft_can_turn_round(tmp_path: Path) -> None:
+    # With 50 m a cell the door of 6 is 300 m wide: more than twice the clearance, less than a turn needs as well.
+    narrow = occupancy(two_halls(tmp_path / "a.map", 6), 50.0)
+    assert max(narrow.start_m[0], narrow.goal_m[0]) < 38 * 50.0
+    assert not any("proved unreachable" in note for note in narrow.notes)
+    wide = occupancy(two_halls(tmp_path / "b.map", 12), 50.0)
+    assert wide.start_m[0] < 38 * 50.0 < wide.goal_m[0]
+
+
+def test_a_world_in_which_it_can_turn_round_nowhere_on_the_way_says_with_which_cells_it_can(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.map"
+    rows = [["."] * 60 for _ in range(14)]
+    for column in range(14, 46):  # two ends, and a narrow corridor between them
+        for row in range(14):
+            rows[row][column] = "." if 4 <= row < 10 else "@"
+    path.write_text("type octile\nheight 14\nwidth 60\nmap\n" + "\n".join(map("".join, rows)) + "\n")
+    found = occupancy(path, 56.0)
+    (note,) = [note for note in found.notes if "proved unreachable" in note]
+    assert "narrower than 460 m, where aerosonde cannot turn round" in note
+    cell = float(note.partition("--metres-per-cell ")[2].split()[0])
+    assert cell > 56.0
+    assert not any("proved unreachable" in note for note in occupancy(path, cell).notes)
