@@ -148,6 +148,10 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--start", "48,9", "--goal", "48.1,9"], "lies outside the area"),
         (["--start", "47.005,8.005", "--goal", "47.005,8.05"], "the scenario would not fly"),
         (["--altitude-m", "1"], "at least 5"),
+        (
+            ["--altitude-m", "12000"],
+            "aerosonde cannot be trimmed for level flight at 25 m/s, 12000 m above sea level; --altitude-m 7000, or",
+        ),
     ],
 )
 def test_bad_usage_is_told_and_nothing_is_written(
