@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,7 +19,10 @@ from harness.analysis.smoothness import (
     window_m,
 )
 from harness.analysis.trackability import FlightLimits, legs, saturated
-from harness.flight.record import Flight, FloatArray, Outcome, Track, digest
+from harness.flight.record import Flight, FloatArray, IntArray, Outcome, Track, digest
+
+COUNTED_BEAMS: Final = 20
+"""A share of lost returns is told of scans in which at least so many beams met something: of a few, chance may lose all."""
 
 
 def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) -> dict[str, Any]:
@@ -28,8 +32,10 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two;
     `min_altitude_above_ground_m` is over the true ground, None where that is not known. Cross-track
     figures are of the rows flown under a plan, altitude figures of all rows, all of them of the true position.
-    `navigation_error_m`, how far from there the aircraft believed to be, and `navigation_margin_m`, what was planned
-    for it, are there unless navigation is perfect. `clearance_violation_s` counts the
+    `navigation_error_m`, how far from there the aircraft believed to be, `navigation_jump_m`, the most that this error
+    changes from one row to the next (as a vector), and `navigation_margin_m`, what was planned for it, are there unless
+    navigation is perfect. `plan_delay_s` is from the latest scan that a plan could know of until it took effect,
+    `lost_returns` how much of what beams met the sensor lost. `clearance_violation_s` counts the
     intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
     `replans` counts the plans accepted after the first. `compute_ms` is over all calls in which the planner searched,
     `smoothness` is defined in `harness.analysis.smoothness`, `trackability` in `harness.analysis.trackability`;
@@ -76,7 +82,9 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "trackable": bool(verdicts) and all(leg.trackable for leg in verdicts),
         "trackability": [dict(vars(leg)) for leg in verdicts],
         "replans": max(len(flight.plans) - 1, 0),
-        "compute_ms": compute_figures(flight.compute_ms),
+        "plan_delay_s": percentiles([plan.delay_s for plan in flight.plans if math.isfinite(plan.delay_s)]),
+        "lost_returns": lost_returns(flight.lost_returns),
+        "compute_ms": percentiles(flight.compute_ms),
         "timing": {
             "sim_s": flight.sim_s,
             "wall_s": flight.wall_s,
@@ -91,8 +99,12 @@ def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:
     """How far off the believed position was, and the margin for it; nothing where navigation was perfect."""
     if not track.has_beliefs:
         return {}
+    off_m = track.believed_m[:, :2] - np.column_stack((track.east_m, track.north_m))
+    jumps_m = np.hypot(*np.diff(off_m, axis=0).T)
+    known_m = jumps_m[np.isfinite(jumps_m)]
     return {
         "navigation_error_m": error_figures(track.navigation_error_m),
+        "navigation_jump_m": float(known_m.max(initial=0.0)),
         "navigation_margin_m": limits.navigation_margin_m,
     }
 
@@ -109,12 +121,31 @@ def error_figures(error: FloatArray) -> dict[str, float | None]:
     }
 
 
-def compute_figures(compute_ms: tuple[float, ...]) -> dict[str, float | None]:
-    """Median, 99th percentile and maximum of search times in ms; None without a search."""
-    if not compute_ms:
+def percentiles(values: Sequence[float]) -> dict[str, float | None]:
+    """Median, 99th percentile and maximum of times, in their unit; None without any."""
+    if not values:
         return {"p50": None, "p99": None, "max": None}
-    p50, p99 = np.percentile(compute_ms, (50, 99))
-    return {"p50": float(p50), "p99": float(p99), "max": max(compute_ms)}
+    p50, p99 = np.percentile(values, (50, 99))
+    return {"p50": float(p50), "p99": float(p99), "max": max(values)}
+
+
+def lost_returns(counts: IntArray | None) -> dict[str, float | None]:
+    """Which share of the beams that met something returned nothing: of all scans, and of the worst.
+
+    Args:
+        counts: `Flight.lost_returns`.
+
+    Returns:
+        `share` and `max`, from 0 to 1; None without a sensor. `max` is over the scans in which at least
+        `COUNTED_BEAMS` beams met something, or the same as `share` where none did.
+    """
+    if counts is None:
+        return {"share": None, "max": None}
+    met, lost = counts.sum(axis=0).tolist()
+    share = lost / met if met else 0.0
+    many = counts[counts[:, 0] >= COUNTED_BEAMS]
+    worst = float((many[:, 1] / many[:, 0]).max()) if len(many) else share
+    return {"share": share, "max": worst}
 
 
 def clearance_violation_s(time_s: FloatArray, clearance_m: FloatArray, wanted_m: float) -> float:

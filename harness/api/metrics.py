@@ -54,6 +54,32 @@ class Percentiles(Figures):
     max: float | None = None
 
 
+class Delays(Figures):
+    """How late plans took effect, s.
+
+    Attributes:
+        p50: median.
+        p99: 99th percentile.
+        max: the latest.
+    """
+
+    p50: float | None = None
+    p99: float | None = None
+    max: float | None = None
+
+
+class LostReturns(Figures):
+    """Which share of the beams that met something returned nothing, 0 to 1.
+
+    Attributes:
+        share: of all scans.
+        max: of the worst scan.
+    """
+
+    share: float | None = None
+    max: float | None = None
+
+
 class PathFigures(Figures):
     """How smooth a path is; `harness.analysis.smoothness` defines each figure.
 
@@ -170,6 +196,7 @@ class Metrics(Figures):
         clearance_violation_s: time below the wanted clearance.
         cross_track_m: distance from the plan being flown.
         navigation_error_m: distance from the true position to the believed one; None where navigation is perfect.
+        navigation_jump_m: the most that this changes from one row of the track to the next; likewise.
         navigation_margin_m: what the planner kept from obstacles beyond the clearance for it; likewise.
         altitude_error_m: distance from the mission's altitude.
         smoothness: of the path as planned and as flown.
@@ -178,6 +205,8 @@ class Metrics(Figures):
         trackable: whether every leg was tracked.
         trackability: verdict and cause, leg by leg.
         replans: plans accepted after the first.
+        plan_delay_s: from the latest scan that a plan could know of until it took effect.
+        lost_returns: what the sensor lost of what its beams met.
         compute_ms: planner's times.
         timing: simulated and wall-clock time.
         digest: SHA-256 of the track.
@@ -200,6 +229,7 @@ class Metrics(Figures):
     cross_track_m: Spread
     altitude_error_m: Spread
     navigation_error_m: Spread | None = None
+    navigation_jump_m: float | None = None
     navigation_margin_m: float | None = None
     smoothness: PlannedAndFlown
     bank_saturation_fraction: float
@@ -207,6 +237,8 @@ class Metrics(Figures):
     trackable: bool
     trackability: tuple[LegVerdict, ...]
     replans: int
+    plan_delay_s: Delays = Delays()
+    lost_returns: LostReturns = LostReturns()
     compute_ms: Percentiles
     timing: Timing
     digest: str

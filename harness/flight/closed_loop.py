@@ -13,7 +13,7 @@ from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput, VerticalLaw
 from aircraft.guidance.progress import RouteProgress
 from aircraft.interface import FlightModel, Route
 from harness.files.crash import sentence, trace
-from harness.flight.observer import PROGRESS_EVERY_S, Observer, Progress, RowObserver
+from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress, RowObserver
 from harness.flight.plans import LATE_S, Plans
 from harness.flight.record import Flight, Outcome
 from harness.flight.signals import held_back
@@ -189,7 +189,8 @@ class ClosedLoop:
         self._loop.seen.start_over(self.true.time_s)
         for observer in self._observers:
             observer.on_event(
-                self.true.time_s, "a fix again: the believed position jumps, the map is forgotten"
+                self.true.time_s,
+                Caution("a fix again: the believed position jumps, the map is forgotten"),
             )
 
     def _sense(self) -> None:
@@ -208,7 +209,9 @@ class ClosedLoop:
         scans = self._scans_on_their_way
         if not scans or scans[0].available_s > self.true.time_s + LATE_S:
             return False
-        self._loop.seen.update(scans.popleft())
+        scan = scans.popleft()
+        self._loop.seen.update(scan)
+        self.plans.scan_s = scan.time_s
         return True
 
     def _plan(self, mapped: bool) -> Ending | None:
@@ -289,8 +292,11 @@ class ClosedLoop:
             self._steer()  # the last row is of the end of the flight, not of the update before
         self._log_row()
         self.verdict = Ending(verdict.outcome, verdict.reason + self.plans.last_word(verdict.outcome))
+        told = f"{self.verdict.outcome.value}: {self.verdict.reason}"
         for observer in self._observers:
-            observer.on_event(self.true.time_s, f"{self.verdict.outcome.value}: {self.verdict.reason}")
+            observer.on_event(
+                self.true.time_s, told if verdict.outcome is Outcome.REACHED else Caution(told)
+            )
         return True
 
     @property
@@ -320,4 +326,5 @@ class ClosedLoop:
             wall_s=time.perf_counter() - self._begun_s,
             error=self.plans.error or self._law_error,
             contact_m=self._loop.termination.contact_m,
+            lost_returns=self._loop.sensor.lost_returns() if self._loop.sensor else None,
         )

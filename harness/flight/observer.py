@@ -17,6 +17,12 @@ PROGRESS_EVERY_S = 5.0
 """Simulated time from one call of `Progress` to the next."""
 
 
+class Caution(str):
+    """The text of an event that should not happen: a recording shows it as a warning."""
+
+    __slots__ = ()
+
+
 class Observer(Protocol):
     """What may look on while the loop runs. Nothing that it does reaches the loop."""
 
@@ -33,7 +39,7 @@ class Observer(Protocol):
         ...
 
     def on_event(self, time_s: float, text: str) -> None:
-        """Something worth a line in the log."""
+        """Something worth a line in the log; a `Caution` is of what should not happen."""
         ...
 
 

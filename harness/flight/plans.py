@@ -10,7 +10,7 @@ from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.files.crash import in_a_line, sentence, trace
 from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
-from harness.flight.observer import Observer
+from harness.flight.observer import Caution, Observer
 from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import Ending
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
@@ -34,7 +34,9 @@ class Plans:
     ) -> None:
         self._planner, self._seen = AskedPlanner(planner, mission, seen), seen
         self._latency_s, self._observers = mission.compute_latency_s, observers
-        self._coming: tuple[float, Plan, Route] | None = None
+        self._coming: tuple[float, float, Plan, Route] | None = None
+        self.scan_s = math.nan
+        """When the latest scan that the map has was taken."""
         self._due_s = math.inf  # when the plan on its way takes effect
         self.index = -1
         """Index of the plan in effect, -1 before the first."""
@@ -89,7 +91,8 @@ class Plans:
         if plan.status is PlanStatus.FOUND:
             self._stuck, self._in_vain = "", set()
             assert plan.path is not None
-            self._coming = (self._planner.compute_ms, plan, Route(plan.path.segments, plan.path.loiter))
+            route = Route(plan.path.segments, plan.path.loiter)
+            self._coming = (self._planner.compute_ms, self.scan_s, plan, route)
             self._due_s = state.time_s + self._latency_s - LATE_S
         return None
 
@@ -105,7 +108,7 @@ class Plans:
         """
         if self._coming is None or state.time_s < self._due_s:
             return None
-        compute_ms, plan, route = self._coming
+        compute_ms, scan_s, plan, route = self._coming
         late_s = state.time_s - (self._due_s - self._latency_s)
         self._coming, self._due_s = None, math.inf
         try:
@@ -115,7 +118,7 @@ class Plans:
             return Ending(
                 Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)} when it was given a plan"
             )
-        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan)
+        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan, scan_s)
         self.accepted.append(accepted)
         self.index = accepted.plan_index
         turn_m = float(route.segments[-1, 5]) if route.loiter else -math.inf
@@ -153,4 +156,4 @@ class Plans:
         if reason not in self._in_vain:
             self._in_vain.add(reason)
             for observer in self._observers:
-                observer.on_event(time_s, reason)
+                observer.on_event(time_s, Caution(reason))

@@ -201,12 +201,14 @@ class AcceptedPlan:
         time_s: in effect from this simulated time on.
         compute_ms: wall-clock time of the call that found it.
         plan: the planner's answer; its `path` is not None.
+        scan_s: simulated time of the latest scan that the planner knew of; NaN where nothing had been sensed.
     """
 
     plan_index: int
     time_s: float
     compute_ms: float
     plan: Plan
+    scan_s: float = math.nan
 
     def __post_init__(self) -> None:
         if self.plan.path is None:
@@ -217,6 +219,11 @@ class AcceptedPlan:
         """(n, 6) segments of the path, as in `planner.interface.Path`."""
         assert self.plan.path is not None
         return self.plan.path.segments
+
+    @property
+    def delay_s(self) -> float:
+        """From that scan until the plan took effect; NaN without one."""
+        return self.time_s - self.scan_s
 
     @property
     def loiter(self) -> bool:
@@ -238,6 +245,8 @@ class Flight:
         wall_s: wall-clock time that took.
         error: the traceback of what the planner or the guidance law raised; None where neither did.
         contact_m: clearance at a contact between the last two rows; +inf without.
+        lost_returns: (k, 2) of each scan of a sensor that has imperfections, how many beams met something, and how many
+            of those returned nothing; k = 0 for a perfect sensor, None without one.
     """
 
     track: Track
@@ -249,3 +258,4 @@ class Flight:
     wall_s: float
     error: str | None = None
     contact_m: float = math.inf
+    lost_returns: IntArray | None = None

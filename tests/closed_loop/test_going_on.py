@@ -90,6 +90,7 @@ def test_a_plan_that_is_on_its_way_is_waited_for(
 ) -> None:
     flight, asked, _ = thinking(2.0, 3.25, latency_s=1.0)
     assert [each.time_s for each in flight.plans] == pytest.approx([1.0, 4.3])
+    assert [each.delay_s for each in flight.plans] == pytest.approx([1.0, 4.3 - SCAN_S * (3.25 // SCAN_S)])
     assert not [time_s for time_s in asked if 3.25 < time_s < 4.3]
 
 

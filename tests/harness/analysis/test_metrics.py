@@ -10,9 +10,10 @@ import pytest
 
 from harness.analysis.metrics import (
     clearance_violation_s,
-    compute_figures,
     error_figures,
+    lost_returns,
     metrics,
+    percentiles,
     planned_length_m,
 )
 from harness.analysis.trackability import FlightLimits
@@ -43,6 +44,8 @@ KEYS = {
     "trackable",
     "trackability",
     "replans",
+    "plan_delay_s",
+    "lost_returns",
     "compute_ms",
     "timing",
     "digest",
@@ -145,7 +148,37 @@ def test_planned_length_counts_every_round_of_a_loiter_and_nothing_beyond_an_end
 
 def test_error_figures_leave_out_nan() -> None:
     assert error_figures(np.array([np.nan, -3.0, 3.0])) == {"rms": 3.0, "p95": 3.0, "max": 3.0}
-    assert compute_figures((5.0,)) == {"p50": 5.0, "p99": 5.0, "max": 5.0}
+    assert percentiles((5.0,)) == {"p50": 5.0, "p99": 5.0, "max": 5.0}
+
+
+def test_lost_returns_are_shares_of_what_beams_met() -> None:
+    """A scan in which one beam met something and lost it is not the worst: chance does that."""
+    scans = np.array([(100, 10), (50, 25), (1, 1), (0, 0)])
+    assert lost_returns(scans) == {"share": pytest.approx(36 / 151), "max": 0.5}
+    assert lost_returns(scans[2:]) == {"share": 1.0, "max": 1.0}
+    assert lost_returns(np.zeros((0, 2), dtype=np.int64)) == {"share": 0.0, "max": 0.0}
+    assert lost_returns(None) == {"share": None, "max": None}
+
+
+def test_a_plan_is_as_late_as_the_scan_it_knew_is_old(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    plans = [replace(straight_plan, time_s=2.0 * late, scan_s=late) for late in (0.5, 2.5)]
+    unsensed = replace(straight_plan, time_s=9.0)
+    delays = metrics(flight(make_track(30), *plans, unsensed), LIMITS)["plan_delay_s"]
+    assert delays == {"p50": 1.5, "p99": pytest.approx(2.48), "max": 2.5}
+
+
+def test_a_jump_of_the_believed_position_is_from_row_to_row(
+    make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    """A steady drift is none, however far it leads; what is not known is left out."""
+    rows = np.arange(101)
+    off_m = 0.2 * rows - np.where(rows >= 60, 30.0, 0.0)
+    north_m = make_track(101).north_m + np.where(rows == 80, np.nan, 0.0)
+    believed = {"believed_up_m": 300.0, "believed_course_deg": 0.0, "believed_cross_track_m": 0.0}
+    track = make_track(101, believed_east_m=off_m, believed_north_m=north_m, **believed)
+    assert metrics(flight(track, straight_plan), LIMITS)["navigation_jump_m"] == pytest.approx(29.8)
 
 
 def test_exactly_the_wanted_clearance_is_no_violation() -> None:
