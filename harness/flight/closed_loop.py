@@ -294,9 +294,7 @@ class ClosedLoop:
         self.verdict = Ending(verdict.outcome, verdict.reason + self.plans.last_word(verdict.outcome))
         told = f"{self.verdict.outcome.value}: {self.verdict.reason}"
         for observer in self._observers:
-            observer.on_event(
-                self.true.time_s, told if verdict.outcome is Outcome.REACHED else Caution(told)
-            )
+            observer.on_event(self.true.time_s, told if verdict.outcome is Outcome.REACHED else Caution(told))
         return True
 
     @property

@@ -40,6 +40,8 @@ BELIEVED = "believed"
 """Below WORLD and PLAN: where the aircraft believed to be, as the trail; only where navigation is not perfect."""
 NAVIGATION = "navigation_error"
 """Below SERIES: likewise."""
+THROTTLE, RETURNS, PLAN_DELAY = "throttle", "returns", "plan_delay"
+"""Below SERIES: throttle in per cent, beams that returned something, how late plans took effect."""
 SENSED = "sensed"
 """Below WORLD and PLAN: places on edges, each when it was sensed first; shown up to the cursor as well."""
 TRUE = "true_obstacles"
@@ -87,7 +89,8 @@ ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 8
 
 TOLD_PLAN: Colour = (58, 150, 214)
 TOLD: Colour = (134, 142, 156)
-"""Of the lines of the event log: legible on black and on white."""
+WARNED: Colour = (214, 120, 20)
+"""Of the lines of the event log, those of warnings last: legible on black and on white."""
 
 SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "cross_track/flown": ("cross-track error", TRACK, 1.5),
@@ -102,12 +105,14 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "speed/flown": ("true airspeed", TRACK, 1.5),
     "altitude_error/flown": ("altitude error", TRACK, 1.5),
     f"{NAVIGATION}/flown": ("navigation error", TRACK, 1.5),
+    f"{THROTTLE}/flown": ("throttle", TRACK, 1.5),
+    f"{RETURNS}/flown": ("beams that returned something", TRACK, 1.0),
     "cross_track/believed": ("as believed", CHOSEN, 1.0),
 }
 """Name, colour and width of every line of the time series, by its entity below SERIES; of overlaid runs, only
 those called `flown` are drawn."""
-SEARCH = "search/flown"
-"""Below SERIES: time of the search of each plan, drawn as points."""
+SEARCH, DELAYS = "search/flown", f"{PLAN_DELAY}/flown"
+"""Below SERIES: time of the search of each plan, and how late it took effect, drawn as points."""
 
 OVERLAY: tuple[Colour, ...] = (
     TRACK,
@@ -193,7 +198,8 @@ class Scene:
     @property
     def empty_series(self) -> tuple[str, ...]:
         """Time series that have nothing to show: clearance where there is no obstacle, search where nothing is."""
-        shown = {"clearance": bool(self.obstacles), "search": self.searches, NAVIGATION: self.believes}
+        shown = {"clearance": bool(self.obstacles), NAVIGATION: self.believes}
+        shown |= dict.fromkeys(("search", PLAN_DELAY, RETURNS), self.searches)
         return tuple(name for name, has in shown.items() if not has)
 
     @property
@@ -212,6 +218,11 @@ class Scene:
 def time_column(time_s: FloatArray) -> rr.TimeColumn:
     """Simulated time, rounded to nanoseconds (rerun truncates floats)."""
     return rr.TimeColumn(TIMELINE, duration=np.round(time_s * 1e9).astype("timedelta64[ns]"))
+
+
+def nanoseconds(time_s: float) -> np.timedelta64:
+    """Simulated time, likewise."""
+    return np.timedelta64(round(time_s * 1e9), "ns")
 
 
 def apart(times_s: Sequence[float], after_s: float = -math.inf) -> FloatArray:

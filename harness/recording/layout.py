@@ -19,10 +19,13 @@ from harness.recording.blueprint import (
     MAP,
     NAVIGATION,
     PLAN,
+    PLAN_DELAY,
+    RETURNS,
     SENSED,
     SERIES,
     STATES,
     SUMMARY,
+    THROTTLE,
     TIMELINE,
     TRUE,
     WORLD,
@@ -89,7 +92,6 @@ def blueprint(
     lanes = 3 if len(runs) == 1 else 2 * len(runs)
     # Shares of a window 768 pixels high: 700 of them are for rows, a lane takes 40 and the rest of the states 52.
     states_share = min((52 + 40 * lanes) / 700, 0.45)
-    series = series_views(frame, runs, without=without)
     return Layout(
         rrb.Horizontal(
             rrb.Vertical(
@@ -98,10 +100,7 @@ def blueprint(
                 rrb.Horizontal(*below, column_shares=[5, 4, 4][: len(below)]),
                 row_shares=[0.77 - states_share, states_share, 0.23],
             ),
-            # Few plots at a time, so that each is high enough for its axis to have numbers.
-            rrb.Vertical(*series[:3], rrb.Tabs(*series[3:], active_tab=0))
-            if len(series) > 4
-            else rrb.Vertical(*series),
+            _plots(frame, runs, without),
             column_shares=[13, 6],
         ),
         rrb.TimePanel(
@@ -117,6 +116,12 @@ def blueprint(
     )
 
 
+PLOTS: Final = (
+    (4, ("cross_track", "altitude_error", NAVIGATION, "speed", THROTTLE)),
+    (4, ("clearance", "search", PLAN_DELAY, RETURNS)),
+    (5, ("bank",)),
+)
+"""Rows of the time series: share of the height, and names."""
 THIN_SERIES: Final = ("cross_track", "clearance", "bank")
 """Time series of a thin recording."""
 
@@ -223,17 +228,20 @@ def series_views(
     wanted = max(frame.clearance_m, 1.0)
     one = len(runs) == 1
     rows: list[tuple[str, str, tuple[float, float] | None]] = [
-        ("cross_track", "Cross-track error, m (right +)", None),
+        ("cross_track", "Cross-track error, m", None),
         (
             "clearance",
             f"Clearance, m; red: wanted {frame.clearance_m:g}" if one else "Clearance, m",
-            (-0.5 * wanted, 6.0 * wanted),
+            (-0.25 * wanted, 6.0 * wanted),
         ),
-        ("bank", _bank_title(frame) if one else "Bank, deg (right +)", (-60.0, 60.0)),
         ("altitude_error", "Altitude error, m", None),
         (NAVIGATION, "Navigation error, m", None),
         ("speed", "Speed, m/s; blue: over ground" if one else "Airspeed, m/s", None),
-        ("search", "Search time, ms", None),
+        (THROTTLE, "Throttle, %", (-5.0, 105.0)),
+        ("search", "Search, ms", None),
+        (PLAN_DELAY, "Plan delay, s", None),
+        (RETURNS, "Returns per scan", None),
+        ("bank", _bank_title(frame) if one else "Bank, deg (right +)", _bank_range_deg(frame)),
     ]
     return [
         rrb.TimeSeriesView(
@@ -249,8 +257,29 @@ def series_views(
     ]
 
 
+def _plots(frame: Frame, runs: Sequence[str], without: Sequence[str]) -> rrb.Vertical:
+    """Three plots, the others in tabs behind them: so few that each is high enough for its axis to have numbers.
+
+    rerun numbers an axis at powers of ten that are 20 pixels apart; a bank of 45 degrees to both sides needs 210.
+    """
+    rows: list[rrb.Container | rrb.View] = []
+    shares: list[int] = []
+    for share, names in PLOTS:
+        views = series_views(frame, runs, names, without)
+        if views:
+            rows.append(views[0] if len(views) == 1 else rrb.Tabs(*views, active_tab=0))
+            shares.append(share)
+    return rrb.Vertical(*rows, row_shares=shares)
+
+
+def _bank_range_deg(frame: Frame) -> tuple[float, float]:
+    """A little beyond the limit: the less, the nearer the plot is to having room for numbers."""
+    limit = 1.1 * (frame.bank_limit_deg or 50.0)
+    return -limit, limit
+
+
 def _bank_title(frame: Frame) -> str:
-    """With the limit as a number: the axis of a low plot has none but 0."""
+    """With the limit as a number: the axis of a low plot, as an overlay of many may have, has none but 0."""
     limit = "" if frame.bank_limit_deg is None else f" {frame.bank_limit_deg:g}"
     return f"Bank, deg; blue: commanded, red: limit{limit}"
 

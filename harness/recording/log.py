@@ -22,13 +22,12 @@ from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
 from harness.recording.geographic import globe
 from harness.recording.layout import blueprint
-from harness.recording.moving import Tracked, log_tracked_style
+from harness.recording.moving import Changing, Tracked, log_tracked_style
 from harness.recording.plans import log_plan_style, send_plans
 from harness.recording.properties import RUN, VARIED, Value, send_properties
 from harness.recording.scene import (
     lines_2d,
     log_end,
-    log_moving,
     log_obstacle,
     log_scene,
     log_summary,
@@ -36,17 +35,21 @@ from harness.recording.scene import (
     send_believed,
 )
 from harness.recording.sensed import News, Sensed, returns_m
+from harness.recording.series import Returns, curves, send_curves, send_levels
+from harness.recording.solids import strips_2d, strips_3d
 from harness.recording.states import (
     AT_LIMIT,
     FREE,
     TRACKABLE,
+    Nearness,
     States,
     log_colours,
     over,
+    plan_text,
     send_changes,
+    send_events,
     tracking_changes,
 )
-from harness.recording.strips import strips_2d, strips_3d
 
 if TYPE_CHECKING:
     from harness.mapping.scan import RangeScan
@@ -61,7 +64,6 @@ CELL_SHARE = 0.0015
 PIECE_SHARE = 0.001
 """Length of a piece of the trail, which has one colour, as a share of the area."""
 MARKER_STEP_ROWS = 5
-MOTION_STEP_ROWS = 10
 
 
 class RerunLog:
@@ -107,9 +109,9 @@ class RerunLog:
         self._believed_point: FloatArray = np.zeros((0, 3))
         self._whole: list[FloatArray] = []
         self._last: Track | None = None
-        self._shown_until_s = -math.inf
         self._known_to_move, self._tracked = moving, Tracked()
-        self._moving = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
+        self._changing, self._returns = Changing(scene), Returns()
+        self._nearness = Nearness(scene.limits.clearance_m)
         log_scene(self._rec, scene)
         self._globe = globe(self._rec, scene)
         log_plan_style(self._rec)
@@ -127,6 +129,7 @@ class RerunLog:
     def on_scan(self, scan: RangeScan, state: AircraftState) -> None:
         """Takes a scan; keeps it when one is due to be drawn."""
         self._scan = scan
+        self._returns.take(scan)
         self._tracked.take(scan.time_s, self._known_to_move())
         if scan.time_s - self._scan_drawn_s >= self._scan_period_s:
             self._draw(scan)
@@ -137,8 +140,7 @@ class RerunLog:
             self._draw(self._scan)
         self._plans.append(accepted)
         self._states.on_plan(accepted)
-        text = f"{accepted.plan.reason} (plan {accepted.plan_index}, {accepted.compute_ms:.1f} ms)"
-        self._events.append((accepted.time_s, text, look.TOLD_PLAN))
+        self._events.append((accepted.time_s, plan_text(accepted), look.TOLD_PLAN))
 
     def on_event(self, time_s: float, text: str) -> None:
         """Adds a line to the log of events."""
@@ -146,6 +148,7 @@ class RerunLog:
 
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and what happened meanwhile."""
+        self._events += [(*event, look.TOLD) for event in self._nearness.events(block)]
         self._send_happened()
         self._last = block
         times = look.time_column(block.time_s)
@@ -160,11 +163,12 @@ class RerunLog:
         )
         self._send_marker(block)
         self._send_trail(block, position)
-        self._log_motion(block)
+        self._changing.send(self._rec, block.time_s)
         for lane, changes in self._states.changes(block).items():
             send_changes(self._rec, lane, changes)
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
-        self._send_series(block, times)
+        send_curves(self._rec, curves(block, self._scene.altitude_m), block.time_s)
+        send_levels(self._rec, self._scene, block.time_s)
         if block.has_beliefs:
             self._believed_point = send_believed(self._rec, block, self._piece_rows, self._believed_point)
 
@@ -220,9 +224,6 @@ class RerunLog:
         self._sink.flush()
         self._sink.end()
 
-    def _set_time(self, time_s: float) -> None:
-        self._rec.set_time(look.TIMELINE, duration=np.timedelta64(round(time_s * 1e9), "ns"))
-
     def _draw(self, scan: RangeScan) -> None:
         self._scan_drawn_s = scan.time_s
         self._scans.append(scan)
@@ -253,6 +254,7 @@ class RerunLog:
         scans, plans = self._scans, self._plans
         self._scans, self._plans = [], []
         self._tracked.send(self._rec)
+        self._returns.send(self._rec)
         send_plans(self._rec, plans, self._scene.altitude_m, self._chord_error_m)
         if scans:
             points = [returns_m(scan) for scan in scans]
@@ -264,26 +266,14 @@ class RerunLog:
                 ),
             )
             self._send_news(scans, self._sensed.take(scans, points))
-        events, self._events = sorted(self._events, key=lambda event: event[0]), []
-        if events:
-            times, texts, colours = zip(*events, strict=True)
-            apart_s = look.apart(times, self._told_s)
-            self._told_s = float(apart_s[-1])
-            self._rec.send_columns(
-                look.EVENTS,
-                [look.time_column(apart_s)],
-                rr.TextLog.columns(
-                    text=[f"t = {at:.0f} s: {text}" for at, text in zip(times, texts, strict=True)],
-                    level=[rr.TextLogLevel.INFO] * len(events),
-                    color=colours,
-                ),
-            )
+        events, self._events = self._events, []
+        self._told_s = send_events(self._rec, events, self._told_s)
 
     def _send_news(self, scans: list[RangeScan], news: News) -> None:
         """Shows obstacles from their first sight on, and the parts of them that were sensed."""
         for index, (number, away_m) in news.first.items():
             time_s = scans[number].time_s
-            self._set_time(time_s)
+            self._rec.set_time(look.TIMELINE, duration=look.nanoseconds(time_s))
             log_obstacle(self._rec, self._scene, index)
             text = f"obstacle {index} comes into view, {away_m / 1e3:.1f} km away"
             self._events.append((time_s, text, look.TOLD))
@@ -304,30 +294,6 @@ class RerunLog:
             times,
             rr.LineStrips3D.columns(strips=strips_3d(list(posts))).partition(counts),
         )
-
-    def _send_series(self, block: Track, times: rr.TimeColumn) -> None:
-        clearance = np.where(np.isfinite(block.clearance_m), block.clearance_m, np.nan)
-        for entity, values in {
-            "cross_track/flown": block.cross_track_m,
-            "clearance/flown": clearance,
-            "bank/commanded": block.roll_command_deg,
-            "bank/flown": block.roll_deg,
-            "bank/pitch": block.pitch_deg,
-            "speed/ground": block.groundspeed_mps,
-            "speed/flown": block.airspeed_mps,
-            "altitude_error/flown": block.up_m - self._scene.altitude_m,
-        }.items():
-            self._rec.send_columns(f"{look.SERIES}/{entity}", [times], rr.Scalars.columns(scalars=values))
-        limit_deg = math.degrees(self._scene.limits.bank_limit_rad)
-        ends = [look.time_column(block.time_s[[0, -1]])]
-        for entity, value in {
-            "clearance/wanted": self._scene.limits.clearance_m,
-            "bank/limit_right": limit_deg,
-            "bank/limit_left": -limit_deg,
-        }.items():
-            self._rec.send_columns(
-                f"{look.SERIES}/{entity}", ends, rr.Scalars.columns(scalars=[value, value])
-            )
 
     def _send_marker(self, block: Track) -> None:
         rows = slice(None, None, MARKER_STEP_ROWS)
@@ -371,27 +337,3 @@ class RerunLog:
             (look.WORLD, rr.LineStrips3D.columns(strips=strips_3d(pieces), colors=colours)),
         ):
             self._rec.send_columns(f"{entity}/{look.FLOWN}", times, strips)
-
-    def _log_motion(self, block: Track) -> None:
-        """Shows, moves and hides the obstacles that do so during a block."""
-        until = float(block.time_s[-1])
-        for index, obstacle in self._moving:
-            start, stop = obstacle.interval_s
-            if self._shown_until_s < start <= until or (start == -math.inf == self._shown_until_s):
-                self._set_time(max(start, 0.0))
-                log_moving(self._rec, self._scene, index)
-            if self._shown_until_s < stop <= until:
-                self._set_time(stop)
-                for entity in (look.PLAN, look.WORLD):
-                    self._rec.log(f"{entity}/moving/{index}", rr.Clear(recursive=True))
-            times = block.time_s[::MOTION_STEP_ROWS]
-            times = times[(times >= start) & (times <= stop)]
-            if obstacle.velocity_mps != (0.0, 0.0) and len(times):
-                moved = np.outer(times - obstacle.epoch_s, (*obstacle.velocity_mps, 0.0))
-                for entity in (look.PLAN, look.WORLD):
-                    self._rec.send_columns(
-                        f"{entity}/moving/{index}",
-                        [look.time_column(times)],
-                        rr.Transform3D.columns(translation=moved),
-                    )
-        self._shown_until_s = until

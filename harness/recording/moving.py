@@ -1,20 +1,25 @@
-"""What the map takes to move, in a recording: outlines as they were seen last, and arrows of where they go."""
+"""What moves, in a recording: what the map takes to, with arrows of where it goes, and obstacles that truly do."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
 
+from harness.flight.record import FloatArray
 from harness.recording import blueprint as look
-from harness.recording.strips import strips_2d
+from harness.recording.scene import log_moving
+from harness.recording.solids import strips_2d
 from planner.interface import MovingEdges
 
 EVERY_S = 1.0
 """It is drawn no more often than this."""
 AHEAD_S = 30.0
 """Arrows end where an obstacle will be after so long."""
+MOTION_STEP_ROWS = 10
+"""True obstacles are moved at every so many rows of the track."""
 TRACKED = "tracked"
 """Below PLAN: outlines; below that `velocity`, the arrows."""
 
@@ -61,3 +66,39 @@ def log_tracked_style(rec: rr.RecordingStream) -> None:
     rec.log(f"{look.PLAN}/{TRACKED}", outline, static=True)
     arrow = rr.Arrows2D.from_fields(colors=[look.MOVES], radii=rr.Radius.ui_points(1.0), draw_order=27)
     rec.log(f"{look.PLAN}/{TRACKED}/velocity", arrow, static=True)
+
+
+class Changing:
+    """Obstacles that move, come or go: shows, moves and hides them as the flight goes on.
+
+    Args:
+        scene: what is known before the flight.
+    """
+
+    def __init__(self, scene: look.Scene) -> None:
+        self._scene, self._shown_until_s = scene, -math.inf
+        self._obstacles = [each for each in enumerate(scene.obstacles) if not each[1].stands_for_ever]
+
+    def send(self, rec: rr.RecordingStream, time_s: FloatArray) -> None:
+        """Sends what becomes of them at consecutive times of the track."""
+        until = float(time_s[-1])
+        for index, obstacle in self._obstacles:
+            start, stop = obstacle.interval_s
+            if self._shown_until_s < start <= until or (start == -math.inf == self._shown_until_s):
+                rec.set_time(look.TIMELINE, duration=look.nanoseconds(max(start, 0.0)))
+                log_moving(rec, self._scene, index)
+            if self._shown_until_s < stop <= until:
+                rec.set_time(look.TIMELINE, duration=look.nanoseconds(stop))
+                for entity in (look.PLAN, look.WORLD):
+                    rec.log(f"{entity}/moving/{index}", rr.Clear(recursive=True))
+            times = time_s[::MOTION_STEP_ROWS]
+            times = times[(times >= start) & (times <= stop)]
+            if obstacle.velocity_mps != (0.0, 0.0) and len(times):
+                moved = np.outer(times - obstacle.epoch_s, (*obstacle.velocity_mps, 0.0))
+                for entity in (look.PLAN, look.WORLD):
+                    rec.send_columns(
+                        f"{entity}/moving/{index}",
+                        [look.time_column(times)],
+                        rr.Transform3D.columns(translation=moved),
+                    )
+        self._shown_until_s = until

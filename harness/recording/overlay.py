@@ -133,12 +133,13 @@ def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], plac
             columns = chunk.to_record_batch().to_pydict()
             texts = next(cells for key, cells in columns.items() if key.endswith("text"))
             times = [at.total_seconds() for at in columns[look.TIMELINE]]
+            levels = next(cells for key, cells in columns.items() if key.endswith("level"))
             rec.send_columns(
                 look.EVENTS,
                 [look.time_column(np.array(times))],
                 rr.TextLog.columns(
                     text=[f"{name}, {text}" for (text,) in texts],
-                    level=[rr.TextLogLevel.INFO] * len(texts),
+                    level=[level for (level,) in levels],
                     color=[look.OVERLAY[place % len(look.OVERLAY)]] * len(texts),
                 ),
             )
@@ -163,7 +164,8 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
             style = rr.SeriesLines(names=[name], colors=[colour], widths=[1.5])
             rec.log(f"{look.SERIES}/{line}/{place}", style, static=True)
     points = rr.SeriesPoints(names=[name], colors=[colour], marker_sizes=[2.0])
-    rec.log(f"{look.SERIES}/{look.SEARCH}/{place}", points, static=True)
+    for line in (look.SEARCH, look.DELAYS):
+        rec.log(f"{look.SERIES}/{line}/{place}", points, static=True)
 
 
 def _end_lanes(rec: rr.RecordingStream, names: Sequence[str], figures: Sequence[Mapping[str, Any]]) -> None:

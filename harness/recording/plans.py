@@ -11,8 +11,7 @@ from harness.flight.polylines import polylines
 from harness.flight.record import AcceptedPlan, FloatArray
 from harness.recording import blueprint as look
 from harness.recording.scene import fan
-from harness.recording.solids import circle
-from harness.recording.strips import strips_2d, strips_3d
+from harness.recording.solids import circle, strips_2d, strips_3d
 
 MET = "met"
 """Below PLAN: edges of what moves, where the planner expects to meet them."""
@@ -55,11 +54,9 @@ def log_plan_style(rec: rr.RecordingStream, thin: bool = False) -> None:
         rr.LineStrips3D.from_fields(colors=[look.CHOSEN], radii=rr.Radius.ui_points(1.25)),
         static=True,
     )
-    rec.log(
-        f"{look.SERIES}/{look.SEARCH}",
-        rr.SeriesPoints(names=["search"], colors=[look.CHOSEN], marker_sizes=[2.0]),
-        static=True,
-    )
+    for entity, name in ((look.SEARCH, "search"), (look.DELAYS, "plan delay")):
+        points = rr.SeriesPoints(names=[name], colors=[look.CHOSEN], marker_sizes=[2.0])
+        rec.log(f"{look.SERIES}/{entity}", points, static=True)
 
 
 def send_plans(
@@ -112,5 +109,8 @@ def send_plans(
     )
     level = [np.column_stack((path, np.full(len(path), altitude_m))) for path in paths]
     rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(level)))
-    searches = np.array([each.compute_ms for each in plans])
-    rec.send_columns(f"{look.SERIES}/{look.SEARCH}", times, rr.Scalars.columns(scalars=searches))
+    for entity, values in (
+        (look.SEARCH, [each.compute_ms for each in plans]),
+        (look.DELAYS, [each.delay_s for each in plans]),
+    ):
+        rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=np.array(values)))

@@ -16,8 +16,7 @@ from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
 from harness.recording.layout import THIN_SERIES
-from harness.recording.solids import CIRCLE_POINTS, circle, log_solids, outlines, rims
-from harness.recording.strips import strips_2d, strips_3d
+from harness.recording.solids import CIRCLE_POINTS, circle, log_solids, outlines, rims, strips_2d, strips_3d
 from harness.recording.summary import colours, summary
 from harness.recording.terrain import log_ground
 

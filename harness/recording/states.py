@@ -1,15 +1,16 @@
-"""The lanes of the state timeline: what the planner does, whether the bank is at its limit, what is tracked."""
+"""What a recording tells: lanes of states (planner, bank at its limit, what is tracked), and lines of events."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import rerun as rr
 
+from harness.flight.observer import Caution
 from harness.recording import blueprint as look
 
 if TYPE_CHECKING:
@@ -22,6 +23,10 @@ WAITING = "waiting for a plan"
 HOLDING = "holding"
 AT_LIMIT, FREE = "bank command at its limit", "bank command below its limit"
 TRACKABLE = "trackable"
+CLEAR_AGAIN: Final = 1.05
+"""Over so many times the wanted clearance an aircraft that came nearer is clear again: one event each time."""
+TOLD_DELAY_S: Final = 0.05
+"""A plan that took effect so long after its scan says so."""
 
 
 def over(metrics: Mapping[str, Any]) -> str:
@@ -113,3 +118,70 @@ def log_colours(rec: rr.RecordingStream, lane: str, states: Mapping[str, look.Co
         rr.StateConfiguration(values=list(states), colors=list(states.values())),
         static=True,
     )
+
+
+def plan_text(accepted: AcceptedPlan) -> str:
+    """What is told of a plan that takes effect."""
+    late = f", {accepted.delay_s:.1f} s after its scan" if accepted.delay_s >= TOLD_DELAY_S else ""
+    return f"{accepted.plan.reason} (plan {accepted.plan_index}, {accepted.compute_ms:.1f} ms{late})"
+
+
+def send_events(
+    rec: rr.RecordingStream,
+    events: Sequence[tuple[float, str, look.Colour]],
+    after_s: float = -math.inf,
+) -> float:
+    """Writes lines into the log of events; a `Caution` is a warning.
+
+    Args:
+        rec: where to.
+        events: simulated time, text, and colour of one that is no warning.
+        after_s: time of the last line before them.
+
+    Returns:
+        The time of the last line.
+    """
+    if not events:
+        return after_s
+    times, texts, colours = zip(*sorted(events, key=lambda event: event[0]), strict=True)
+    apart_s = look.apart(times, after_s)
+    warned = [isinstance(text, Caution) for text in texts]
+    rec.send_columns(
+        look.EVENTS,
+        [look.time_column(apart_s)],
+        rr.TextLog.columns(
+            text=[f"t = {at:.0f} s: {text}" for at, text in zip(times, texts, strict=True)],
+            level=[rr.TextLogLevel.WARN if each else rr.TextLogLevel.INFO for each in warned],
+            color=[look.WARNED if warns else own for warns, own in zip(warned, colours, strict=True)],
+        ),
+    )
+    return float(apart_s[-1])
+
+
+class Nearness:
+    """Tells when the aircraft comes nearer to an obstacle than was wanted, and when it is clear again.
+
+    Args:
+        wanted_m: clearance that was wanted.
+    """
+
+    def __init__(self, wanted_m: float) -> None:
+        self._wanted_m, self._least_m = wanted_m, math.inf
+
+    def events(self, block: Track) -> list[tuple[float, str]]:
+        """Times and texts for consecutive rows of the track."""
+        found: list[tuple[float, str]] = []
+        least_m = float(block.clearance_m.min(initial=math.inf))
+        if self._least_m == math.inf and least_m >= self._wanted_m:
+            return found
+        for time_s, clearance_m in zip(block.time_s.tolist(), block.clearance_m.tolist(), strict=True):
+            if self._least_m == math.inf and clearance_m < self._wanted_m:
+                told = f"nearer to an obstacle than the wanted {self._wanted_m:g} m"
+                found.append((time_s, Caution(told)))
+            if self._least_m < math.inf and clearance_m > CLEAR_AGAIN * self._wanted_m:
+                told = f"clear of the obstacle again, after {self._least_m:.1f} m at the least"
+                found.append((time_s, told))
+                self._least_m = math.inf
+            elif clearance_m < self._wanted_m:
+                self._least_m = min(self._least_m, clearance_m)
+        return found

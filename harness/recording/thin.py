@@ -6,7 +6,6 @@ and most of the time series' rows.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -25,7 +24,9 @@ from harness.recording.layout import thin_blueprint
 from harness.recording.plans import log_plan_style
 from harness.recording.properties import RUN, VARIED, Value, send_properties
 from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, quaternions
-from harness.recording.strips import strips_2d, strips_3d
+from harness.recording.series import send_curves, send_levels, thin_curves
+from harness.recording.solids import strips_2d, strips_3d
+from harness.recording.states import Nearness, send_events
 from harness.run_files.flight_logs import LogTrack, read_log
 from harness.run_files.plans_table import PlanRow
 from harness.run_files.run_folder import Run, load_run
@@ -61,6 +62,7 @@ class ThinLog:
         self._events: list[tuple[float, str]] = []
         self._whole: list[FloatArray] = []
         self._last: Track | None = None
+        self._nearness = Nearness(scene.limits.clearance_m)
         log_scene(self._rec, scene, thin=True)
         log_plan_style(self._rec, thin=True)
 
@@ -78,6 +80,7 @@ class ThinLog:
     def on_block(self, block: Track) -> None:
         """Draws consecutive rows of the track, and the plans meanwhile."""
         self._send_plans()
+        self._events += self._nearness.events(block)
         self._last = block
         rows = np.unique(np.append(np.arange(0, len(block), ROWS), len(block) - 1))
         times = [look.time_column(block.time_s[rows])]
@@ -97,22 +100,9 @@ class ThinLog:
             ),
         ):
             self._rec.send_columns(entity, times, rr.Transform3D.columns(translation=place, quaternion=turn))
-        clearance = np.where(np.isfinite(block.clearance_m), block.clearance_m, np.nan)
-        for name, values in {
-            "cross_track/flown": block.cross_track_m,
-            "clearance/flown": clearance,
-            "bank/commanded": block.roll_command_deg,
-            "bank/flown": block.roll_deg,
-        }.items():
-            self._rec.send_columns(f"{look.SERIES}/{name}", times, rr.Scalars.columns(scalars=values[rows]))
-        ends = [look.time_column(block.time_s[[0, -1]])]
-        limit_deg = math.degrees(self._scene.limits.bank_limit_rad)
-        for name, value in {
-            "clearance/wanted": self._scene.mission.clearance_m,
-            "bank/limit_right": limit_deg,
-            "bank/limit_left": -limit_deg,
-        }.items():
-            self._rec.send_columns(f"{look.SERIES}/{name}", ends, rr.Scalars.columns(scalars=[value, value]))
+        kept = {name: curve[rows] for name, curve in thin_curves(block).items()}
+        send_curves(self._rec, kept, block.time_s[rows])
+        send_levels(self._rec, self._scene, block.time_s)
 
     def end(self) -> None:
         """Ends the file as it is, without summary; after `close` it does nothing."""
@@ -129,14 +119,7 @@ class ThinLog:
         if self._whole:
             track = lines_2d([np.concatenate(self._whole)], look.WHOLE_TRACK, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
-        if self._events:
-            times, texts = zip(*self._events, strict=True)
-            text = [f"t = {at:.0f} s: {told}" for at, told in self._events]
-            self._rec.send_columns(
-                look.EVENTS,
-                [look.time_column(look.apart(times))],
-                rr.TextLog.columns(text=text, level=[rr.TextLogLevel.INFO] * len(texts)),
-            )
+        send_events(self._rec, [(*event, look.TOLD) for event in self._events])
         log_summary(self._rec, replace(self._scene, scenario_yaml=""), metrics)
         if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):
             log_end(self._rec, self._last, metrics["outcome"])

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import urllib.request
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,6 +21,7 @@ from aircraft.interface import AircraftState
 from harness.analysis.metrics import metrics
 from harness.analysis.trackability import FlightLimits
 from harness.files.errors import RunFolderError
+from harness.flight.observer import Caution
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
@@ -88,8 +90,8 @@ def record(
 ) -> Flight:
     """100 s north, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
     track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
-    first = make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE)
-    second = make_plan([(0, 1250, 0, 1, 0.0, 1250.0)], index=1, time_s=50.0)
+    first = replace(make_plan([(0, 0, 0, 1, 0.0, 2500.0)], picture=lambda: PICTURE), scan_s=0.0)
+    second = replace(make_plan([(0, 1250, 0, 1, 0.0, 1250.0)], index=1, time_s=50.0), scan_s=48.5)
     log = RerunLog(path, SCENE, recording_id="a")
     for tick in range(200):
         log.on_scan(scan(0.5 * tick), STATE)
@@ -152,6 +154,7 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
         "speed/ground": flight.track.groundspeed_mps,
         "speed/flown": flight.track.airspeed_mps,
         "altitude_error/flown": flight.track.up_m - 300.0,
+        "throttle/flown": np.full(1001, 50.0),
     }.items():
         logged = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
         np.testing.assert_array_equal(logged[-1001:], values)
@@ -163,6 +166,12 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
             100,
         )
     np.testing.assert_array_equal(np.ravel(column(entities, "/series/search/flown", "scalars")), [2.5, 2.5])
+    np.testing.assert_array_equal(
+        np.ravel(column(entities, "/series/plan_delay/flown", "scalars")), [0.0, 1.5]
+    )
+    returns = np.ravel(column(entities, "/series/returns/flown", "scalars"))
+    np.testing.assert_array_equal(returns, np.full(200, 2.0))  # two of four beams, in every scan
+    assert seconds(entities, "/series/returns/flown") == [0.5 * tick for tick in range(200)]
     clearance = np.array(column(entities, "/series/clearance/flown", "scalars"), dtype=np.float64).ravel()
     assert np.isnan(clearance[:200]).all()
     assert (clearance[200:] == 150.0).all()
@@ -215,6 +224,29 @@ def test_obstacles_appear_as_they_are_sensed(tmp_path: Path, make_track: Callabl
     np.testing.assert_allclose(post, [(*near, 0.0), (*near, SCENE.obstacle_top_m)], rtol=1e-6)
     assert [str(text) for (text,) in column(entities, "/events", "text")] == [
         "t = 5 s: obstacle 0 comes into view, 1.3 km away"
+    ]
+
+
+def test_what_should_not_happen_is_a_warning(tmp_path: Path, make_track: Callable[..., Track]) -> None:
+    """Nearer than the wanted 100 m from 5 to 15 s, over two blocks; 102 m at 10 s is not yet clear."""
+    row = np.arange(201)
+    clearance_m = np.where((row < 50) | (row > 150), 300.0, np.where(row == 100, 102.0, 80.0))
+    clearance_m[120] = 62.5
+    track = make_track(201, clearance_m=clearance_m, plan_index=-1)
+    log = RerunLog(tmp_path / "a.rrd", SCENE, "a")
+    for start in (0, 60):
+        log.on_block(track.part(start, 60 if start == 0 else 201))
+    log.on_event(18.0, Caution("no way on"))
+    log.on_event(20.0, "reached: inside the goal circle")
+    log.close()
+    entities = read(tmp_path / "a.rrd")
+    texts = [str(text) for (text,) in column(entities, "/events", "text")]
+    levels = [str(level) for (level,) in column(entities, "/events", "level")]
+    assert list(zip(texts, levels, strict=True)) == [
+        ("t = 5 s: nearer to an obstacle than the wanted 100 m", "WARN"),
+        ("t = 15 s: clear of the obstacle again, after 62.5 m at the least", "INFO"),
+        ("t = 18 s: no way on", "WARN"),
+        ("t = 20 s: reached: inside the goal circle", "INFO"),
     ]
 
 
@@ -355,7 +387,7 @@ def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
     texts = [str(text) for (text,) in column(entities, "/events", "text")]
     assert texts == [
         "t = 0 s: a way was found (plan 0, 2.5 ms)",
-        "t = 50 s: a way was found (plan 1, 2.5 ms)",
+        "t = 50 s: a way was found (plan 1, 2.5 ms, 1.5 s after its scan)",
         "t = 100 s: goal reached",
     ]
     documents = [str(text) for (text,) in column(entities, "/summary", "text")]
@@ -393,7 +425,7 @@ def test_recording_is_sound_and_has_its_layout(recording: tuple[Path, Flight]) -
     assert len(reader.blueprints()) == 1
     assert [entry.application_id for entry in reader.recordings()] == ["wayproof"]
     layout = [chunk.entity_path for chunk in reader.stream(store=reader.blueprints()[0]).to_chunks()]
-    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 13
+    assert len([entity for entity in layout if entity.endswith("/ViewContents")]) == 16
 
 
 def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight]) -> None:

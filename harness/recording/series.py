@@ -1,0 +1,88 @@
+"""The time series of a recording: curves of the track, the levels they are held against, returns scan by scan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import rerun as rr
+
+from harness.flight.record import FloatArray, Track
+from harness.recording import blueprint as look
+
+if TYPE_CHECKING:
+    from harness.mapping.scan import RangeScan
+
+
+def thin_curves(block: Track) -> dict[str, FloatArray]:
+    """The curves that a thin recording has, by entity below SERIES."""
+    return {
+        "cross_track/flown": block.cross_track_m,
+        "clearance/flown": np.where(np.isfinite(block.clearance_m), block.clearance_m, np.nan),
+        "bank/commanded": block.roll_command_deg,
+        "bank/flown": block.roll_deg,
+    }
+
+
+def curves(block: Track, altitude_m: float) -> dict[str, FloatArray]:
+    """The curves of a whole recording, by entity below SERIES.
+
+    Args:
+        block: rows of the track.
+        altitude_m: to be held, above mean sea level.
+    """
+    return {
+        **thin_curves(block),
+        "bank/pitch": block.pitch_deg,
+        "speed/ground": block.groundspeed_mps,
+        "speed/flown": block.airspeed_mps,
+        "altitude_error/flown": block.up_m - altitude_m,
+        f"{look.THROTTLE}/flown": 100.0 * block.throttle,
+    }
+
+
+def send_curves(rec: rr.RecordingStream, values: Mapping[str, FloatArray], time_s: FloatArray) -> None:
+    """Sends curves that have the same times, by entity below SERIES."""
+    times = [look.time_column(time_s)]
+    for entity, curve in values.items():
+        rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=curve))
+
+
+def send_levels(rec: rr.RecordingStream, scene: look.Scene, time_s: FloatArray) -> None:
+    """Sends the wanted clearance and the limits of the bank, from the first of some times to the last."""
+    limit_deg = math.degrees(scene.limits.bank_limit_rad)
+    levels = {
+        "clearance/wanted": scene.limits.clearance_m,
+        "bank/limit_right": limit_deg,
+        "bank/limit_left": -limit_deg,
+    }
+    send_curves(rec, {name: np.full(2, level) for name, level in levels.items()}, time_s[[0, -1]])
+
+
+class Returns:
+    """Counts the beams that returned something, scan by scan.
+
+    Of a perfect sensor only scans that somebody has read are counted, and those without any return: to follow the rays
+    of the others would cost more than all else that is recorded.
+    """
+
+    def __init__(self) -> None:
+        self._scans: list[RangeScan] = []
+
+    def take(self, scan: RangeScan) -> None:
+        """Takes a scan."""
+        self._scans.append(scan)
+
+    def send(self, rec: rr.RecordingStream) -> None:
+        """Sends the counts of the scans since the last time."""
+        scans, self._scans = self._scans, []
+        counts = {
+            scan.time_s: np.count_nonzero(scan.ranges_m < math.inf) if scan.nearest_m < math.inf else 0
+            for scan in scans
+            if scan.followed or scan.nearest_m == math.inf
+        }
+        if counts:
+            values = np.array([*counts.values()], dtype=np.float64)
+            send_curves(rec, {f"{look.RETURNS}/flown": values}, np.array([*counts]))
