@@ -22,7 +22,7 @@ from harness.analysis.trackability import FlightLimits, legs, saturated
 from harness.flight.record import Flight, FloatArray, IntArray, Outcome, Track, digest
 
 COUNTED_BEAMS: Final = 20
-"""A share of lost returns is told of scans in which at least so many beams met something: of a few, chance may lose all."""
+"""The worst scan is one in which at least so many beams met something: of a few, chance may lose all."""
 
 
 def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) -> dict[str, Any]:

@@ -51,6 +51,12 @@ class Row:
         guidance: the guidance law; empty where all flew under the same one.
         bank_saturation_fraction: share of the time at the bank limit.
         cause: why the first leg that was not tracked was not; empty where all were.
+        navigation_error_p95_m: distance from the true position to the believed one, 95th percentile; None where
+            navigation is perfect.
+        navigation_error_max_m: the same, largest.
+        navigation_jump_m: the most that it changes from one row of the track to the next; likewise.
+        plan_delay_max_s: longest time from the latest scan that a plan could know of until it took effect.
+        lost_returns: share of the beams that met something and returned nothing; None without a sensor.
     """
 
     scenario: str
@@ -80,6 +86,11 @@ class Row:
     guidance: str = ""
     bank_saturation_fraction: float | None = None
     cause: str = ""
+    navigation_error_p95_m: float | None = None
+    navigation_error_max_m: float | None = None
+    navigation_jump_m: float | None = None
+    plan_delay_max_s: float | None = None
+    lost_returns: float | None = None
 
     @property
     def label(self) -> str:
@@ -146,7 +157,18 @@ def row_of(
         cause=""
         if kinematic
         else next((leg["cause"] for leg in metrics["trackability"] if leg["cause"]), ""),
+        navigation_error_p95_m=_within(metrics, "navigation_error_m", "p95"),
+        navigation_error_max_m=_within(metrics, "navigation_error_m", "max"),
+        navigation_jump_m=metrics.get("navigation_jump_m"),
+        plan_delay_max_s=_within(metrics, "plan_delay_s", "max"),
+        lost_returns=_within(metrics, "lost_returns", "share"),
     )
+
+
+def _within(metrics: Mapping[str, Any], name: str, figure: str) -> float | None:
+    """A figure of a group that only some flights have, or older versions did not write."""
+    value: float | None = metrics.get(name, {}).get(figure)
+    return value
 
 
 @dataclass(frozen=True)
@@ -158,12 +180,14 @@ class Figure:
         short: the same in a few letters, for a terminal.
         text: its value in a row.
         hint: what it means, where the label does not say it; empty else.
+        everywhere: it is shown where no row has a value, too.
     """
 
     label: str
     short: str
     text: Callable[[Row], str]
     hint: str = ""
+    everywhere: bool = True
 
 
 FIGURES = (
@@ -200,6 +224,23 @@ FIGURES = (
     Figure("cross-track error p95, m", "xt p95", lambda row: number(row.cross_track_p95_m)),
     Figure("cross-track error max, m", "xt max", lambda row: number(row.cross_track_max_m)),
     Figure(
+        "navigation error p95, m",
+        "nav p95",
+        lambda row: number(row.navigation_error_p95_m),
+        hint="distance from the true position to the one that the aircraft believed to have",
+        everywhere=False,
+    ),
+    Figure(
+        "navigation error max, m", "nav max", lambda row: number(row.navigation_error_max_m), everywhere=False
+    ),
+    Figure(
+        "largest jump of the believed position, m",
+        "nav jump",
+        lambda row: number(row.navigation_jump_m),
+        hint="the most that the navigation error changes in a tenth of a second, when a fix comes back for example",
+        everywhere=False,
+    ),
+    Figure(
         "heading change planned, °",
         "turn °",
         lambda row: number(row.planned_heading_change_deg),
@@ -221,13 +262,32 @@ FIGURES = (
     Figure("planner time p50, ms", "p50 ms", lambda row: number(row.planner_p50_ms)),
     Figure("planner time p99, ms", "p99 ms", lambda row: number(row.planner_p99_ms)),
     Figure("planner time max, ms", "max ms", lambda row: number(row.planner_max_ms)),
+    Figure(
+        "plan delay max, s",
+        "delay s",
+        lambda row: number(row.plan_delay_max_s) if row.plan_delay_max_s else "",
+        hint="simulated time from the latest scan that a plan could know of until it was flown",
+        everywhere=False,
+    ),
+    Figure(
+        "returns lost by the sensor, %",
+        "lost %",
+        lambda row: number(row.lost_returns, 100.0) if row.lost_returns else "",
+        hint="share of the beams that met something and returned nothing",
+        everywhere=False,
+    ),
     Figure("replans", "replans", lambda row: "" if row.replans is None else str(row.replans)),
     Figure("digest", "digest", lambda row: row.digest[:12]),
 )
-"""What people are shown, in this order."""
+"""What people may be shown, in this order."""
 
 ON_TERMINAL = ("outcome", "km", "ratio", "clear m", "κ·R", "tracks", "xt max", "p99 ms")
 """Those that fit 80 columns, by `short`."""
+
+
+def shown_figures(rows: Sequence[Row]) -> list[Figure]:
+    """The figures that a table of rows shows."""
+    return [figure for figure in FIGURES if figure.everywhere or any(map(figure.text, rows))]
 
 
 def number(value: float | None, factor: float = 1.0) -> str:
@@ -263,7 +323,8 @@ def to_markdown(rows: Sequence[Row]) -> str:
         own = [row for row in rows if row.scenario == name]
         lines = [f"## {escaped(name)}", "", _line(["", *(row.label for row in own)])]
         lines.append(_line(["---", *("---:" for _ in own)]))
-        lines += [_line([figure.label, *(figure.text(row) or DASH for row in own)]) for figure in FIGURES]
+        shown = shown_figures(own)
+        lines += [_line([figure.label, *(figure.text(row) or DASH for row in own)]) for figure in shown]
         lines += ["", *(f"- {escaped(row.label)}: {escaped(row.reason)}" for row in own), ""]
         parts.append("\n".join(lines))
     return "\n".join(parts)

@@ -28,6 +28,7 @@ class Job:
         folder: the run folder, if it is kept.
         recordings: when it is kept.
         optimum: whether to compute the shortest path of the world.
+        again: the command line that flies it again.
         varied: the keys that the campaign varies and their values in this run, for the recording's properties.
     """
 
@@ -36,6 +37,7 @@ class Job:
     folder: Path
     recordings: Literal["all", "thin", "failures", "none"]
     optimum: bool
+    again: str = ""
     varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
 
 
@@ -94,7 +96,13 @@ def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
     from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 
     recorded = partial(
-        fly_to_folder, scenario, job.folder, recording=True, identity=f"run {job.run}", varied=job.varied
+        fly_to_folder,
+        scenario,
+        job.folder,
+        recording=True,
+        identity=f"run {job.run}",
+        varied=job.varied,
+        command=job.again or None,
     )
     if job.recordings in ("all", "thin"):
         return recorded(thin=job.recordings == "thin")

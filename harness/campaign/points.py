@@ -1,21 +1,23 @@
-"""The runs of a campaign as what is drawn of them: points of figures and varied numbers, and the ways of failures."""
+"""The runs of a campaign one by one: points of figures and varied numbers, runs that stand out, ways of failures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.campaign.table import load_tables, runs_of, varied_keys
+from harness.campaign.table import Runs, column, load_tables, run_name, runs_of, varied_keys
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from harness.campaign.summary import Summary
     from harness.report.figures import FigureScene
 
@@ -60,6 +62,74 @@ def run_points(folder: Path) -> RunPoints:
         {label: values for label, values in figures.items() if np.isfinite(values).any()},
         runs.reached,
     )
+
+
+STANDING_OUT: Final = {
+    "cross_track_m.max": ("cross-track error, m", 1.0),
+    "altitude_error_m.max": ("altitude error, m", 1.0),
+    "navigation_error_m.max": ("navigation error, m", 1.0),
+    "navigation_jump_m": ("jump of the believed position, m", 1.0),
+    "bank_saturation_fraction": ("time at the bank limit, %", 100.0),
+    "max_load_factor": ("load factor", 1.0),
+    "plan_delay_s.max": ("plan delay, s", 1.0),
+    "lost_returns.max": ("returns lost in the worst scan, %", 100.0),
+    "smoothness.flown.heading_change_deg": ("heading change, deg", 1.0),
+    "length_ratio": ("length over the optimum", 1.0),
+}
+"""Figures whose largest value is named with its run, by their column of the results; label, and factor for its unit."""
+
+
+@dataclass(frozen=True)
+class Extreme:
+    """The run that stands out most by a figure.
+
+    Attributes:
+        figure: what it is of, with its unit.
+        run: its number.
+        name: of its world, planner and aircraft.
+        value: the figure: the largest of all runs, of clearance the least.
+        following: the same of the run that comes next; None where only one run has the figure.
+        median: of all runs that have one.
+    """
+
+    figure: str
+    run: int
+    name: str
+    value: float
+    following: float | None
+    median: float
+
+
+def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
+    """The run that stands out by each figure by which any does: what is the same in all runs is left out.
+
+    Args:
+        results: one row a run.
+        runs: the same rows.
+    """
+    wanted_m = np.where((runs.wanted_clearance_m > 0.0) & runs.reached, runs.wanted_clearance_m, np.nan)
+    figures = {label: factor * column(results, name) for name, (label, factor) in STANDING_OUT.items()} | {
+        "longest search, ms": runs.planner_ms["max"]
+    }
+    least = _extreme(runs, "clearance over the wanted one, goal reached", -runs.min_clearance_m / wanted_m)
+    if least is not None:
+        following = None if least.following is None else -least.following
+        least = replace(least, value=-least.value, following=following, median=-least.median)
+    found = (least, *(_extreme(runs, label, values) for label, values in figures.items()))
+    return tuple(each for each in found if each is not None)
+
+
+def _extreme(runs: Runs, figure: str, values: FloatArray) -> Extreme | None:
+    """The run with the largest value; None where none is larger than the median."""
+    known = np.flatnonzero(np.isfinite(values))
+    if not len(known):
+        return None
+    order, median = known[np.argsort(-values[known], kind="stable")], float(np.median(values[known]))
+    row = int(order[0])
+    if values[row] <= median:
+        return None
+    following = float(values[order[1]]) if len(order) > 1 else None
+    return Extreme(figure, int(runs.run[row]), run_name(runs, row), float(values[row]), following, median)
 
 
 def _numeric(values: tuple[object, ...]) -> bool:

@@ -7,6 +7,7 @@ flew what when, so that its bytes are the same whatever flew it; times are in `t
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -171,6 +172,11 @@ def campaign_of(results: Path) -> dict[str, Any]:
     if not isinstance(found, dict) or found.get("schema") != SCHEMA or "digest" not in schema.names:
         raise InputError(f"{results}: is not the {RESULTS} of a campaign; give one")
     return found
+
+
+def fly_again(results: Path, run: int) -> str:
+    """The command line that flies a run of a campaign again."""
+    return shlex.join(["wayproof", "fly", "--from", str(results), "--run", str(run)])
 
 
 def row_of(results: Path, run: int) -> dict[str, Any] | None:

@@ -19,14 +19,16 @@ from numpy.typing import NDArray
 
 from harness.campaign.groups import Axis, grouped
 from harness.campaign.paired import CONFIDENCE, Duel, duels
-from harness.campaign.results import ERROR, RESULTS
+from harness.campaign.points import Extreme, extremes
+from harness.campaign.results import ERROR, RESULTS, fly_again
 from harness.campaign.table import (
     NAMED,
     Runs,
-    column,
+    are_crossed,
     drawn_keys,
     load_tables,
     planned_runs,
+    run_name,
     runs_of,
     varied_keys,
 )
@@ -44,16 +46,6 @@ BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of so many varied keys, the first ones."""
 
 CURVE_POINTS: Final = 201
-EXTREMES: Final = {
-    "cross_track_m.max": "cross-track error, m",
-    "altitude_error_m.max": "altitude error, m",
-    "navigation_error_m.max": "navigation error, m",
-    "max_load_factor": "load factor",
-    "bank_saturation_fraction": "share of the time at the bank limit",
-    "smoothness.flown.heading_change_deg": "heading change, deg",
-    "length_ratio": "length over the optimum",
-}
-"""Figures whose largest value is named with its run, by their column of the results."""
 SEVERITY: Final = tuple(
     f"collision lost_control out_of_bounds planner_failed {ERROR} timeout unreachable".split()
 )
@@ -144,25 +136,6 @@ class WorstRun:
 
 
 @dataclass(frozen=True)
-class Extreme:
-    """The run in which a figure is largest.
-
-    Attributes:
-        figure: what it is of, with its unit.
-        run: its number.
-        name: of its world, planner and aircraft.
-        value: the figure.
-        median: of all runs that have one.
-    """
-
-    figure: str
-    run: int
-    name: str
-    value: float
-    median: float
-
-
-@dataclass(frozen=True)
 class Summary:
     """The answers.
 
@@ -175,7 +148,7 @@ class Summary:
         curves: one for each key that a table has, by planner.
         lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
-        extremes: the run in which each of some figures is largest.
+        extremes: the run that stands out by each of some figures.
         untracked: the first runs that were not tracked: number, name, and why.
         duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
@@ -228,21 +201,16 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         curves=tuple(table(runs, [key, "planner"], drawn) for key in singles if key != "planner"),
         lengths=_lengths(runs),
         worst=_worst(runs, folder, keys),
-        extremes=_extremes(results, runs),
+        extremes=extremes(results, runs),
         untracked=_untracked(results, runs),
         duels=duels(runs),
         planned=planned_runs(results),
     )
 
 
-def _are_crossed(worlds: Sequence[str], scenarios: Sequence[str]) -> bool:
-    """Whether one world was flown with several scenarios: else it stands for its scenario."""
-    return len(set(zip(worlds, scenarios, strict=True))) > len(set(worlds))
-
-
 def _default_choice(keys: Sequence[str], runs: Runs) -> list[tuple[str, ...]]:
     """Every two of the first keys, but for one by which nearly every run would be a row of its own."""
-    crossed = _are_crossed(runs.names["world"], runs.names["scenario"])
+    crossed = are_crossed(runs.names["world"], runs.names["scenario"])
     useful = [key for key in keys if key != "scenario" or crossed or "world" not in keys]
     useful = [
         key
@@ -321,31 +289,11 @@ def _lengths(runs: Runs) -> dict[str, tuple[float, ...]]:
     return curves
 
 
-def _extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
-    found = []
-    for name, figure in EXTREMES.items():
-        values = column(results, name)
-        known = _finite(values)
-        if len(known) and known.max() > (median := float(np.median(known))):
-            row = int(np.nanargmax(values))
-            found.append(Extreme(figure, int(runs.run[row]), _name(runs, row), float(values[row]), median))
-    return tuple(found)
-
-
 def _untracked(results: pa.Table, runs: Runs) -> tuple[tuple[int, str, str], ...]:
     column_of = "trackability.causes"
     causes = results[column_of].to_pylist() if column_of in results.column_names else [None] * len(runs)
     rows = np.flatnonzero(runs.trackable == 0.0)[:WORST].tolist()
-    return tuple((int(runs.run[row]), _name(runs, row), causes[row] or "") for row in rows)
-
-
-def _name(runs: Runs, row: int) -> str:
-    """World, planner and aircraft of a run."""
-    names = runs.names
-    world, scenario = names["world"][row], names["scenario"][row]
-    crossed = world and _are_crossed(names["world"], names["scenario"])
-    place = (scenario, world) if crossed else (world or scenario,)
-    return ", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row])))
+    return tuple((int(runs.run[row]), run_name(runs, row), causes[row] or "") for row in rows)
 
 
 def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...]:
@@ -376,7 +324,7 @@ def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[
     recording = (folder / kept / RECORDING).is_file()
     return WorstRun(
         run=number,
-        name=_name(runs, row),
+        name=run_name(runs, row),
         seed=int(runs.seed[row]),
         outcome=names["outcome"][row],
         reason=names["reason"][row],
@@ -386,5 +334,5 @@ def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[
         folder=str(kept) if (folder / kept).is_dir() else "",
         recording=recording,
         view=shlex.join(["wayproof", "view", str(folder / kept)]) if recording else "",
-        command=shlex.join(["wayproof", "fly", "--from", str(folder / RESULTS), "--run", str(number)]),
+        command=fly_again(folder / RESULTS, number),
     )

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from harness.campaign.flight import Answer, Job, failed
 from harness.campaign.folder import RUNS, CampaignFolder
-from harness.campaign.results import ERROR
+from harness.campaign.results import ERROR, RESULTS, fly_again
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import WorkerDiedError, Workers
 from harness.files.errors import RunFolderError
@@ -94,6 +94,7 @@ def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:
                 (folder.path / RUNS / str(number)).resolve(),
                 campaign.recordings,
                 campaign.optimum,
+                fly_again(folder.path / RESULTS, number),
                 {name: value for name, value in runs.run(number).varied.items() if value is not None},
             )
 

@@ -182,6 +182,20 @@ def runs_of(results: pa.Table, timings: pa.Table | None, keys: Sequence[str]) ->
     )
 
 
+def are_crossed(worlds: Sequence[str], scenarios: Sequence[str]) -> bool:
+    """Whether one world was flown with several scenarios: else it stands for its scenario."""
+    return len(set(zip(worlds, scenarios, strict=True))) > len(set(worlds))
+
+
+def run_name(runs: Runs, row: int) -> str:
+    """World, planner and aircraft of a run."""
+    names = runs.names
+    world, scenario = names["world"][row], names["scenario"][row]
+    crossed = world and are_crossed(names["world"], names["scenario"])
+    place = (scenario, world) if crossed else (world or scenario,)
+    return ", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row])))
+
+
 def column(table: pa.Table | None, name: str) -> FloatArray:
     """A column of numbers, NaN where there is none."""
     if table is None:

@@ -43,6 +43,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
     clearance_m = metrics.get("min_clearance_m")
     ratio = None if clearance_m is None else clearance_m / (scenario.planner.clearance_m or math.inf)
     causes = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
+    lost = metrics["lost_returns"]["max"]
     wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
     found: dict[str, Value | None] = {
         "outcome": metrics["outcome"],
@@ -55,6 +56,10 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "cross_track_p95_m": metrics["cross_track_m"]["p95"],
         "cross_track_max_m": metrics["cross_track_m"]["max"],
         "altitude_error_p95_m": metrics["altitude_error_m"]["p95"],
+        "navigation_error_max_m": metrics.get("navigation_error_m", {}).get("max"),
+        "navigation_jump_m": metrics.get("navigation_jump_m"),
+        "plan_delay_max_s": metrics["plan_delay_s"]["max"],
+        "lost_returns_max_percent": None if lost is None else 100.0 * lost,
         "bank_saturation_percent": 100.0 * metrics["bank_saturation_fraction"],
         "flown_length_m": metrics["flown_length_m"],
         "flight_time_s": metrics["flight_time_s"],

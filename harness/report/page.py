@@ -9,7 +9,7 @@ from typing import Any
 
 import jinja2
 
-from harness.analysis.rows import DASH, FIGURES, Row
+from harness.analysis.rows import DASH, Figure, Row, shown_figures
 
 
 @dataclass(frozen=True)
@@ -123,5 +123,9 @@ def rendered(template: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    shown = [figure for figure in FIGURES if figure.short != "digest"]
-    return environment.get_template(template).render(figures=shown, dash=DASH, **values)
+    return environment.get_template(template).render(shown=_shown, dash=DASH, **values)
+
+
+def _shown(rows: Sequence[Row]) -> list[Figure]:
+    """What a page shows of rows: a digest stands elsewhere."""
+    return [figure for figure in shown_figures(rows) if figure.short != "digest"]

@@ -38,6 +38,8 @@ SCHEMA = pa.schema(
     + [("cross_track_m.p95", pa.float64()), ("trackability.legs", pa.int64()), ("trackable", pa.bool_())]
     + [("optimum_m", pa.float64()), ("length_ratio", pa.float64()), ("wanted_clearance_m", pa.float64())]
     + [("max_load_factor", pa.float64()), ("trackability.causes", pa.string())]
+    + [("bank_saturation_fraction", pa.float64()), ("plan_delay_s.max", pa.float64())]
+    + [("navigation_jump_m", pa.float64()), ("lost_returns.max", pa.float64())]
 )
 WIND = "environment.wind.speed_mps"
 
@@ -514,13 +516,48 @@ def test_runs_that_stand_out_are_named(tmp_path: Path) -> None:
     rows[3] |= {"trackable": False, "trackability.causes": "bank limit", "min_clearance_m": 49.9}
     folder = campaign(tmp_path / "c", rows)
     summary = summarise(folder)
-    (load,) = summary.extremes
-    assert (load.figure, load.run, load.value, load.median) == ("load factor", 2, 1.6, 1.0)
+    near, load = summary.extremes
+    assert (load.figure, load.run, load.value, load.following, load.median) == (
+        "load factor",
+        2,
+        1.6,
+        1.0,
+        1.0,
+    )
+    assert near.run == 3
+    assert (near.value, near.following) == pytest.approx((49.9 / 50.0, 1.2))
     assert [(run, why) for run, _, why in summary.untracked] == [(3, "bank limit")]
     page = write_summary(summary, folder).read_text()
     assert "Runs that stand out" in page
     assert "49.9 m; <strong class='bad'>below</strong> the wanted 50 m" in page
     assert "60 m; wanted 50 m" in page
+
+
+ODD = {
+    1: ("clearance over the wanted one, goal reached", {"min_clearance_m": 21.0}),
+    2: ("time at the bank limit, %", {"bank_saturation_fraction": 0.06}),
+    3: ("plan delay, s", {"plan_delay_s.max": 4.2}),
+    4: ("jump of the believed position, m", {"navigation_jump_m": 31.0}),
+    5: ("returns lost in the worst scan, %", {"lost_returns.max": 0.9}),
+}
+"""Run, the figure by which it stands out, and what is odd about it."""
+
+
+def test_each_oddity_of_a_campaign_stands_out_on_its_page_though_runs_failed(tmp_path: Path) -> None:
+    usual = {
+        "bank_saturation_fraction": 0.0,
+        "plan_delay_s.max": 0.2,
+        "navigation_jump_m": 0.4,
+        "lost_returns.max": 0.05,
+    }
+    rows = [row(run, **usual) | ODD.get(run, ("", {}))[1] for run in range(20)]
+    rows[7] |= {"outcome": "collision", "min_clearance_m": -1.0}  # it is among the failures, and no near miss
+    folder = campaign(tmp_path / "odd", rows)
+    summary = summarise(folder)
+    assert {each.run: each.figure for each in summary.extremes} == {run: ODD[run][0] for run in ODD}
+    page = write_summary(summary, folder).read_text()
+    for figure, _ in ODD.values():
+        assert f'<th scope="row">{figure}</th>' in page
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:

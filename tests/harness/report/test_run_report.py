@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,45 @@ def test_report_is_written_into_the_run_folder(run: Path) -> None:
     assert (row["outcome"], row["digest"]) == ("reached", metrics["digest"])
     assert float(row["flown_length_m"]) == metrics["flown_length_m"]
     assert "| outcome | reached |" in (run / "report.md").read_text()
+
+
+def test_rows_that_some_flights_have_are_shown_where_they_do(run: Path, tmp_path: Path) -> None:
+    assert "navigation error" not in (run / "report.html").read_text()
+    assert "navigation error" not in (run / "report.md").read_text()
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    figures = json.loads((copy / "metrics.json").read_text())
+    figures["navigation_error_m"] = {"rms": 3.0, "p95": 6.25, "max": 41.5}
+    figures |= {"navigation_jump_m": 33.25, "navigation_margin_m": 9.0}
+    figures["plan_delay_s"] = {"p50": 0.5, "p99": 2.5, "max": 2.75}
+    figures["lost_returns"] = {"share": 0.125, "max": 0.5}
+    (copy / "metrics.json").write_text(json.dumps(figures))
+    assert main(["report", str(copy)]) == 0
+    markdown = (copy / "report.md").read_text()
+    for label, value in (
+        ("navigation error p95, m", "6.25"),
+        ("navigation error max, m", "41.5"),
+        ("largest jump of the believed position, m", "33.2"),
+        ("plan delay max, s", "2.75"),
+        ("returns lost by the sensor, %", "12.5"),
+    ):
+        assert f"| {label} | {value} |" in markdown
+        assert label in (copy / "report.html").read_text()
+    (row,) = csv.DictReader((copy / "report.csv").read_text().splitlines())
+    assert float(row["navigation_error_max_m"]) == 41.5
+
+
+def test_the_report_of_a_campaigns_run_says_how_to_fly_it_again(tmp_path: Path) -> None:
+    (tmp_path / "ring.yaml").write_text(SCENARIO)
+    campaign = f"schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [{tmp_path}/ring.yaml]\nrecordings: thin\n"
+    (tmp_path / "c.yaml").write_text(campaign)
+    out = tmp_path / "out"
+    assert main(["sweep", str(tmp_path / "c.yaml"), "--workers", "1", "--out", str(out), "--quiet"]) == 0
+    assert main(["report", str(out / "runs" / "0")]) == 0
+    command = f"wayproof fly --from {out / 'results.parquet'} --run 0"
+    assert command in (out / "runs" / "0" / "report.html").read_text()
+    again = [*shlex.split(command)[1:], "--out", str(tmp_path / "again"), "--no-recording", "--quiet"]
+    assert main(again) == 0
 
 
 def test_report_escapes_what_it_is_told(run: Path, tmp_path: Path) -> None:
