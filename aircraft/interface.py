@@ -45,6 +45,8 @@ class AircraftState(NamedTuple):
     """Throttle command, 0 to 1; NaN for a model without an engine."""
     actuator_limited_s: float = 0.0
     """Time since the start in which a servo was at its rate limit, each counted."""
+    vertical_actuator_limited_s: float = 0.0
+    """That of the servos of elevator and throttle alone."""
 
     @property
     def groundspeed_mps(self) -> float:

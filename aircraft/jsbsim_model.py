@@ -92,7 +92,10 @@ class JsbsimModel:
         self._enable = node(fdm, "wayproof/enable").set_double_value
         self._read_for_fault = tuple(node(fdm, path).get_double_value for path in FAULT_PROPERTIES)
         servos = [name for name, servo in frame.files.actuators if servo.rate_limit_1ps is not None]
-        self._limited = tuple(node(fdm, f"wayproof/{name}-limited").get_double_value for name in servos)
+        self._limited, self._vertical_limited = (
+            tuple(node(fdm, f"wayproof/{name}-limited").get_double_value for name in names)
+            for names in (servos, [name for name in servos if name in ("elevator", "throttle")])
+        )
         self._set_up_autopilot(climb_limit_mps)
         self.command(roll_rad=0.0, altitude_m=start.altitude_m, airspeed_mps=start.airspeed_mps)
         if self._windy:
@@ -142,6 +145,7 @@ class JsbsimModel:
             load_factor,
             throttle,
             sum(read() for read in self._limited) / self._step_rate_hz if self._limited else 0.0,
+            sum(read() for read in self._vertical_limited) / self._step_rate_hz if self._limited else 0.0,
         )
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:

@@ -10,6 +10,8 @@ from typing import Any, Final
 import numpy as np
 
 from harness.analysis.as_given import AsGiven
+from harness.analysis.causes import saturated
+from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.smoothness import (
     flown_lengths,
     flown_profile,
@@ -18,7 +20,7 @@ from harness.analysis.smoothness import (
     stations_in_effect,
     window_m,
 )
-from harness.analysis.trackability import FlightLimits, legs, saturated
+from harness.analysis.trackability import legs
 from harness.flight.record import Flight, FloatArray, IntArray, Outcome, Track, digest
 
 COUNTED_BEAMS: Final = 20

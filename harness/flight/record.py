@@ -95,6 +95,9 @@ class Track:
             in_digest=False,
         ),
     ] = None
+    vertical_actuator_limited_s: Annotated[
+        FloatArray | None, Column("that of the servos of elevator and throttle alone", in_digest=False)
+    ] = None
     believed_east_m: Annotated[
         FloatArray | None, Column("where the aircraft believed to be", in_digest=False, believed=True)
     ] = None
@@ -114,8 +117,9 @@ class Track:
     ] = None
 
     def __post_init__(self) -> None:
-        if self.actuator_limited_s is None:
-            object.__setattr__(self, "actuator_limited_s", np.zeros(len(self.time_s)))
+        for name in SERVO_FIELDS:
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.zeros(len(self.time_s)))
         for name in UNKNOWN:
             if getattr(self, name) is None:
                 object.__setattr__(self, name, np.full(len(self.time_s), math.nan))
@@ -177,7 +181,10 @@ BELIEVED_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if column
 UNKNOWN = ("altitude_above_ground_m", *BELIEVED_FIELDS)
 """Names of those that are all NaN where they are left out."""
 
-TRACK_OPTIONAL = ("actuator_limited_s", *UNKNOWN)
+SERVO_FIELDS = ("actuator_limited_s", "vertical_actuator_limited_s")
+"""Names of those that are all 0 where they are left out."""
+
+TRACK_OPTIONAL = (*SERVO_FIELDS, *UNKNOWN)
 """Names of those that may be left out."""
 
 COLUMNS = tuple(name for name, column in TRACK_COLUMNS.items() if column.in_digest)

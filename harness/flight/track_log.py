@@ -151,6 +151,7 @@ class TrackLog:
             arc_length_m=of["arc_length_m"],
             throttle=of["throttle"],
             actuator_limited_s=of["actuator_limited_s"],
+            vertical_actuator_limited_s=of["vertical_actuator_limited_s"],
             altitude_above_ground_m=(
                 None if self._ground is None else of["up_m"] - self._ground(of["east_m"], of["north_m"])
             ),

@@ -11,7 +11,7 @@ import numpy as np
 import rerun as rr
 
 if TYPE_CHECKING:
-    from harness.analysis.trackability import FlightLimits
+    from harness.analysis.flight_limits import FlightLimits
     from harness.flight.record import FloatArray
     from harness.world.obstacle import Obstacle
     from harness.world_files.height_field import HeightField

@@ -12,9 +12,9 @@ from aircraft.guidance.altitude import slewed
 from harness.analysis.as_given import AsGiven
 from harness.analysis.breaches import Kept, kept
 from harness.analysis.deviation import allowed_m, deviation
+from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
-from harness.analysis.trackability import FlightLimits
 from harness.flight.record import Flight, Outcome, Track
 from harness.run.path_layers import layer_contacts
 from harness.run.path_verdict import verdict

@@ -20,8 +20,8 @@ from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import GRAVITY_MPS2, FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions
+from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
-from harness.analysis.trackability import FlightLimits
 from harness.files.errors import WriteError
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.navigation import Navigator, pose_error_m

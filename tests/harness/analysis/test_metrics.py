@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import (
     clearance_violation_s,
     error_figures,
@@ -16,7 +17,6 @@ from harness.analysis.metrics import (
     percentiles,
     planned_length_m,
 )
-from harness.analysis.trackability import FlightLimits
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from planner.interface import Path
 

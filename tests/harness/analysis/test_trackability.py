@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from harness.analysis.as_given import AsGiven
-from harness.analysis.trackability import FlightLimits, legs
+from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.trackability import legs
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
 LIMITS = FlightLimits(

@@ -18,8 +18,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aircraft.interface import AircraftState
+from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
-from harness.analysis.trackability import FlightLimits
 from harness.files.errors import RunFolderError
 from harness.flight.observer import Caution
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track

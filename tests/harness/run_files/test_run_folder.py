@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
-from harness.analysis.trackability import FlightLimits
 from harness.files.errors import RunFolderError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
 from harness.run_files.run_folder import METRICS, PLANS, TRACK, RunFolder, load_run
