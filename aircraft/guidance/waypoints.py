@@ -84,7 +84,7 @@ class WaypointLaw:
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route; the first leg is the first that ends ahead of the place on it."""
         self._progress = RouteProgress(route, arc_length_m)
-        self._points = mission_waypoints(route)
+        self._points: list[tuple[float, float]] = [tuple(p) for p in mission_waypoints(route).tolist()]
         self._circle = Route(route.segments[-1:], loiter=True) if route.loiter else None
         self._leg = -1
         self._next_leg()
@@ -95,42 +95,52 @@ class WaypointLaw:
             raise RuntimeError("follow() a route before update()")
         while self._leg < len(self._points) - 1 and self._reached(state):
             self._next_leg()
-        output = self._law.update(state)
-        place = self._progress.nearest(state.east_m, state.north_m)
-        return output._replace(
-            cross_track_m=place.cross_track_m, arc_length_m=place.arc_length_m, past_end=place.past_end
+        roll_rad, _, _, saturated, _, airspeed_mps = self._law.update(state)
+        place = self._progress.along(state.east_m, state.north_m)
+        return GuidanceOutput(
+            roll_rad, place.cross_track_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
         )
 
     def _next_leg(self) -> None:
         """Goes on to the next leg; beyond the last one to the loiter, or straight on."""
         self._leg += 1
         if self._leg < len(self._points) - 1:
-            self._law.follow(_line(self._points[self._leg], self._points[self._leg + 1]))
+            start, end = self._points[self._leg], self._points[self._leg + 1]
+            self._along = end[0] - start[0], end[1] - start[1]
+            self._turn_rad = self._turn_at_end_rad()
+            self._law.follow(_line(start, end))
         elif self._circle is not None:
             self._law.follow(self._circle)
 
     def _reached(self, state: AircraftState) -> bool:
         """Whether the leg's end counts as reached: near enough, or passed."""
-        start, end = self._points[self._leg], self._points[self._leg + 1]
-        east, north = end[0] - state.east_m, end[1] - state.north_m
-        along_east, along_north = end - start
-        if east * along_east + north * along_north <= 0.0:
+        end_east, end_north = self._points[self._leg + 1]
+        east, north = end_east - state.east_m, end_north - state.north_m
+        if east * self._along[0] + north * self._along[1] <= 0.0:
             return True
-        turn = 0.0
-        if self._leg + 2 < len(self._points):
-            after_east, after_north = self._points[self._leg + 2] - end
-            turn = abs(
-                math.atan2(
-                    along_east * after_north - along_north * after_east,
-                    along_east * after_east + along_north * after_north,
-                )
-            )
+        turn = self._turn_rad
         return turn > 0.0 and math.hypot(east, north) <= self._acceptance_m(state.groundspeed_mps, turn)
 
+    def _turn_at_end_rad(self) -> float:
+        """By how much the leg after this one is turned from it, at least 0; 0 where there is none."""
+        if self._leg + 2 >= len(self._points):
+            return 0.0
+        (end_east, end_north), (next_east, next_north) = self._points[self._leg + 1 : self._leg + 3]
+        after_east, after_north = next_east - end_east, next_north - end_north
+        along_east, along_north = self._along
+        return abs(
+            math.atan2(
+                along_east * after_north - along_north * after_east,
+                along_east * after_east + along_north * after_north,
+            )
+        )
 
-def _line(start: FloatArray, end: FloatArray) -> Route:
+
+def _line(start: tuple[float, float], end: tuple[float, float]) -> Route:
     length = math.dist(start, end)
-    return Route(np.array([[*start, *((end - start) / length), 0.0, length]]))
+    return Route(
+        np.array([[*start, (end[0] - start[0]) / length, (end[1] - start[1]) / length, 0.0, length]])
+    )
 
 
 def acceptance(kind: str, config: Any, limits: GuidanceLimits, radius_m: float | None = None) -> Acceptance:
