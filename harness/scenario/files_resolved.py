@@ -50,19 +50,21 @@ def resolved(
     at = [index for index, each in enumerate(obstacles) if each.file is not None]
     if not at:
         return Resolved(tuple(obstacles), tuple(f"obstacles[{i}]" for i in range(len(obstacles))), ground, ())
+    from harness.world_files.bounded import uncollected
     from harness.world_files.expansion import FileFault, expanded
     from harness.world_files.plane import Place
 
     place = Place(area.origin.latitude_deg, area.origin.longitude_deg)
     specs = [spec_of(file, folder) for each in obstacles if (file := each.file)]
     known = None if ground is None else ground.field()
-    try:
-        found = expanded(specs, place, area.bounds_m, altitude_m, turn_room_m, ground=known)
-    except FileFault as fault:
-        raise KeyFault(
-            ("obstacles", at[fault.index], "file"), f"{specs[fault.index].path.name} {fault}"
-        ) from fault
-    return _joined(obstacles, found, ground)
+    with uncollected():
+        try:
+            found = expanded(specs, place, area.bounds_m, altitude_m, turn_room_m, ground=known)
+        except FileFault as fault:
+            raise KeyFault(
+                ("obstacles", at[fault.index], "file"), f"{specs[fault.index].path.name} {fault}"
+            ) from fault
+        return _joined(obstacles, found, ground)
 
 
 def spec_of(file: WorldFile, folder: Path | None) -> FileSpec:

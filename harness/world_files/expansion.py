@@ -13,6 +13,7 @@ import numpy as np
 
 from harness.files.input_file import open_regular
 from harness.world_files import kinds
+from harness.world_files.bounded import uncollected
 from harness.world_files.growing import simplified
 from harness.world_files.height_field import HeightField
 from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError, counted
@@ -171,7 +172,8 @@ def loaded_file(path: Path, kind: str | None, reading: Reading) -> Contents:
 @lru_cache(maxsize=4)
 def _loaded(path: Path, kind: str | None, reading: Reading, stamp: tuple[int, int]) -> Contents:
     try:
-        return kinds.read(path, kind, reading)
+        with uncollected():
+            return kinds.read(path, kind, reading)
     except MemoryError as error:
         raise WorldFileError("needs more memory than there is; cut the area of interest out of it") from error
     except RecursionError as error:

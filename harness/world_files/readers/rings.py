@@ -113,6 +113,8 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]]) -> list[Any]:
         if area > 0.0:
             several.setdefault(part, []).append(shape)
     for part, pieces in several.items():
+        if len(pieces) > 1:  # floor and roof of a block are the same
+            pieces = list(dict(zip(shapely.to_wkb(shapely.normalize(pieces)), pieces, strict=True)).values())
         found[part] = pieces[0] if len(pieces) == 1 else shapely.union_all(pieces)
     return found
 

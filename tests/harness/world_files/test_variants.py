@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import math
 from pathlib import Path
@@ -13,6 +14,7 @@ import shapely
 from PIL import Image
 from pyproj import CRS
 
+from harness.world_files.expansion import loaded_file
 from harness.world_files.kinds import kind_of, read
 from harness.world_files.parts import (
     FOOT_M,
@@ -394,3 +396,89 @@ def test_layers_in_different_systems_are_refused(tmp_path: Path) -> None:
             assert read_any(path).parts[0].top == Limit(12.0, Datum.GROUND)
     with pytest.raises(WorldFileError, match="different coordinate reference systems"):
         read_any(path)
+
+
+def city(crs: str, objects: dict[str, Any], vertices: list[list[float]], **more: Any) -> dict[str, Any]:
+    metadata = {"referenceSystem": crs}
+    return {
+        "type": "CityJSON", "version": "1.1", "metadata": metadata, "CityObjects": objects, "vertices": vertices, **more
+    }  # fmt: skip
+
+
+def floor(kind: str = "MultiSurface", **attributes: Any) -> dict[str, Any]:
+    geometry = [{"type": kind, "lod": "0", "boundaries": [[[0, 1, 2, 3]]]}]
+    return {"type": "Building", "attributes": attributes, "geometry": geometry}
+
+
+SQUARE_M = [[0.0, 0.0, 7.0], [10.0, 0.0, 7.0], [10.0, 10.0, 7.0], [0.0, 10.0, 7.0]]
+
+
+def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_path: Path) -> None:
+    objects = {"a": floor(measuredHeight=12.5), "b": floor(), "c": floor("MultiLineString")}
+    path = written(
+        tmp_path / "a.city.json", json.dumps(city("urn:ogc:def:crs:EPSG::7415", objects, SQUARE_M))
+    )
+    found = read_any(path)
+    assert [(part.name, part.bottom, part.top) for part in found.parts] == [
+        ("a", Limit(7.0), Limit(19.5)),
+        ("b", Limit(7.0), Limit(13.0)),
+    ]
+    assert found.crs == "EPSG:7415"
+    assert any("1 building without height" in note for note in found.notes)
+
+
+def test_a_sequence_of_city_features_has_vertices_a_line(tmp_path: Path) -> None:
+    how = {"scale": [0.1, 0.1, 0.1], "translate": [1000.0, 2000.0, 0.0]}
+    first = city("https://www.opengis.net/def/crs/EPSG/0/7415", {}, [], transform=how)
+    lines = [first]
+    for k in range(3):
+        square = [[x + 1000 * k, y, z] for x, y, z in SQUARE_M]
+        lines.append(
+            {
+                "type": "CityJSONFeature",
+                "id": f"b{k}",
+                "CityObjects": {f"b{k}": floor(height=5)},
+                "vertices": square,
+            }
+        )
+    text = "\n".join(map(json.dumps, lines)) + "\n"
+    found = read_any(written(tmp_path / "a.city.jsonl", text))
+    assert [part.footprint.bounds[:2] for part in found.parts] == [
+        (1000.0, 2000.0), (1100.0, 2000.0), (1200.0, 2000.0)
+    ]  # fmt: skip
+    with pytest.raises(WorldFileError, match="'b2' with a vertex that is not there"):
+        read_any(written(tmp_path / "b.city.jsonl", text.replace("[2010.0, 0.0, 7.0], ", "")))
+
+
+def test_city_objects_in_degrees_have_an_area_and_their_latitudes_may_come_first(tmp_path: Path) -> None:
+    places = [
+        [35.0 + 1e-4 * y, 139.0 + 1e-4 * x, z] for x, y, z in ((0, 0, 3), (1, 0, 3), (1, 1, 9), (0, 1, 9))
+    ]
+    for vertices in (places, [[y, x, z] for x, y, z in places]):
+        path = written(tmp_path / "a.city.json", json.dumps(city("EPSG:6697", {"a": floor()}, vertices)))
+        (part,) = read_any(path).parts
+        assert part.footprint.bounds == pytest.approx((139.0, 35.0, 139.0001, 35.0001))
+        assert part.footprint.area == pytest.approx(1e-8)
+
+
+@pytest.mark.parametrize("index", [-1, 4, 1.5, "1", None, 10**30])
+def test_a_city_object_with_a_vertex_that_is_not_there_is_named(index: Any, tmp_path: Path) -> None:
+    thing = floor()
+    thing["geometry"][0]["boundaries"][0][0][2] = index
+    path = written(tmp_path / "a.city.json", json.dumps(city("EPSG:7415", {"tower": thing}, SQUARE_M)))
+    with pytest.raises(WorldFileError, match="'tower' with a vertex that is not there"):
+        read_any(path)
+
+
+def test_reading_leaves_the_collection_of_cycles_as_it_was(tmp_path: Path) -> None:
+    good = written(tmp_path / "a.geojson", json.dumps(feature({})))
+    bad = written(tmp_path / "b.geojson", "{")
+    for on in (True, False):
+        (gc.enable if on else gc.disable)()
+        try:
+            loaded_file(good, None, Reading())
+            with pytest.raises(WorldFileError):
+                loaded_file(bad, None, Reading())
+            assert gc.isenabled() is on
+        finally:
+            gc.enable()
