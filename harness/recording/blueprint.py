@@ -45,7 +45,9 @@ THROTTLE, RETURNS, PLAN_DELAY = "throttle", "returns", "plan_delay"
 SENSED = "sensed"
 """Below WORLD and PLAN: places on edges, each when it was sensed first; shown up to the cursor as well."""
 TRUE = "true_obstacles"
-"""Below WORLD: the standing obstacles as solids from the start on; hidden but in overlays."""
+"""Below WORLD: the standing obstacles as solids from the start on; hidden but in overlays and thin recordings."""
+DISCS = "discs"
+"""Below PLAN: round obstacles of a thin recording."""
 
 PLANNER_LANE, BANK_LANE, TRACKING_LANE = "planner", "saturation", "tracking"
 """Lanes of the state timeline, below STATES; shown in the order of their names."""
@@ -98,8 +100,7 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "clearance/wanted": ("wanted", WANTED, 1.0),
     "bank/commanded": ("commanded", CHOSEN, 1.0),
     "bank/flown": ("flown", TRACK, 1.5),
-    "bank/limit_right": ("limit", WANTED, 1.0),
-    "bank/limit_left": ("limit", WANTED, 1.0),
+    "bank/limit": ("limit", WANTED, 1.0),
     "bank/pitch": ("pitch", WINDOW, 1.0),
     "speed/ground": ("over the ground", CHOSEN, 1.0),
     "speed/flown": ("true airspeed", TRACK, 1.5),
@@ -111,6 +112,8 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
 }
 """Name, colour and width of every line of the time series, by its entity below SERIES; of overlaid runs, only
 those called `flown` are drawn."""
+WHOLE_ONLY = ("bank/pitch", "cross_track/believed")
+"""Lines that a thin recording does not have."""
 SEARCH, DELAYS = "search/flown", f"{PLAN_DELAY}/flown"
 """Below SERIES: time of the search of each plan, and how late it took effect, drawn as points."""
 

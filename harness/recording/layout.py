@@ -44,6 +44,9 @@ class Layout(rrb.Blueprint):
 
     def _log_to_stream(self, stream: rr.RecordingStream) -> None:
         self._stream = stream
+        # Wall clock and count beside the time line of layouts would take 12 kB of the file.
+        stream.set_log_time_enabled(False)
+        stream.set_log_tick_enabled(False)
         super()._log_to_stream(stream)
 
     def let_go(self) -> None:
@@ -127,17 +130,20 @@ THIN_SERIES: Final = ("cross_track", "clearance", "bank")
 
 
 def thin_blueprint(frame: Frame) -> Layout:
-    """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series."""
+    """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series.
+
+    Every component of a layout takes 1.5 kB of the file, most of that in its table of contents: there are few.
+    """
     events = rrb.TextLogView(origin=EVENTS, name="Events")
     about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
     return Layout(
         rrb.Horizontal(
             rrb.Vertical(
-                rrb.Horizontal(plan_view(frame, ("",)), flight_view(frame, ("",))),
+                rrb.Horizontal(plan_view(frame), flight_view(frame)),
                 rrb.Horizontal(events, about),
                 row_shares=[12, 5],
             ),
-            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES)),
+            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES, background=False)),
             column_shares=[13, 6],
         ),
         rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),
@@ -148,10 +154,15 @@ def thin_blueprint(frame: Frame) -> Layout:
     )
 
 
-def plan_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial2DView:
+def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:
     """The plan view, north up, framed on the area.
 
     A 2-D view counts its second axis downwards; the transform at PLAN turns it round.
+
+    Args:
+        frame: what to frame the view on.
+        trails: entity of each run, as `runs` of `blueprint`, whose trail is shown up to the cursor; of thin recordings
+            none.
     """
     xmin, ymin, xmax, ymax = frame.bounds_m
     margin = 0.03 * frame.span_m
@@ -159,18 +170,23 @@ def plan_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial2DView:
         origin="/",
         contents=[f"/{PLAN}/**"],
         name="Plan view (north up)",
-        background=list(BACKGROUND),
+        background=list(BACKGROUND) if trails else None,
         visual_bounds=rrb.VisualBounds2D(
             x_range=[xmin - margin, xmax + margin], y_range=[-ymax - margin, -ymin + margin]
         ),
         overrides={
-            f"{PLAN}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, BELIEVED, SENSED)
+            f"{PLAN}/{run}{each}": _up_to_cursor() for run in trails for each in (FLOWN, BELIEVED, SENSED)
         },
     )
 
 
-def flight_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial3DView:
-    """The 3-D view: the whole area, seen from the south-west and above."""
+def flight_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial3DView:
+    """The 3-D view: the whole area, seen from the south-west and above.
+
+    Args:
+        frame: what to frame the view on.
+        trails: as in `plan_view`.
+    """
     xmin, ymin, xmax, ymax = frame.bounds_m
     middle = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), frame.altitude_m)
     away = 1.25 * frame.span_m
@@ -181,18 +197,18 @@ def flight_view(frame: Frame, runs: Sequence[str]) -> rrb.Spatial3DView:
         middle[2] + away * math.sin(elevation),
     )
     contents = [f"/{WORLD}/**"]
-    if len(runs) == 1:
+    if len(trails) == 1:
         contents.append(f"- /{WORLD}/{TRUE}/**")
     return rrb.Spatial3DView(
         origin=WORLD,
         contents=contents,
         name="3-D flight",
-        background=list(BACKGROUND),
+        background=list(BACKGROUND) if trails else None,
         line_grid=rrb.LineGrid3D(visible=False),
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital, position=eye, look_target=middle, eye_up=(0.0, 0.0, 1.0)
         ),
-        overrides={f"{WORLD}/{run}{each}": _up_to_cursor() for run in runs for each in (FLOWN, SENSED)},
+        overrides={f"{WORLD}/{run}{each}": _up_to_cursor() for run in trails for each in (FLOWN, SENSED)},
     )
 
 
@@ -213,7 +229,11 @@ def attitude_view() -> rrb.Spatial3DView:
 
 
 def series_views(
-    frame: Frame, runs: Sequence[str], only: Sequence[str] | None = None, without: Sequence[str] = ()
+    frame: Frame,
+    runs: Sequence[str],
+    only: Sequence[str] | None = None,
+    without: Sequence[str] = (),
+    background: bool = True,
 ) -> list[rrb.TimeSeriesView]:
     """The time series, one a question, each over the whole flight.
 
@@ -224,6 +244,7 @@ def series_views(
         runs: as in `blueprint`.
         only: names of the series shown; default: all.
         without: names of series that are not shown.
+        background: whether they have ours; else rerun's.
     """
     wanted = max(frame.clearance_m, 1.0)
     one = len(runs) == 1
@@ -247,10 +268,14 @@ def series_views(
         rrb.TimeSeriesView(
             origin=f"{SERIES}/{entity}",
             name=title,
-            background=rrb.archetypes.PlotBackground(color=list(BACKGROUND), show_grid=True),
+            background=rrb.archetypes.PlotBackground(color=list(BACKGROUND), show_grid=True)
+            if background
+            else None,
             axis_x=_whole_flight(),
             axis_y=rrb.ScalarAxis(range=limits) if limits else None,
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=not one and entity == "cross_track"),
+            plot_legend=rrb.PlotLegend(visible=False)
+            if one
+            else rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=entity == "cross_track"),
         )
         for entity, title, limits in rows
         if (only is None or entity in only) and entity not in without

@@ -18,7 +18,7 @@ from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import blueprint
 from harness.recording.states import over, send_changes
 
-SHARED = ("bounds", "goal", "ends", "area", "outlines", "moving", look.TRUE)
+SHARED = ("bounds", "goal", "ends", "area", "outlines", look.DISCS, "moving", look.TRUE)
 """Below PLAN and WORLD: what all runs of a scenario have in common."""
 OWN = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 """Below PLAN and WORLD: what is drawn of every run."""

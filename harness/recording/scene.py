@@ -19,6 +19,7 @@ from harness.recording.layout import THIN_SERIES
 from harness.recording.solids import CIRCLE_POINTS, circle, log_solids, outlines, rims, strips_2d, strips_3d
 from harness.recording.summary import colours, summary
 from harness.recording.terrain import log_ground
+from harness.world.obstacle import Circle, Obstacle
 
 LEAST_CIRCLE_POINTS, POINTS_OF_ALL = 12, 400_000
 """Thousands of circles are drawn with fewer points each, so that their recording fits into memory."""
@@ -43,7 +44,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
     Args:
         rec: where to.
         scene: what it is.
-        thin: for a thin recording: circles with fewer corners, no attitude, and the summary when it is known.
+        thin: for a thin recording: circles as discs, no attitude, and the summary when it is known.
     """
     frame = scene.frame
     rec.send_property(
@@ -57,28 +58,39 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         log_ground(rec, scene.ground)
     standing = [obstacle for obstacle in scene.obstacles if obstacle.stands_for_ever]
     if standing:
-        points = (
-            LEAST_CIRCLE_POINTS
-            if thin
-            else max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
-        )
-        rings = [ring for each in standing for ring in outlines(each.shape, points)]
+        points = max(LEAST_CIRCLE_POINTS, min(CIRCLE_POINTS, POINTS_OF_ALL // len(standing)))
+        lined = _log_discs(rec, standing) if thin else standing
+        rings = [ring for each in lined for ring in outlines(each.shape, points)]
         # Of many obstacles each of these is large: none is kept while the next is made.
-        rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
+        if rings:
+            rec.log(f"{look.PLAN}/outlines", lines_2d(rings, look.OUTLINE, 1.5, 10), static=True)
         del rings
         if not thin:
             rec.log(f"{look.WORLD}/outlines", rims(scene, standing, look.OUTLINE, points), static=True)
-        solid = "obstacles" if thin else look.TRUE
-        log_solids(rec, f"{look.WORLD}/{solid}", scene, standing, look.OBSTACLE)
+        log_solids(rec, f"{look.WORLD}/{look.TRUE}", scene, standing, look.OBSTACLE)
     _log_aircraft(rec, scene, thin)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
-        if thin and entity.partition("/")[0] not in THIN_SERIES:
+        if thin and (entity.partition("/")[0] not in THIN_SERIES or entity in look.WHOLE_ONLY):
             continue
         style = rr.SeriesLines(names=[name], colors=[colour], widths=[width])
         rec.log(f"{look.SERIES}/{entity}", style, static=True)
     if not thin:
         log_colours_page(rec, scene)
         log_summary(rec, scene, None)
+
+
+def _log_discs(rec: rr.RecordingStream, obstacles: Sequence[Obstacle]) -> list[Obstacle]:
+    """Draws circles in the plan view as discs, a tenth of what outlines take; returns the other obstacles."""
+    circles = [each.shape for each in obstacles if isinstance(each.shape, Circle)]
+    if circles:
+        discs = rr.Points2D(
+            [shape.center_m for shape in circles],
+            radii=[shape.radius_m for shape in circles],
+            colors=[look.OUTLINE],
+            draw_order=10,
+        )
+        rec.log(f"{look.PLAN}/{look.DISCS}", discs, static=True)
+    return [each for each in obstacles if not isinstance(each.shape, Circle)]
 
 
 def send_believed(rec: rr.RecordingStream, block: Track, piece_rows: int, last_m: FloatArray) -> FloatArray:

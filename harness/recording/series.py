@@ -44,7 +44,7 @@ def curves(block: Track, altitude_m: float) -> dict[str, FloatArray]:
 
 
 def send_curves(rec: rr.RecordingStream, values: Mapping[str, FloatArray], time_s: FloatArray) -> None:
-    """Sends curves that have the same times, by entity below SERIES."""
+    """Sends curves (n,) or sets of k curves (n, k) that have the same times, by entity below SERIES."""
     times = [look.time_column(time_s)]
     for entity, curve in values.items():
         rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=curve))
@@ -53,12 +53,9 @@ def send_curves(rec: rr.RecordingStream, values: Mapping[str, FloatArray], time_
 def send_levels(rec: rr.RecordingStream, scene: look.Scene, time_s: FloatArray) -> None:
     """Sends the wanted clearance and the limits of the bank, from the first of some times to the last."""
     limit_deg = math.degrees(scene.limits.bank_limit_rad)
-    levels = {
-        "clearance/wanted": scene.limits.clearance_m,
-        "bank/limit_right": limit_deg,
-        "bank/limit_left": -limit_deg,
-    }
-    send_curves(rec, {name: np.full(2, level) for name, level in levels.items()}, time_s[[0, -1]])
+    wanted = np.full(2, scene.limits.clearance_m)
+    levels = {"clearance/wanted": wanted, "bank/limit": np.tile((-limit_deg, limit_deg), (2, 1))}
+    send_curves(rec, levels, time_s[[0, -1]])
 
 
 class Returns:

@@ -38,6 +38,9 @@ if TYPE_CHECKING:
 ROWS = 20
 """Every so many rows of the track are kept: two seconds of flight."""
 
+CHORD_ERROR = 1e-2
+"""How far a drawn plan may be off the true one, as a share of the turn radius: a pixel of the plan view is more."""
+
 
 class ThinLog:
     """Writes one thin recording; an observer of the loop like `RerunLog`.
@@ -117,7 +120,7 @@ class ThinLog:
         """Draws the whole track and the events, writes the summary and the typed properties, and ends the file."""
         self._send_plans()
         if self._whole:
-            track = lines_2d([np.concatenate(self._whole)], look.WHOLE_TRACK, 1.5, 15)
+            track = lines_2d([np.concatenate(self._whole)], look.TRACK, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
         send_events(self._rec, [(*event, look.TOLD) for event in self._events])
         log_summary(self._rec, replace(self._scene, scenario_yaml=""), metrics)
@@ -133,7 +136,7 @@ class ThinLog:
         if not plans:
             return
         times = [look.time_column(np.array([plan.time_s for plan in plans]))]
-        paths = polylines([plan.segments for plan in plans], 2e-3 * self._scene.mission.turn_radius_m)
+        paths = polylines([plan.segments for plan in plans], CHORD_ERROR * self._scene.mission.turn_radius_m)
         self._rec.send_columns(f"{look.PLAN}/chosen", times, rr.LineStrips2D.columns(strips=strips_2d(paths)))
         points = [plan.plan.waypoints_m for plan in plans]
         self._rec.send_columns(

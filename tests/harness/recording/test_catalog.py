@@ -80,7 +80,7 @@ def test_a_thin_recording_is_small_and_has_typed_properties(
 ) -> None:
     given = record(tmp_path, 7, flight(make_track, make_plan, Outcome.TIMEOUT, 90.0))
     (path,) = recordings_of(tmp_path)
-    assert path.stat().st_size < 300_000
+    assert path.stat().st_size < 240_000
     assert properties_of(path) == pytest.approx(given)
     kinds = {name: type(value) for name, value in properties_of(path).items()}
     assert kinds["outcome"] is str
@@ -101,6 +101,8 @@ def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
         "/plan/waypoints",
         "/plan/whole_track",
         "/plan/outlines",
+        "/plan/discs",
+        "/world/true_obstacles/circles",
         "/summary",
         "/events",
     } <= rows.keys()

@@ -158,9 +158,10 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
     }.items():
         logged = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
         np.testing.assert_array_equal(logged[-1001:], values)
-    for entity, value in {"clearance/wanted": 100.0, "bank/limit_left": -math.degrees(0.78)}.items():
-        level = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64).ravel()
-        np.testing.assert_allclose(level, value)
+    limit_deg = math.degrees(0.78)
+    for entity, value in {"clearance/wanted": [100.0], "bank/limit": [-limit_deg, limit_deg]}.items():
+        level = np.array(column(entities, f"/series/{entity}", "scalars"), dtype=np.float64)
+        np.testing.assert_allclose(level, np.tile(value, (len(level), 1)))
         assert (seconds(entities, f"/series/{entity}")[0], seconds(entities, f"/series/{entity}")[-1]) == (
             0,
             100,
