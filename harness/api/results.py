@@ -173,7 +173,7 @@ class CampaignResult:
     @property
     def recordings(self) -> dict[int, Recording]:
         """The recordings that the campaign kept, by the number of the run."""
-        from harness.campaign.folder import recordings_of
+        from harness.campaign.table import recordings_of
 
         return {int(path.parent.name): Recording(path) for path in recordings_of(self.folder)}
 

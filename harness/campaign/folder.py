@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -17,7 +17,7 @@ from typing import IO, TYPE_CHECKING, Any, Final
 
 from aircraft.airframes import airframe
 from harness.campaign.journal import JOURNAL, columns, read_journal, rows, time_rows
-from harness.campaign.results import RESULTS, SCHEMA, TIMES, TIMINGS, table
+from harness.campaign.results import INDEX, RESULTS, SCHEMA, TIMES, TIMINGS, table
 from harness.campaign.runs import CampaignRuns
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
@@ -25,16 +25,12 @@ from harness.files.input_file import read_index
 from harness.files.versions import versions
 from harness.files.whole_file import PARTIAL, replace_text
 from harness.files.wording import counted
-from harness.recording.properties import severity
-from harness.run_files.run_folder import RECORDING
 from planner.registry import distribution_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-INDEX: Final = "campaign.json"
 LOCK: Final = "lock"
-RUNS: Final = "runs"
 FOLDER_SCHEMA: Final = "wayproof/campaign-folder/1"
 MAX_INDEX_BYTES: Final = 10**9
 
@@ -194,34 +190,3 @@ def _changes(before: Any, now: Any, where: str = "") -> Iterator[str]:
 def _shown(value: Any) -> str:
     text = "not there" if value is ABSENT else json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def recordings_of(folder: Path) -> list[Path]:
-    """The recordings that a campaign's folder keeps, by the number of the run."""
-    kept = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
-    return sorted(kept, key=lambda path: int(path.parent.name))
-
-
-def worst_first(folder: Path, recordings: Sequence[Path]) -> list[Path]:
-    """Recordings of a campaign in the order of how badly their runs went, as far as its results tell.
-
-    Args:
-        folder: of the campaign.
-        recordings: some of it, by the number of the run; those that results tell nothing of come last.
-    """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    columns = ["run", "outcome", "trackable", "min_clearance_m", "wanted_clearance_m"]
-    try:
-        rows = pq.read_table(folder / RESULTS, columns=columns).to_pylist()
-    except (OSError, pa.ArrowException):
-        return [*recordings]
-    bad = {row["run"]: _how_bad(row) for row in rows}
-    return sorted(recordings, key=lambda path: -bad.get(int(path.parent.name), -1.0))
-
-
-def _how_bad(row: Mapping[str, Any]) -> float:
-    least_m, wanted_m = row["min_clearance_m"], row["wanted_clearance_m"]
-    ratio = least_m / wanted_m if least_m is not None and wanted_m else None
-    return severity(str(row["outcome"]), bool(row["trackable"]), ratio)

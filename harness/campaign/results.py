@@ -19,6 +19,10 @@ from harness.files.strict_yaml import InputError
 if TYPE_CHECKING:
     import pyarrow as pa
 
+INDEX: Final = "campaign.json"
+"""In the folder of a campaign: what is flown."""
+RUNS: Final = "runs"
+"""Below that: run folders, each called by the number of its run."""
 RESULTS: Final = "results.parquet"
 TIMINGS: Final = "timings.parquet"
 SCHEMA: Final = "wayproof/results/1"

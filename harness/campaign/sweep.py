@@ -9,8 +9,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Any, Final
 
 from harness.campaign.flight import Answer, Job, failed
-from harness.campaign.folder import RUNS, CampaignFolder
-from harness.campaign.results import ERROR, RESULTS, fly_again
+from harness.campaign.folder import CampaignFolder
+from harness.campaign.results import ERROR, RESULTS, RUNS, fly_again
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import WorkerDiedError, Workers
 from harness.files.errors import RunFolderError

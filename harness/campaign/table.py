@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.campaign.results import RESULTS, TIMINGS
+from harness.campaign.results import RESULTS, RUNS, TIMINGS
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
+from harness.recording.properties import severity
+from harness.run_files.run_folder import RECORDING
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -219,3 +221,34 @@ def _texts(table: pa.Table, name: str) -> tuple[str, ...]:
     if name not in table.column_names:
         return ("",) * len(table)
     return tuple("" if value is None else str(value) for value in table[name].to_pylist())
+
+
+def recordings_of(folder: Path) -> list[Path]:
+    """The recordings that a campaign's folder keeps, by the number of the run."""
+    kept = [path for path in (folder / RUNS).glob(f"*/{RECORDING}") if path.parent.name.isdecimal()]
+    return sorted(kept, key=lambda path: int(path.parent.name))
+
+
+def worst_first(folder: Path, recordings: Sequence[Path]) -> list[Path]:
+    """Recordings of a campaign in the order of how badly their runs went, as far as its results tell.
+
+    Args:
+        folder: of the campaign.
+        recordings: some of it, by the number of the run; those that results tell nothing of come last.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = ["run", "outcome", "trackable", "min_clearance_m", "wanted_clearance_m"]
+    try:
+        rows = pq.read_table(folder / RESULTS, columns=columns).to_pylist()
+    except (OSError, pa.ArrowException):
+        return [*recordings]
+    bad = {row["run"]: _how_bad(row) for row in rows}
+    return sorted(recordings, key=lambda path: -bad.get(int(path.parent.name), -1.0))
+
+
+def _how_bad(row: Mapping[str, Any]) -> float:
+    least_m, wanted_m = row["min_clearance_m"], row["wanted_clearance_m"]
+    ratio = least_m / wanted_m if least_m is not None and wanted_m else None
+    return severity(str(row["outcome"]), bool(row["trackable"]), ratio)

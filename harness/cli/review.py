@@ -27,7 +27,7 @@ def view(
 
     For example: wayproof view runs/paper_circles/rolling_window-aerosonde-1
     """
-    from harness.campaign.folder import INDEX
+    from harness.campaign.results import INDEX
 
     if len(runs) == 1 and (runs[0] / INDEX).is_file():
         return 0 if open_campaign(runs[0], web) else FAILED
@@ -49,8 +49,8 @@ def report(
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
     """
-    from harness.campaign.folder import INDEX, LOCK
-    from harness.campaign.results import RESULTS
+    from harness.campaign.folder import LOCK
+    from harness.campaign.results import INDEX, RESULTS
     from harness.files.errors import RunFolderError
     from harness.files.folder_lock import is_held
     from harness.files.input_file import InputError
@@ -118,7 +118,7 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
 
 def open_campaign(folder: Path, web: bool = False) -> bool:
     """Shows the recordings of a campaign as a table until the viewer is closed; says why, if it cannot start."""
-    from harness.campaign.folder import recordings_of, worst_first
+    from harness.campaign.table import recordings_of, worst_first
     from harness.files.errors import RunFolderError
     from harness.recording.catalog import AT_ONCE, open_table
     from harness.recording.viewer import ViewerError

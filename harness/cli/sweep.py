@@ -115,7 +115,8 @@ def _fly(
     """Flies what is missing; returns how many runs ended how."""
     from contextlib import nullcontext
 
-    from harness.campaign.folder import INDEX, CampaignFolder
+    from harness.campaign.folder import CampaignFolder
+    from harness.campaign.results import INDEX
     from harness.campaign.sweep import fly_missing
     from harness.cli.sweep_terminal import sweep_bar
     from harness.files.errors import RunFolderError

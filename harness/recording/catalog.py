@@ -7,12 +7,14 @@ import tempfile
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.files.errors import RunFolderError
+from harness.recording.blueprint import FRAME, MAP, PLANNER_LANE, SERIES, STATES, Frame
+from harness.recording.layout import PLOTS, Layout, blueprint, thin_blueprint
 from harness.recording.properties import RUN, VARIED
 from harness.recording.viewer import (
     LOCALHOST,
@@ -20,6 +22,7 @@ from harness.recording.viewer import (
     SETTLE_S,
     ViewerError,
     address_of,
+    answers,
     free_port,
     need_screen,
     viewer_process,
@@ -27,6 +30,8 @@ from harness.recording.viewer import (
 )
 
 if TYPE_CHECKING:
+    import subprocess
+
     import pyarrow as pa
 
 NEEDS_CATALOG: Final = (
@@ -54,6 +59,8 @@ COLUMNS: Final = {
     "severity": "severity",
 }
 """Figures of a run that the table shows, in this order, and how they are headed."""
+FIRST: Final = 2
+"""So many of them come before the varied keys: there may be more keys than fit a window."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +89,14 @@ class Catalog:
 
 AT_ONCE: Final = 100
 """Recordings that rerun's server reads together: about half a second's work."""
+ENDING_S: Final = 2.0
+"""The server has so long to end."""
+OPENING_S: Final = 5.0
+"""The others are added when a viewer has had so long to show the first: both at once would keep it waiting."""
 
 
 @contextlib.contextmanager
-def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
+def catalog(name: str, recordings: Sequence[Path], opening_s: float = 0.0) -> Iterator[Catalog]:
     """Serves recordings as one dataset on 127.0.0.1, as long as the block lasts.
 
     The first of many are there when the block begins, the others follow: to read a thousand takes seconds.
@@ -93,6 +104,7 @@ def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
     Args:
         name: of the campaign.
         recordings: files of runs, each with an identity of its own, those that matter most first.
+        opening_s: wall time after which the others begin to be added.
 
     Raises:
         RunFolderError: there are none.
@@ -111,19 +123,32 @@ def catalog(name: str, recordings: Sequence[Path]) -> Iterator[Catalog]:
         server = Server(host=LOCALHOST, datasets={name: first})
     except (RuntimeError, ValueError, OSError, ConnectionError) as error:
         raise ViewerError(f"rerun's server does not start: {error}") from error
-    with server, tempfile.TemporaryDirectory(prefix="wayproof-table-") as scratch:
+    with ended_in_time(server), tempfile.TemporaryDirectory(prefix="wayproof-table-") as scratch:
         dataset = server.client().get_dataset(name)
-        _lay_out(dataset, Path(scratch) / "table.rbl")
-        with _followed_by(dataset, recordings[AT_ONCE:]) as all_there:
+        _lay_out(dataset, Path(scratch))
+        with _followed_by(dataset, recordings[AT_ONCE:], opening_s) as all_there:
             yield Catalog(f"{server.url()}/entry/{dataset.id}", dataset, all_there)
 
 
 @contextlib.contextmanager
-def _followed_by(dataset: Any, recordings: Sequence[Path]) -> Iterator[threading.Event]:
+def ended_in_time(server: Any) -> Iterator[None]:
+    """Ends a server with the block; it would wait for who is still connected, a browser's page for ever."""
+    try:
+        yield
+    finally:
+        ender = threading.Thread(target=server.shutdown, name="server", daemon=True)
+        ender.start()
+        ender.join(ENDING_S)
+
+
+@contextlib.contextmanager
+def _followed_by(dataset: Any, recordings: Sequence[Path], after_s: float) -> Iterator[threading.Event]:
     """Adds recordings while the block lasts; gives what is set when all are there."""
     over, all_there = threading.Event(), threading.Event()
 
     def add() -> None:
+        if recordings:
+            over.wait(after_s)
         for first in range(0, len(recordings), AT_ONCE):
             if over.is_set():
                 return
@@ -144,25 +169,66 @@ def _figure(name: str) -> str:
     return f"property:{RUN}:{name}"
 
 
-def _lay_out(dataset: Any, path: Path) -> None:
-    """Has the table of runs show its figures under plain headings, the worst run first."""
+def _lay_out(dataset: Any, scratch: Path) -> None:
+    """Has the table of runs show its figures under plain headings, the worst run first, and a run our layout.
+
+    Args:
+        dataset: rerun's handle of it.
+        scratch: a folder for the layouts, which lies there as long as the server does.
+    """
     import rerun.blueprint as rrb
     from rerun.blueprint.table import Column, SortBy, TableLayout
 
-    names = [field.name for field in dataset.segment_table().schema()]
+    runs = dataset.segment_table().to_arrow_table()
+    names = runs.column_names
     varied = [name for name in names if name.startswith(f"property:{VARIED}:")]
     columns = [
         Column("rerun_segment_id", name="run"),
-        *(Column(name, name=name.rpartition(":")[2]) for name in varied),
         *(Column(_figure(name), name=label) for name, label in COLUMNS.items() if _figure(name) in names),
     ]
+    columns[1 + FIRST : 1 + FIRST] = [Column(name, name=name.rpartition(":")[2]) for name in varied]
     shown = {column.source for column in columns}
     hidden = [Column(name, visible=False) for name in names if name not in shown]
     rrb.TableBlueprint(
         table_layout=TableLayout(columns=[*columns, *hidden]),
         sort_by=SortBy(_figure("severity"), direction="descending"),
-    ).save("wayproof", str(path))
-    dataset.register_blueprint(path.resolve().as_uri(), segment_table=True)
+    ).save("wayproof", str(scratch / "table.rbl"))
+    dataset.register_blueprint((scratch / "table.rbl").resolve().as_uri(), segment_table=True)
+    if f"property:{FRAME}:bounds_m" in names:
+        # A viewer does not take the layout inside a recording that is one of a dataset.
+        layout = _run_layout(runs, {str(each.entity_path) for each in dataset.schema().component_columns()})
+        layout.save("wayproof", str(scratch / "run.rbl"))
+        layout.let_go()
+        dataset.register_blueprint((scratch / "run.rbl").resolve().as_uri())
+
+
+def _run_layout(runs: pa.Table, entities: Collection[str]) -> Layout:
+    """The layout of each run, framed on all of them.
+
+    Args:
+        runs: a row a recording, with its properties.
+        entities: paths of all that any of them holds.
+    """
+    frame = common_frame(runs)
+    if f"/{STATES}/{PLANNER_LANE}" not in entities:
+        return thin_blueprint(frame)
+    drawn = {each.strip("/").split("/")[1] for each in entities if each.startswith(f"/{SERIES}/")}
+    without = [name for _, names in PLOTS for name in names if name not in drawn]
+    return blueprint(frame, without=without, on_earth=any(each.startswith(f"/{MAP}/") for each in entities))
+
+
+def common_frame(runs: pa.Table) -> Frame:
+    """What all recordings of a table are framed on; those that were not closed have nothing."""
+    given = {
+        name: [each for each in runs[f"property:{FRAME}:{name}"].to_pylist() if each]
+        for name in ("bounds_m", "altitude_m", "clearance_m")
+    }
+    (xmin, ymin), (xmax, ymax) = (
+        map(extreme, zip(*(each[first : first + 2] for each in given["bounds_m"]), strict=True))
+        for extreme, first in ((min, 0), (max, 2))
+    )
+    altitude_m, clearance_m = (max(each[0] for each in given[name]) for name in ("altitude_m", "clearance_m"))
+    return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m)
 
 
 def open_table(
@@ -185,9 +251,10 @@ def open_table(
     """
     if not web:
         need_screen()
-    with catalog(name, recordings) as served, tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
+    with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
         if web:
             with (
+                catalog(name, recordings, OPENING_S) as served,
                 contextlib.suppress(KeyboardInterrupt),
                 web_viewer(Path(scratch)) as (viewer, address, _),
             ):
@@ -196,10 +263,46 @@ def open_table(
                 webbrowser.open(page)
                 viewer.wait()
             return
-        arguments = [served.url, "--bind", LOCALHOST, "--port", str(free_port())]
-        with viewer_process(arguments, Path(scratch)) as viewer:
+        with window(name, recordings, Path(scratch)) as (viewer, _):
             if viewer.wait() != 0:
                 raise ViewerError(f"the viewer ended with status {viewer.returncode}")
+
+
+@contextlib.contextmanager
+def window(
+    name: str, recordings: Sequence[Path], scratch: Path, arguments: Sequence[str] = ()
+) -> Iterator[tuple[subprocess.Popen[str], Any]]:
+    """Opens the table of a campaign in a viewer; gives that, and rerun's handle of it.
+
+    The viewer starts while the recordings are read.
+
+    Args:
+        name: of the campaign.
+        recordings: files of its runs, those that matter most first.
+        scratch: an empty folder for the viewer's settings.
+        arguments: of the viewer besides.
+
+    Raises:
+        RunFolderError: the campaign has no recordings.
+        ViewerError: the viewer or the server does not start.
+    """
+    port = free_port()
+    command = ["--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen", *arguments]
+    with viewer_process(command, scratch) as viewer, catalog(name, recordings, OPENING_S) as served:
+        from rerun.experimental import ViewerClient
+
+        if not answers(port, viewer):
+            raise ViewerError(NO_DRIVER if "--headless" in arguments else "the viewer does not start")
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
+            client.open(served.url)
+        except ConnectionError as error:
+            raise ViewerError(NO_DRIVER) from error
+        try:
+            yield viewer, client
+        finally:
+            viewer.kill()  # the server waits for who is still connected
+            viewer.wait()
 
 
 def table_screenshot(
@@ -210,21 +313,16 @@ def table_screenshot(
     Raises:
         ViewerError: no driver, or no server.
     """
-    from rerun.experimental import ViewerClient
-
-    port = free_port()
-    arguments = ["--headless", "--bind", LOCALHOST, "--port", str(port), "--hide-welcome-screen"]
+    arguments = ["--headless", "--window-size", f"{size[0]}x{size[1]}"]
     with (
-        catalog(name, recordings) as served,
         tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch,
-        viewer_process([*arguments, "--window-size", f"{size[0]}x{size[1]}"], Path(scratch), port),
+        window(name, recordings, Path(scratch), arguments) as (_, client),
     ):
         try:
-            client = ViewerClient.connect(f"rerun+http://{LOCALHOST}:{port}/proxy")
-            client.open(served.url)
             time.sleep(2.0 * SETTLE_S)
             client.save_screenshot(str(png.resolve()))
         except ConnectionError as error:
+            # Without a driver it listens for a moment before it gives up.
             raise ViewerError(NO_DRIVER) from error
 
 

@@ -30,7 +30,6 @@ from harness.recording.states import Nearness, send_events
 from harness.run_files.flight_logs import LogTrack, read_log
 from harness.run_files.plans_table import PlanRow
 from harness.run_files.run_folder import Run, load_run
-from harness.scenario.scenario import parse_scenario
 
 if TYPE_CHECKING:
     from harness.mapping.scan import RangeScan
@@ -160,6 +159,8 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
         InputError: the log cannot be read.
         RunFolderError: the folder holds no complete run.
     """
+    from harness.scenario.scenario import parse_scenario  # half of what it takes to come to a viewer
+
     run = load_run(run_dir)
     scenario = parse_scenario(run.scenario_yaml, str(run_dir / "scenario.yaml"), ends_checked=False)
     origin = scenario.area.origin

@@ -148,7 +148,7 @@ def web_viewer(scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str, str]
     command += ["--port", str(port), "--web-viewer-port", str(web_port)]
     with _viewer(command, scratch) as viewer:
         for each in (port, web_port):
-            if not _answers(each, viewer):
+            if not answers(each, viewer):
                 raise ViewerError(f"the viewer does not start: {_last_words(str(scratch))}")
         yield viewer, f"http://{LOCALHOST}:{web_port}/", f"rerun+http://{LOCALHOST}:{port}/proxy"
 
@@ -303,7 +303,7 @@ def viewer_process(
         ViewerError: there is no viewer, or a headless one does not come to listen.
     """
     with _viewer([_executable(), *arguments], scratch) as viewer:
-        if port is not None and not _answers(port, viewer):
+        if port is not None and not answers(port, viewer):
             raise ViewerError(NO_DRIVER)
         yield viewer
 
@@ -329,7 +329,7 @@ def free_port() -> int:
         return port
 
 
-def _answers(port: int, viewer: subprocess.Popen[str]) -> bool:
+def answers(port: int, viewer: subprocess.Popen[str]) -> bool:
     """Whether a viewer comes to listen on a port."""
     until = time.monotonic() + START_TIMEOUT_S
     while time.monotonic() < until and viewer.poll() is None:

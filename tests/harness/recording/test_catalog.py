@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,11 +14,12 @@ import rerun as rr
 
 from harness.analysis.metrics import metrics
 from harness.api.results import CampaignResult
-from harness.campaign.folder import recordings_of, worst_first
+from harness.campaign.table import recordings_of, worst_first
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.recording import catalog as catalogs
+from harness.recording.blueprint import Frame
 from harness.recording.catalog import catalog, properties_of, table_screenshot
 from harness.recording.properties import run_properties
 from harness.recording.thin import ThinLog
@@ -141,6 +144,43 @@ def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:
     assert table["property:run:min_clearance_m"] == [[-3.0], [120.0], [250.0]]
     varied = next(name for name in table if name.startswith("property:varied:"))
     assert table[varied] == [[5.0], [6.0], [4.0]]
+
+
+def test_a_run_of_the_table_opens_in_our_layout(campaign: Path) -> None:
+    """A viewer does not take the layout inside a recording that is one of a dataset."""
+    pytest.importorskip("datafusion")
+    with catalog("small", recordings_of(campaign)) as served:
+        assert served.dataset.default_blueprint() is not None
+        assert served.dataset.default_segment_table_blueprint() is not None
+
+
+def test_the_layout_of_all_runs_is_framed_on_all_of_them() -> None:
+    import pyarrow as pa
+
+    runs = pa.table(
+        {
+            "property:frame:bounds_m": [[0.0, -50.0, 100.0, 200.0], [-10.0, 0.0, 50.0, 300.0], None],
+            "property:frame:altitude_m": [[300.0], [350.0], None],
+            "property:frame:clearance_m": [[40.0], [30.0], None],
+        }
+    )
+    assert catalogs.common_frame(runs) == Frame((-10.0, -50.0, 100.0, 300.0), 350.0, 40.0)
+
+
+def test_a_server_that_waits_for_ever_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A browser's page stays connected for as long as its tab is open."""
+    closed = threading.Event()
+
+    class Server:
+        def shutdown(self) -> None:
+            closed.wait(60.0)
+
+    monkeypatch.setattr(catalogs, "ENDING_S", 0.05)
+    begun_s = time.monotonic()
+    with catalogs.ended_in_time(Server()):
+        pass
+    assert time.monotonic() - begun_s < 30.0
+    closed.set()
 
 
 def test_a_campaign_without_recordings_says_what_keeps_them(tmp_path: Path) -> None:
