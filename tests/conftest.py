@@ -2,18 +2,40 @@
 
 from __future__ import annotations
 
+import importlib
 import signal
+from pathlib import Path
 
+import pytest
 from hypothesis import settings
+
+from planner.compiled import compile_all
 
 # No test is timed: how long an example takes is the machine's affair. `pytest --hypothesis-profile all` tries more.
 settings.register_profile("wayproof", deadline=None, max_examples=30)
 settings.register_profile("all", deadline=None, max_examples=200)
 settings.load_profile("wayproof")
 
+ROOT = Path(__file__).parents[1]
+ROOMS = ("aircraft", "harness", "planner")
 
-def pytest_configure() -> None:
+
+def pytest_configure(config: pytest.Config) -> None:
     """Signals that whoever began this had ignored (`nohup`, a job in the background) are not, for what tests begin."""
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)
+    if getattr(config.option, "numprocesses", None):
+        _before_several_processes_test(config)
+
+
+def _before_several_processes_test(config: pytest.Config) -> None:
+    # One process compiles; else each of them would.
+    for path in (each for room in ROOMS for each in (ROOT / room).rglob("*.py")):
+        if "\n@compiled(" in path.read_text(encoding="utf-8"):
+            importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    compile_all()
+    # Each gets a half of the list, and who is done takes tests from the end of another's: neighbours, which share
+    # flights, stay together, and nobody waits long for the other at the end.
+    if config.option.dist == "load":
+        config.option.dist = "worksteal"
