@@ -1,15 +1,19 @@
-"""The command in a process of its own, for what can only be done to a process."""
+"""The command in a process of its own, for what can only be done to a process, and in this one for all else."""
 
 from __future__ import annotations
 
+import io
 import os
 import resource
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
+
+from harness.cli.app import main
 
 ROOT = Path(__file__).parents[2]
 FOREST = ROOT / "scenarios" / "aerosonde_forest.yaml"
@@ -75,6 +79,13 @@ def run(folder: Path, *arguments: str, **keys: Any) -> tuple[int, str, str]:
         process.communicate()
         raise
     return process.returncode, out, err
+
+
+def run_here(folder: Path, *arguments: str) -> tuple[int, str, str]:
+    """The same of the command in this process, which has all imported: it takes half as long."""
+    with chdir(folder), redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+        status = main(arguments)
+    return status, out.getvalue(), err.getvalue()
 
 
 def wait_until(true: Callable[[], bool], process: subprocess.Popen[str]) -> None:

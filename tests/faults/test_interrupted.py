@@ -16,7 +16,7 @@ from harness.cli.app import main
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.run_files.run_folder import load_run
-from tests.faults.command import FOREST, ROOT, run, start, wait_until
+from tests.faults.command import FOREST, ROOT, run, run_here, start, wait_until
 from tests.longer import longer
 
 FLY = ("fly", str(FOREST), "--out", "run")
@@ -44,7 +44,7 @@ def test_a_signal_in_flight_is_said_in_a_line(
     assert err == "wayproof: interrupted; the run in run is marked incomplete\n"
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path / "run")
-    assert run(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
+    assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
     assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
 
 
@@ -81,7 +81,7 @@ def test_a_full_disk(size: int, tmp_path: Path) -> None:
     assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path / "run")
-    assert run(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
+    assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
     assert load_run(tmp_path / "run").manifest["complete"] is True
 
 
@@ -97,21 +97,22 @@ def test_a_disk_that_is_full_for_a_report(a_run: Path, tmp_path: Path) -> None:
     status, _, err = run(tmp_path, "report", "run", file_bytes=20_000)
     assert (status, err) == (2, "wayproof: cannot write the report in run: File too large\n")
     assert not (tmp_path / "run" / "report.html").exists()
-    assert run(tmp_path, "report", "run")[0] == 0
+    assert run_here(tmp_path, "report", "run")[0] == 0
 
 
 @pytest.mark.flights
 def test_two_flights_into_one_folder(tmp_path: Path) -> None:
     first = start(tmp_path, *LONG)
     wait_until((tmp_path / "run" / "scenario.yaml").exists, first)
-    status, out, err = run(tmp_path, *FLY, *SHORT)
+    first.send_signal(signal.SIGSTOP)  # it need not fly on meanwhile
+    status, out, err = run_here(tmp_path, *FLY, *SHORT)
     assert (status, out) == (2, "")
     assert err == (
         "wayproof: another wayproof is writing to run: wait until it has ended or choose another folder\n"
     )
     first.kill()
     first.communicate()
-    assert run(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1, "a killed process leaves no lock"
+    assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1, "a killed process leaves no lock"
     assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
 
 
@@ -133,7 +134,7 @@ def test_a_scenario_changed_and_deleted_while_it_is_flown(tmp_path: Path) -> Non
     scenario.write_text("spoilt: [")
     scenario.unlink()
     assert (process.wait(timeout=60), process.communicate()) == (0, ("", ""))
-    assert run(tmp_path, "fly", str(FOREST), "--out", "same", "--quiet", "--no-recording")[0] == 0
+    assert run_here(tmp_path, "fly", str(FOREST), "--out", "same", "--quiet", "--no-recording")[0] == 0
     assert load_run(tmp_path / "run").metrics["digest"] == load_run(tmp_path / "same").metrics["digest"]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from harness.run_files.run_folder import load_run
-from tests.faults.command import CAMPAIGN_FILES, run, start, wait_until
+from tests.faults.command import CAMPAIGN_FILES, run, run_here, start, wait_until
 
 SWEEP = ("sweep", "campaign.yaml", "--out", "out", "--workers", "1", "--quiet")
 
@@ -23,13 +24,19 @@ def place(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def unbroken(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """The results of a sweep without a break."""
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a sweep without a break."""
     place = tmp_path_factory.mktemp("unbroken")
     for name, text in CAMPAIGN_FILES.items():
         (place / name).write_text(text)
     assert run(place, *SWEEP) == (0, "", "")
-    return results(place)
+    return place / "out"
+
+
+@pytest.fixture(scope="module")
+def unbroken(whole: Path) -> bytes:
+    """The results of a sweep without a break."""
+    return results(whole.parent)
 
 
 def results(place: Path) -> bytes:
@@ -55,13 +62,13 @@ def test_a_full_disk(size: int, status: int, said: str, place: Path, unbroken: b
     assert "File too large" in err
     if (place / "out" / "results.parquet").exists():
         assert pq.read_table(place / "out" / "results.parquet").num_rows < 3
-    assert run(place, *SWEEP, "--resume") == (0, "", "")
+    assert run_here(place, *SWEEP, "--resume") == (0, "", "")
     assert results(place) == unbroken
 
 
 @pytest.mark.flights
-def test_a_disk_that_is_full_for_the_summary_alone(place: Path, unbroken: bytes) -> None:
-    assert run(place, *SWEEP) == (0, "", "")
+def test_a_disk_that_is_full_for_the_summary_alone(place: Path, whole: Path, unbroken: bytes) -> None:
+    shutil.copytree(whole, place / "out")
     (place / "out" / "summary.html").unlink()
     status, out, err = run(place, *SWEEP, "--resume", file_bytes=25_000)
     assert (status, out) == (1, "")
@@ -75,7 +82,7 @@ def test_a_disk_that_is_full_for_the_summary_alone(place: Path, unbroken: bytes)
 
 @pytest.mark.parametrize("folder", ["/proc/campaign", "/sys/campaign"])
 def test_a_file_system_that_takes_nothing(folder: str, place: Path) -> None:
-    status, out, err = run(place, *SWEEP[:3], folder, *SWEEP[4:])
+    status, out, err = run_here(place, *SWEEP[:3], folder, *SWEEP[4:])
     assert (status, out) == (2, "")
     assert err.startswith(f"wayproof: cannot write the campaign {folder}: ")
     assert len(err.splitlines()) == 1
@@ -87,12 +94,12 @@ def test_two_sweeps_into_one_folder(place: Path, unbroken: bytes) -> None:
     wait_until((place / "out" / "campaign.json").exists, first)
     first.send_signal(signal.SIGSTOP)  # else it may end before the others have begun
     for resume in ((), ("--resume",)):
-        status, out, err = run(place, *SWEEP, *resume)
+        status, out, err = run_here(place, *SWEEP, *resume)
         assert (status, out) == (2, "")
         assert err == (
             "wayproof: another wayproof is writing to out: wait until it has ended or choose another folder\n"
         )
-    assert run(place, "report", "out") == (
+    assert run_here(place, "report", "out") == (
         *(2, ""),
         "out: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended\n",
     )
@@ -112,16 +119,16 @@ def test_a_scenario_changed_and_deleted_in_mid_campaign(place: Path, unbroken: b
     process.kill()
     process.communicate(timeout=60)
     journal = (place / "out" / "journal.jsonl").read_bytes()
-    status, _, err = run(place, *SWEEP, "--resume")
+    status, _, err = run_here(place, *SWEEP, "--resume")
     assert status == 2
     assert "scenarios[0].keys.sensor.rays was 360, is 720" in err
     scenario.unlink()
-    assert run(place, *SWEEP, "--resume")[0] == 2
+    assert run_here(place, *SWEEP, "--resume")[0] == 2
     assert (place / "out" / "journal.jsonl").read_bytes() == journal, "nothing lost"
     assert (
         load_run(place / "out" / "runs" / "0").metrics["digest"]
         == json.loads(journal.splitlines()[0])["row"]["digest"]
     )
     scenario.write_text(CAMPAIGN_FILES["short.yaml"])
-    assert run(place, *SWEEP, "--resume") == (0, "", "")
+    assert run_here(place, *SWEEP, "--resume") == (0, "", "")
     assert results(place) == unbroken

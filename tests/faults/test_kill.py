@@ -20,7 +20,7 @@ import rerun as rr
 from harness.files.errors import RunFolderError
 from harness.flight.record import digest
 from harness.run_files.run_folder import load_run
-from tests.faults.command import CAMPAIGN_FILES, FOREST, run, start
+from tests.faults.command import CAMPAIGN_FILES, FOREST, run, run_here, start
 from tests.longer import longer
 
 KILLS = [*longer([2]), pytest.param(50, marks=pytest.mark.slow)]
@@ -164,7 +164,7 @@ def test_killed_at_any_moment(name: str, kills: int, tmp_path: Path) -> None:
         if command.claims(folder):
             whole += 1
             assert command.kept(folder) == unbroken
-        status, _, err = run(folder, *command.again)
+        status, _, err = run_here(folder, *command.again)
         assert (status, err) == (command.status, "")
         assert command.kept(folder) == unbroken
         assert names(folder) == files
