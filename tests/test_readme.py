@@ -11,6 +11,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -112,9 +113,14 @@ def test_the_second_command_runs_these_tests_and_is_what_ci_runs() -> None:
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
 
 
-@pytest.mark.parametrize(
-    "command", [command if quick(command) else longer([command])[0] for command in COMMANDS]
-)
+def marked(command: str) -> Any:
+    """A command shown; the figures of all aircraft take a minute of flights, of three they are listed elsewhere."""
+    if command == "wayproof list aircraft":
+        return pytest.param(command, marks=pytest.mark.slow)
+    return command if quick(command) else longer([command])[0]
+
+
+@pytest.mark.parametrize("command", [marked(command) for command in COMMANDS])
 def test_a_command_shown_ends_well(command: str, tmp_path: Path) -> None:
     shown = wayproof(command.removeprefix("wayproof "), tmp_path)
     assert shown.returncode == 0, shown.stderr
@@ -206,6 +212,7 @@ def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
     assert json.loads(flown.stdout)["digest"] == found["digest"]
 
 
+@pytest.mark.flights
 def test_ones_own_planner_in_a_file_is_flown_on_the_command_line_and_in_python(tmp_path: Path) -> None:
     planner, script = blocks("python")
     (scenario,) = blocks("yaml")
@@ -224,10 +231,15 @@ def test_ones_own_planner_in_a_file_is_flown_on_the_command_line_and_in_python(t
     assert again.startswith("wayproof.fly('my_world', planner='rolling_window', ")
 
 
-@pytest.mark.parametrize("name", READMES)
+@pytest.mark.parametrize(
+    "name", [longer([name])[0] if name == "harness/learning/README.md" else name for name in READMES]
+)
 def test_python_shown_runs(name: str, tmp_path: Path) -> None:
-    for block in blocks("python", READMES[name]) if name not in ("README.md", "planner/README.md") else ():
-        ran = python(block, tmp_path)
+    shown = blocks("python", READMES[name]) if name not in ("README.md", "planner/README.md") else []
+    # Each with names of its own, in one process: to import and load all of it takes longer than to run them.
+    code = "\n".join(f"exec({block!r}, {{'__name__': '__main__'}})" for block in shown)
+    if shown:
+        ran = python(code, tmp_path)
         assert (ran.returncode, ran.stderr) == (0, "")
 
 
