@@ -81,17 +81,20 @@ print(made(21.0))
     assert ran(source, tmp_path, HOME="/nonexistent") == ["42.0"]
 
 
-@pytest.mark.flights
 def test_where_the_disk_is_full_functions_are_compiled_all_the_same(tmp_path: Path) -> None:
     source = """
 import resource
-from planner.compiled import compile_all
-from planner.kernels.fans import encircled
-import numpy as np
+from two import half, twice
 resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-print(encircled(np.zeros((3, 2)), np.ones((1, 2)))[0])
+print(twice(21.0), half(42.0), half.anew, half.kept)
 """
-    assert ran(source, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache")) == ["False"]
+    (tmp_path / "two.py").write_text(
+        "from planner.compiled import compiled\n"
+        "@compiled('float64')\ndef twice(x):\n    return 2.0 * x\n"
+        "@compiled('float64')\ndef half(x):\n    return 0.5 * twice(x) / 2.0\n"
+    )
+    paths = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{os.getcwd()}{os.pathsep}{tmp_path}"}
+    assert ran(source, tmp_path, **paths) == ["42.0", "21.0", "True", "False"]
 
 
 def test_other_failures_are_told() -> None:
@@ -173,31 +176,28 @@ print(made.anew)
     assert [ran(source, tmp_path, **paths) for _ in range(2)] == [["True"], ["False"]]
 
 
-@pytest.mark.parametrize(
-    ("before", "here"),
-    [
-        ("os.cpu_count = lambda: 2", 2),
-        ("os.cpu_count = lambda: 1", 3),
-        ("os.cpu_count = lambda: 2; sys.executable = '/bin/false'", 3),
-        ("os.cpu_count = lambda: 2; sys.executable = '/no/such/file'", 3),
-    ],
-)
-def test_another_process_compiles_some_of_them(before: str, here: int, tmp_path: Path) -> None:
+def test_another_process_compiles_some_of_them(tmp_path: Path) -> None:
     """Of three modules one is compiled elsewhere; all are compiled here where that cannot be, or fails."""
-    source = f"""
-import os, sys
-import one, two, three
+    source = """
+import importlib, os, sys
 from planner.compiled import compile_all
-{before}
-made = [one.it, two.it, three.it]
-compile_all()
-print(*(each(1.0) for each in made), sum(each.anew for each in made))
+for folder, processors, python in (
+    ("two", 2, sys.executable), ("one", 1, sys.executable), ("fails", 2, "/bin/false"), ("missing", 2, "/no/such/file")
+):
+    os.cpu_count, sys.executable = lambda: processors, python
+    made = [importlib.import_module(f"{folder}.{name}").it for name in "abc"]
+    compile_all()
+    print(folder, *(each(1.0) for each in made), sum(each.anew for each in made))
 """
-    for number, name in enumerate(("one", "two", "three")):
-        text = f"from planner.compiled import compiled\n@compiled('float64')\ndef it(x):\n    return x + {number}\n"
-        (tmp_path / f"{name}.py").write_text(text)
+    for folder in ("two", "one", "fails", "missing"):
+        (tmp_path / folder).mkdir()
+        for number, name in enumerate("abc"):
+            text = f"@compiled('float64')\ndef it(x):\n    return x + {number}\n"
+            (tmp_path / folder / f"{name}.py").write_text(f"from planner.compiled import compiled\n{text}")
     paths = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{os.getcwd()}{os.pathsep}{tmp_path}"}
-    assert ran(source, tmp_path, **paths) == ["1.0", "2.0", "3.0", str(here)]
+    said = ran(source, tmp_path, **paths)
+    here = {"two": "2", "one": "3", "fails": "3", "missing": "3"}
+    assert said == [word for folder in here for word in (folder, "1.0", "2.0", "3.0", here[folder])]
 
 
 def test_the_garbage_collector_of_a_callers_process_is_left_as_it_is(tmp_path: Path) -> None:

@@ -70,7 +70,7 @@ def test_a_script_needs_no_guard(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(
         "import wayproof\nprint('begun')\n"
-        "print(wayproof.sweep('two.yaml', out='swept', workers=2).outcomes)\n"
+        "print(wayproof.sweep('two.yaml', out='swept', workers=1).outcomes)\n"
         "print(wayproof.compare('short.yaml', ['bug2'], out='compared').all_reached)\n"
     )
     done = subprocess.run(

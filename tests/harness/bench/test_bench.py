@@ -48,7 +48,6 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {**measured, "told": told, "left": list(folder.iterdir())}
 
 
-@pytest.mark.flights
 def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
     cpu = result["cpu_s"]
     for name in ("closed_loop", "closed_loop_recording"):

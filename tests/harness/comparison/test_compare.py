@@ -141,7 +141,6 @@ def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-@pytest.mark.flights
 def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path) -> None:
     assert files(flown) == {"comparison.csv", "comparison.json", "comparison.md", "report.html", "ring"}
     drawn = {

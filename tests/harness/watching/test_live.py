@@ -116,7 +116,7 @@ class Kept:
 def test_what_is_handed_over_is_the_flight(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The calls, made on a file here: every row of the track and every plan is in it, as soon as it was flown."""
     monkeypatch.setattr(live, "HAND_OVER_S", 0.0)
-    scenario, relay = world(TREE, **NEAR), Kept()
+    scenario, relay = world(TREE, mission={"goal_m": [2700.0, 2700.0], "time_limit_s": 40.0}), Kept()
     loop, log = make_loop(scenario, PointMass), LiveLog(relay, "rerun+http://127.0.0.1:1/proxy")
     log.begin(loop, scene_of(scenario, loop, ""), "handed over")
     flight = fly(loop, [log])
