@@ -39,3 +39,8 @@ def _before_several_processes_test(config: pytest.Config) -> None:
     # flights, stay together, and nobody waits long for the other at the end.
     if config.option.dist == "load":
         config.option.dist = "worksteal"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The files beside this one come first: among the flights theirs are the longest, for which all would wait."""
+    items.sort(key=lambda item: item.path.parent != Path(__file__).parent)
