@@ -23,7 +23,11 @@ from harness.run_files.run_folder import load_run
 from tests.faults.command import CAMPAIGN_FILES, FOREST, run, run_here, start
 from tests.longer import longer
 
-KILLS = [*longer([2]), pytest.param(50, marks=pytest.mark.slow)]
+KILLED = [
+    *longer([("fly", 2), ("sweep of one process", 2)]),
+    *(pytest.param(name, 50, marks=pytest.mark.slow) for name in ("fly", "sweep")),
+]
+"""What is killed, and how often."""
 ORPHANS_LIVE_S = 20.0
 """How long processes of a killed command may live on: one that has just been started imports everything before it sees
 that nobody waits for it, which takes its time on a busy machine."""
@@ -90,19 +94,26 @@ def results_claim(folder: Path) -> bool:
 
 
 FLY = ("fly", str(FOREST), "--set", "mission.time_limit_s=60", "--out", "run", "--quiet")
-SWEEP = ("sweep", "campaign.yaml", "--out", "out", "--workers", "2", "--quiet")
-COMMANDS = {
-    "fly": Command(
-        FLY, FLY, 1, {}, lambda folder: run_claims(folder / "run"), lambda folder: run_digest(folder / "run")
-    ),
-    "sweep": Command(
-        SWEEP,
-        (*SWEEP, "--resume"),
+
+
+def sweep(workers: int) -> Command:
+    begin = ("sweep", "campaign.yaml", "--out", "out", "--workers", str(workers), "--quiet")
+    return Command(
+        begin,
+        (*begin, "--resume"),
         0,
         CAMPAIGN_FILES,
         lambda folder: results_claim(folder / "out"),
         lambda folder: results(folder / "out"),
+    )
+
+
+COMMANDS = {
+    "fly": Command(
+        FLY, FLY, 1, {}, lambda folder: run_claims(folder / "run"), lambda folder: run_digest(folder / "run")
     ),
+    "sweep": sweep(2),
+    "sweep of one process": sweep(1),
 }
 
 
@@ -131,8 +142,7 @@ def alive(group: int) -> list[int]:
     return found
 
 
-@pytest.mark.parametrize("kills", KILLS)
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(("name", "kills"), KILLED)
 def test_killed_at_any_moment(name: str, kills: int, tmp_path: Path) -> None:
     command = COMMANDS[name]
     folder = made(tmp_path / "unbroken", command)
