@@ -59,8 +59,12 @@ def _saved(figure: Figure, kind: str, **options: Any) -> bytes:
     with mpl.rc_context(STYLE), warnings.catch_warnings():
         # A letter that the font lacks is drawn as a box.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        # A map of fixed shape gives room back only once it has been laid out.
-        figure.draw_without_rendering()
+        # A map of fixed shape gives room back only once it has been laid out; what has been keeps its places.
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            for _ in range(2):
+                engine.execute(figure)
+            figure.set_layout_engine("none")
         figure.savefig(file, format=kind, **options)
     return file.getvalue()
 
