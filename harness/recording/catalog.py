@@ -7,14 +7,14 @@ import tempfile
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.files.errors import RunFolderError
-from harness.recording.blueprint import FRAME, MAP, PLANNER_LANE, SERIES, STATES, Frame
-from harness.recording.layout import PLOTS, Layout, blueprint, thin_blueprint
+from harness.recording.blueprint import FRAME, Frame
+from harness.recording.layout import layout_of
 from harness.recording.properties import RUN, VARIED
 from harness.recording.viewer import (
     LOCALHOST,
@@ -196,25 +196,11 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
     dataset.register_blueprint((scratch / "table.rbl").resolve().as_uri(), segment_table=True)
     if f"property:{FRAME}:bounds_m" in names:
         # A viewer does not take the layout inside a recording that is one of a dataset.
-        layout = _run_layout(runs, {str(each.entity_path) for each in dataset.schema().component_columns()})
+        entities = {str(each.entity_path) for each in dataset.schema().component_columns()}
+        layout = layout_of(common_frame(runs), entities)
         layout.save("wayproof", str(scratch / "run.rbl"))
         layout.let_go()
         dataset.register_blueprint((scratch / "run.rbl").resolve().as_uri())
-
-
-def _run_layout(runs: pa.Table, entities: Collection[str]) -> Layout:
-    """The layout of each run, framed on all of them.
-
-    Args:
-        runs: a row a recording, with its properties.
-        entities: paths of all that any of them holds.
-    """
-    frame = common_frame(runs)
-    if f"/{STATES}/{PLANNER_LANE}" not in entities:
-        return thin_blueprint(frame)
-    drawn = {each.strip("/").split("/")[1] for each in entities if each.startswith(f"/{SERIES}/")}
-    without = [name for _, names in PLOTS for name in names if name not in drawn]
-    return blueprint(frame, without=without, on_earth=any(each.startswith(f"/{MAP}/") for each in entities))
 
 
 def common_frame(runs: pa.Table) -> Frame:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import rerun as rr
@@ -62,6 +62,7 @@ def blueprint(
     without: Sequence[str] = (NAVIGATION,),
     on_earth: bool = False,
     follows: bool = False,
+    lanes: int | None = None,
 ) -> Layout:
     """The layout: plan view and 3-D flight, states, events and summary, time series.
 
@@ -72,6 +73,7 @@ def blueprint(
         without: names of time series that have nothing to show.
         on_earth: whether there is a map of the earth, a tab behind the plan view.
         follows: whether the cursor stays at the latest time, for a flight that goes on.
+        lanes: how many lanes of states there are; default: those of `runs`.
     """
     plan: rrb.Container | rrb.View = plan_view(frame, runs)
     if on_earth:
@@ -92,16 +94,17 @@ def blueprint(
         about,
         *([rrb.Tabs(colours, attitude_view(), active_tab=0)] if len(runs) == 1 else []),
     ]
-    lanes = 3 if len(runs) == 1 else 2 * len(runs)
+    if lanes is None:
+        lanes = 3 if len(runs) == 1 else 2 * len(runs)
     # Shares of a window 768 pixels high: 700 of them are for rows, a lane takes 40 and the rest of the states 52.
-    states_share = min((52 + 40 * lanes) / 700, 0.45)
+    states_share = min((52 + 40 * lanes) / 700, 0.45) if lanes else 0.0
     return Layout(
         rrb.Horizontal(
             rrb.Vertical(
                 rrb.Horizontal(plan, flight_view(frame, runs), column_shares=[1, 1]),
-                states,
+                *([states] if lanes else []),
                 rrb.Horizontal(*below, column_shares=[5, 4, 4][: len(below)]),
-                row_shares=[0.77 - states_share, states_share, 0.23],
+                row_shares=[0.77 - states_share, *([states_share] if lanes else []), 0.23],
             ),
             _plots(frame, runs, without),
             column_shares=[13, 6],
@@ -117,6 +120,23 @@ def blueprint(
         auto_layout=False,
         auto_views=False,
     )
+
+
+def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = ("",)) -> Layout:
+    """The layout of a recording, or of an overlay, by what it holds.
+
+    Args:
+        frame: what to frame the views on.
+        entities: paths of all that it holds, beginning with a slash.
+        runs: as in `blueprint`.
+    """
+    lanes = sum(each.startswith(f"/{STATES}/") for each in entities)
+    if not lanes and len(runs) == 1:
+        return thin_blueprint(frame)
+    drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
+    without = [name for _, names in PLOTS for name in names if name not in drawn]
+    on_earth = any(each.startswith(f"/{MAP}/") for each in entities)
+    return blueprint(frame, runs, without, on_earth, lanes=lanes)
 
 
 PLOTS: Final = (

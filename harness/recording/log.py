@@ -31,6 +31,7 @@ from harness.recording.scene import (
     log_obstacle,
     log_scene,
     log_summary,
+    log_trail_style,
     quaternions,
     send_believed,
 )
@@ -229,10 +230,8 @@ class RerunLog:
         self._scans.append(scan)
 
     def _log_style(self) -> None:
-        width = rr.Radius.ui_points(1.25)
+        log_trail_style(self._rec)
         for entity, style in (
-            (f"{look.PLAN}/{look.FLOWN}", rr.LineStrips2D.from_fields(radii=width, draw_order=50)),
-            (f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D.from_fields(radii=width)),
             (
                 f"{look.PLAN}/scan",
                 rr.Points2D.from_fields(colors=[look.HIT], radii=rr.Radius.ui_points(1.5), draw_order=25),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from harness.analysis.rows import escaped, number
 from harness.files.errors import RunFolderError
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream
-from harness.recording.layout import blueprint
+from harness.recording.layout import layout_of
+from harness.recording.properties import RUN
 from harness.recording.states import over, send_changes
 
 SHARED = ("bounds", "goal", "ends", "area", "outlines", look.DISCS, "moving", look.TRUE)
@@ -46,7 +48,12 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
     runs = [f"runs/{place}/" for place in range(len(recordings))]
     title = ", ".join(names)
     with recording_stream(f"overlay: {title}") as rec:
-        file = RecordingFile(rec, path, blueprint(_frame(chunks[0], recordings[0]), runs))
+        entities = {
+            renamed.entity_path
+            for own, run, place in zip(chunks, runs, range(len(runs)), strict=True)
+            for renamed in _renamed(own, run, place, str(place))
+        }
+        file = RecordingFile(rec, path, layout_of(_frame(chunks[0], recordings[0]), entities, runs))
         rec.send_recording_name(title)
         rec.send_chunks(chunk for chunk in chunks[0] if _is_shared(chunk.entity_path))
         for place, (own, run, name) in enumerate(zip(chunks, runs, names, strict=True)):
@@ -54,8 +61,11 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             _send_events(rec, own, place, name)
             _style(rec, run, place, name)
         figures = [_metrics(own) for own in chunks]
-        _end_lanes(rec, names, figures)
-        summary = _summary(names, figures)
+        lane = f"/{look.STATES}/{look.PLANNER_LANE}"
+        laned = [p for p, own in enumerate(chunks) if any(chunk.entity_path == lane for chunk in own)]
+        _end_lanes(rec, names, figures, laned)
+        logs = ["/" + look.SUMMARY not in {chunk.entity_path for chunk in own} for own in chunks]
+        summary = _summary(names, figures, ["log" if each else "unfinished" for each in logs])
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
 
@@ -74,7 +84,7 @@ def send_recording(recording: Path, runs: int, address: str) -> None:
     chunks = _chunks(recording)
     names = [f"runs/{place}/" for place in range(runs)] if runs > 1 else [""]
     with recording_stream(str(recording)) as rec:
-        layout = blueprint(_frame(chunks, recording), names)
+        layout = layout_of(_frame(chunks, recording), {chunk.entity_path for chunk in chunks}, names)
         rec.connect_grpc(address, default_blueprint=layout)
         layout.let_go()
         rec.send_chunks(chunks)
@@ -168,28 +178,60 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
         rec.log(f"{look.SERIES}/{line}/{place}", points, static=True)
 
 
-def _end_lanes(rec: rr.RecordingStream, names: Sequence[str], figures: Sequence[Mapping[str, Any]]) -> None:
-    """Says in the lanes of each run from when on its flight is over, for the others go on."""
+def _end_lanes(
+    rec: rr.RecordingStream,
+    names: Sequence[str],
+    figures: Sequence[Mapping[str, Any]],
+    laned: Collection[int],
+) -> None:
+    """Says in the lanes of each run from when on its flight is over, for the others go on.
+
+    Args:
+        rec: where to.
+        names: of the runs.
+        figures: of each, as `_metrics` gives them.
+        laned: places of those that have lanes.
+    """
     for place, (name, each) in enumerate(zip(names, figures, strict=True)):
-        for lane in (look.PLANNER_LANE, look.TRACKING_LANE) if each else ():
+        for lane in (look.PLANNER_LANE, look.TRACKING_LANE) if each and place in laned else ():
             own = f"{place + 1}-{rr.escape_entity_path_part(name)}/{lane}"
             send_changes(rec, own, [(each["flight_time_s"], over(each))])
 
 
 def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:
-    """The figures that a recording carries; empty where its run did not end."""
-    for chunk in chunks:
-        if chunk.entity_path == "/__properties/metrics":
-            columns = chunk.to_record_batch().to_pydict()
-            found: dict[str, Any] = json.loads(
-                next(cells[0][0] for name, cells in columns.items() if name.endswith("json"))
-            )
-            return found
-    return {}
+    """The figures that a recording carries; empty where its run did not end, or it is of a log."""
+    found = {
+        chunk.entity_path.rpartition("/")[2]: {
+            name.rpartition(":")[2]: cells[0][0]
+            for name, cells in chunk.to_record_batch().to_pydict().items()
+            if isinstance(cells[0], list)
+        }
+        for chunk in chunks
+        if chunk.entity_path.startswith("/__properties/")
+    }
+    if "metrics" in found:
+        whole: dict[str, Any] = json.loads(found["metrics"]["json"])
+        return whole
+    if RUN not in found:
+        return {}
+    thin = defaultdict(lambda: None, found[RUN])
+    return {
+        **{name: thin[name] for name in ("outcome", "flown_length_m", "flight_time_s", "min_clearance_m")},
+        **{name: thin[name] for name in ("trackable", "replans")},
+        "cross_track_m": {"max": thin["cross_track_max_m"]},
+        "smoothness": {"flown": {"heading_change_deg": None}},
+        "compute_ms": {"p99": thin["planner_p99_ms"]},
+    }
 
 
-def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]]) -> str:
-    """What came out of every run, side by side, as Markdown."""
+def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]], without: Sequence[str]) -> str:
+    """What came out of every run, side by side, as Markdown.
+
+    Args:
+        names: of the runs.
+        figures: of each, as `_metrics` gives them.
+        without: what is said of each where it has none.
+    """
     labels: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "outcome": lambda m: m["outcome"],
         "flown, km": lambda m: number(m["flown_length_m"], 1e-3),
@@ -202,7 +244,15 @@ def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]]) -> str:
         "search p99, ms": lambda m: number(m["compute_ms"]["p99"]),
     }
     rows = [
-        " | ".join([label, *((of(each) or "none") if each else "unfinished" for each in figures)])
+        " | ".join(
+            [
+                label,
+                *(
+                    (of(each) or "none") if each else what
+                    for each, what in zip(figures, without, strict=True)
+                ),
+            ]
+        )
         for label, of in labels.items()
     ]
     colours = [COLOUR_NAMES[place % len(COLOUR_NAMES)] for place in range(len(names))]

@@ -148,6 +148,13 @@ def log_moving(rec: rr.RecordingStream, scene: Scene, index: int) -> None:
     rec.log(f"{look.WORLD}/moving/{index}", rims(scene, [obstacle], look.MOVING_DIM))
 
 
+def log_trail_style(rec: rr.RecordingStream) -> None:
+    """Logs what all pieces of a trail have in common."""
+    width = rr.Radius.ui_points(1.25)
+    rec.log(f"{look.PLAN}/{look.FLOWN}", rr.LineStrips2D.from_fields(radii=width, draw_order=50), static=True)
+    rec.log(f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D.from_fields(radii=width), static=True)
+
+
 def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
     """Marks where a flight ended that did not reach its goal, with how it ended."""
     last = np.array([[track.east_m[-1], track.north_m[-1], track.up_m[-1]]])

@@ -16,6 +16,7 @@ import rerun as rr
 
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState
+from harness.files.input_file import InputError
 from harness.flight.polylines import polylines
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
@@ -23,12 +24,12 @@ from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import thin_blueprint
 from harness.recording.plans import log_plan_style
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, quaternions
+from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, log_trail_style, quaternions
 from harness.recording.series import send_curves, send_levels, thin_curves
 from harness.recording.solids import strips_2d, strips_3d
 from harness.recording.states import Nearness, send_events
+from harness.run_files.exports.exported_path import planned_points
 from harness.run_files.flight_logs import LogTrack, read_log
-from harness.run_files.plans_table import PlanRow
 from harness.run_files.run_folder import Run, load_run
 
 if TYPE_CHECKING:
@@ -37,6 +38,10 @@ if TYPE_CHECKING:
 ROWS = 20
 """Every so many rows of the track are kept: two seconds of flight."""
 
+LOG_ROWS = 20_000
+"""Of a log with more rows some are left out."""
+FARTHEST_LOG_M = 2e5
+"""A log of elsewhere would not be seen."""
 CHORD_ERROR = 1e-2
 """How far a drawn plan may be off the true one, as a share of the turn radius: a pixel of the plan view is more."""
 
@@ -164,7 +169,13 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
     run = load_run(run_dir)
     scenario = parse_scenario(run.scenario_yaml, str(run_dir / "scenario.yaml"), ends_checked=False)
     origin = scenario.area.origin
-    track = read_log(log, LocalPlane(origin.latitude_deg, origin.longitude_deg))
+    track = read_log(log, LocalPlane(origin.latitude_deg, origin.longitude_deg)).thinned(LOG_ROWS)
+    away_m = _outside_m(track, scenario.area.bounds_m)
+    if away_m > FARTHEST_LOG_M:
+        raise InputError(
+            f"{log}: comes no nearer than {away_m / 1e3:.0f} km to the area of {run_dir}, "
+            "whose plane lies on earth where area.origin says"
+        )
     frame = look.Frame(
         scenario.area.bounds_m, scenario.mission.altitude_m, scenario.planner.clearance_m or 0.0
     )
@@ -179,6 +190,14 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
         _send_track(rec, track, run, frame.altitude_m)
     finally:
         file.end()
+
+
+def _outside_m(track: LogTrack, bounds_m: tuple[float, float, float, float]) -> float:
+    """How far from an area a track stays."""
+    xmin, ymin, xmax, ymax = bounds_m
+    east = np.maximum(np.maximum(xmin - track.east_m, track.east_m - xmax), 0.0)
+    north = np.maximum(np.maximum(ymin - track.north_m, track.north_m - ymax), 0.0)
+    return float(np.hypot(east, north).min())
 
 
 def _send_track(rec: rr.RecordingStream, track: LogTrack, run: Run, altitude_m: float) -> None:
@@ -196,33 +215,38 @@ def _send_track(rec: rr.RecordingStream, track: LogTrack, run: Run, altitude_m: 
         times,
         rr.LineStrips2D.columns(strips=strips_2d([p[:, :2] for p in pieces])),
     )
+    log_trail_style(rec)
     rec.send_columns(f"{look.WORLD}/{look.FLOWN}", times, rr.LineStrips3D.columns(strips=strips_3d(pieces)))
-    whole = rr.LineStrips2D(strips_2d([position[:, :2]]), colors=[look.WHOLE_TRACK])
+    whole = lines_2d([position[:, :2]], look.WHOLE_TRACK, 1.5, 15)
     rec.log(f"{look.PLAN}/{look.WHOLE}", whole, static=True)
     series = {"altitude_error/flown": track.up_m - altitude_m, "speed/flown": track.groundspeed_mps}
-    cross = cross_track_m(np.column_stack((track.east_m, track.north_m)), run.plans)
+    cross = cross_track_m(np.column_stack((track.east_m, track.north_m)), planned_points(run)[0])
     if cross is not None:
         series["cross_track/flown"] = cross
     for name, values in series.items():
         rec.send_columns(f"{look.SERIES}/{name}", times, rr.Scalars.columns(scalars=values))
 
 
-def cross_track_m(points_m: FloatArray, plans: tuple[PlanRow, ...]) -> FloatArray | None:
-    """(n,) distance of (n, 2) points from the nearest part of any plan, positive right of it; None without a plan."""
+def cross_track_m(points_m: FloatArray, planned_m: FloatArray) -> FloatArray | None:
+    """(n,) distance of (n, 2) points from the nearest part of what was planned, positive right of it.
+
+    Args:
+        points_m: east and north.
+        planned_m: (k, 2) of every plan the part that was in effect, in the order in which it was flown.
+
+    Returns:
+        None where there is no plan.
+    """
     import shapely
 
-    if not plans:
+    if len(planned_m) < 2:
         return None
-    lines = [shapely.LineString(plan.path_m) for plan in plans if len(plan.path_m) > 1]
-    tree = shapely.STRtree(lines)
-    found = []
-    for place in shapely.points(points_m):
-        line = lines[int(tree.nearest(place))]
-        along = line.project(place)
-        near, ahead = line.interpolate(along), line.interpolate(along + 1.0)
-        if ahead.equals(near):
-            ahead, near = near, line.interpolate(line.length - 1.0)
-        east, north = ahead.x - near.x, ahead.y - near.y
-        right = (place.x - near.x) * north - (place.y - near.y) * east
-        found.append(float(np.copysign(line.distance(place), right)))
-    return np.array(found)
+    line, places = shapely.LineString(planned_m), shapely.points(points_m)
+    along_m = shapely.line_locate_point(line, places)
+    before, near, after = (
+        shapely.get_coordinates(shapely.line_interpolate_point(line, np.clip(along_m + by, 0.0, line.length)))
+        for by in (-0.5, 0.0, 0.5)
+    )
+    (east, north), (off_east, off_north) = (after - before).T, (points_m - near).T
+    off_m: FloatArray = np.copysign(shapely.distance(line, places), off_east * north - off_north * east)
+    return off_m

@@ -23,9 +23,11 @@ from pathlib import Path
 from urllib.parse import quote
 
 from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
 from harness.recording.blueprint import TIMELINE
 from harness.recording.overlay import send_recording, write_overlay
 from harness.recording.thin import write_log_recording
+from harness.run_files.flight_logs import READERS
 from harness.run_files.run_folder import RECORDING, recording_of
 
 LOCALHOST = "127.0.0.1"
@@ -66,9 +68,11 @@ def open_viewer(
         InputError: a flight log cannot be read.
         ViewerError: there is no screen, or the viewer does not start.
     """
-    for folder in run_dirs:
-        if not folder.is_file():
-            recording_of(folder)
+    for each in run_dirs:
+        if each.suffix.lower() in READERS and not each.exists():
+            raise InputError(f"{each}: there is no such file")
+        if not each.is_file():
+            recording_of(each)
     if not web:
         need_screen()
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import math
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -17,7 +20,15 @@ from harness.flight.record import FloatArray
 
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 MAX_BYTES: Final = 1_000_000_000
+MAX_TEXT_BYTES: Final = 200_000_000
+"""Of a log that is read line by line: some millions of rows."""
+FARTHEST_M: Final = 2e7
+"""No place on earth is farther from another."""
+LONGEST_S: Final = 1e7
+"""No flight is longer; where a clock was set meanwhile, times are."""
 LEAST_ROWS: Final = 2
+DATAFLASH: Final = b"\xa3\x95\x80"
+"""What a DataFlash log begins with: a message that describes formats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +46,13 @@ class LogTrack:
     east_m: FloatArray
     north_m: FloatArray
     up_m: FloatArray
+
+    def thinned(self, most: int) -> LogTrack:
+        """Every so many of its rows, and the last, that no more than about `most` are left."""
+        rows = np.unique(
+            np.append(np.arange(0, len(self.time_s), -(-len(self.time_s) // most)), len(self.time_s) - 1)
+        )
+        return LogTrack(self.time_s[rows], self.east_m[rows], self.north_m[rows], self.up_m[rows])
 
     @property
     def groundspeed_mps(self) -> FloatArray:
@@ -75,12 +93,13 @@ def read_log(path: Path, plane: LocalPlane) -> LogTrack:
         raise InputError(f"{path}: is no flight log that can be shown; must end in {', '.join(READERS)}")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(
-            f"{path}: has {path.stat().st_size / 1e9:.1f} GB; at most {MAX_BYTES / 1e9:g} GB are read"
-        )
+    size, most = path.stat().st_size, MAX_TEXT_BYTES if reader in (_csv, _igc) else MAX_BYTES
+    if size > most:
+        raise InputError(f"{path}: has {size / 1e6:.0f} MB; at most {most / 1e6:g} MB are read")
     try:
-        rows = reader(path)
+        # Of a damaged file libraries print a line for each byte.
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            rows = reader(path)
     except ImportError as error:
         raise InputError(f"{path}: {NEEDS_LOGS} ({error.name})") from error
     except InputError:
@@ -95,15 +114,28 @@ def _track(rows: Rows | LogTrack, plane: LocalPlane, path: Path) -> LogTrack:
     if isinstance(rows, LogTrack):
         found = rows
     else:
-        finite = [row for row in rows if all(map(math.isfinite, row)) and (row[1], row[2]) != (0.0, 0.0)]
+        finite = [row for row in rows if all(map(math.isfinite, row)) and _on_earth(*row[1:3])]
         places = np.array([plane.plane(row[1], row[2]) for row in finite]).reshape(-1, 2)
         times, heights = np.array([row[0] for row in finite]), np.array([row[3] for row in finite])
         found = LogTrack(times, places[:, 0], places[:, 1], heights)
+    columns = np.array((found.time_s, found.east_m, found.north_m, found.up_m))
+    known = np.isfinite(columns).all(axis=0) & (np.abs(columns[1:]) <= FARTHEST_M).all(axis=0)
+    found = LogTrack(*columns[:, known])
     order = np.unique(found.time_s, return_index=True)[1]
     if len(order) < LEAST_ROWS:
         raise InputError(f"{path}: has {len(order)} rows with a position; a track has at least {LEAST_ROWS}")
     time_s = found.time_s[order]
+    if time_s[-1] - time_s[0] > LONGEST_S:
+        raise InputError(
+            f"{path}: its times reach from {time_s[0]:g} to {time_s[-1]:g} s; a flight may take {LONGEST_S:g} s at most"
+        )
     return LogTrack(time_s - time_s[0], found.east_m[order], found.north_m[order], found.up_m[order])
+
+
+def _on_earth(latitude_deg: float, longitude_deg: float) -> bool:
+    """Whether a place is one: receivers without a fix say 0, 0."""
+    there = abs(latitude_deg) <= 90.0 and abs(longitude_deg) <= 360.0
+    return there and (latitude_deg, longitude_deg) != (0.0, 0.0)
 
 
 def _ulog(path: Path) -> Rows:
@@ -132,15 +164,32 @@ def _dataflash(path: Path) -> Rows:
     from pymavlink.DFReader import DFReader_binary
 
     found: dict[str, Rows] = {"POS": [], "GPS": []}
-    log: Any = DFReader_binary(str(path), zero_time_base=True)
-    try:
-        while (message := log.recv_match(type=list(found))) is not None:
-            row = (message._timestamp, message.Lat, message.Lng, message.Alt)
-            found[message.get_type()].append(tuple(map(float, row)))  # type: ignore[arg-type]
-    finally:
-        log.data_map.close()
-        log.filehandle.close()
+    with path.open("rb") as file:
+        if file.read(len(DATAFLASH)) != DATAFLASH:
+            raise InputError(f"{path}: is no DataFlash log: such a file begins with {DATAFLASH.hex(' ')}")
+    with _silent():
+        log: Any = DFReader_binary(str(path), zero_time_base=True)
+        try:
+            while (message := log.recv_match(type=list(found))) is not None:
+                row = (message._timestamp, message.Lat, message.Lng, message.Alt)
+                found[message.get_type()].append(tuple(map(float, row)))  # type: ignore[arg-type]
+        finally:
+            log.data_map.close()
+            log.filehandle.close()
     return found["POS"] or found["GPS"]
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """Lets nothing through to standard error, not of machine code either."""
+    with open(os.devnull, "wb") as nothing:
+        before = os.dup(2)
+        os.dup2(nothing.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(before, 2)
+            os.close(before)
 
 
 def _igc(path: Path) -> Rows:
@@ -187,30 +236,28 @@ def _mcap(path: Path) -> Rows:
 
 def _csv(path: Path) -> Rows | LogTrack:
     """A table with a header: time_s, a position, and altitude_m where there is one."""
-    with path.open(encoding="utf-8", newline="") as file:
-        table = list(csv.DictReader(file))
-    names = set(table[0]) if table else set()
-    local = {"x_m", "y_m"} <= names
-    if "time_s" not in names or not (local or {"latitude_deg", "longitude_deg"} <= names):
-        raise InputError(f"{path}:1: must have the columns time_s and x_m,y_m or latitude_deg,longitude_deg")
-    first, second = ("x_m", "y_m") if local else ("latitude_deg", "longitude_deg")
     rows: Rows = []
-    for line, row in enumerate(table, start=2):
-        try:
-            rows.append(
-                (
-                    float(row["time_s"]),
-                    float(row[first]),
-                    float(row[second]),
-                    float(row.get("altitude_m") or 0),
-                )
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        table = csv.reader(file, skipinitialspace=True)
+        names = [name.strip() for name in next(table, [])]
+        local = {"x_m", "y_m"} <= set(names)
+        if "time_s" not in names or not (local or {"latitude_deg", "longitude_deg"} <= set(names)):
+            raise InputError(
+                f"{path}:1: must have the columns time_s and x_m,y_m or latitude_deg,longitude_deg"
             )
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{path}:{line}: has no number in time_s, {first} or {second}") from error
-    if not local:
-        return rows
-    columns = np.array(rows, dtype=np.float64).T
-    return LogTrack(*columns)
+        wanted = ["time_s", *(("x_m", "y_m") if local else ("latitude_deg", "longitude_deg"))]
+        height = names.index("altitude_m") if "altitude_m" in names else None
+        places = [names.index(name) for name in wanted]
+        for row in filter(None, table):
+            try:
+                up_m = float(row[height] or 0) if height is not None else 0.0
+                time_s, first, second = (float(row[place]) for place in places)
+            except (IndexError, ValueError) as error:
+                wanted += ["altitude_m"] if height is not None else []
+                told = f"{', '.join(wanted[:-1])} or {wanted[-1]}"
+                raise InputError(f"{path}:{table.line_num}: has no number in {told}") from error
+            rows.append((time_s, first, second, up_m))
+    return LogTrack(*np.array(rows, dtype=np.float64).reshape(-1, 4).T) if local else rows
 
 
 READERS: Final[dict[str, Callable[[Path], Rows | LogTrack]]] = {

@@ -15,6 +15,7 @@ from harness.cli.app import main
 from harness.files.input_file import InputError
 from harness.recording.overlay import write_overlay
 from harness.recording.thin import cross_track_m, write_log_recording
+from harness.run_files.exports.exported_path import planned_points
 from harness.run_files.flight_logs import LogTrack, read_log
 from harness.run_files.run_folder import load_run
 
@@ -110,6 +111,16 @@ def test_a_log_is_the_track_that_was_written(
         ("a.csv", b"a,b\n1,2\n", "must have the columns time_s and x_m,y_m or latitude_deg,longitude_deg"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n1,two,3\n", "a.csv:3: has no number in time_s, x_m or y_m"),
         ("a.csv", b"time_s,x_m,y_m\n0,1,2\n", "has 1 rows with a position; a track has at least 2"),
+        ("a.csv", b"time_s,x_m,y_m\n", "has 0 rows with a position"),
+        (
+            "a.csv",
+            b"time_s,x_m,y_m,altitude_m\n0,1,2,high\n",
+            "a.csv:2: has no number in time_s, x_m, y_m or alti",
+        ),
+        ("a.csv", b"time_s,x_m,y_m\nnan,0,1\n0,2,inf\n1,1e300,2\n", "has 0 rows with a position"),
+        ("a.csv", b"time_s,x_m,y_m\n-1e300,0,1\n1e300,2,3\n", "its times reach from -1e+300 to 1e+300 s"),
+        ("a.csv", b"time_s,latitude_deg,longitude_deg\n0,500,8\n1,47,9000\n", "has 0 rows with a position"),
+        ("a.bin", b"not a log", "is no DataFlash log: such a file begins with a3 95 80"),
     ],
 )
 def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str, tmp_path: Path) -> None:
@@ -118,6 +129,54 @@ def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str,
         read_log(tmp_path / name, PLANE)
     assert sentence in str(raised.value)
     assert "\n" not in str(raised.value)
+
+
+def test_a_log_that_is_not_there_is_told_as_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "flight.rrd").write_bytes(b"")
+    assert main(["view", str(run), str(tmp_path / "none.csv"), "--web"]) == 2
+    assert capsys.readouterr().err == f"{tmp_path / 'none.csv'}: there is no such file\n"
+
+
+def test_cross_track_is_positive_right_of_what_was_flown_of_the_plans() -> None:
+    """Towards north, then east; what lies beyond the end is as far as the end is."""
+    planned = np.array([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)])
+    points = np.array([(30.0, 500.0), (-20.0, 400.0), (500.0, 990.0), (500.0, 1040.0), (0.0, 700.0)])
+    off = cross_track_m(points, planned)
+    assert off is not None
+    np.testing.assert_allclose(off, [30.0, -20.0, 10.0, -40.0, 0.0])
+    assert cross_track_m(points, planned[:1]) is None
+
+
+def test_a_damaged_dataflash_log_is_told_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """pymavlink's machine code prints a line for each byte that it skips."""
+    whole = tmp_path / "a.bin"
+    write_dataflash(whole)
+    torn = whole.read_bytes()[:86]
+    whole.write_bytes(torn + bytes(300))
+    with pytest.raises(InputError, match=r"has 0 rows with a position|cannot be read as"):
+        read_log(whole, PLANE)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_table_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
+    """With a mark of its encoding, spaces, an empty line, a row without a fix, and rows out of order."""
+    text = "\ufefftime_s, x_m, y_m\n2, 10, 30\n\n1, nan, nan\n0, 0, 10\n"
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    track = read_log(tmp_path / "a.csv", PLANE)
+    assert track.time_s.tolist() == [0.0, 2.0]
+    assert (track.east_m.tolist(), track.north_m.tolist()) == ([0.0, 10.0], [10.0, 30.0])
+
+
+def test_a_long_log_is_thinned_to_its_last_row() -> None:
+    row = np.arange(100_001.0)
+    track = LogTrack(row, row, row, row).thinned(20_000)
+    assert 10_000 < len(track.time_s) <= 20_001
+    assert (track.time_s[0], track.up_m[-1]) == (0.0, 100_000.0)
+    assert len(LogTrack(row[:5], row[:5], row[:5], row[:5]).thinned(20_000).time_s) == 5
 
 
 def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path) -> None:
@@ -133,10 +192,14 @@ def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path) -> None:
         run = load_run(folder)
         track = read_log(log, LocalPlane(47.0, 8.0))
         assert track.time_s[-1] == pytest.approx(run.track.time_s[-1], abs=0.2)
-        off = cross_track_m(np.column_stack((track.east_m, track.north_m)), run.plans)
+        off = cross_track_m(np.column_stack((track.east_m, track.north_m)), planned_points(run)[0])
         assert off is not None
         assert np.abs(off).max() < 2.0
         write_log_recording(log, folder, tmp_path / f"{form}.rrd")
         shown = tmp_path / f"{form}-overlay.rrd"
         write_overlay([folder / "flight.rrd", tmp_path / f"{form}.rrd"], ["run", "log"], shown)
         assert shown.stat().st_size > 50_000
+    far = tmp_path / "far.csv"
+    far.write_text("time_s,latitude_deg,longitude_deg\n0,-33,150\n1,-33,150.1\n")
+    with pytest.raises(InputError, match=r"comes no nearer than \d+ km to the area of "):
+        write_log_recording(far, folder, tmp_path / "far.rrd")
