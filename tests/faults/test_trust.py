@@ -52,9 +52,8 @@ def unsafe(source: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_nothing_that_is_read_is_run(path: Path) -> None:
-    assert unsafe(path.read_text()) == []
+def test_nothing_that_is_read_is_run() -> None:
+    assert {path: found for path in SOURCES if (found := unsafe(path.read_text()))} == {}
 
 
 @pytest.mark.parametrize(
