@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gc
 import json
 import zipfile
@@ -38,6 +39,10 @@ def uncollected() -> Iterator[None]:
             gc.enable()
 
 
+UTF_16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+"""How a text begins that Windows' editors call Unicode."""
+
+
 def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
     """The bytes of a regular file.
 
@@ -71,7 +76,9 @@ def head(path: Path, size: int = 65_536) -> bytes:
 
 
 def text_of(data: bytes) -> str:
-    """Bytes as text: UTF-8, or Latin-1 as older airspace files are."""
+    """Bytes as text: UTF-8, UTF-16 that says so, or Latin-1 as older airspace files are."""
+    if data.startswith(UTF_16):
+        return data.decode("utf-16", "replace")
     if b"\0" in data:
         raise WorldFileError("is not a text file; give a file of one of the kinds that are known")
     try:

@@ -151,9 +151,11 @@ def _names(path: Path) -> list[str]:
 
 
 def _text(path: Path, first: bytes, ending: str) -> str | None:
+    if first.startswith(bounded.UTF_16):
+        first = bounded.text_of(first).encode()
     if b"\0" in first:
         return None
-    start = first.lstrip(b"\xef\xbb\xbf \t\r\n")
+    start = first.lstrip(b"\xef\xbb\xbf\x1e \t\r\n")
     if start[:1] == b"<":
         roots = _XML_ROOT.search(start)
         return ROOTS.get(roots[2].decode("ascii").lower()) if roots else None
@@ -175,7 +177,7 @@ def _text(path: Path, first: bytes, ending: str) -> str | None:
         line.startswith("resolution:") for line in lines
     ):
         return "ros_map"
-    if any(line.upper().startswith("AC ") for line in lines):
+    if any(line.upper().startswith(("AC ", "AC\t")) for line in lines):
         return "openair"
     if len(lines) >= 2 and all(_PLACES.match(line) for line in lines[:20]):
         return "ardupilot_fence"
@@ -198,6 +200,8 @@ _JSON_KINDS: Final = (
 
 def _json(path: Path) -> str | None:
     data = bounded.read_bytes(path, bounded.MAX_TREE_BYTES)
+    if data.startswith(bounded.UTF_16):
+        data = bounded.text_of(data).encode()
     found = next((kind for pattern, kind in _JSON_KINDS if pattern.search(data)), None)
     if found is None:
         bounded.json_of(path)  # says so where it is no JSON at all

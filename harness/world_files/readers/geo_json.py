@@ -38,12 +38,13 @@ def read(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is not GeoJSON, or has no polygon.
     """
-    content = json_of(path)
+    content = _whole(path)
     notes: list[str] = []
     parts: list[Part] = []
     unknown = Counter[str]()
-    passed = bare = 0
-    every = [(tags, name, one) for tags, geometry, name in _features(content) for one in _simple(geometry, 0)]
+    features = list(_features(content))
+    every = [(tags, name, one) for tags, geometry, name in features for one in _simple(geometry, 0)]
+    passed, bare = sum(geometry is None for _, geometry, _ in features), 0
     shapes = rings.shapes_of([rings_of(one) for _, _, one in every])
     for (tags, name, _), footprint in zip(every, shapes, strict=True):
         if footprint is None:
@@ -73,7 +74,7 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
     notes: list[str] = []
     parts: list[Part] = []
     passed = free = 0
-    for tags, geometry, name in _features(json_of(path)):
+    for tags, geometry, name in _features(_whole(path)):
         if str(tags.get("type", "")).upper() in FREE:
             free += 1
             continue
@@ -128,6 +129,12 @@ def radius_of(value: Any) -> float:
     if radius is None:
         raise WorldFileError("has a circle without a radius")
     return radius
+
+
+def _whole(path: Path) -> Any:
+    """The content of a GeoJSON file; features that stand one a line are a collection."""
+    contents = json_of(path, lines=True)
+    return contents[0] if len(contents) == 1 else {"type": "FeatureCollection", "features": contents}
 
 
 def _features(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:

@@ -6,6 +6,7 @@ nothing.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -30,8 +31,10 @@ from harness.world_files.parts import (
 from harness.world_files.readers import limits
 
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
+BOUNDARIES: Final = ("outerBoundaryIs", "innerBoundaryIs")
 LINKED: Final = ("NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay")
 PASSED: Final = ("Point", "LineString", "Model", "Track", "MultiTrack")
+_COMMA: Final = re.compile(r"\s*,\s*")
 
 
 def read(path: Path, reading: Reading) -> Contents:
@@ -51,6 +54,9 @@ def read(path: Path, reading: Reading) -> Contents:
         if _name(element) != "Placemark":
             continue
         tags = _tags(element)
+        lone = sum(_name(each) == "LinearRing" for each in element.iter())
+        lone -= sum(_name(each) in BOUNDARIES for each in element.iter())
+        passed += max(lone, 0)
         for each in element.iter():
             passed += _name(each) in PASSED
             if _name(each) != "Polygon":
@@ -125,7 +131,7 @@ def _rings(element: ElementTree.Element, boundary: str) -> Sequence[FloatArray]:
     for each in element.iter():
         if _name(each) != boundary:
             continue
-        words = _text(each, "coordinates").split()
+        words = _COMMA.sub(",", _text(each, "coordinates")).split()
         try:
             numbers = [[float(part) for part in word.split(",")] for word in words]
             places = np.array([(*row, 0.0)[:3] for row in numbers], dtype=np.float64).reshape(-1, 3)

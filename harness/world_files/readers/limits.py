@@ -15,7 +15,7 @@ from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum,
 
 _NUMBER: Final = re.compile(r"[-+]?\d+(?:\.\d*)?|[-+]?\.\d+")
 _SURFACE: Final = re.compile(r"^(SFC|GND|SURFACE|GROUND|0+(\s*(FT|M))?(\s*(AGL|GND|ASFC|SFC))?)$")
-_NO_END: Final = re.compile(r"^(UNL|UNLIM|UNLIMITED|INF|INFINITE)\b")
+_NO_END: Final = re.compile(r"^(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b")
 _GROUND: Final = re.compile(r"AGL|GND|SFC|GROUND|RELATIVE")
 _WORD: Final = re.compile(
     r"\d+(?:[.,]\d*)?|\.\d+|[-+]|AMSL|MSL|METRES|METERS|METER|METRE|MEAN|MTR|FEET|FL|FT|F|"
@@ -33,6 +33,9 @@ _LOWER: Final = (
     "loweraltitude",
     "minaltitude",
     "altmin",
+    "minalt",
+    "lower_limit_altitude",
+    *(f"{name}_{unit}" for name in ("lower", "lower_limit", "floor", "bottom") for unit in ("ft", "m")),
 )
 _UPPER: Final = (
     "upperlimit",
@@ -44,8 +47,14 @@ _UPPER: Final = (
     "upperaltitude",
     "maxaltitude",
     "altmax",
+    "maxalt",
+    "upper_limit_altitude",
+    *(f"{name}_{unit}" for name in ("upper", "upper_limit", "ceiling", "top") for unit in ("ft", "m")),
 )
-_REFERENCES: Final = ("refer", "code", "datum")
+_FEET: Final = "_ft"
+_UNITS: Final = ("uom", "unit")
+"""What the name of an attribute has that says in what unit a limit is."""
+_REFERENCES: Final = ("refer", "_ref", "code", "datum")
 """What the name of an attribute has that says what a limit is counted from, as `lowerReference`, `UPPER_CODE`."""
 NO_NUMBER: Final = -9000.0
 """Limits so low stand for one that is not known, as -9998 of the FAA's files."""
@@ -94,6 +103,8 @@ def limit_of(text: str, feet: bool = True, datum: Datum = Datum.SEA) -> Limit | 
     if number is None or _WORD.sub("", word).strip() or len(_NUMBER.findall(word)) > 1:
         return None
     value = float(number[0])
+    if value <= NO_NUMBER:
+        return None
     if "FL" in word:
         return Limit(value * 100.0 * FOOT_M)
     metres = bool(_METRES.search(word)) if re.search(r"\d\s*(FT|FEET|F\b|M(?!SL))", word) else not feet
@@ -204,9 +215,14 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     tags = {key.lower(): value for key, value in tags.items() if value is not None}
     found: list[Limit | None] = []
     for names, none, word in ((_LOWER, NO_BOTTOM, "lower"), (_UPPER, NO_TOP, "upper")):
-        value = next((tags[each] for each in names if each in tags), None)
-        units = (f"{word}_uom", f"{word}unit", f"{word}_unit", "uom", "unit", "uomdimensions")
-        unit = next((str(tags[each]) for each in units if each in tags), "m").lower()
+        key = next((each for each in names if each in tags), None)
+        value = None if key is None else tags[key]
+        units = [each for each in tags if each.startswith(word) and any(u in each for u in _UNITS)]
+        unit = next(
+            (str(tags[each]) for each in (*units, *_UNITS, "uomdimensions") if each in tags), "m"
+        ).lower()
+        if key is not None and key.endswith(_FEET):
+            unit = "ft"
         reference = next(
             (str(tags[each]).upper() for each in tags if each.startswith(word) and any(r in each for r in _REFERENCES)),
             "",

@@ -75,8 +75,8 @@ def read(path: Path, reading: Reading) -> Contents:
     spaces: list[_Airspace] = []
     ignored = Counter[str]()
     for number, line in enumerate(lines, 1):
-        command, _, rest = line.partition("*")[0].strip().partition(" ")
-        command, rest = command.upper(), rest.strip()
+        command, *more = line.partition("*")[0].split(None, 1) or ("",)
+        command, rest = command.upper(), more[0].strip() if more else ""
         if command == "AC":
             spaces.append(_Airspace(rest))
         elif spaces and command in CLOSED:

@@ -482,3 +482,87 @@ def test_reading_leaves_the_collection_of_cycles_as_it_was(tmp_path: Path) -> No
             assert gc.isenabled() is on
         finally:
             gc.enable()
+
+
+@pytest.mark.parametrize(
+    ("tags", "bottom", "top"),
+    [
+        # Germany's DIPUL
+        (
+            {
+                "lower_limit_altitude": "0", "lower_limit_unit": "FT", "lower_limit_alt_ref": "AGL",
+                "upper_limit_altitude": "2500", "upper_limit_unit": "FT", "upper_limit_alt_ref": "AMSL",
+            },
+            NO_BOTTOM, Limit(2500 * FOOT_M),
+        ),
+        # the FAA: -9998 stands for a limit that is not known
+        (
+            {"LOWER_VAL": "0", "LOWER_UOM": "FT", "LOWER_CODE": "SFC", "UPPER_VAL": "-9998", "UPPER_UOM": ""},
+            NO_BOTTOM, NO_TOP,
+        ),
+        ({"floor_ft": 100, "ceiling_ft": 400}, Limit(100 * FOOT_M), Limit(400 * FOOT_M)),
+        ({"floor_m": 100, "ceiling_m": 400}, Limit(100.0), Limit(400.0)),
+        ({"minAlt": 50, "maxAlt": 120}, Limit(50.0), Limit(120.0)),
+        ({"lower": "GND", "upper": "UNLTD"}, NO_BOTTOM, NO_TOP),
+    ],
+)  # fmt: skip
+def test_limits_of_zones_by_the_names_that_authorities_use(
+    tags: dict[str, Any], bottom: Limit, top: Limit, tmp_path: Path
+) -> None:
+    (part,) = read_any(geojson(tmp_path / "a.geojson", feature(tags))).parts
+    assert same(part.bottom, bottom)
+    assert same(part.top, top)
+
+
+@pytest.mark.parametrize("before", ["", "\x1e"])
+def test_features_a_line_are_a_collection(before: str, tmp_path: Path) -> None:
+    lines = [before + json.dumps(feature({"height": 5 + k})) for k in range(3)]
+    found = read_any(written(tmp_path / "a.geojsonl", "\n".join(lines) + "\n"))
+    assert [part.top.height_m for part in found.parts] == [5.0, 6.0, 7.0]
+    with pytest.raises(WorldFileError, match="not whole JSON"):
+        read_any(written(tmp_path / "b.geojsonl", "\n".join(lines)[:-5]))
+
+
+def test_a_feature_without_a_geometry_is_counted(tmp_path: Path) -> None:
+    bare = {"type": "Feature", "properties": {"height": 9}, "geometry": None}
+    found = read_any(geojson(tmp_path / "a.geojson", feature({"height": 5}), bare))
+    assert len(found.parts) == 1
+    assert "1 point, line or polygon without an area passed over" in found.notes
+
+
+AIRSPACE = "AC D\nAN Zürich CTR\nAL SFC\nAH 3500 ft\nV X=47:30:00 N 008:30:00 E\nDC 5\n"
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        AIRSPACE.replace(" ", "\t", 3).replace("AH ", "AH\t").encode(),
+        AIRSPACE.replace("\n", "\r\n").encode("utf-8-sig"),
+        AIRSPACE.encode("latin-1"),
+        AIRSPACE.encode("utf-16"),
+    ],
+)
+def test_airspace_is_the_same_in_every_encoding_and_with_tabs(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_bytes(data)
+    (part,) = read_any(path).parts
+    assert (part.name.replace("\t", " "), part.bottom) == ("Zürich CTR", NO_BOTTOM)
+    assert same(part.top, Limit(3500 * FOOT_M))
+
+
+def test_kml_with_blanks_after_commas_and_rings_of_their_own(tmp_path: Path) -> None:
+    ring = " ".join(f"{x}, {y}, 120" for x, y in RING)
+    inner = f"<outerBoundaryIs><LinearRing><coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs>"
+    mode = "<altitudeMode>relativeToGround</altitudeMode>"
+    lone = f"<LinearRing><coordinates>{ring}</coordinates></LinearRing>"
+    text = (
+        '<?xml version="1.0" encoding="{}"?><kml><Placemark><name>zone</name><MultiGeometry>'
+        f"<Polygon>{mode}{inner}</Polygon>{lone}</MultiGeometry></Placemark></kml>"
+    )
+    for encoding in ("UTF-8", "UTF-16"):
+        path = tmp_path / f"{encoding}.kml"
+        path.write_bytes(text.format(encoding).encode(encoding))
+        found = read_any(path)
+        (part,) = found.parts
+        assert (part.bottom, part.top) == (NO_BOTTOM, Limit(120.0, Datum.GROUND))
+        assert "1 point, line or wall passed over" in found.notes
