@@ -20,7 +20,7 @@ from harness.world_files.readers.geotiff import check_cells, plausible
 SIDES: Final = {2 * n * n: n for n in (1201, 3601)}
 """Bytes of an SRTM tile: samples a side; rows and columns on its edges are shared with its neighbours."""
 VOID: Final = -32768
-_TILE: Final = re.compile(r"([NS])(\d{2})([EW])(\d{3})", re.IGNORECASE)
+_TILE: Final = re.compile(r"([NS])(\d{2})_?([EW])(\d{3})", re.IGNORECASE)
 _HEADER: Final = re.compile(r"\s*([A-Za-z_]+)\s+(\S+)[ \t]*\r?\n")
 MAX_MEMBER_BYTES: Final = 500_000_000
 

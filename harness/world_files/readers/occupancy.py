@@ -197,11 +197,12 @@ def read_gazebo(path: Path, reading: Reading) -> Contents:
     """
     scale = (reading.metres_per_cell or BARN_CELL_M) / BARN_CELL_M
     parts: list[Part] = []
-    passed = 0
+    passed = included = 0
     in_state = False  # where the models are listed again, as they were when the world was saved
     for event, element in xml_events(read_bytes(path, MAX_TREE_BYTES), ends_only=False):
         if element.tag == "state":
             in_state = event == "start"
+        included += element.tag == "include" and event == "end" and not in_state
         if element.tag != "model" or event == "start" or in_state:
             continue
         pose = _pose(element)
@@ -214,6 +215,8 @@ def read_gazebo(path: Path, reading: Reading) -> Contents:
     if not parts:
         raise WorldFileError("has no upright cylinder or box; must be a Gazebo world with some")
     notes = [f"{counted(passed, 'shape')} other than cylinders and boxes passed over"] if passed else []
+    if included:
+        notes.append(f"{counted(included, 'model')} of other files passed over")
     if not reading.metres_per_cell:
         notes.append("a cell is taken as 0.15 m (metres_per_cell)")
     return Contents("gazebo_world", None, tuple(parts), notes=tuple(notes))

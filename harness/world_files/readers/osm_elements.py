@@ -1,8 +1,8 @@
 """Buildings of OpenStreetMap from nodes, ways and relations in any order.
 
-Buildings and their parts (`building:part`) are all taken, each with its own height: where they overlap the union is
-solid, which is never less than the Simple 3D Buildings scheme has it. Outlines that the edge of an extract has cut
-open are closed by a straight line.
+Buildings and their parts (`building:part`), chimneys, towers and tanks (`man_made`) are all taken, each with its own
+height: where they overlap the union is solid, which is never less than the Simple 3D Buildings scheme has it. Outlines
+that the edge of an extract has cut open are closed by a straight line.
 """
 
 from __future__ import annotations
@@ -26,7 +26,21 @@ from harness.world_files.parts import (
 )
 from harness.world_files.readers import limits, rings
 
-AREAS: Final = ("building", "building:part")
+AREAS: Final = ("building", "building:part", "man_made")
+TALL: Final = frozenset(
+    (
+        "chimney",
+        "communications_tower",
+        "cooling_tower",
+        "gasometer",
+        "mast",
+        "silo",
+        "storage_tank",
+        "tower",
+        "water_tower",
+    )
+)
+"""Of `man_made`, what stands up like a building; piers, pipelines and the like do not."""
 MULTIPOLYGON: Final = "multipolygon"
 
 Line = list[tuple[float, float]]
@@ -158,8 +172,8 @@ class Elements:
 
 
 def is_building(tags: Mapping[str, str]) -> bool:
-    """Whether tags are those of a building, or of a part of one."""
-    return any(tags.get(name, "no") != "no" for name in AREAS)
+    """Whether tags are those of a building, of a part of one, or of what stands up like one."""
+    return any(tags.get(name, "no") != "no" for name in AREAS[:2]) or tags.get("man_made") in TALL
 
 
 def _area(lines: Sequence[Line]) -> tuple[Any, bool]:

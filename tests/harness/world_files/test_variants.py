@@ -26,7 +26,7 @@ from harness.world_files.parts import (
     Reading,
     WorldFileError,
 )
-from tests.harness.world_files.making import feature, geojson
+from tests.harness.world_files.making import feature, geojson, osm
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of rasterio's own
 
@@ -566,3 +566,28 @@ def test_kml_with_blanks_after_commas_and_rings_of_their_own(tmp_path: Path) -> 
         (part,) = found.parts
         assert (part.bottom, part.top) == (NO_BOTTOM, Limit(120.0, Datum.GROUND))
         assert "1 point, line or wall passed over" in found.notes
+
+
+def test_chimneys_and_towers_stand_like_buildings_and_piers_do_not(tmp_path: Path) -> None:
+    kinds = [{"man_made": "chimney", "height": "150"}, {"man_made": "tower", "height": "80 m"}]
+    ways = [(tags, CORNERS) for tags in (*kinds, {"man_made": "pier", "height": "5"}, {"building": "yes"})]
+    found = read_any(osm(tmp_path / "a.osm", ways))
+    assert [part.top.height_m for part in found.parts] == [150.0, 80.0, 6.0]
+
+
+def test_a_tile_may_be_named_with_a_bar(tmp_path: Path) -> None:
+    path = tmp_path / "n46_e009_3arc_v2.hgt"
+    path.write_bytes(np.zeros((1201, 1201), ">i2").tobytes())
+    terrain = read_any(path).terrain
+    assert terrain is not None
+    assert terrain.affine[2] == pytest.approx(9.0, abs=1e-3)
+
+
+def test_models_of_other_files_in_a_gazebo_world_are_counted(tmp_path: Path) -> None:
+    shape = "<collision name='c'><geometry><cylinder><radius>1</radius></cylinder></geometry></collision>"
+    text = (
+        f"<sdf><world><model name='m'><link name='l'>{shape}</link></model>"
+        "<include><uri>model://sun</uri></include><include><uri>model://house</uri></include></world></sdf>"
+    )
+    found = read_any(written(tmp_path / "a.world", text))
+    assert "2 models of other files passed over" in found.notes
