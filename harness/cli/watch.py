@@ -102,7 +102,7 @@ def opened(watch: Watch, scenario: Scenario) -> Iterator[Opened]:
         yield Opened(who(None), lambda: None)
     elif watch.viewer is not None:
         address, url = viewer_address(watch.viewer, watch.beyond)
-        address.need_listener("--viewer")
+        address.need_viewer("--viewer", secure=not url.startswith("rerun+http:"))
         yield Opened(who(url), lambda: None)
     else:
         with _viewer(watch.web) as (url, wait):

@@ -67,7 +67,7 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
         render_mode: str | None = None,
     ) -> None:
         self._own = self._flown = _loaded(scenario)
-        self._updates = round(step_s * UPDATE_RATE_HZ)
+        self._updates = round(step_s * UPDATE_RATE_HZ) if math.isfinite(step_s) else 0
         if self._updates < 1 or abs(self._updates - step_s * UPDATE_RATE_HZ) > 1e-9:
             raise ValueError(f"step_s is {step_s:g}; must be a multiple of {1.0 / UPDATE_RATE_HZ:g} s")
         rays = self._own.sensor.rays
@@ -104,11 +104,20 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
         return self._observed(status), self._info(status)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Flies on for a step."""
+        """Flies on for a step. What of an action lies beyond -1 and 1 is cut off; after the end nothing more is flown.
+
+        Raises:
+            RuntimeError: no episode has begun.
+            ValueError: the action has another shape, or is not finite.
+        """
         if self._loop is None:
             raise RuntimeError("reset() before step(): no episode has begun")
         before = self._loop.status
-        self._act(np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0), before)
+        given = np.asarray(action, dtype=np.float64)
+        if given.shape != self.action_space.shape or not np.isfinite(given).all():
+            (numbers,) = self.action_space.shape or (0,)
+            raise ValueError(f"action is {action!r}; must be {numbers} finite numbers from -1 to 1")
+        self._act(np.clip(given, -1.0, 1.0), before)
         status = self._advanced(before)
         reward = (self._to_go_m - status.to_go_m) / math.dist(
             self._own.mission.start_m, self._own.mission.goal_m

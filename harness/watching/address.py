@@ -15,6 +15,10 @@ GROUND_STATION_PORT: Final = 14550
 """Where ground stations listen for MAVLink."""
 
 KNOCK_S: Final = 3.0
+"""Who listens takes a connection, and greets, within this wall time."""
+PREFACE: Final = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+SETTINGS: Final = bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))
+"""What both sides of HTTP/2 begin with, the client after the preface (RFC 9113, 3.4): a frame of type 4, byte 3."""
 
 _SCHEMES: Final = ("rerun+http://", "rerun+https://", "rerun://")
 
@@ -31,18 +35,35 @@ class Address:
         """As people write it."""
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
-    def need_listener(self, option: str) -> None:
-        """Refuses an address where nobody takes a connection.
+    def need_viewer(self, option: str, secure: bool = False) -> None:
+        """Refuses an address where nobody takes a connection, or what does speaks no HTTP/2, as viewers do.
+
+        Args:
+            option: of the command line.
+            secure: over TLS, of which nothing more is asked.
 
         Raises:
-            InputError: nobody does.
+            InputError: nobody does, or something else.
         """
         try:
-            socket.create_connection((self.host, self.port), KNOCK_S).close()
+            with socket.create_connection((self.host, self.port), KNOCK_S) as line:
+                greeting = SETTINGS if secure else _greeted(line)
         except OSError as error:
             raise InputError(
                 f"command line: {option}: nothing listens at {self.text}; start it first"
             ) from error
+        if greeting[3:4] != SETTINGS[3:4]:
+            raise InputError(f"command line: {option}: what listens at {self.text} is no rerun viewer")
+
+
+def _greeted(line: socket.socket) -> bytes:
+    """What the other side of a connection says to one who speaks HTTP/2; nothing where it keeps silent."""
+    line.settimeout(KNOCK_S)
+    try:
+        line.sendall(PREFACE + SETTINGS)
+        return line.recv(len(SETTINGS))
+    except OSError:
+        return b""
 
 
 def viewer_address(text: str, beyond: bool = False) -> tuple[Address, str]:

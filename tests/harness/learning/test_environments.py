@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import subprocess
@@ -153,6 +154,7 @@ def test_the_state_is_what_it_says() -> None:
         (IDS[0], {"step_s": 0.25}, r"step_s is 0\.25; must be a multiple of 0\.1 s"),
         (IDS[0], {"step_s": 0.1}, "actions would be passed over"),
         (IDS[1], {"step_s": 0.0}, "step_s is 0; must be a multiple"),
+        (IDS[1], {"step_s": math.nan}, "step_s is nan; must be a multiple"),
         (IDS[1], {"beams": 145}, "beams is 145; must be from 1 to the 144 rays"),
         (IDS[1], {"scenario": "no_such_world"}, "no_such_world: no such file"),
     ],
@@ -160,6 +162,23 @@ def test_the_state_is_what_it_says() -> None:
 def test_what_makes_no_sense_is_told(name: str, keys: dict[str, Any], sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         gymnasium.make(name, **({"scenario": near()} | keys))
+
+
+@pytest.mark.parametrize(
+    ("name", "action"),
+    [
+        ("Waypoints", [math.nan, 0.5]),
+        ("Waypoints", [0.0, math.inf]),
+        ("Waypoints", [0.0, 0.5, 0.0]),
+        ("Roll", [math.nan]),
+        ("Roll", 0.5),
+    ],
+)
+def test_an_action_that_is_none_is_told(name: str, action: Any) -> None:
+    env: Any = gymnasium.make(f"wayproof/{name}-v0", scenario=near(), disable_env_checker=True).unwrapped
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match=r"action is .*; must be [12] finite numbers from -1 to 1"):
+        env.step(np.array(action, dtype=np.float32))
 
 
 def test_a_step_before_the_first_reset_is_told() -> None:

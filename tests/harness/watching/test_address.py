@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import socket
+import threading
 
 import pytest
 
 from harness.files.input_file import InputError
+from harness.watching import address as addresses
 from harness.watching.address import Address, ground_station_address, viewer_address
 
 
@@ -57,6 +59,42 @@ def test_where_nobody_listens_is_told() -> None:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         with pytest.raises(InputError, match=rf"--viewer: nothing listens at 127\.0\.0\.1:{port}"):
-            Address("127.0.0.1", port).need_listener("--viewer")
-        taken.listen()
-        Address("127.0.0.1", port).need_listener("--viewer")
+            Address("127.0.0.1", port).need_viewer("--viewer")
+
+
+@pytest.mark.parametrize("answer", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"SSH-2.0-OpenSSH_9.2\r\n"])
+def test_what_is_no_viewer_is_told_before_the_flight(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A viewer that does not answer in flight is given up after a minute: that is too late."""
+    monkeypatch.setattr(addresses, "KNOCK_S", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        address = Address("127.0.0.1", other.getsockname()[1])
+
+        def answers() -> None:
+            line, _ = other.accept()
+            with line:
+                line.sendall(answer)
+                line.recv(1000)
+
+        thread = threading.Thread(target=answers)
+        thread.start()
+        with pytest.raises(
+            InputError, match=r"--viewer: what listens at 127\.0\.0\.1:\d+ is no rerun viewer"
+        ):
+            address.need_viewer("--viewer")
+        thread.join()
+
+
+def test_who_greets_as_http_2_does_is_taken_for_a_viewer() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as viewer:
+        address = Address("127.0.0.1", viewer.getsockname()[1])
+
+        def greets() -> None:
+            line, _ = viewer.accept()
+            with line:
+                assert line.recv(1000).startswith(addresses.PREFACE)
+                line.sendall(bytes((0, 0, 6, 4)) + bytes(11))
+
+        thread = threading.Thread(target=greets)
+        thread.start()
+        address.need_viewer("--viewer")
+        thread.join()
