@@ -44,7 +44,6 @@ class ObstacleMemory:
         self._count = 0
         self._with_moving: tuple[FloatArray, IntArray] | None = None
         self._of_cell: dict[tuple[int, int], int] = {}
-        self._cells: dict[int, list[tuple[int, int]]] = {}  # of each obstacle
         self._next = 0
 
     @property
@@ -156,19 +155,19 @@ class ObstacleMemory:
         self._genuine[new] = genuine
         self._count = total
         if new.start == 0:
-            at = np.floor(fresh / self.cell_m).astype(np.int64)
-            cells, which = np.unique(at, axis=0, return_inverse=True)
+            cells, which = _cells_of(fresh, self.cell_m)
             labels = _gathered(cells)
-            for cell, label in zip(map(tuple, cells.tolist()), labels.tolist(), strict=True):
-                self._put(cell, label)
+            self._of_cell = dict(zip(map(tuple, cells.tolist()), labels.tolist(), strict=True))
             self._next = len(cells)
-            self._labels[new] = labels[which.ravel()]
+            self._labels[new] = labels[which]
             return
         side = self.cell_m
         cells_of = [(math.floor(east / side), math.floor(north / side)) for east, north in fresh.tolist()]
+        joined: list[tuple[int, int]] = []
         for cell in dict.fromkeys(cells_of):
             if cell not in self._of_cell:
-                self._join(cell)
+                self._join(cell, joined, new.start)
+                joined.append(cell)
         self._labels[new] = [self._of_cell[cell] for cell in cells_of]
 
     def _grow(self, total: int) -> None:
@@ -178,22 +177,37 @@ class ObstacleMemory:
             self._labels = np.resize(self._labels, size)
             self._genuine = np.resize(self._genuine, size)
 
-    def _join(self, cell: tuple[int, int]) -> None:
-        """Gives a new cell the label of its neighbours, which become one obstacle if they were several."""
+    def _join(self, cell: tuple[int, int], joined: list[tuple[int, int]], count: int) -> None:
+        """Gives a new cell the label of its neighbours, which become one obstacle if they were several.
+
+        Args:
+            cell: the cell.
+            joined: the other new cells that have a label already.
+            count: so many points have a label already.
+        """
         x, y = cell
         around = ((x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j)
         found = {self._of_cell[near] for near in around if near in self._of_cell}
         label = min(found) if found else self._next
         self._next += not found
-        self._put(cell, label)
-        for other in found - {label}:
-            self._labels[: self._count][self._labels[: self._count] == other] = label
-            for joined in self._cells.pop(other):
-                self._put(joined, label)
-
-    def _put(self, cell: tuple[int, int], label: int) -> None:
         self._of_cell[cell] = label
-        self._cells.setdefault(label, []).append(cell)
+        for other in found - {label}:
+            mine = self._labels[:count] == other
+            cells, _ = _cells_of(self._points[:count][mine], self.cell_m)
+            of_new = (each for each in joined if self._of_cell[each] == other)
+            self._of_cell |= dict.fromkeys([*map(tuple, cells.tolist()), *of_new], label)
+            self._labels[:count][mine] = label
+
+
+def _cells_of(points_m: FloatArray, cell_m: float) -> tuple[IntArray, IntArray]:
+    """(k, 2) cells of (m, 2) points, each once, in order of columns and rows; (m,) which of them each point lies in."""
+    at = np.floor(points_m / cell_m).astype(np.int64)
+    if not len(at):
+        return at, np.zeros(0, dtype=np.intp)
+    low = at.min(axis=0)
+    rows = int(np.ptp(at[:, 1])) + 1
+    keys, which = np.unique((at - low) @ (rows, 1), return_inverse=True)
+    return np.column_stack(np.divmod(keys, rows)) + low, which
 
 
 def _gathered(cells: IntArray) -> IntArray:

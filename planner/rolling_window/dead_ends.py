@@ -148,8 +148,9 @@ class GivingUp:
             no_room: it is proved that no way has room to turn everywhere.
             settled: the world has stood still long enough.
         """
-        # What moved may have closed the way; where edge points were only taken back, one more try tells.
-        doubtful = self.dead_ends.stability.ever or (self._memory.ever_cleared and not self.tried_again)
+        # What moved may have closed the way. Where edge points were taken back the sensor errs, and a place that was
+        # given up may be seen to be free at another look.
+        doubtful = self.dead_ends.stability.ever or self._memory.ever_cleared
         return no_room and settled and not (doubtful and len(self._memory.refused_m))
 
     def retries_used(self) -> bool:

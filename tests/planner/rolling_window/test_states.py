@@ -265,3 +265,15 @@ def test_a_whole_turn_is_counted_from_the_entry_or_from_what_was_given_up_last()
     assert not giving_up.turned_since(1000.0, 1629.0 + 628.0)
     giving_up.new_plan()
     assert giving_up.turned_since(1000.0, 1000.0 + 629.0)
+
+
+def test_no_room_to_turn_is_no_verdict_while_a_place_is_given_up_that_the_sensor_may_err_about() -> None:
+    memory = ObstacleMemory(MISSION.clearance_m)
+    giving_up = GivingUp(MISSION, memory)
+    giving_up.try_again(narrow=False, at_end=True, arc_length_m=0.0)
+    memory.refuse((500.0, 0.0))
+    assert giving_up.narrow(no_room=True, settled=True)
+    memory.ever_cleared = True
+    assert not giving_up.narrow(no_room=True, settled=True)
+    memory.forgive()
+    assert giving_up.narrow(no_room=True, settled=True)
