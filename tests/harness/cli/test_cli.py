@@ -334,7 +334,7 @@ def test_a_flight_of_a_model_that_cannot_be_flown_ends_before_it(
 def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "tracking", "--seeds", "1", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert (result["aircraft"], result["seeds"], len(result["cases"])) == ("aerosonde", 1, 6)
+    assert (result["aircraft"], result["seeds"], len(result["cases"])) == ("aerosonde", 1, 7)
     calm = result["cases"][0]
     assert 0.0 < calm["cross_track_p95_m"] < calm["cross_track_max_m"] <= calm["limits"]["cross_track_max_m"]
     assert all(case["kept"] for case in result["cases"])
