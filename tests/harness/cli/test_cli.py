@@ -337,7 +337,10 @@ def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[
     assert (result["aircraft"], result["seeds"], len(result["cases"])) == ("aerosonde", 1, 7)
     calm = result["cases"][0]
     assert 0.0 < calm["cross_track_p95_m"] < calm["cross_track_max_m"] <= calm["limits"]["cross_track_max_m"]
-    assert all(case["kept"] for case in result["cases"])
+    *promised, gnss = result["cases"]
+    assert all(case["kept"] for case in promised)
+    assert (gnss["case"], gnss["limits"], gnss["kept"]) == ("gnss", None, None)
+    assert gnss["cross_track_p95_m"] > calm["cross_track_p95_m"]
 
 
 @pytest.mark.parametrize(
