@@ -5,6 +5,7 @@ Tags are told by their names, whatever the namespace: files of both kinds carry 
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from typing import Final
@@ -20,6 +21,7 @@ MAX_ELEMENTS: Final = 4_000_000
 DECLARED: Final = ("<!DOCTYPE", "<!ENTITY")
 """A file that declares entities is refused: none of these formats needs them."""
 
+COMMA: Final = re.compile(r"\s*,\s*")
 ABSOLUTE, RELATIVE = "absolute", "relativeToGround"
 """Values of KML's altitudeMode; with any other the altitude means nothing."""
 
@@ -146,11 +148,15 @@ def _text(element: ElementTree.Element, name: str) -> str:
 
 
 def _kml_points(line: ElementTree.Element, name: str, source: str) -> list[Point]:
-    if _name(line) == "Track":  # longitude latitude altitude, one an element
-        rows = [(each.text or "").split() for each in _all(line, "coord")]
-    else:
-        rows = [each.split(",") for each in _text(line, "coordinates").split()]
+    # Of a track: longitude latitude altitude, one an element.
+    track = _name(line) == "Track"
+    rows = [(each.text or "").split() for each in _all(line, "coord")] if track else _coordinates(line)
     return [_point(row, f"{source}: {name}: point {number}") for number, row in enumerate(rows)]
+
+
+def _coordinates(element: ElementTree.Element) -> list[list[str]]:
+    """Numbers of each position; blanks round a comma do not part positions."""
+    return [part.split(",") for part in COMMA.sub(",", _text(element, "coordinates")).split()]
 
 
 def _point(row: list[str], where: str) -> Point:
@@ -164,7 +170,7 @@ def _polygon(element: ElementTree.Element, name: str, source: str) -> Fence:
     rings = []
     for boundary in ("outerBoundaryIs", "innerBoundaryIs"):
         for each in _all(element, boundary):
-            rows = [part.split(",") for part in _text(each, "coordinates").split()]
+            rows = _coordinates(each)
             where = f"{source}: {name}: corner"
             rings.append(tuple(_point(row, f"{where} {number}")[:2] for number, row in enumerate(rows)))
     if not rings:

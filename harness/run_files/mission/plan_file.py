@@ -92,6 +92,9 @@ def _items(item: Any, key: str, source: str, number: int, notes: list[str]) -> I
 
 def _simple(item: dict[str, Any], key: str, source: str, number: int) -> Item:
     params = item.get("params")
+    place = item.get("coordinate")
+    if isinstance(params, list) and len(params) == 4 and isinstance(place, list) and len(place) == 3:
+        params = [*params, *place]  # before version 4.0 of QGroundControl
     if not isinstance(params, list) or len(params) != 7:
         raise InputError(f"{source}: {key}.params: must be a list of 7")
     # QGroundControl writes null where something is left to the autopilot.
@@ -138,6 +141,11 @@ def _fences(geofence: Any, source: str, inside_all: bool) -> Fences:
     if not isinstance(geofence, dict):
         raise InputError(f"{source}: geoFence: must be a mapping")
     found = []
+    old = geofence.get("polygon", [])
+    if not isinstance(old, list):
+        raise InputError(f"{source}: geoFence.polygon: must be a list of [latitude, longitude]")
+    if old:  # before version 2: one, to stay inside of
+        found.append(_polygon({"polygon": old, "inclusion": True}, source, "geoFence"))
     for kind in ("polygons", "circles"):
         listed = geofence.get(kind, [])
         if not isinstance(listed, list):

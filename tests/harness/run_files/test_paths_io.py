@@ -215,7 +215,6 @@ BROKEN = {
         wpl(*wpl_items(), line(4, 0, 3, 177, 1, 30000, 0, 0, 0, 0, 0, 1)),
         "jumps make it more than 20,000 legs",
     ),
-    "one number twice": ("a.waypoints", wpl(*wpl_items(), wpl_items()[0]), ": item 1 is there twice"),
     "nothing to fly": (
         "a.plan",
         plan(item(0, 0, command=183), item(0, 0, command=2000, doJumpId=2)),
@@ -295,3 +294,60 @@ def test_points_are_within_a_metre_of_the_geodesic_out_to_100_km(tmp_path: Path)
     found = read_path(path).points_m[1:]
     wanted = 1e5 * np.column_stack((np.sin(np.radians(azimuths)), np.cos(np.radians(azimuths))))
     assert np.hypot(*(found - wanted).T).max() < 1.0
+
+
+def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_path: Path) -> None:
+    def old(number: int, latitude: float, longitude: float) -> dict[str, Any]:
+        keys: dict[str, Any] = {
+            "coordinate": [latitude, longitude, 120.0],
+            "params": [0, 0, 0, 0],
+            "doJumpId": number,
+        }
+        return item(latitude, longitude, **keys)
+
+    content = json.loads(plan(*(old(k, *place) for k, place in enumerate(POINTS, 1))))
+    content["geoFence"] = {"polygon": [[46.9, 7.9], [47.2, 7.9], [47.2, 8.5], [46.9, 8.5]], "version": 1}
+    path = tmp_path / "old.plan"
+    path.write_text(json.dumps(content))
+    found = read_path(path)
+    assert found.mission is not None
+    assert [step.position for step in found.mission.program.steps] == POINTS
+    assert [step.height_m for step in found.mission.program.steps] == [120.0] * 3
+    (fence,) = found.fences.every
+    assert fence.inclusion
+
+
+def test_items_of_a_plain_text_mission_are_counted_by_their_lines(tmp_path: Path) -> None:
+    rows = [line(2, *row.split("\t")[1:]) for row in wpl_items()]
+    rows.append(line(9, 0, 0, 177, 2, 1, 0, 0, 0, 0, 0, 1))
+    path = tmp_path / "a.waypoints"
+    path.write_text(wpl(*rows))
+    found = read_path(path)
+    assert found.mission is not None
+    assert [step.item for step in found.mission.program.steps] == [1, 2, 3, 2, 3]
+    assert found.notes == ("3 items with another number than their line: counted by lines",)
+
+
+def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must_be_numbers(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.waypoints"
+    path.write_text(wpl(line(1, 0, 3, 16, 0, 0, 0, "nan", *POINTS[0], 120, 1), *wpl_items()[1:]))
+    found = read_path(path)
+    assert found.mission is not None
+    assert len(found.mission.program.steps) == 3
+    path.write_text(wpl(line(1, 0, 3, 16, 0, 0, 0, 0, "nan", 8.0, 120, 1), *wpl_items()[1:]))
+    with pytest.raises(InputError, match=":3: is 'nan'; must be a finite number"):
+        read_path(path)
+
+
+def test_a_path_of_kml_may_have_blanks_round_its_commas(tmp_path: Path) -> None:
+    text = " ".join(f"{longitude}, {latitude} ,500" for latitude, longitude in POINTS)
+    mode = "<altitudeMode>absolute</altitudeMode>"
+    path = tmp_path / "a.kml"
+    path.write_text(
+        f"<kml><Placemark><LineString>{mode}<coordinates>{text}</coordinates></LineString></Placemark></kml>"
+    )
+    found = read_path(path)
+    assert len(found.points_m) == 3
+    assert found.altitudes_m.tolist() == [500.0] * 3
