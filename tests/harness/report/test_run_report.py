@@ -141,6 +141,16 @@ def test_a_browser_shows_the_report_on_phone_and_screen(run: Path, chromium: Any
         assert (page.figures, page.missing) == (2, 0)
 
 
+def test_a_table_of_corners_does_not_make_the_page_wider_than_a_phone(tmp_path: Path, chromium: Any) -> None:
+    path, checked = tmp_path / "corners.csv", tmp_path / "checked"
+    path.write_text("x_m,y_m\n0,0\n2000,0\n2000,1500\n4000,1500\n")
+    assert main(["check", str(path), "--aircraft", "aerosonde", "--out", str(checked), "--no-recording"]) == 1
+    assert main(["report", str(checked)]) == 0
+    page = shown(chromium, checked / "report.html", 390)
+    assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
+    assert "corners are cut" in (checked / "report.html").read_text()
+
+
 def test_a_browser_would_tell_what_is_wrong(tmp_path: Path, chromium: Any) -> None:
     page = tmp_path / "bad.html"
     page.write_text(
