@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Final
 
 from harness.files.input_file import InputError
-from harness.files.wording import counted
 from harness.run_files.fences import Fences
 from harness.run_files.mission.items import Item, MissionAsRead
 from harness.run_files.read_values import finite, whole
@@ -22,8 +21,6 @@ NAN: Final = "nan"
 def read_waypoints(text: str, source: str) -> MissionAsRead:
     """The mission of a plain-text file; its first item is home, lines that begin with # are comments.
 
-    Items are counted by their lines, whatever number stands in them: ground stations and autopilots do.
-
     Args:
         text: of the file.
         source: its name, for faults.
@@ -34,8 +31,7 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     lines = text.splitlines()
     if not lines or not lines[0].startswith(WPL):
         raise InputError(f'{source}:1: must begin with "{WPL} 110"')
-    items: list[Item] = []
-    other = 0
+    items = []
     for number, line in enumerate(lines[1:], start=2):
         cells = line.split()
         if not cells or cells[0].startswith(COMMENT):
@@ -44,16 +40,16 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
         if len(cells) != CELLS:
             raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
         index, frame, command = (whole(cells[i], place) for i in (0, 2, 3))
-        counted_as = items[0].number + len(items) if items else index
-        other += index != counted_as
         # What is left to the autopilot is 0, or no number.
         params = [0.0 if cell.lower() == NAN else finite(cell, place) for cell in cells[4:8]]
         params += [finite(cell, place) for cell in cells[8:11]]
-        items.append(Item(place, counted_as, command, frame, tuple(params)))
+        items.append(Item(place, index, command, frame, tuple(params)))
     if not items:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
     home, *others = items
-    notes = (
-        (f"{counted(other, 'item')} with another number than their line: counted by lines",) if other else ()
-    )
-    return MissionAsRead(source, tuple(others), home.position, home.params[6], Fences(), notes)
+    again = next((item for item in others if item.number == home.number), None)
+    if again is not None:
+        raise InputError(
+            f"{again.place}: item {home.number} is there twice, first as home; numbers must differ"
+        )
+    return MissionAsRead(source, tuple(others), home.position, home.params[6], Fences())

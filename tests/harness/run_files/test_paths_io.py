@@ -215,6 +215,7 @@ BROKEN = {
         wpl(*wpl_items(), line(4, 0, 3, 177, 1, 30000, 0, 0, 0, 0, 0, 1)),
         "jumps make it more than 20,000 legs",
     ),
+    "one number twice": ("a.waypoints", wpl(*wpl_items(), wpl_items()[0]), ": item 1 is there twice"),
     "nothing to fly": (
         "a.plan",
         plan(item(0, 0, command=183), item(0, 0, command=2000, doJumpId=2)),
@@ -315,17 +316,6 @@ def test_a_plan_of_before_version_4_has_its_places_beside_four_parameters(tmp_pa
     assert [step.height_m for step in found.mission.program.steps] == [120.0] * 3
     (fence,) = found.fences.every
     assert fence.inclusion
-
-
-def test_items_of_a_plain_text_mission_are_counted_by_their_lines(tmp_path: Path) -> None:
-    rows = [line(2, *row.split("\t")[1:]) for row in wpl_items()]
-    rows.append(line(9, 0, 0, 177, 2, 1, 0, 0, 0, 0, 0, 1))
-    path = tmp_path / "a.waypoints"
-    path.write_text(wpl(*rows))
-    found = read_path(path)
-    assert found.mission is not None
-    assert [step.item for step in found.mission.program.steps] == [1, 2, 3, 2, 3]
-    assert found.notes == ("3 items with another number than their line: counted by lines",)
 
 
 def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must_be_numbers(
