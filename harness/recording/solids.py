@@ -9,7 +9,7 @@ what a recording costs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -23,6 +23,13 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 CIRCLE_POINTS = 72
+
+Prism: TypeAlias = tuple[
+    np.ndarray[Any, np.dtype[np.float32]],
+    np.ndarray[Any, np.dtype[np.float32]],
+    np.ndarray[Any, np.dtype[np.uint32]],
+]
+"""Vertices (n, 3), their normals (n, 3) and triangles (k, 3) of indices, in the types that rerun keeps."""
 
 
 def strips_2d(polylines: Sequence[FloatArray]) -> pa.ListArray:
@@ -39,7 +46,7 @@ def _strips(polylines: Sequence[FloatArray], axes: int, points: Any, strip: Any)
     import pyarrow as pa
 
     ends = np.cumsum([0, *map(len, polylines)], dtype=np.int32)
-    joined = np.concatenate([np.zeros((0, axes)), *polylines])
+    joined = np.concatenate([np.zeros((0, axes)), *polylines], dtype=np.float32)
     return pa.ListArray.from_arrays(ends, points(joined).as_arrow_array(), type=strip.arrow_type())
 
 
@@ -109,29 +116,30 @@ def log_solids(
     polygons = [
         (each, *at) for each, at in zip(obstacles, heights, strict=True) if isinstance(each.shape, Polygon)
     ]
-    prisms = [prism(each.shape, low, high) for each, low, high in polygons if high > low]  # type: ignore[arg-type]
-    if prisms:
-        counts = np.cumsum([0, *(len(vertices) for vertices, _, _ in prisms)])
-        rec.log(
-            f"{entity}/polygons",
-            rr.Mesh3D(
-                vertex_positions=np.concatenate([vertices for vertices, _, _ in prisms]),
-                vertex_normals=np.concatenate([normals for _, normals, _ in prisms]),
-                triangle_indices=np.concatenate(
-                    [faces + first for (_, _, faces), first in zip(prisms, counts[:-1], strict=True)]
-                ),
-                albedo_factor=colour,
-            ),
-            static=static,
-        )
+    mesh = _mesh([prism(each.shape, low, high) for each, low, high in polygons if high > low], colour)  # type: ignore[arg-type]
+    if mesh is not None:
+        rec.log(f"{entity}/polygons", mesh, static=static)
     terrain = [each for each, low, high in polygons if high <= low]
     if terrain:
         rec.log(f"{entity}/terrain", rims(scene, terrain, colour), static=static)
 
 
-def prism(
-    polygon: Polygon, low_m: float, high_m: float
-) -> tuple[FloatArray, FloatArray, np.ndarray[Any, np.dtype[np.int64]]]:
+def _mesh(prisms: Sequence[Prism], colour: Colour) -> rr.Mesh3D | None:
+    """One mesh of prisms; None without any. Of 100,000 it is large: the prisms end before it is logged."""
+    if not prisms:
+        return None
+    firsts = np.cumsum([0, *(len(vertices) for vertices, _, _ in prisms)], dtype=np.uint32)
+    return rr.Mesh3D(
+        vertex_positions=np.concatenate([vertices for vertices, _, _ in prisms]),
+        vertex_normals=np.concatenate([normals for _, normals, _ in prisms]),
+        triangle_indices=np.concatenate(
+            [faces + first for (_, _, faces), first in zip(prisms, firsts[:-1], strict=True)]
+        ),
+        albedo_factor=colour,
+    )
+
+
+def prism(polygon: Polygon, low_m: float, high_m: float) -> Prism:
     """Vertices, normals and triangles of an upright prism without a floor, with sharp edges; its holes are open."""
     import shapely
 
@@ -154,7 +162,7 @@ def prism(
     roof_normals = np.tile((0.0, 0.0, 1.0), (len(roof), 1))
     roof_faces = 4 * count + np.arange(len(roof)).reshape(-1, 3)
     return (
-        np.concatenate((walls.reshape(-1, 3), roof)),
-        np.concatenate((wall_normals, roof_normals)),
-        np.concatenate((faces, roof_faces)).astype(np.int64),
+        np.concatenate((walls.reshape(-1, 3), roof), dtype=np.float32),
+        np.concatenate((wall_normals, roof_normals), dtype=np.float32),
+        np.concatenate((faces, roof_faces)).astype(np.uint32),
     )
