@@ -36,6 +36,9 @@ planner: {clearance_m: 100}
 environment: {wind: {speed_mps: 4, from_deg: 270}}
 """
 
+ROWS = (240, 225, 1600, 870)
+"""Where the rows of a table are in a picture of 1600 x 900: left, top, right, bottom."""
+
 MakeTrack = Callable[..., Track]
 MakePlan = Callable[..., AcceptedPlan]
 
@@ -198,6 +201,67 @@ def test_the_table_is_drawn(campaign: Path, tmp_path: Path) -> None:
             raise
         pytest.skip(NO_DRIVER)
     assert png.stat().st_size > 20_000
+
+
+@pytest.fixture
+def many(tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """More runs than the table has at once; the last of them went worst."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    monkeypatch.setattr(catalogs, "AT_ONCE", 16)
+    least_m = [300.0 - number for number in range(20)]
+    for number, clearance_m in enumerate(least_m):
+        record(tmp_path, number, flight(make_track, make_plan, Outcome.REACHED, clearance_m))
+    runs = len(least_m)
+    rows = {
+        "run": [*range(runs)],
+        "outcome": ["reached"] * runs,
+        "trackable": [True] * runs,
+        "min_clearance_m": least_m,
+        "wanted_clearance_m": [100.0] * runs,
+    }
+    pq.write_table(pa.table(rows), tmp_path / "results.parquet")
+    return tmp_path
+
+
+def seen(client: Any, there: Callable[[Any], object]) -> Any:
+    """What a viewer shows, as soon as that is there; fails where it does not come."""
+    until_s = time.monotonic() + 30.0
+    while not there(state := client.get_state()):
+        assert time.monotonic() < until_s, state
+        time.sleep(0.1)
+    return state
+
+
+@pytest.mark.flights
+def test_the_table_of_many_is_drawn_worst_first_and_the_worst_opens(many: Path, tmp_path: Path) -> None:
+    pytest.importorskip("datafusion")
+    from PIL import Image, ImageChops
+
+    worst = worst_first(many, recordings_of(many))[: catalogs.AT_ONCE]
+    assert worst[0].parent.name == "19"
+    rows: list[Image.Image] = []
+    for order, name in ((worst, "sorted"), (worst[::-1], "turned")):
+        png = tmp_path / f"{name}.png"
+        try:
+            table_screenshot("many", order, png)
+        except ViewerError as error:
+            if str(error) != NO_DRIVER:
+                raise
+            pytest.skip(NO_DRIVER)
+        with Image.open(png) as picture:
+            rows.append(picture.convert("RGB").crop(ROWS))
+    assert ImageChops.difference(*rows).getbbox() is None, "the order of the rows is that of the files"
+    assert len(rows[0].getcolors(1 << 24) or ()) > 20, "there are rows"
+    with catalogs.window("many", worst, tmp_path, ["--headless", "--window-size", "1600x900"]) as (_, client):
+        table = seen(client, lambda state: "/dataset/" in state.location).location
+        client.open(f"{table}?segment_id=run%2019")
+        opened = seen(client, lambda state: state.views and not state.loading)
+    assert opened.active_recording.endswith(":run 19")
+    shown = {view.name: view.reports for view in opened.views}
+    assert {"Plan view (north up)", "3-D flight", "Events", "Summary"} <= shown.keys()
+    assert not any(shown.values())
 
 
 def test_many_recordings_follow_the_first(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
