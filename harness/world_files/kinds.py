@@ -171,6 +171,8 @@ def _text(path: Path, first: bytes, ending: str) -> str | None:
         return "ascii_grid"
     if words[0] == "type" and any(line == "map" for line in lines[:6]):
         return "moving_ai"
+    if words[0] == "rally":
+        raise WorldFileError("is a list of rally points: places to return to, no obstacles; give the fence")
     if lines[0].startswith("QGC WPL"):
         return "ardupilot_fence"
     if any(line.startswith("image:") for line in lines) and any(

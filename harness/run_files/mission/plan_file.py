@@ -10,9 +10,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 from harness.files.input_file import InputError
-from harness.files.wording import counted
 from harness.run_files.fences import Fence, Fences
 from harness.run_files.mission import commands
+from harness.run_files.mission.fence_items import rally_note
 from harness.run_files.mission.items import Item, MissionAsRead
 from harness.run_files.read_values import finite, parsed_json, shown, whole
 
@@ -193,5 +193,5 @@ def _passed_over(plan: dict[str, Any]) -> tuple[str, ...]:
         notes.append("geoFence.breachReturn passed over: it is flown to only after a breach")
     points = rally.get("points") if isinstance(rally, dict) else None
     if isinstance(points, list) and points:
-        notes.append(f"{counted(len(points), 'rally point')} passed over: not flown to on the mission")
+        notes += rally_note(len(points))
     return tuple(notes)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from harness.world_files.bounded import json_of, read_bytes, text_of
-from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
+from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError, counted
 from harness.world_files.readers import rings
 
 PX4: Final = 12
@@ -17,6 +17,7 @@ PX4: Final = 12
 FENCE_COMMANDS: Final = {5001: True, 5002: False, 5003: True, 5004: False}
 """MAV_CMD_NAV_FENCE_*: vertex of an inclusion and exclusion polygon, inclusion and exclusion circle."""
 CIRCLES: Final = (5003, 5004)
+RALLY_POINT: Final = 5100
 
 
 def read_plan(path: Path, reading: Reading) -> Contents:
@@ -46,7 +47,9 @@ def read_plan(path: Path, reading: Reading) -> Contents:
         raise WorldFileError("has a geoFence whose polygons or circles are not whole") from error
     mission = content.get("mission")
     any_of = isinstance(mission, dict) and mission.get("firmwareType") == PX4
-    return _contents("plan_fence", found, any_of)
+    rally = content.get("rallyPoints")
+    points = rally.get("points") if isinstance(rally, dict) else None
+    return _contents("plan_fence", found, any_of, len(points) if isinstance(points, list) else 0)
 
 
 def _turned(place: Any) -> rings.Place:
@@ -62,7 +65,9 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
     lines = [line.partition("#")[0].split() for line in text_of(read_bytes(path, 10_000_000)).splitlines()]
     rows = [line for line in lines if line]
     if rows and rows[0][0] == "QGC":
-        return _contents("ardupilot_fence", _items(rows[1:]), any_of=False)
+        found = _items(rows[1:])
+        rally = sum(row[3] == str(RALLY_POINT) for row in rows[1:])
+        return _contents("ardupilot_fence", found, any_of=False, rally=rally)
     try:
         places = [rings.on_earth(float(row[1]), float(row[0])) for row in rows if len(row) == 2]
     except ValueError as error:
@@ -106,20 +111,23 @@ def _items(rows: list[list[str]]) -> list[tuple[Any, bool]]:
     return found
 
 
-def _contents(kind: str, fences: list[tuple[Any, bool]], any_of: bool) -> Contents:
+def _contents(kind: str, fences: list[tuple[Any, bool]], any_of: bool, rally: int = 0) -> Contents:
     import shapely
 
     if any(shape is None for shape, _ in fences):
         raise WorldFileError("has a fence with fewer than three corners, or without an area")
     if not fences:
+        held = f", but {counted(rally, 'rally point')}, which are no obstacles" if rally else ""
         raise WorldFileError(
-            "has an empty fence; must have at least one polygon or circle (a mission is flown by `wayproof check`)"
+            f"has an empty fence{held}; must have at least one polygon or circle (a mission is flown by `wayproof "
+            "check`)"
         )
     inside = [shape for shape, inclusion in fences if inclusion]
     if any_of and len(inside) > 1:
         inside = [shapely.union_all(inside)]
     parts = [Part(shape, name="inclusion fence", keep_in=True) for shape in inside]
     parts += [Part(shape, name="exclusion fence") for shape, inclusion in fences if not inclusion]
-    return Contents(
-        kind, WGS84, tuple(parts), notes=("a fence has no heights: taken as solid at every altitude",)
-    )
+    notes = ["a fence has no heights: taken as solid at every altitude"]
+    if rally:
+        notes.append(f"{counted(rally, 'rally point')} passed over: places to return to, no obstacles")
+    return Contents(kind, WGS84, tuple(parts), notes=tuple(notes))

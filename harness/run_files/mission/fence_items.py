@@ -1,0 +1,91 @@
+"""Fences and rally points that stand among the items of a mission, as autopilots exchange them.
+
+Fences and rally points are lists of items of their own (https://mavlink.io/en/services/mission.html#mission_types);
+files that ground stations write may hold them together with the mission.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from harness.files.input_file import InputError
+from harness.files.wording import counted
+from harness.run_files.fences import Fence, Fences
+from harness.run_files.mission.items import Item
+
+RETURN_POINT: Final = 5000
+CORNERS: Final = {5001: True, 5002: False}
+"""Corner of an area to stay inside of, and of one to stay out of; the first parameter counts the corners."""
+CIRCLES: Final = {5003: True, 5004: False}
+"""A circle to stay inside of, and one to stay out of; the first parameter is the radius."""
+RALLY_POINT: Final = 5100
+APART: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
+"""Commands of items that are no part of the mission."""
+
+
+def fences_of(items: Sequence[Item]) -> Fences:
+    """The fences among some items, in degrees. An aircraft must be inside of all inclusion fences, as ArduPilot has it.
+
+    Raises:
+        InputError: one has fewer corners than it says, or a circle has no radius.
+    """
+    found: list[Fence] = []
+    pending: list[Item] = []
+    for item in items:
+        if item.command not in (*CORNERS, *CIRCLES):
+            continue
+        if pending and item.command != pending[0].command:
+            raise _torn(pending)
+        if item.command in CIRCLES:
+            found.append(_circle(item))
+            continue
+        pending.append(item)
+        if len(pending) >= pending[0].params[0]:
+            found.append(_polygon(pending))
+            pending = []
+    if pending:
+        raise _torn(pending)
+    return Fences(tuple(found), inside_all=True)
+
+
+def rally_note(points: int) -> tuple[str, ...]:
+    """What is to be said of rally points."""
+    if not points:
+        return ()
+    return (
+        f"{counted(points, 'rally point')} passed over: a return to launch is flown to home, not to the nearest of "
+        "them",
+    )
+
+
+def nothing_but(items: Sequence[Item]) -> str:
+    """What a list without a mission holds instead; empty where it is neither fence nor rally points."""
+    fences = sum(item.command in (*CORNERS, *CIRCLES) for item in items)
+    rally = sum(item.command == RALLY_POINT for item in items)
+    held = [f"a fence of {counted(fences, 'item')}"] if fences else []
+    held += [counted(rally, "rally point")] if rally else []
+    more = "; `wayproof world` takes fences, and `check` takes them beside a mission" if fences else ""
+    return " and ".join(held) + more
+
+
+def _torn(pending: Sequence[Item]) -> InputError:
+    first = pending[0]
+    return InputError(
+        f"{first.place}: item {first.number} begins a fence of {first.params[0]:g} corners, of which "
+        f"{len(pending)} follow; it may be torn"
+    )
+
+
+def _polygon(corners: Sequence[Item]) -> Fence:
+    name = f"items {corners[0].number} to {corners[-1].number}"
+    return Fence(name, CORNERS[corners[0].command], (tuple(item.params[4:6] for item in corners),))  # type: ignore[misc]
+
+
+def _circle(item: Item) -> Fence:
+    radius = item.params[0]
+    if not radius > 0.0:
+        raise InputError(
+            f"{item.place}: item {item.number} is a fence of radius {radius:g} m; must be greater than 0"
+        )
+    return Fence(f"item {item.number}", CIRCLES[item.command], center=item.params[4:6], radius_m=radius)  # type: ignore[arg-type]

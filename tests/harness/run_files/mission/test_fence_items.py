@@ -1,0 +1,83 @@
+"""Fences and rally points among the items of a mission."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from harness.files.input_file import InputError
+from harness.run_files.mission.wpl_file import read_waypoints
+from harness.run_files.path_files import read_path
+from harness.world_files.kinds import read as read_world
+from harness.world_files.parts import Reading, WorldFileError
+
+CORNERS = [(46.99, 7.99), (47.03, 7.99), (47.03, 8.01), (46.99, 8.01)]
+PLACES = [(47.0, 8.0), (47.02, 8.0)]
+
+
+def wpl(*items: tuple[int, float, float, float]) -> str:
+    """A plain-text mission of items: command, first parameter, latitude, longitude."""
+    rows = [
+        f"{number}\t0\t3\t{command}\t{first}\t0\t0\t0\t{latitude}\t{longitude}\t100\t1"
+        for number, (command, first, latitude, longitude) in enumerate(((16, 0, 47.0, 8.0), *items))
+    ]
+    return "\n".join(("QGC WPL 110", *rows)) + "\n"
+
+
+WAYPOINTS = [(16, 0.0, *place) for place in PLACES]
+INSIDE = [(5001, 4.0, *place) for place in CORNERS]
+RALLY = [(5100, 0.0, 47.005, 8.0), (5100, 0.0, 47.015, 8.0)]
+
+
+def test_fences_of_a_mission_are_fences_and_rally_points_are_named() -> None:
+    found = read_waypoints(wpl(*WAYPOINTS, *INSIDE, (5004, 50.0, 47.01, 8.005), *RALLY), "m.txt")
+    assert [item.number for item in found.items] == [1, 2]
+    inside, circle = found.fences.every
+    assert (inside.inclusion, inside.rings, found.fences.inside_all) == (True, (tuple(CORNERS),), True)
+    assert (circle.inclusion, circle.center, circle.radius_m) == (False, (47.01, 8.005), 50.0)
+    assert found.notes == (
+        "2 rally points passed over: a return to launch is flown to home, not to the nearest of them",
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (wpl(*RALLY), "has no items to fly to, but 2 rally points"),
+        (wpl(*INSIDE, *RALLY[:1]), "no items to fly to, but a fence of 4 items and 1 rally point; `wayproof"),
+        (wpl(*WAYPOINTS, *INSIDE[:3]), ":5: item 3 begins a fence of 4 corners, of which 3 follow"),
+        (wpl(*WAYPOINTS, (5003, 0.0, 47.0, 8.0)), ":5: item 3 is a fence of radius 0 m"),
+        ("RALLY 47.0 8.0 100 40 0 0\n", ":1: is a list of rally points, which no mission flies to"),
+        ("47.0 8.0\n47.1 8.0\n47.1 8.1\n47.0 8.1\n", ":1: looks like a fence, which `wayproof world` takes"),
+    ],
+)
+def test_what_is_no_mission_is_told(text: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "m.txt"
+    path.write_text(text)
+    with pytest.raises(InputError) as fault:
+        read_path(path)
+    assert said in str(fault.value)
+
+
+def test_a_world_names_rally_points(tmp_path: Path) -> None:
+    path = tmp_path / "m.txt"
+    path.write_text(wpl(*INSIDE, *RALLY))
+    notes = read_world(path, None, Reading()).notes
+    assert "2 rally points passed over: places to return to, no obstacles" in notes
+    path.write_text(wpl(*RALLY))
+    with pytest.raises(
+        WorldFileError, match="has an empty fence, but 2 rally points, which are no obstacles"
+    ):
+        read_world(path, None, Reading())
+    path.write_text("RALLY 47.0 8.0 100 40 0 0\n")
+    with pytest.raises(WorldFileError, match="is a list of rally points"):
+        read_world(path, None, Reading())
+    path = tmp_path / "m.plan"
+    path.write_text(
+        '{"fileType": "Plan", "rallyPoints": {"points": [[47.0, 8.0, 50]]}, "geoFence": {"polygons": '
+        '[{"inclusion": true, "polygon": [[47.0, 8.0], [47.1, 8.0], [47.1, 8.1]]}]}}'
+    )
+    assert any(
+        note.startswith("1 rally point passed over") for note in read_world(path, None, Reading()).notes
+    )
