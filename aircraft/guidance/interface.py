@@ -35,6 +35,16 @@ class GuidanceLimits:
     roll_delay_s: float
     bandwidth_radps: float
 
+    @property
+    def slowest_roll_s(self) -> float:
+        """Time constant of first order that roll is never slower than, s.
+
+        A roll of first order begins a step to the bank limit at that limit over its time constant. An aircraft whose
+        roll rate is limited below that is as slow as one with the longer time constant, and a law that counts on less
+        swings from limit to limit.
+        """
+        return max(self.roll_lag_s + self.roll_delay_s, self.bank_limit_rad / self.roll_rate_radps)
+
 
 class GuidanceOutput(NamedTuple):
     """One decision of a guidance law."""

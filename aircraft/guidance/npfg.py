@@ -62,7 +62,10 @@ class NpfgConfig:
         5.0, "largest ground speed that track keeping asks for (NPFG_GSP_MAX_TK)", "m/s", minimum=0.0
     )
     roll_time_constant_s: float | None = key(
-        None, "time constant of roll (NPFG_ROLL_TC); default: the aircraft's", "s", minimum=0.0
+        None,
+        "time constant of roll (NPFG_ROLL_TC); default: the aircraft's, at least bank limit / roll rate",
+        "s",
+        minimum=0.0,
     )
     switch_distance_multiplier: float = key(
         0.32,
@@ -72,17 +75,13 @@ class NpfgConfig:
         maximum=1.0,
     )
     period_safety_factor: float = key(
-        1.5,
-        "the lower bound of the period is multiplied by this (NPFG_PERIOD_SF)",
-        "1",
-        minimum=1.0,
-        maximum=10.0,
+        1.5, "factor on the lower bound of the period (NPFG_PERIOD_SF)", "1", minimum=1.0, maximum=10.0
     )
 
     def resolved(self, limits: GuidanceLimits) -> NpfgConfig:
         """The config with every default filled in."""
-        lag_s = limits.roll_lag_s + limits.roll_delay_s
-        return self if self.roll_time_constant_s is not None else replace(self, roll_time_constant_s=lag_s)
+        given_s = self.roll_time_constant_s
+        return replace(self, roll_time_constant_s=limits.slowest_roll_s if given_s is None else given_s)
 
     def parameters(
         self, nominal_airspeed_mps: float, max_airspeed_mps: float, roll_limit_rad: float
