@@ -126,7 +126,12 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
     try:
         recordings = worst_first(folder, recordings_of(folder))
         many = len(recordings) > AT_ONCE
-        added = f", the worst {AT_ONCE} first; the circular arrow beside the name shows those that have been added"
+        shows = (
+            "the circular arrow beside the name shows those that have been added"
+            if web
+            else "the others follow"
+        )
+        added = f", the worst {AT_ONCE} first; {shows}"
         say(f"{len(recordings)} recordings{added if many else ''}", err=True)
         open_table(
             folder.resolve().name,

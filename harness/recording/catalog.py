@@ -7,7 +7,7 @@ import tempfile
 import threading
 import time
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -93,6 +93,8 @@ ENDING_S: Final = 2.0
 """The server has so long to end."""
 OPENING_S: Final = 5.0
 """The others are added when a viewer has had so long to show the first: both at once would keep it waiting."""
+LOOKING_S: Final = 0.5
+"""Once in so long it is looked whether the others are there."""
 
 
 @contextlib.contextmanager
@@ -285,10 +287,32 @@ def window(
         except ConnectionError as error:
             raise ViewerError(NO_DRIVER) from error
         try:
-            yield viewer, client
+            with _kept_fresh(client, served) if len(recordings) > AT_ONCE else contextlib.nullcontext():
+                yield viewer, client
         finally:
             viewer.kill()  # the server waits for who is still connected
             viewer.wait()
+
+
+@contextlib.contextmanager
+def _kept_fresh(client: Any, served: Catalog) -> Iterator[None]:
+    """Has the viewer read the table again when all recordings are there: at once, or when it comes back from a run."""
+    over = threading.Event()
+
+    def refresh() -> None:
+        while not over.wait(LOOKING_S):
+            if served.all_there.is_set():
+                with contextlib.suppress(RuntimeError, ConnectionError):  # a run is shown
+                    client.run_command("table.refresh")
+                    return
+
+    refresher = threading.Thread(target=refresh, name="refresh", daemon=True)
+    refresher.start()
+    try:
+        yield
+    finally:
+        over.set()
+        refresher.join()
 
 
 def table_screenshot(
@@ -310,17 +334,6 @@ def table_screenshot(
         except ConnectionError as error:
             # Without a driver it listens for a moment before it gives up.
             raise ViewerError(NO_DRIVER) from error
-
-
-def properties_of(recording: Path) -> Mapping[str, Any]:
-    """The typed figures of one recording; empty where it was not closed."""
-    import rerun as rr
-
-    for chunk in rr.chunk.RrdReader(str(recording)).stream():
-        if str(chunk.entity_path) == f"/__properties/{RUN}":
-            row = chunk.to_record_batch().to_pylist()[0]
-            return {name: value[0] for name, value in row.items() if isinstance(value, list)}
-    return {}
 
 
 def series_table(

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import rerun as rr
 
     from harness.scenario.scenario import Scenario
@@ -24,7 +26,8 @@ SEVERITY: Final = {
     "timeout": 3.0,
     "unreachable": 2.0,
 }
-"""How bad an outcome is; a run that reached the goal has 1 where it was not trackable, and else 0."""
+"""How bad an outcome is; a run that reached the goal has 1 where it was not trackable or came nearer to an obstacle
+than was wanted, and else 0."""
 
 Value = str | float | int | bool
 
@@ -90,7 +93,8 @@ def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> fl
         trackable: whether all legs were tracked.
         clearance_ratio: least clearance over the wanted one; None where there was nothing to keep clear of.
     """
-    whole = SEVERITY.get(outcome, 0.0 if trackable else 1.0)
+    fair = trackable and (clearance_ratio is None or clearance_ratio >= 1.0)
+    whole = SEVERITY.get(outcome, 0.0 if fair else 1.0)
     near = 0.0 if clearance_ratio is None else 1.0 / (1.0 + math.exp(min(clearance_ratio, 50.0)))
     return round(whole + near, 6)
 
@@ -102,3 +106,14 @@ def send_properties(rec: rr.RecordingStream, name: str, values: Mapping[str, Val
     if values:
         components: dict[str, Any] = {each: _rounded(value) for each, value in values.items()}
         rec.send_property(name, rr.AnyValues(**components))
+
+
+def properties_of(recording: Path) -> Mapping[str, Any]:
+    """The typed figures of one recording; empty where it was not closed."""
+    import rerun as rr
+
+    for chunk in rr.chunk.RrdReader(str(recording)).stream():
+        if str(chunk.entity_path) == f"/__properties/{RUN}":
+            row = chunk.to_record_batch().to_pylist()[0]
+            return {name: value[0] for name, value in row.items() if isinstance(value, list)}
+    return {}

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import rerun as rr
+from PIL import Image, ImageChops
 
 from harness.analysis.metrics import metrics
 from harness.api.results import CampaignResult
@@ -20,10 +22,10 @@ from harness.files.input_file import InputError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.recording import catalog as catalogs
 from harness.recording.blueprint import Frame
-from harness.recording.catalog import catalog, properties_of, table_screenshot
-from harness.recording.properties import run_properties
+from harness.recording.catalog import catalog, table_screenshot
+from harness.recording.properties import properties_of, run_properties, severity
 from harness.recording.thin import ThinLog
-from harness.recording.viewer import NO_DRIVER, ViewerError
+from harness.recording.viewer import NO_DRIVER, SETTLE_S, ViewerError
 from harness.scenario.scenario import parse_scenario
 from tests.harness.recording.test_rerun_log import LIMITS, SCENE
 
@@ -38,6 +40,8 @@ environment: {wind: {speed_mps: 4, from_deg: 270}}
 
 ROWS = (240, 225, 1600, 870)
 """Where the rows of a table are in a picture of 1600 x 900: left, top, right, bottom."""
+ROW = 32
+"""Height of one."""
 
 MakeTrack = Callable[..., Track]
 MakePlan = Callable[..., AcceptedPlan]
@@ -117,7 +121,7 @@ def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
 def test_severity_orders_outcomes_then_clearance(make_track: MakeTrack, make_plan: MakePlan) -> None:
     scenario = parse_scenario(SCENARIO)
 
-    def severity(outcome: Outcome, clearance_m: float) -> float:
+    def severity_of(outcome: Outcome, clearance_m: float) -> float:
         value = run_properties(
             scenario, metrics(flight(make_track, make_plan, outcome, clearance_m), LIMITS)
         )["severity"]
@@ -132,9 +136,17 @@ def test_severity_orders_outcomes_then_clearance(make_track: MakeTrack, make_pla
         (Outcome.REACHED, 90.0),
         (Outcome.REACHED, 300.0),
     ]
-    figures = [severity(*each) for each in worst_first]
+    figures = [severity_of(*each) for each in worst_first]
     assert figures == sorted(figures, reverse=True)
     assert len(set(figures)) == len(figures)
+
+
+def test_who_came_too_near_is_no_better_than_who_was_not_tracked() -> None:
+    """Where navigation errs hardly any run is tracked, and a near miss would be lost below them all."""
+    figures = [severity("reached", *each) for each in ((True, 0.14), (False, 0.9), (False, 1.2), (True, 1.0))]
+    assert figures == sorted(figures, reverse=True)
+    assert severity("unreachable", True, 9.0) > figures[0]
+    assert severity("reached", True, None) < figures[-1]
 
 
 def test_a_campaign_is_one_table_worst_first(campaign: Path) -> None:
@@ -194,12 +206,8 @@ def test_a_campaign_without_recordings_says_what_keeps_them(tmp_path: Path) -> N
 def test_the_table_is_drawn(campaign: Path, tmp_path: Path) -> None:
     pytest.importorskip("datafusion")
     png = tmp_path / "table.png"
-    try:
+    with driven():
         table_screenshot("small", recordings_of(campaign), png)
-    except ViewerError as error:
-        if str(error) != NO_DRIVER:
-            raise
-        pytest.skip(NO_DRIVER)
     assert png.stat().st_size > 20_000
 
 
@@ -225,6 +233,31 @@ def many(tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan, monkeypatch
     return tmp_path
 
 
+@contextlib.contextmanager
+def driven() -> Iterator[None]:
+    """Skips the test where nothing can be drawn."""
+    try:
+        yield
+    except ViewerError as error:
+        if str(error) != NO_DRIVER:
+            raise
+        pytest.skip(NO_DRIVER)
+
+
+@contextlib.contextmanager
+def window(recordings: Sequence[Path], scratch: Path) -> Iterator[Any]:
+    """rerun's handle of a viewer without a screen that shows the table of `many`."""
+    arguments = ["--headless", "--window-size", "1600x900"]
+    with driven(), catalogs.window("many", recordings, scratch, arguments) as (_, client):
+        yield client
+
+
+def rows_of(png: Path) -> Image.Image:
+    """The rows of a table in its picture."""
+    with Image.open(png) as picture:
+        return picture.convert("RGB").crop(ROWS)
+
+
 def seen(client: Any, there: Callable[[Any], object]) -> Any:
     """What a viewer shows, as soon as that is there; fails where it does not come."""
     until_s = time.monotonic() + 30.0
@@ -237,24 +270,16 @@ def seen(client: Any, there: Callable[[Any], object]) -> Any:
 @pytest.mark.flights
 def test_the_table_of_many_is_drawn_worst_first_and_the_worst_opens(many: Path, tmp_path: Path) -> None:
     pytest.importorskip("datafusion")
-    from PIL import Image, ImageChops
-
     worst = worst_first(many, recordings_of(many))[: catalogs.AT_ONCE]
     assert worst[0].parent.name == "19"
-    rows: list[Image.Image] = []
+    rows = []
     for order, name in ((worst, "sorted"), (worst[::-1], "turned")):
-        png = tmp_path / f"{name}.png"
-        try:
-            table_screenshot("many", order, png)
-        except ViewerError as error:
-            if str(error) != NO_DRIVER:
-                raise
-            pytest.skip(NO_DRIVER)
-        with Image.open(png) as picture:
-            rows.append(picture.convert("RGB").crop(ROWS))
+        with driven():
+            table_screenshot("many", order, tmp_path / f"{name}.png")
+        rows.append(rows_of(tmp_path / f"{name}.png"))
     assert ImageChops.difference(*rows).getbbox() is None, "the order of the rows is that of the files"
     assert len(rows[0].getcolors(1 << 24) or ()) > 20, "there are rows"
-    with catalogs.window("many", worst, tmp_path, ["--headless", "--window-size", "1600x900"]) as (_, client):
+    with window(worst, tmp_path) as client:
         table = seen(client, lambda state: "/dataset/" in state.location).location
         client.open(f"{table}?segment_id=run%2019")
         opened = seen(client, lambda state: state.views and not state.loading)
@@ -262,6 +287,27 @@ def test_the_table_of_many_is_drawn_worst_first_and_the_worst_opens(many: Path, 
     shown = {view.name: view.reports for view in opened.views}
     assert {"Plan view (north up)", "3-D flight", "Events", "Summary"} <= shown.keys()
     assert not any(shown.values())
+
+
+@pytest.mark.flights
+def test_the_recordings_that_follow_come_into_the_table_by_themselves(
+    many: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where a run was looked at meanwhile; else its reader would take the first for all."""
+    pytest.importorskip("datafusion")
+    monkeypatch.setattr(catalogs, "OPENING_S", 2.0)
+    recordings = worst_first(many, recordings_of(many))
+    with window(recordings, tmp_path) as client:
+        table = seen(client, lambda state: "/dataset/" in state.location).location
+        client.open(f"{table}?segment_id=run%2019")
+        seen(client, lambda state: state.views and not state.loading)
+        time.sleep(4.0)
+        client.set_location(table)
+        time.sleep(2.0 * SETTLE_S)
+        client.save_screenshot(str(tmp_path / "table.png"))
+    rows = rows_of(tmp_path / "table.png")
+    last = rows.crop((0, catalogs.AT_ONCE * ROW + ROW // 2, *rows.size))
+    assert len(last.getcolors(1 << 24) or ()) > 20, "only the first are there"
 
 
 def test_many_recordings_follow_the_first(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
