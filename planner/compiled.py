@@ -135,15 +135,14 @@ def compile_all() -> None:
     with _compiling:
         if not _waiting:
             return
-        while _waiting:
-            first = _waiting[0]
-            _compile([first])
-            if first.anew:
-                _tell("wayproof: compiling for this machine, once; this takes some seconds")
-                elsewhere = _half(_waiting) if first.kept and os.cpu_count() != 1 else set()
-                with _compiled_elsewhere(elsewhere):
-                    _compile([each for each in _waiting if each.__module__ not in elsewhere])
-                _compile(list(_waiting))
+        # The compiler makes many objects that stay: to look through them for garbage takes a tenth of its time.
+        looked = gc.isenabled()
+        gc.disable()
+        try:
+            _compile_waiting()
+        finally:
+            if looked:
+                gc.enable()
         # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
         # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
         gc.collect()
@@ -151,10 +150,23 @@ def compile_all() -> None:
             gc.freeze()
 
 
+def _compile_waiting() -> None:
+    while _waiting:
+        first = _waiting[0]
+        _compile([first])
+        if first.anew:
+            _tell("wayproof: compiling for this machine, once; this takes some seconds")
+            elsewhere = _half(_waiting) if first.kept and os.cpu_count() != 1 else set()
+            with _compiled_elsewhere(elsewhere):
+                _compile([each for each in _waiting if each.__module__ not in elsewhere])
+            _compile(list(_waiting))
+
+
 def compile_modules(names: Sequence[str]) -> None:
     """Compiles the functions of some modules, so that they are on disk."""
     for name in names:
         importlib.import_module(name)
+    gc.disable()  # This process does nothing else.
     with _compiling:
         _compile([each for each in _waiting if each.__module__ in names])
 

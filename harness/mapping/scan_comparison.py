@@ -168,8 +168,11 @@ def near_line(places: ComplexArray, line: ComplexArray, within_m: float, apart_m
     near = np.zeros(len(places), dtype=np.bool_)
     if not len(line):
         return near
-    west, east = line.real.min() - within_m, line.real.max() + within_m
-    south, north = line.imag.min() - within_m, line.imag.max() + within_m
+    west, east, south, north = math.inf, -math.inf, math.inf, -math.inf
+    for point in line:
+        west, east = min(west, point.real), max(east, point.real)
+        south, north = min(south, point.imag), max(north, point.imag)
+    west, east, south, north = west - within_m, east + within_m, south - within_m, north + within_m
     for i in range(len(places)):
         x, y = places[i].real, places[i].imag
         if not (west <= x <= east and south <= y <= north):
