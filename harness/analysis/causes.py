@@ -31,6 +31,9 @@ LATE_SHARE = 0.25
 ROUNDING = 1.001
 """A radius smaller by no more than this factor is not smaller."""
 
+NAVIGATION_ERROR = "navigation error"
+"""Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
+
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 
 

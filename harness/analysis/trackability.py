@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from harness.analysis.as_given import AsGiven
-from harness.analysis.causes import altitude_cause, averaged, cross_track_cause, speed_cause
+from harness.analysis.causes import NAVIGATION_ERROR, altitude_cause, averaged, cross_track_cause, speed_cause
 from harness.analysis.flight_limits import LOAD_S, SPEED_S, FlightLimits
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 
@@ -166,7 +166,7 @@ def _judge(
     if lost_control:
         cause = "lost control"
     elif off.max() > threshold and _believed_within(leg.believed_cross_track_m, 0.0, threshold):
-        cause = "navigation error"
+        cause = NAVIGATION_ERROR
     elif off.max() > threshold:
         cause = cross_track_cause(track, first + int(off.argmax()), plans, limits)
     elif load > limits.max_load_factor:
@@ -177,7 +177,7 @@ def _judge(
     elif high.max() > limits.max_altitude_error_m and _believed_within(
         leg.believed_up_m, wanted_m, limits.max_altitude_error_m
     ):
-        cause = "navigation error"
+        cause = NAVIGATION_ERROR
     elif high.max() > limits.max_altitude_error_m:
         cause = altitude_cause(track, first + int(high.argmax()), limits, given)
     return Leg(

@@ -264,12 +264,19 @@ def series_views(
         runs: as in `blueprint`.
         only: names of the series shown; default: all.
         without: names of series that are not shown.
-        background: whether they have ours; else rerun's.
+        background: whether they have ours, as whole recordings do; else rerun's.
     """
     wanted = max(frame.clearance_m, 1.0)
     one = len(runs) == 1
+    whole = one and background
     rows: list[tuple[str, str, tuple[float, float] | None]] = [
-        ("cross_track", "Cross-track error, m", None),
+        (
+            "cross_track",
+            "Cross-track, m; blue: believed"
+            if whole and NAVIGATION not in without
+            else "Cross-track error, m",
+            None,
+        ),
         (
             "clearance",
             f"Clearance, m; red: wanted {frame.clearance_m:g}" if one else "Clearance, m",
@@ -282,7 +289,7 @@ def series_views(
         ("search", "Search, ms", None),
         (PLAN_DELAY, "Plan delay, s", None),
         (RETURNS, "Returns per scan", None),
-        ("bank", _bank_title(frame) if one else "Bank, deg (right +)", _bank_range_deg(frame)),
+        ("bank", _bank_title(frame, whole) if one else "Bank, deg (right +)", _bank_range_deg(frame)),
     ]
     return [
         rrb.TimeSeriesView(
@@ -323,10 +330,10 @@ def _bank_range_deg(frame: Frame) -> tuple[float, float]:
     return -limit, limit
 
 
-def _bank_title(frame: Frame) -> str:
+def _bank_title(frame: Frame, whole: bool) -> str:
     """With the limit as a number: the axis of a low plot, as an overlay of many may have, has none but 0."""
     limit = "" if frame.bank_limit_deg is None else f" {frame.bank_limit_deg:g}"
-    return f"Bank, deg; blue: commanded, red: limit{limit}"
+    return f"Bank, deg; blue: command, red: limit{limit}" + (", violet: pitch" if whole else "")
 
 
 def _whole_flight() -> rrb.TimeAxis:

@@ -17,6 +17,7 @@ import numpy as np
 import rerun as rr
 
 from aircraft.interface import AircraftState
+from harness.analysis.causes import NAVIGATION_ERROR
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
@@ -212,7 +213,9 @@ class RerunLog:
         if metrics is not None:
             changes = tracking_changes(metrics["trackability"])
             send_changes(self._rec, look.TRACKING_LANE, changes)
-            causes = dict.fromkeys((state for _, state in changes), look.HIT)
+            causes = dict.fromkeys((state for _, state in changes), look.HIT) | {
+                NAVIGATION_ERROR: look.WARNED
+            }
             ended = {over(metrics): look.CALM}
             log_colours(self._rec, look.TRACKING_LANE, causes | {TRACKABLE: look.GOAL_DIM} | ended)
             log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours() | ended)

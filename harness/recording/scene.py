@@ -281,30 +281,38 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
     )
 
 
-def _log_aircraft(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
-    """The aircraft as a mesh (x forward, y left, z up), and as an arrowhead within the sensing range."""
-    half = 0.5 * AIRCRAFT_SHARE * scene.frame.span_m
-    sizes = (
-        {f"{look.WORLD}/aircraft": half}
-        if thin
-        else {f"{look.WORLD}/aircraft": half, f"{look.ATTITUDE}/aircraft": 1.0}
+def log_shapes(rec: rr.RecordingStream, frame: look.Frame) -> None:
+    """The aircraft as a mesh (x forward, y left, z up) in the 3-D view, and as an arrowhead in the plan view."""
+    half = 0.5 * AIRCRAFT_SHARE * frame.span_m
+    _log_mesh(rec, look.WORLD, half)
+    arrowhead = half * np.array([(1.0, 0.0), (-0.8, 0.65), (-0.4, 0.0), (-0.8, -0.65), (1.0, 0.0)])
+    rec.log(f"{look.PLAN}/aircraft/shape", lines_2d([arrowhead], look.AIRCRAFT, 2.5, 60), static=True)
+
+
+def _log_mesh(rec: rr.RecordingStream, top: str, size: float) -> None:
+    corners = size * SHAPE.reshape(-1, 3)
+    rec.log(
+        f"{top}/aircraft/shape",
+        rr.Mesh3D(
+            vertex_positions=corners,
+            triangle_indices=np.arange(len(corners)).reshape(-1, 3),
+            albedo_factor=look.AIRCRAFT,
+            face_rendering="DoubleSided",
+        ),
+        static=True,
     )
-    for entity, size in sizes.items():
-        corners = size * SHAPE.reshape(-1, 3)
+
+
+def _log_aircraft(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
+    """The aircraft, within the sensing range; beside it its axes and the horizon, but in thin recordings."""
+    log_shapes(rec, scene.frame)
+    if thin:
+        return
+    _log_mesh(rec, look.ATTITUDE, 1.0)
+    half = 0.5 * AIRCRAFT_SHARE * scene.frame.span_m
+    for top, size in ((look.WORLD, half), (look.ATTITUDE, 1.0)):
         rec.log(
-            f"{entity}/shape",
-            rr.Mesh3D(
-                vertex_positions=corners,
-                triangle_indices=np.arange(len(corners)).reshape(-1, 3),
-                albedo_factor=look.AIRCRAFT,
-                face_rendering="DoubleSided",
-            ),
-            static=True,
-        )
-        if thin:
-            continue
-        rec.log(
-            f"{entity}/axes",
+            f"{top}/aircraft/axes",
             rr.Arrows3D(vectors=1.5 * size * np.eye(3), colors=look.AXES, radii=rr.Radius.ui_points(1.0)),
             static=True,
         )
@@ -312,12 +320,7 @@ def _log_aircraft(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
     horizon = rr.LineStrips3D(
         [level, [(-1.6, 0.0, 0.0), (1.6, 0.0, 0.0)]], colors=[look.BOUNDS], radii=rr.Radius.ui_points(0.75)
     )
-    if not thin:
-        rec.log(f"{look.ATTITUDE}/level", horizon, static=True)
-    arrowhead = half * np.array([(1.0, 0.0), (-0.8, 0.65), (-0.4, 0.0), (-0.8, -0.65), (1.0, 0.0)])
-    rec.log(f"{look.PLAN}/aircraft/shape", lines_2d([arrowhead], look.AIRCRAFT, 2.5, 60), static=True)
-    if thin:
-        return
+    rec.log(f"{look.ATTITUDE}/level", horizon, static=True)
     rec.log(
         f"{look.PLAN}/aircraft/sensing",
         lines_2d([circle((0.0, 0.0), scene.mission.sensor_range_m)], look.SENSING, 1.0, 20),

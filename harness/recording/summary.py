@@ -12,20 +12,21 @@ if TYPE_CHECKING:
     from harness.recording.blueprint import Scene
 
 LEGEND = """\
-| colour | meaning |
-|---|---|
-| yellow to red | flown track: on the plan, to {error} m off it, where it is no longer tracked; brown: still ahead |
-| blue | plan in effect with its waypoints; dark blue: the candidates it was compared with |
-| pink | guide vector |
-| green, violet | free sectors, planning window |
-| grey circle | sensing range |
-| red dots | what the last scan returned |
-| white | sensed so far; dark grey: the true outline |
-| brown | obstacles that move or come and go |
-| orange | what the map takes to move, with where it will be in 30 s; violet dots: where the plan expects to meet it |
+* **yellow to red**: flown track, from on the plan to {error} m off it, where it is no longer tracked
+* **brown line**: track still ahead of the cursor
+* **blue**: plan in effect with its waypoints; **dark blue**: candidates it was compared with
+* **pink**: guide vector
+* **green, violet**: free sectors, planning window
+* **grey circle**: sensing range
+* **red dots**: what the last scan returned
+* **white**: sensed so far; **dark grey**: true outline
+* **brown**: obstacles that move or come and go
+* **orange**: what the map takes to move, with where it will be in 30 s
+* **violet dots**: where the plan expects to meet it
 
 Axes of the aircraft: red ahead, green left, blue up. It is drawn larger than it is; obstacles have no top.
 """
+"""A list, for its lines are wrapped; a viewer cuts the cells of a table at the edge of a narrow view."""
 
 
 def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
@@ -36,10 +37,12 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
         metrics: content of `metrics.json`; None while flying.
     """
     mission = scene.mission
-    lines = [f"### {escaped(scene.name)}", ""]
+    # No heading: it would take three lines of a view that has room for five.
+    lines = [escaped(scene.name), ""]
     if metrics is None:
         lines += ["Still flying, or stopped before the end.", ""]
     else:
+        lines += [f"**{metrics['outcome'].replace('_', ' ')}**: {escaped(metrics['reason'])}", ""]
         rows = [f"| {name} | {escaped(value)} |" for name, value in figures(scene, metrics).items()]
         lines += [rows[0], "|---|---|", *rows[1:], ""]
     lines += [
@@ -59,21 +62,20 @@ def colours(scene: Scene) -> str:
 
 
 def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
-    """What came out, name and value."""
+    """What came out, name and value, what is looked for first before the rest."""
     cross, altitude, compute = metrics["cross_track_m"], metrics["altitude_error_m"], metrics["compute_ms"]
     planned, flown = metrics["smoothness"]["planned"], metrics["smoothness"]["flown"]
     causes = [leg["cause"] for leg in metrics["trackability"] if not leg["trackable"]]
     return {
-        "outcome": f"{metrics['outcome']}: {metrics['reason']}",
-        "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
         "least clearance": _clearance(scene, metrics),
-        "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
-        **_navigation(metrics),
-        "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
         "trackable": "yes"
         if metrics["trackable"]
         else f"no: {', '.join(dict.fromkeys(causes)) or 'no plan'}",
+        "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
+        **_navigation(metrics),
+        "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
         "bank at its limit": f"{100 * metrics['bank_saturation_fraction']:.1f} % of the time",
+        "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
         "heading change": f"planned {_text(planned['heading_change_deg'], 0)}°, "
         f"flown {_text(flown['heading_change_deg'], 0)}°",
         "replans": str(metrics["replans"]),

@@ -24,7 +24,15 @@ from harness.recording.file import RecordingFile, recording_stream
 from harness.recording.layout import thin_blueprint
 from harness.recording.plans import log_plan_style
 from harness.recording.properties import RUN, VARIED, Value, send_properties
-from harness.recording.scene import lines_2d, log_end, log_scene, log_summary, log_trail_style, quaternions
+from harness.recording.scene import (
+    lines_2d,
+    log_end,
+    log_scene,
+    log_shapes,
+    log_summary,
+    log_trail_style,
+    quaternions,
+)
 from harness.recording.series import send_curves, send_levels, thin_curves
 from harness.recording.solids import strips_2d, strips_3d
 from harness.recording.states import Nearness, send_events
@@ -187,6 +195,7 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
             look.FRAME,
             rr.AnyValues(bounds_m=frame.bounds_m, altitude_m=frame.altitude_m, clearance_m=frame.clearance_m),
         )
+        log_shapes(rec, frame)
         _send_track(rec, track, run, frame.altitude_m)
     finally:
         file.end()

@@ -25,6 +25,7 @@ from harness.flight.observer import Caution
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
+from harness.recording.layout import series_views
 from harness.recording.log import RerunLog
 from harness.recording.overlay import write_overlay
 from harness.recording.scene import quaternions
@@ -393,7 +394,8 @@ def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
     ]
     documents = [str(text) for (text,) in column(entities, "/summary", "text")]
     assert "stopped before the end" in documents[0]
-    assert "reached: in the goal's circle" in documents[-1]
+    assert "**reached**: in the goal's circle" in documents[-1]
+    assert not documents[-1].startswith("#"), "a heading leaves a low view no room for figures"
     assert "2500 m in 100 s" in documents[-1]
     assert "name: straight" in documents[-1]
     figures = json.loads(column(entities, "/__properties/metrics", "json")[0][0])
@@ -444,6 +446,7 @@ sys.path[:0] = {[str(Path(__file__).parents[3])]!r}
 from pathlib import Path
 from tests.harness.conftest import track
 from tests.harness.recording.test_rerun_log import SCENE
+from harness.recording.layout import series_views
 from harness.recording.log import RerunLog
 log = RerunLog(Path({str(tmp_path / "a.rrd")!r}), SCENE, "a")
 log.on_block(track(600, plan_index=-1))
@@ -470,6 +473,7 @@ sys.path[:0] = {[str(Path(__file__).parents[3])]!r}
 from pathlib import Path
 from tests.harness.conftest import track
 from tests.harness.recording.test_rerun_log import SCENE
+from harness.recording.layout import series_views
 from harness.recording.log import RerunLog
 def log(name):
     log = RerunLog(Path({str(tmp_path)!r}, name), SCENE, "a")
@@ -591,6 +595,16 @@ def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
     assert complaints == []
     assert png.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert int.from_bytes(png.read_bytes()[16:20]) == 1200
+
+
+def test_every_line_of_a_plot_is_named(recording: tuple[Path, Flight]) -> None:
+    """By its colour in the title: there is no legend."""
+    drawn = {str(name) for name in read(recording[0]) if str(name).startswith("/series/bank/")}
+    assert drawn == {f"/series/bank/{line}" for line in ("commanded", "flown", "limit", "pitch")}
+    titles = {str(view.origin).strip("/"): view.name for view in series_views(SCENE.frame, ("",))}
+    assert titles["series/bank"] == "Bank, deg; blue: command, red: limit 44.7, violet: pitch"
+    assert titles["series/cross_track"] == "Cross-track, m; blue: believed"
+    assert "believed" not in str(series_views(SCENE.frame, ("",), without=["navigation_error"])[0].name)
 
 
 def test_a_missing_driver_is_said(recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
 
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
@@ -199,6 +200,8 @@ def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path) -> None:
         shown = tmp_path / f"{form}-overlay.rrd"
         write_overlay([folder / "flight.rrd", tmp_path / f"{form}.rrd"], ["run", "log"], shown)
         assert shown.stat().st_size > 50_000
+        own = {str(chunk.entity_path) for chunk in rr.chunk.RrdReader(str(tmp_path / f"{form}.rrd")).stream()}
+        assert {"/plan/aircraft/shape", "/world/aircraft/shape", "/plan/flown"} <= own
     far = tmp_path / "far.csv"
     far.write_text("time_s,latitude_deg,longitude_deg\n0,-33,150\n1,-33,150.1\n")
     with pytest.raises(InputError, match=r"comes no nearer than \d+ km to the area of "):
