@@ -141,7 +141,9 @@ def _report(error: Exception) -> int:
         say(str(error), err=True)
         return BAD_INPUT
     if isinstance(error, typer.TyperException):
-        text = " ".join(error.format_message().split())
+        text = " ".join(error.format_message().split()).replace(
+            "Value error, ", ""
+        )  # typer checks with pydantic
         say(f"wayproof: {text} (see wayproof --help)", err=True)
         return BAD_INPUT
     if isinstance(error, WriteError):

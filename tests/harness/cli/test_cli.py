@@ -192,7 +192,10 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
         (["fly", "paper_circles", "--view", "--no-recording"], "nothing to view with --no-recording"),
         (["fly", "paper_circle"], "no such file; give a scenario file or one of aerosonde_forest"),
         (["fly", "one", "two"], "two"),
-        (["schema", "campaigns"], "campaigns"),
+        (
+            ["schema", "campaigns"],
+            "Invalid value for 'kind': 'campaigns' is not one of 'scenario', 'campaign'.",
+        ),
         (["list", "birds"], "birds"),
         (["validate"], "FILE"),
         (["view"], "RUN_DIR"),
