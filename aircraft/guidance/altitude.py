@@ -13,6 +13,9 @@ from aircraft.interface import AircraftState, FloatArray
 LEAD_S = 1.0
 """The slope is taken from so far ahead: what the climb takes to follow its command."""
 
+CLIMBS_FROM = (0.95, 0.88)
+"""Shares of the commanded airspeed: from the first on the fastest climb is commanded, below the second none."""
+
 SPEED_CHANGE_PER_S = 0.02
 """A commanded airspeed changes by no more than this share of itself a second."""
 
@@ -132,10 +135,20 @@ class AltitudeGuidance:
         self._airspeed_mps += min(max(wanted - self._airspeed_mps, -change), change)
         altitude, slope = self._slopes.at(arc_length_m, arc_length_m + LEAD_S * state.groundspeed_mps)
         up, down = self._limits(self._airspeed_mps)
+        up *= _speed_kept(state.airspeed_mps / self._airspeed_mps)
         climb = self._gain * (altitude - state.up_m) + slope * state.groundspeed_mps
         climb = min(max(climb, -down), up)
         # The command is held, and the error shrinks by then: half an update on average.
         return state.up_m + climb * (1.0 / self._gain + 0.5 / UPDATE_RATE_HZ), self._airspeed_mps
+
+
+def _speed_kept(share: float) -> float:
+    """The share of the fastest climb that is commanded at a share of the airspeed that is: speed goes before height.
+
+    In a turn the engine has less left over for a climb than wings level.
+    """
+    most, none = CLIMBS_FROM
+    return min(max((share - none) / (most - none), 0.0), 1.0)
 
 
 class _Slopes:

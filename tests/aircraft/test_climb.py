@@ -78,6 +78,18 @@ def test_the_command_gives_the_climb_of_the_profile_within_what_can_be_flown() -
     assert climb(400.0, 2800.0) == pytest.approx(0.0)
 
 
+def test_speed_goes_before_height() -> None:
+    guidance = AltitudeGuidance(RAMP, 0.8, lambda speed: (5.0, 6.0))
+
+    def climb(airspeed_mps: float) -> float:
+        altitude, _ = guidance.command(state(300.0, airspeed_mps), 1500.0)
+        return 0.8 * (altitude - 300.0) / (1.0 + 0.8 * 0.05)
+
+    assert climb(24.0) == pytest.approx(5.0)
+    assert 0.0 < climb(23.0) < 4.0
+    assert climb(21.0) == pytest.approx(0.0)
+
+
 def test_a_level_profile_is_commanded_as_it_is() -> None:
     guidance = AltitudeGuidance(flat(321.0, 25.0), 0.8, lambda speed: (math.nan, math.nan))
     assert guidance.command(state(300.0), 0.0) == (321.0, 25.0)

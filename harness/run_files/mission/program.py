@@ -26,6 +26,9 @@ MOST_RADIUS_M: Final = 50_000.0
 MOST_HEIGHT_M: Final = 50_000.0
 """Beyond these an item is taken for a mistake."""
 
+SIDE_ALONE_M: Final = 1.0
+"""A radius of 1 m or less says which way round, and no more: ArduPlane hands back 1 or -1 where it has none."""
+
 AIRSPEED, GROUND_SPEED = 0, 1
 """Kinds of speed of a change of speed, its first parameter."""
 
@@ -250,12 +253,16 @@ class _Run:
             return
         self.steps.append(step)
         self.airspeed_mps = None
-        if self.closing is not None or item.command in (
-            commands.LOITER_UNLIMITED,
-            commands.RETURN_TO_LAUNCH,
-            *commands.LANDINGS,
-        ):
+        ends = item.command in (commands.LOITER_UNLIMITED, commands.RETURN_TO_LAUNCH, *commands.LANDINGS)
+        if self.closing is not None or (ends and self._takeoff_after(item) is None):
             self.over = True
+
+    def _takeoff_after(self, item: Item) -> Item | None:
+        """The takeoff that is the next to be flown after a landing; None where there is none."""
+        if item.command not in commands.LANDINGS:
+            return None
+        after = self._first_flown(self.index[item.number] + 1)
+        return after if after is not None and after.command in commands.TAKEOFFS else None
 
     def _step(self, item: Item, **more: object) -> MissionStep:
         """A step to where an item says, at its altitude.
@@ -281,14 +288,19 @@ class _Run:
         if item.position is None and not self.steps:
             self._tell(item, NOT_FLOWN, "has no position, and nothing is before it")
             return None
-        hold = item.params[0]
+        hold, beyond = item.params[0], item.params[2]
         why = f"held for {hold:g} s by a multicopter; an aeroplane flies on" if hold > 1.0 else ""
+        if beyond:
+            why = f"passing by or beyond it, {beyond:g} m, is not flown"
         if item.command == commands.SPLINE_WAYPOINT:
             why = "as a plain waypoint"
         self._tell(item, FLOWN, why)
         return self._step(item, acceptance_m=max(item.params[1], 0.0))
 
     def _takeoff(self, item: Item) -> MissionStep | None:
+        if self.steps and self.steps[-1].landing:
+            self._tell(item, FLOWN, "from the end of the approach before it, without a stop")
+            return self._step(item)
         if self.steps:
             self._tell(item, NOT_FLOWN, "in the air already")
             return None
@@ -320,6 +332,8 @@ class _Run:
         elif item.command == commands.LOITER_UNLIMITED:
             turns, why = 1.0, "one turn is flown, and the flight ends"
         radius = _bounded(item, "loiters with a radius of", abs(signed), MOST_RADIUS_M, "m")
+        if radius <= SIDE_ALONE_M:
+            radius = 0.0
         self._tell(item, FLOWN, why)
         return self._step(item, loiter=Loiter(radius, signed >= 0.0, turns, time_s))
 
@@ -328,7 +342,9 @@ class _Run:
             self._tell(item, NOT_FLOWN, "has no position: where it lands is left to the autopilot")
             self.over = True
             return None
-        self._tell(item, FLOWN, "the approach, not the touchdown")
+        after = self._takeoff_after(item)
+        on = "" if after is None else f"; then on with the takeoff, item {after.number}"
+        self._tell(item, FLOWN, f"the approach, not the touchdown{on}")
         return self._step(item, landing=True)
 
     def _home(self, item: Item) -> MissionStep | None:

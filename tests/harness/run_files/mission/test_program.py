@@ -113,3 +113,24 @@ def test_an_item_without_a_place_is_where_the_one_before_was() -> None:
 def test_frames_say_what_an_altitude_is_above(frame: int, altitude: float) -> None:
     step = run(item(1, 16, 0, 0, 0, 0, 47.1, 8, 100, frame=frame), at(2)).steps[0]
     assert altitude_m(step, 400.0, 550.0, math.nan) == altitude
+
+
+def test_a_landing_before_a_takeoff_is_flown_on_from() -> None:
+    done = run(at(1), at(2, 85, 0.0), item(3, 189), at(4, 84, 35.0), at(5), at(6, 21, 0.0), at(7))
+    assert flown(done) == [1, 2, 4, 5, 6]
+    assert told(done)[2] == ("flown", "the approach, not the touchdown; then on with the takeoff, item 4")
+    assert told(done)[4] == ("flown", "from the end of the approach before it, without a stop")
+    assert told(done)[7][0] == "not reached"
+
+
+@pytest.mark.parametrize("radius", [1.0, -1.0])
+def test_a_radius_of_one_metre_is_a_side(radius: float) -> None:
+    done = run(at(1), at(2, 19, first=45.0, third=radius))
+    loiter = done.steps[1].loiter
+    assert loiter is not None
+    assert (loiter.radius_m, loiter.clockwise) == (0.0, radius > 0)
+
+
+def test_a_distance_to_pass_by_is_named() -> None:
+    done = run(at(1), at(2, third=80.0))
+    assert told(done)[2] == ("flown", "passing by or beyond it, 80 m, is not flown")
