@@ -50,12 +50,13 @@ def list_names(
 
 
 def _print_shipped(what: str) -> None:
-    """Shipped files, a line each where they fit."""
-    from harness.cli.terminal import print_columns
+    """Shipped files, a row each."""
     from harness.scenario.shipped import shipped_campaigns, shipped_scenarios, summary
 
     files = shipped_campaigns() if what == "campaigns" else shipped_scenarios()
-    print_columns({name: summary(path) for name, path in files.items()})
+    width = max(map(len, files), default=0)
+    for name, path in files.items():
+        say(_row(f"{name:{width}}  ", summary(path)))
 
 
 def _print_kinds(kinds: Mapping[str, Any]) -> None:
@@ -84,7 +85,7 @@ def _print_aircraft() -> None:
     new, faults = [name for name in names if not is_surveyed(name)], {}
     if new:
         many = f"{len(new)} aircraft are" if len(new) > 1 else f"{new[0]} is"
-        say(f"{many} flown for the figures, the first time only; all of the fleet takes a minute", err=True)
+        say(f"{many} flown for the figures, once; the whole fleet takes a minute", err=True)
         with step_bar() as report:
             faults = _survey(new, report)
     say(_row(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "verified"), "what"))

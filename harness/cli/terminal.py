@@ -46,7 +46,7 @@ def progress_bar(straight_m: float) -> Iterator[Report | None]:
                 completed=max(0.0, straight_m - to_go_m),
                 description=plain(state),
                 time_s=time_s,
-                to_go_m=to_go_m,
+                to_go_m=max(0.0, to_go_m),
                 speed_up=time_s / elapsed_s if elapsed_s > 0 else 0.0,
             )
 
@@ -91,14 +91,6 @@ def print_table(title: str, rows: Mapping[str, str]) -> None:
     for name, value in rows.items():
         table.add_row(printable(name), printable(value))
     console.print(table, width=min(80, console.width))
-
-
-def print_columns(rows: Mapping[str, str]) -> None:
-    """Names and what they stand for, one line each where they fit."""
-    console = Console()
-    width = max((len(name) for name in rows), default=0)
-    for name, text in rows.items():
-        console.print(printable(f"{name:{width}}  {text}"), highlight=False, markup=False, soft_wrap=True)
 
 
 def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:

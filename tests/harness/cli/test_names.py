@@ -30,6 +30,22 @@ def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
         assert all(len(line.split()) > 3 for line in lines)
 
 
+@pytest.mark.parametrize("what", ["scenarios", "campaigns"])
+def test_rows_go_on_below_themselves_in_a_narrow_terminal(
+    what: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["list", what]) == 0
+    piped = capsys.readouterr().out.splitlines()
+    assert any(len(line) > 80 for line in piped)
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    assert main(["list", what]) == 0
+    shown = capsys.readouterr().out.splitlines()
+    assert max(map(len, shown)) <= 80
+    assert [line.split()[0] for line in shown if line[0] != " "] == [line.split()[0] for line in piped]
+    assert " ".join(shown).split() == " ".join(piped).split()
+
+
 def test_planners_and_guidance_are_listed_with_their_keys_and_defaults(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
