@@ -21,9 +21,6 @@ from aircraft.interface import GRAVITY_MPS2, FloatArray
 INTERCEPT_SINE = 0.7
 """Sine of the steepest angle to the path at which the law `preview` approaches it from far off."""
 
-SPLIT = 2.0**27 + 1.0
-"""Times this, a number is parted into two of half its digits."""
-
 CURVATURE, LENGTH, START, STOP, TURNED = 4, 5, 6, 7, 8
 """Columns of a route's rows."""
 
@@ -201,7 +198,7 @@ def nearest_on_route(
             if abs(since) > math.pi:
                 since -= math.copysign(math.tau, since)
             angle = expected + since
-            away = _length(east, north)
+            away = math.sqrt(east * east + north * north)
             cross = away - radius if radius > 0.0 else -radius - away
             along = angle * radius
             sine, cosine = math.sin(angle), math.cos(angle)
@@ -212,31 +209,6 @@ def nearest_on_route(
         if along <= rows[row, LENGTH] or row == len(rows) - 1:
             return row, max(along, 0.0), cross, tangent_east, tangent_north
         row, along_m = row + 1, 0.0
-
-
-@compiled
-def _length(x: float, y: float) -> float:
-    """sqrt(x^2 + y^2) to half a unit in the last place, as CPython's `math.hypot` has it and that of C has not.
-
-    Squares are taken in two parts, and one step of Newton's makes up for the error of the root (T. J. Dekker, A
-    floating-point technique for extending the available precision, Numerische Mathematik 18, 1971).
-    """
-    large, small = max(abs(x), abs(y)), min(abs(x), abs(y))
-    if large == 0.0:
-        return 0.0
-    square = large * large + small * small
-    root = math.sqrt(square)
-    lost = large * large - square + small * small
-    lost += _rounded_off(large) + _rounded_off(small) - _rounded_off(root)
-    return root + (square - root * root + lost) / (2.0 * root)
-
-
-@compiled
-def _rounded_off(x: float) -> float:
-    """What x * x lacks of the exact square."""
-    high = x * SPLIT - (x * SPLIT - x)
-    low = x - high
-    return (high * high - x * x) + 2.0 * high * low + low * low
 
 
 @compiled
@@ -288,5 +260,5 @@ def air_direction(
     ground = along + math.sqrt(reach) if along > 0.0 and reach > 0.0 else math.sqrt(max(excess, 0.0))
     east = ground * bearing_east - wind_east_mps
     north = ground * bearing_north - wind_north_mps
-    length = max(_length(east, north), 1e-9)
+    length = max(math.sqrt(east * east + north * north), 1e-9)
     return east / length, north / length

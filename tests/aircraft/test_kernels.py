@@ -101,11 +101,3 @@ def test_beyond_the_end_of_a_route_its_last_tangent_is_nearest() -> None:
     point = progress.nearest(3.0, 130.0)
     assert point.past_end
     assert (point.arc_length_m, point.cross_track_m, point.curvature_1pm) == (130.0, 3.0, 0.0)
-
-
-def test_a_length_is_rounded_once() -> None:
-    """As CPython's own, which C's is not."""
-    rng = np.random.default_rng(1)
-    for x, y in rng.uniform(-1.0, 1.0, (2000, 2)) * 10.0 ** rng.uniform(-3.0, 5.0, (2000, 2)):
-        assert kernels._length(x, y) == math.hypot(x, y)
-    assert kernels._length(0.0, 0.0) == 0.0
