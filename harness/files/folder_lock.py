@@ -1,4 +1,8 @@
-"""One writer at a time in a folder. A killed process leaves no lock."""
+"""One writer at a time in a folder. A killed process leaves no lock.
+
+Why not filelock: it holds a file beside what is to be written, which stays behind in the user's folder, and cannot ask
+whether somebody holds a folder that may only be read.
+"""
 
 from __future__ import annotations
 
