@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import json
 import os
 import stat
@@ -23,13 +24,14 @@ _KINDS: Final = {
 }
 
 
-def read_text(path: Path, max_bytes: int, what: str) -> str:
+def read_text(path: Path, max_bytes: int, what: str, utf_16: bool = False) -> str:
     """The text of a regular file, without a byte order mark.
 
     Args:
         path: the file.
         max_bytes: the largest that is read.
         what: what the file should be, for faults: "a scenario, in YAML".
+        utf_16: UTF-16 that says so is taken, too: Windows' editors write it.
 
     Raises:
         InputError: it cannot be opened, is not a regular file, is too large or is not UTF-8 text.
@@ -44,6 +46,8 @@ def read_text(path: Path, max_bytes: int, what: str) -> str:
         raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
     if len(data) > max_bytes:
         raise InputError(f"{path}: is larger than {max_bytes // 10**6} MB; must be {what}")
+    if utf_16 and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        data = data.decode("utf-16", "replace").encode()
     if b"\0" in data:
         raise InputError(f"{path}: is not a text file; must be {what}, as UTF-8")
     try:

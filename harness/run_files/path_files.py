@@ -5,6 +5,7 @@ What is read is put into the local plane; positions in degrees lie in a plane ab
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,9 +25,10 @@ from harness.run_files.igc_path import read_igc
 from harness.run_files.map_paths import read_gpx, read_kml
 from harness.run_files.mission.flying import GivenMission
 from harness.run_files.mission.items import MissionAsRead
+from harness.run_files.mission.old_mission import read_old_mission
 from harness.run_files.mission.plan_file import read_plan
 from harness.run_files.mission.program import program
-from harness.run_files.mission.wpl_file import read_waypoints
+from harness.run_files.mission.wpl_file import WPL, read_waypoints
 from harness.run_files.path_as_read import PathAsRead
 from harness.scenario.sections import ALTITUDES_M
 
@@ -35,6 +37,9 @@ Place = tuple[float, float]
 
 MAX_BYTES: Final = 64_000_000
 MAX_SPAN_M: Final = 500e3
+JSON_ENDINGS: Final = (".json", ".txt", ".mission")
+PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
+"""What stands in every plan of QGroundControl, whatever the name of its file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +81,7 @@ def read_path(
     """Reads a path; the name's ending says how it is written.
 
     Args:
-        path: .csv, .geojson or .json, .kml, .gpx, .igc; or a mission: .plan, .waypoints or .txt.
+        path: .csv, .geojson or .json, .kml, .gpx, .igc; or a mission: .plan, .waypoints or .txt, .mission.
         any_altitude: the altitudes of a drawn line are left out, for a flight whose altitude is given otherwise.
         origin_deg: latitude and longitude of east = north = 0; None: those of the first point of a path in degrees.
         polygons: what the polygons beside a drawn path are that do not say so themselves: `exclusion`, `inclusion` or
@@ -88,9 +93,10 @@ def read_path(
     suffix = path.suffix.lower()
     if suffix not in (*LINES, *MISSIONS):
         raise InputError(f"{path}: is none of {', '.join((*LINES, *MISSIONS))}; save the path as one of them")
-    text = read_text(path, MAX_BYTES, "a path")
-    if suffix in MISSIONS:
-        return _mission(MISSIONS[suffix](text, str(path)), origin_deg)
+    text = read_text(path, MAX_BYTES, "a path", utf_16=True)
+    mission = _mission_reader(text, suffix)
+    if mission is not None:
+        return _mission(mission(text, str(path)), origin_deg)
     found = LINES[suffix](text, str(path))
     if polygons is not None:
         found = _as_asked(found, polygons)
@@ -113,6 +119,15 @@ def read_path(
         fences=_fences(found.fences, origin, str(path)),
         notes=found.notes,
     )
+
+
+def _mission_reader(text: str, suffix: str) -> Callable[[str, str], MissionAsRead] | None:
+    """The reader of a mission, told by what stands in it, else by its name; None of a drawn line."""
+    if text.startswith(WPL):
+        return read_waypoints
+    if suffix in JSON_ENDINGS and PLAN.search(text):
+        return read_plan
+    return MISSIONS.get(suffix)
 
 
 def _mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
@@ -253,6 +268,7 @@ LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
 
 MISSIONS: Final[dict[str, Callable[[str, str], MissionAsRead]]] = {
     ".plan": read_plan,
+    ".mission": read_old_mission,
     ".waypoints": read_waypoints,
     ".txt": read_waypoints,
 }

@@ -40,29 +40,46 @@ def read_plan(text: str, source: str) -> MissionAsRead:
     if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
         raise InputError(f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan"')
     mission = plan.get("mission")
-    listed = mission.get("items") if isinstance(mission, dict) else None
-    if not isinstance(mission, dict) or not isinstance(listed, list):
+    if not isinstance(mission, dict):
         raise InputError(f"{source}: mission.items: is missing; it is required")
-    home, home_altitude_m = _home(mission, source)
+    read = read_mission(mission, source, "mission.")
+    fences = _fences(plan.get("geoFence"), source, mission.get("firmwareType") == ARDUPILOT)
+    return replace(read, fences=fences, notes=(*read.notes, *_passed_over(plan)))
+
+
+def read_mission(mission: dict[str, Any], source: str, key: str) -> MissionAsRead:
+    """The mission of a plan, without its fences.
+
+    Args:
+        mission: the mapping.
+        source: name of the file, for faults.
+        key: what the keys of the mapping begin with, for faults.
+
+    Raises:
+        InputError: it is none.
+    """
+    listed = mission.get("items")
+    if not isinstance(listed, list):
+        raise InputError(f"{source}: {key}items: is missing; it is required")
+    home, home_altitude_m = _home(mission, source, key)
     items: list[Item] = []
     notes: list[str] = []
     for number, each in enumerate(listed):
-        items += _items(each, f"mission.items[{number}]", source, len(items) + 1, notes)
+        items += _items(each, f"{key}items[{number}]", source, len(items) + 1, notes)
     if len({item.number for item in items}) < len(items):
         items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
         notes.append("a doJumpId is there twice: items are counted from 1 instead")
-    fences = _fences(plan.get("geoFence"), source, mission.get("firmwareType") == ARDUPILOT)
-    return MissionAsRead(source, tuple(items), home, home_altitude_m, fences, (*notes, *_passed_over(plan)))
+    return MissionAsRead(source, tuple(items), home, home_altitude_m, Fences(), tuple(notes))
 
 
-def _home(mission: dict[str, Any], source: str) -> tuple[tuple[float, float] | None, float]:
+def _home(mission: dict[str, Any], source: str, key: str) -> tuple[tuple[float, float] | None, float]:
     home = mission.get("plannedHomePosition")
     if home is None:
         return None, 0.0
     if not isinstance(home, list) or len(home) != 3:
-        raise InputError(f"{source}: mission.plannedHomePosition: must be [latitude, longitude, altitude]")
+        raise InputError(f"{source}: {key}plannedHomePosition: must be [latitude, longitude, altitude]")
     latitude, longitude, altitude = (
-        finite(value, f"{source}: mission.plannedHomePosition[{i}]") for i, value in enumerate(home)
+        finite(value, f"{source}: {key}plannedHomePosition[{i}]") for i, value in enumerate(home)
     )
     return (latitude, longitude), altitude
 
@@ -93,8 +110,8 @@ def _items(item: Any, key: str, source: str, number: int, notes: list[str]) -> I
 def _simple(item: dict[str, Any], key: str, source: str, number: int) -> Item:
     params = item.get("params")
     place = item.get("coordinate")
-    if isinstance(params, list) and len(params) == 4 and isinstance(place, list) and len(place) == 3:
-        params = [*params, *place]  # before version 4.0 of QGroundControl
+    if isinstance(params, list) and isinstance(place, list):
+        params = _with_place(params, place)
     if not isinstance(params, list) or len(params) != 7:
         raise InputError(f"{source}: {key}.params: must be a list of 7")
     # QGroundControl writes null where something is left to the autopilot.
@@ -108,6 +125,15 @@ def _simple(item: dict[str, Any], key: str, source: str, number: int) -> Item:
     jump_id = item.get("doJumpId")
     numbered = jump_id if isinstance(jump_id, int) and not isinstance(jump_id, bool) else number
     return Item(f"{source}: {key}", numbered, command, frame, tuple(values))
+
+
+def _with_place(params: list[Any], place: list[Any]) -> list[Any]:
+    """Parameters with the place that stands beside them.
+
+    Before version 4.0 of QGroundControl it stood apart; some scripts write both, and zeros among the parameters.
+    """
+    apart = len(params) == 4 or (len(params) == 7 and not any(params[4:]))
+    return [*params[:4], *place] if apart and len(place) == 3 else params
 
 
 def _landing(item: dict[str, Any], key: str, source: str, number: int, land: int) -> Iterator[Item]:
