@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.campaign.table import Runs, column, load_tables, run_name, runs_of, varied_keys
+from harness.campaign.table import Runs, column, load_tables, own_name, runs_of, varied_keys
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
@@ -79,6 +79,10 @@ STANDING_OUT: Final = {
 """Figures whose largest value is named with its run, by their column of the results; label, and factor for its unit."""
 
 
+APART: Final = 1.5
+"""A figure so many times as large as that of any other run, or as small, is likely to be odd."""
+
+
 @dataclass(frozen=True)
 class Extreme:
     """The run that stands out most by a figure.
@@ -86,10 +90,11 @@ class Extreme:
     Attributes:
         figure: what it is of, with its unit.
         run: its number.
-        name: of its world, planner and aircraft.
+        name: what of its world, planner and aircraft not all runs share.
         value: the figure: the largest of all runs, of clearance the least.
         following: the same of the run that comes next; None where only one run has the figure.
         median: of all runs that have one.
+        apart: whether the figure is far from that of every other run: by the factor `APART`.
     """
 
     figure: str
@@ -98,10 +103,13 @@ class Extreme:
     value: float
     following: float | None
     median: float
+    apart: bool = False
 
 
 def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
-    """The run that stands out by each figure by which any does: what is the same in all runs is left out.
+    """The run that stands out by each figure by which any does, those that are far from all others first.
+
+    A figure that is the same in all runs is left out.
 
     Args:
         results: one row a run.
@@ -116,7 +124,15 @@ def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
         following = None if least.following is None else -least.following
         least = replace(least, value=-least.value, following=following, median=-least.median)
     found = (least, *(_extreme(runs, label, values) for label, values in figures.items()))
-    return tuple(each for each in found if each is not None)
+    marked = [replace(each, apart=_is_apart(each)) for each in found if each is not None]
+    return tuple(sorted(marked, key=lambda each: not each.apart))
+
+
+def _is_apart(extreme: Extreme) -> bool:
+    if extreme.following is None:
+        return False
+    less, more = sorted((extreme.value, extreme.following))
+    return more > 0.0 and more >= APART * less
 
 
 def _extreme(runs: Runs, figure: str, values: FloatArray) -> Extreme | None:
@@ -129,7 +145,7 @@ def _extreme(runs: Runs, figure: str, values: FloatArray) -> Extreme | None:
     if values[row] <= median:
         return None
     following = float(values[order[1]]) if len(order) > 1 else None
-    return Extreme(figure, int(runs.run[row]), run_name(runs, row), float(values[row]), following, median)
+    return Extreme(figure, int(runs.run[row]), own_name(runs, row), float(values[row]), following, median)
 
 
 def _numeric(values: tuple[object, ...]) -> bool:

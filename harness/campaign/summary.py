@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 WORST: Final = 10
 CLOSEST: Final = 3
 """Runs shown where none failed: those that came closest to an obstacle."""
+FIRST: Final = 5
+"""Runs that are named of those that were not tracked for the same causes."""
 BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of so many varied keys, the first ones."""
 
@@ -136,6 +138,21 @@ class WorstRun:
 
 
 @dataclass(frozen=True)
+class Untracked:
+    """Runs that were not tracked for the same causes.
+
+    Attributes:
+        causes: of all their legs; empty where nothing was flown of a plan.
+        count: how many runs.
+        runs: numbers of the first of them.
+    """
+
+    causes: str
+    count: int
+    runs: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class Summary:
     """The answers.
 
@@ -149,7 +166,7 @@ class Summary:
         lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
         extremes: the run that stands out by each of some figures.
-        untracked: the first runs that were not tracked: number, name, and why.
+        untracked: runs that were not tracked, by why, the most frequent first.
         duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
     """
@@ -163,7 +180,7 @@ class Summary:
     lengths: Mapping[str, tuple[float, ...]]
     worst: tuple[WorstRun, ...]
     extremes: tuple[Extreme, ...]
-    untracked: tuple[tuple[int, str, str], ...]
+    untracked: tuple[Untracked, ...]
     duels: tuple[Duel, ...]
     planned: int | None = None
 
@@ -289,11 +306,16 @@ def _lengths(runs: Runs) -> dict[str, tuple[float, ...]]:
     return curves
 
 
-def _untracked(results: pa.Table, runs: Runs) -> tuple[tuple[int, str, str], ...]:
+def _untracked(results: pa.Table, runs: Runs) -> tuple[Untracked, ...]:
     column_of = "trackability.causes"
     causes = results[column_of].to_pylist() if column_of in results.column_names else [None] * len(runs)
-    rows = np.flatnonzero(runs.trackable == 0.0)[:WORST].tolist()
-    return tuple((int(runs.run[row]), run_name(runs, row), causes[row] or "") for row in rows)
+    alike: dict[str, list[int]] = {}
+    for row in np.flatnonzero(runs.trackable == 0.0).tolist():
+        alike.setdefault(causes[row] or "", []).append(int(runs.run[row]))
+    return tuple(
+        Untracked(why, len(numbers), tuple(numbers[:FIRST]))
+        for why, numbers in sorted(alike.items(), key=lambda each: -len(each[1]))
+    )
 
 
 def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...]:

@@ -191,11 +191,23 @@ def are_crossed(worlds: Sequence[str], scenarios: Sequence[str]) -> bool:
 
 def run_name(runs: Runs, row: int) -> str:
     """World, planner and aircraft of a run."""
+    return ", ".join(filter(None, (*_place(runs, row), *(runs.names[name][row] for name in NAMED[:2]))))
+
+
+def own_name(runs: Runs, row: int) -> str:
+    """What of a run's world, planner and aircraft not all runs share; may be empty."""
+    several = {name for name in NAMED if len(set(runs.names[name])) > 1}
+    place = _place(runs, row) if several & {*NAMED[2:]} else ()
+    return ", ".join(
+        filter(None, (*place, *(runs.names[name][row] for name in NAMED[:2] if name in several)))
+    )
+
+
+def _place(runs: Runs, row: int) -> tuple[str, ...]:
     names = runs.names
     world, scenario = names["world"][row], names["scenario"][row]
     crossed = world and are_crossed(names["world"], names["scenario"])
-    place = (scenario, world) if crossed else (world or scenario,)
-    return ", ".join(filter(None, (*place, names["planner"][row], names["aircraft"][row])))
+    return (scenario, world) if crossed else (world or scenario,)
 
 
 def column(table: pa.Table | None, name: str) -> FloatArray:

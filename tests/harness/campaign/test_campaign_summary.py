@@ -516,7 +516,8 @@ def test_runs_that_stand_out_are_named(tmp_path: Path) -> None:
     rows[3] |= {"trackable": False, "trackability.causes": "bank limit", "min_clearance_m": 49.9}
     folder = campaign(tmp_path / "c", rows)
     summary = summarise(folder)
-    near, load = summary.extremes
+    load, near = summary.extremes
+    assert (load.apart, near.apart) == (True, False)
     assert (load.figure, load.run, load.value, load.following, load.median) == (
         "load factor",
         2,
@@ -526,7 +527,7 @@ def test_runs_that_stand_out_are_named(tmp_path: Path) -> None:
     )
     assert near.run == 3
     assert (near.value, near.following) == pytest.approx((49.9 / 50.0, 1.2))
-    assert [(run, why) for run, _, why in summary.untracked] == [(3, "bank limit")]
+    assert [(each.causes, each.count, each.runs) for each in summary.untracked] == [("bank limit", 1, (3,))]
     page = write_summary(summary, folder).read_text()
     assert "Runs that stand out" in page
     assert "49.9 m; <strong class='bad'>below</strong> the wanted 50 m" in page
@@ -555,9 +556,28 @@ def test_each_oddity_of_a_campaign_stands_out_on_its_page_though_runs_failed(tmp
     folder = campaign(tmp_path / "odd", rows)
     summary = summarise(folder)
     assert {each.run: each.figure for each in summary.extremes} == {run: ODD[run][0] for run in ODD}
+    assert all(each.apart for each in summary.extremes)
     page = write_summary(summary, folder).read_text()
-    for figure, _ in ODD.values():
-        assert f'<th scope="row">{figure}</th>' in page
+    for run, (figure, _) in ODD.items():
+        assert f'<tr class="apart"><th scope="row">{figure}</th><td>{run}</td>' in page
+
+
+def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
+    """Where navigation errs they are nearly all: their first ten would say nothing of the others."""
+    untracked = {"trackable": False, "trackability.causes": "navigation error"}
+    rows = [row(run, **untracked) for run in range(20)]
+    rows[0] |= {"trackable": True, "trackability.causes": ""}
+    rows[13] |= {"trackability.causes": "navigation error; bank limit"}
+    folder = campaign(tmp_path / "c", rows)
+    summary = summarise(folder)
+    assert [(each.causes, each.count, each.runs) for each in summary.untracked] == [
+        ("navigation error", 18, (1, 2, 3, 4, 5)),
+        ("navigation error; bank limit", 1, (13,)),
+    ]
+    page = write_summary(summary, folder).read_text()
+    assert "Not every leg was tracked in 19 of 20 runs:" in page
+    assert "<li>navigation error: 18 runs (1, 2, 3, 4, 5, \N{HORIZONTAL ELLIPSIS})</li>" in page
+    assert "<li>navigation error; bank limit: 1 run (13)</li>" in page
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:
