@@ -219,7 +219,7 @@ FIGURES = (
         lambda row: {None: "", True: "yes", False: "no"}[row.trackable],
         hint="every leg was flown within the limits for cross-track error, altitude, airspeed and load",
     ),
-    Figure("why the first leg not tracked was not", "cause", lambda row: row.cause),
+    Figure("cause of the first leg not tracked", "cause", lambda row: row.cause),
     Figure("time at the bank limit, %", "bank %", lambda row: number(row.bank_saturation_fraction, 100.0)),
     Figure("cross-track error p95, m", "xt p95", lambda row: number(row.cross_track_p95_m)),
     Figure("cross-track error max, m", "xt max", lambda row: number(row.cross_track_max_m)),

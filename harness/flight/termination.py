@@ -77,7 +77,7 @@ class MissionEnd:
         east, north = state.east_m, state.north_m
         clearance = self._surely_clear_m(east, north, state.time_s)
         if clearance < 0.0:
-            return Ending(Outcome.COLLISION, f"inside an obstacle by {-clearance:.1f} m")
+            return Ending(Outcome.COLLISION, f"inside an obstacle by {-clearance:.2g} m")
         if self.contact_m < 0.0:
             return Ending(Outcome.COLLISION, "touched an obstacle between two steps")
         if world.ground is not None and (hit := self._ground_hit(world.ground, state)):

@@ -9,7 +9,7 @@ from typing import Any
 
 import jinja2
 
-from harness.analysis.rows import DASH, Figure, Row, shown_figures
+from harness.analysis.rows import DASH, Figure, Row, number, shown_figures
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,7 @@ def run_html(
         "run.html",
         chapter=chapter,
         row=chapter.rows[0],
+        number=number,
         legs=legs,
         lost=[leg for leg in legs if not leg["trackable"]],
         checked=checked,

@@ -449,7 +449,7 @@ def test_under_several_guidance_laws_a_row_is_called_after_both() -> None:
     ]
     text = to_markdown(rows)
     assert "|  | a, preview | a, l1 |" in text
-    assert "| why the first leg not tracked was not | \N{EN DASH} | tracking error |" in text
+    assert "| cause of the first leg not tracked | \N{EN DASH} | tracking error |" in text
     assert "| time at the bank limit, % | 25 | 25 |" in text
 
 

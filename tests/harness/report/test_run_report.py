@@ -49,6 +49,27 @@ def test_report_is_written_into_the_run_folder(run: Path) -> None:
     assert "| outcome | reached |" in (run / "report.md").read_text()
 
 
+def test_a_near_miss_is_said_before_the_figures(run: Path, tmp_path: Path) -> None:
+    """Also where the goal was reached."""
+    assert "nearer to an obstacle than wanted" not in (
+        page_with(run, tmp_path / "fair", clearance_violation_s=0.0)
+    )
+    page = page_with(run, tmp_path / "near", min_clearance_m=5.49, clearance_violation_s=2.1)
+    said = "nearer to an obstacle than wanted</strong>: 5.49 m at the least; below the wanted clearance for 2.1 s"
+    assert page.index(said) < page.index("<table")
+    assert '<td class="bad">5.49</td>' in page
+    assert '<td class="bad">2.1</td>' in page
+
+
+def page_with(run: Path, folder: Path, **figures: float) -> str:
+    """The page of a copy of a run with other figures."""
+    shutil.copytree(run, folder)
+    metrics = json.loads((folder / "metrics.json").read_text())
+    (folder / "metrics.json").write_text(json.dumps(metrics | figures))
+    assert main(["report", str(folder)]) == 0
+    return (folder / "report.html").read_text()
+
+
 def test_rows_that_some_flights_have_are_shown_where_they_do(run: Path, tmp_path: Path) -> None:
     assert "navigation error" not in (run / "report.html").read_text()
     assert "navigation error" not in (run / "report.md").read_text()
@@ -148,7 +169,13 @@ def test_a_table_of_corners_does_not_make_the_page_wider_than_a_phone(tmp_path: 
     assert main(["report", str(checked)]) == 0
     page = shown(chromium, checked / "report.html", 390)
     assert (page.said, page.asked_for, page.overflow_px) == ((), (), 0)
-    assert "corners are cut" in (checked / "report.html").read_text()
+    text = (checked / "report.html").read_text()
+    assert "corners are cut" in text
+    # What is tracked is the path with its corners rounded: the error against that is no reason for the verdict.
+    leg = next(leg for leg in load_run(checked).metrics["trackability"] if not leg["trackable"])
+    assert leg["max_deviation_m"] > 20.0 > leg["max_cross_track_m"]
+    assert "off the path given, m" in text
+    assert f'<td>{leg["max_deviation_m"]:.1f}</td><td class="bad">{leg["cause"]}</td>' in text
 
 
 def test_a_browser_would_tell_what_is_wrong(tmp_path: Path, chromium: Any) -> None:
