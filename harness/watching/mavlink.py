@@ -81,6 +81,8 @@ class GroundStationLink(Onlooker):
         except OSError as error:
             raise InputError(f"wayproof: nothing can be sent to {to.text} ({error.strerror})") from error
         self._mission: PlanAsMission | None = None
+        self._asked_for: PlanAsMission | None = None
+        """What the ground station fetches: the mission when it asked for the count, whatever plan comes meanwhile."""
         self._current, self._last = 0, _NOWHERE
         self._rates_radps = (0.0, 0.0, 0.0)
         self._fast_s = self._slow_s = -math.inf
@@ -229,17 +231,21 @@ class GroundStationLink(Onlooker):
             parser = self._m.MAVLink(None)  # anew: a message does not go on in the next datagram
             parser.robust_parsing = True
             for message in parser.parse_buffer(data) or ():
+                if getattr(message, "target_system", SYSTEM_ID) not in (0, SYSTEM_ID):
+                    continue
                 answer = self._answers.get(message.get_type())
                 if answer is not None:
                     answer(self, message)
 
     def _give_count(self, asked: Any) -> None:
-        flown = asked.mission_type == self._m.MAV_MISSION_TYPE_MISSION and self._mission is not None
-        count = len(self._mission) if flown and self._mission else 0
+        flown = asked.mission_type == self._m.MAV_MISSION_TYPE_MISSION
+        if flown:
+            self._asked_for = self._mission
+        count = len(self._asked_for) if flown and self._asked_for is not None else 0
         self._send(self._mav.mission_count_encode(*_sender(asked), count, asked.mission_type))
 
     def _give_item(self, asked: Any) -> None:
-        m, mission = self._m, self._mission
+        m, mission = self._m, self._asked_for or self._mission
         there = asked.mission_type == m.MAV_MISSION_TYPE_MISSION and mission is not None
         if mission is None or not there or not 0 <= asked.seq < len(mission):
             self._send(
@@ -257,7 +263,7 @@ class GroundStationLink(Onlooker):
                 asked.seq,
                 m.MAV_FRAME_GLOBAL,
                 m.MAV_CMD_NAV_WAYPOINT,
-                int(asked.seq == self._current),
+                int(mission is self._mission and asked.seq == self._current),
                 1,
                 0.0,
                 0.0,

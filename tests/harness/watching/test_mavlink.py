@@ -139,6 +139,38 @@ def test_the_mission_is_given_item_by_item(station: GroundStation, link: GroundS
     assert (fence.count, fence.mission_type) == (0, 1)
 
 
+def test_a_mission_is_of_one_plan_though_another_comes_while_it_is_fetched(
+    station: GroundStation, link: GroundStationLink, make_plan: MakePlan
+) -> None:
+    station.listen()
+    northwards = make_plan([(0.0, 0.0, 0.0, 1.0, 0.0, 400.0), (0.0, 400.0, 0.0, 1.0, 0.0, 200.0)], index=1)
+    fetched: list[list[tuple[int, int]]] = []
+    for again in (False, True):
+        items: list[Any] = []
+        station.link.mav.mission_request_list_send(1, 1)
+        (count,) = answers(station, link, "MISSION_COUNT")
+        for number in range(count.count):
+            station.link.mav.mission_request_int_send(1, 1, number)
+            items += answers(station, link, "MISSION_ITEM_INT")
+            if not again and number == 0:
+                link.on_plan(northwards, state(0.2))
+        fetched.append([(item.x, item.y) for item in items])
+    east, north = (
+        [PLANE.geodetic(*each) for each in ends] for ends in (((0, 0), (300, 0)), ((0, 0), (0, 400)))
+    )
+    assert fetched == [[(round(1e7 * a), round(1e7 * b)) for a, b in each] for each in (east, north)]
+
+
+def test_what_is_meant_for_another_vehicle_is_not_answered(
+    station: GroundStation, link: GroundStationLink
+) -> None:
+    station.listen()
+    station.link.mav.mission_request_list_send(7, 1)
+    assert answers(station, link, "MISSION_COUNT", wait_s=0.2) == []
+    station.link.mav.mission_request_list_send(0, 0)
+    assert len(answers(station, link, "MISSION_COUNT")) == 1
+
+
 def test_nobody_can_command_or_change_the_flight(station: GroundStation, link: GroundStationLink) -> None:
     station.listen()
     mav = station.link.mav
