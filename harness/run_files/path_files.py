@@ -5,6 +5,7 @@ What is read is put into the local plane; positions in degrees lie in a plane ab
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -104,6 +105,7 @@ def read_path(
         raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
     origin = None if found.local else origin_deg or found.positions[0]
     _check_degrees(origin, found.positions, "point", str(path))
+    origin = _turned(origin)
     points = _in_plane(found.positions, origin)
     _check_span(points, str(path))
     _check_places(points, str(path))
@@ -137,6 +139,7 @@ def _mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
     placed = [position for position in positions if position is not None]
     origin = None if flown.local else origin_deg or placed[0]
     _check_degrees(origin, placed, "item", source)
+    origin = _turned(origin)
     points = _in_plane(placed, origin)
     _check_span(points, source)
     each = iter(points.tolist())
@@ -202,11 +205,18 @@ def _check_altitudes(altitudes_m: Sequence[float], source: str) -> None:
 
 def _check_degrees(origin: Place | None, positions: Sequence[Place], what: str, source: str) -> None:
     for number, (latitude, longitude) in enumerate(positions if origin is not None else ()):
-        if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0):
+        if not (abs(latitude) <= 85.0 and abs(longitude) <= 360.0):
             raise InputError(
                 f"{source}: {what} {number} is at latitude {latitude:g}, longitude {longitude:g}; must be degrees "
-                "within 85 and 180 (local metres can be given as CSV with the columns x_m,y_m)"
+                "within 85 and 360 (local metres can be given as CSV with the columns x_m,y_m)"
             )
+
+
+def _turned(origin: Place | None) -> Place | None:
+    """An origin whose longitude is within half a turn."""
+    if origin is None or abs(origin[1]) <= 180.0:
+        return origin
+    return origin[0], math.remainder(origin[1], 360.0)
 
 
 def _as_asked(found: PathAsRead, polygons: str) -> PathAsRead:
@@ -249,10 +259,10 @@ def _fences(fences: Fences, origin: Place | None, source: str) -> Fences:
 def _check_fence(fence: Fence, source: str) -> None:
     places = [*(place for ring in fence.rings for place in ring), *((fence.center,) if fence.center else ())]
     for latitude, longitude in places:
-        if not (abs(latitude) <= 85.0 and abs(longitude) <= 180.0):
+        if not (abs(latitude) <= 85.0 and abs(longitude) <= 360.0):
             raise InputError(
                 f"{source}: {fence.name}: has latitude {latitude:g}, longitude {longitude:g}; must be degrees within "
-                "85 and 180"
+                "85 and 360"
             )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.world_files.expansion import corners_of
 from harness.world_files.parts import WGS84, Contents, Datum, FloatArray, Part, WorldFileError
-from harness.world_files.plane import Mapping, Place, geodetic
+from harness.world_files.plane import TURN_DEG, Mapping, Place, geodetic, short_way
 from harness.world_files.slicing import Box
 
 LARGEST_TURNS, LARGEST_M = 400.0, 400_000.0
@@ -47,20 +47,21 @@ Ends = tuple[tuple[float, float], tuple[float, float]]
 def middle_of(contents: Sequence[Contents], given: Ends | None) -> Place:
     """Origin: between start and goal, else in the middle of what the files hold."""
     if given is not None:
-        (north, west), (south, east) = given
-        return Place(round((north + south) / 2, 5), round((west + east) / 2, 5))
+        latitude, longitude = np.array(given).T
+        east = float(np.mean(short_way(longitude)))
+        return Place(round(float(np.mean(latitude)), 5), round(math.remainder(east, TURN_DEG), 5))
     latitudes, longitudes = [], []
     for each in contents:
         latitude, longitude = geodetic(str(each.crs), *corners_of(each))
         latitudes.append(latitude[np.isfinite(latitude)])
         longitudes.append(longitude[np.isfinite(latitude)])
-    latitude, longitude = np.concatenate(latitudes), np.concatenate(longitudes)
+    latitude, longitude = np.concatenate(latitudes), short_way(np.concatenate(longitudes))
     if not len(latitude):
         raise WorldFileError("nothing of these files has a place on earth; their crs may be another")
     middle = [0.5 * float(each.min() + each.max()) for each in (latitude, longitude)]
     if max(np.ptp(latitude), np.ptp(longitude)) > 5.0:  # a country: where most of it is
         middle = [float(np.median(each)) for each in (latitude, longitude)]
-    return Place(round(min(max(middle[0], -84.0), 84.0), 5), round(middle[1], 5))
+    return Place(round(min(max(middle[0], -84.0), 84.0), 5), round(math.remainder(middle[1], TURN_DEG), 5))
 
 
 def center_of(box: Box) -> tuple[float, float]:

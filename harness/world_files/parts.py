@@ -88,6 +88,12 @@ class Raster:
     values: FloatArray
     affine: tuple[float, float, float, float, float, float]
 
+    @property
+    def middle_x(self) -> float:
+        """X of the middle."""
+        rows, columns = self.values.shape
+        return float(self.affine[0] * columns / 2 + self.affine[1] * rows / 2 + self.affine[2])
+
     def places(self, column: FloatArray, row: FloatArray) -> tuple[FloatArray, FloatArray]:
         """X and y of places given in columns and rows from the upper left corner."""
         a, b, c, d, e, f = self.affine

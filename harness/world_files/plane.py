@@ -15,6 +15,7 @@ import numpy as np
 from harness.world_files.parts import WGS84, FloatArray, WorldFileError
 
 MOST_LATITUDE_DEG: Final = 85.0
+TURN_DEG: Final = 360.0
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,22 @@ class Mapping:
         east, north = self._transformer.transform(x, y)
         return np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)
 
-    def from_plane(self, east: FloatArray, north: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """X and y in the file of places of the plane."""
+    def from_plane(
+        self, east: FloatArray, north: FloatArray, about_x: float | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """X and y in the file of places of the plane.
+
+        Args:
+            east: of the places.
+            north: of the places.
+            about_x: in the middle of what the file has; longitudes are given by the turn that is nearest to it, since
+                files write those across the antimeridian in several ways.
+        """
         if self.crs is None:
             return east - self.shift_m[0], north - self.shift_m[1]
-        x, y = self._transformer.transform(east, north, direction="INVERSE")
+        x, y = (np.asarray(each) for each in self._transformer.transform(east, north, direction="INVERSE"))
+        if about_x is not None and self._in_degrees:
+            x = x + TURN_DEG * np.round((about_x - x) / TURN_DEG)
         return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
 
     def geometries(self, shapes: Any) -> Any:
@@ -65,6 +77,10 @@ class Mapping:
         return shapely.transform(
             shapes, lambda points: np.column_stack(self.to_plane(points[:, 0], points[:, 1]))
         )
+
+    @cached_property
+    def _in_degrees(self) -> bool:
+        return in_degrees(self.crs)
 
     @cached_property
     def _transformer(self) -> Any:
@@ -92,6 +108,33 @@ def flat_crs(name: str) -> Any:
         raise WorldFileError(
             f"has the crs {name[:60]!r}, which is not known; give one as EPSG:32632"
         ) from error
+
+
+def in_degrees(name: str | None) -> bool:
+    """Whether coordinates of a coordinate reference system are longitude and latitude in degrees.
+
+    Raises:
+        WorldFileError: there is none of that name.
+    """
+    return name is not None and bool(flat_crs(name).is_geographic)
+
+
+def short_way(longitudes_deg: FloatArray) -> FloatArray:
+    """Longitudes by turns that bring them nearest together: across the antimeridian, files go on at its other side.
+
+    Those that leave no half of the earth free stay as they are, and so do the two ends of a map of the whole.
+    """
+    turned = longitudes_deg % TURN_DEG
+    every = np.unique(turned)
+    if len(every) < 2:
+        return longitudes_deg
+    gaps = np.diff(every, append=every[0] + TURN_DEG)
+    widest = int(np.argmax(gaps))
+    if gaps[widest] < 0.5 * TURN_DEG:
+        return longitudes_deg
+    begin = every[(widest + 1) % len(every)]
+    together: FloatArray = begin + (turned - begin) % TURN_DEG
+    return together
 
 
 def vertical_unit_m(name: str) -> float:

@@ -263,7 +263,7 @@ def window_of(raster: Raster, mapping: Mapping, box: Box) -> tuple[slice, slice]
     north = np.concatenate(
         (np.full(33, ymin), ymin + share * (ymax - ymin), np.full(33, ymax), ymin + share * (ymax - ymin))
     )
-    column, row = raster.cells(*mapping.from_plane(east, north))
+    column, row = raster.cells(*mapping.from_plane(east, north, raster.middle_x))
     spans = []
     for places, size in ((row, raster.values.shape[0]), (column, raster.values.shape[1])):
         known = places[np.isfinite(places)]

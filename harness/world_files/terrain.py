@@ -51,7 +51,7 @@ def height_field(sources: Sequence[tuple[Raster, Mapping]], box: Box) -> tuple[H
         missing = np.flatnonzero(np.isnan(heights))
         if len(missing):
             heights[missing] = sampled(
-                raster, *mapping.from_plane(east.ravel()[missing], north.ravel()[missing])
+                raster, *mapping.from_plane(east.ravel()[missing], north.ravel()[missing], raster.middle_x)
             )
     if not np.isfinite(heights).any():
         return None, []

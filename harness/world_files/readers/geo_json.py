@@ -25,6 +25,7 @@ from harness.world_files.parts import (
     WorldFileError,
     counted,
 )
+from harness.world_files.plane import in_degrees
 from harness.world_files.readers import limits, rings
 
 DEEPEST: Final = 8
@@ -45,7 +46,8 @@ def read(path: Path, reading: Reading) -> Contents:
     features = list(_features(content))
     every = [(tags, name, one) for tags, geometry, name in features for one in _simple(geometry, 0)]
     passed, bare = sum(geometry is None for _, geometry, _ in features), 0
-    shapes = rings.shapes_of([rings_of(one) for _, _, one in every])
+    crs = reading.crs or _crs(content)
+    shapes = rings.shapes_of([rings_of(one) for _, _, one in every], in_degrees(crs))
     for (tags, name, _), footprint in zip(every, shapes, strict=True):
         if footprint is None:
             passed += 1
@@ -62,7 +64,7 @@ def read(path: Path, reading: Reading) -> Contents:
         notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
     if passed:
         notes.append(f"{counted(passed, 'point, line or polygon')} without an area passed over")
-    return Contents("geojson", reading.crs or _crs(content), tuple(parts), notes=tuple(notes))
+    return Contents("geojson", crs, tuple(parts), notes=tuple(notes))
 
 
 def read_ed318(path: Path, reading: Reading) -> Contents:
@@ -172,7 +174,7 @@ def _simple(geometry: Any, depth: int) -> Iterator[dict[str, Any]]:
 
 def footprint_of(geometry: dict[str, Any]) -> Any:
     """The area of a Polygon or MultiPolygon; None of anything else, or without one."""
-    return rings.shapes_of([rings_of(geometry)])[0]
+    return rings.shapes_of([rings_of(geometry)], degrees=True)[0]
 
 
 def rings_of(geometry: dict[str, Any]) -> list[list[FloatArray]]:

@@ -28,7 +28,7 @@ from harness.world_files.parts import (
     WorldFileError,
     counted,
 )
-from harness.world_files.readers import limits
+from harness.world_files.readers import limits, rings
 
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
 BOUNDARIES: Final = ("outerBoundaryIs", "innerBoundaryIs")
@@ -111,7 +111,9 @@ def _polygon(
     outer, inner = _rings(element, "outerBoundaryIs"), _rings(element, "innerBoundaryIs")
     if not outer:
         return None
-    shape = shapely.Polygon(outer[0][:, :2], [each[:, :2] for each in inner])
+    about = float(outer[0][0, 0])
+    shell, *holes = (rings.short_ring(each[:, :2], about) for each in (outer[0], *inner))
+    shape = shapely.Polygon(shell, holes)
     shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
     if shape.is_empty or shape.area == 0.0:
         return None

@@ -91,7 +91,7 @@ class Collected:
         Raises:
             WorldFileError: nothing was.
         """
-        shapes = rings.shapes_of([[[np.array(line)]] for _, line, _ in self._rings])
+        shapes = rings.shapes_of([[[np.array(line)]] for _, line, _ in self._rings], degrees=True)
         for (tags, _, name), shape in zip(self._rings, shapes, strict=True):
             if shape is None:
                 self.broken += 1

@@ -10,12 +10,14 @@ from typing import Any, Final
 import numpy as np
 
 from harness.world_files.parts import FloatArray, WorldFileError
+from harness.world_files.plane import TURN_DEG, short_way
 
 NAUTICAL_MILE_M: Final = 1852.0
 CIRCLE_POINTS: Final = 96
 """Corners of a circle; it lies inside of their polygon, whose area is 0.04 % larger."""
 ARC_STEP_DEG: Final = 1.0
 LARGEST_M: Final = 2_000_000.0
+HALF_TURN_DEG: Final = TURN_DEG / 2
 
 Place = tuple[float, float]
 """Longitude and latitude, degrees."""
@@ -30,7 +32,23 @@ def circle(center: Place, radius_m: float) -> Any:
             f"has a circle of radius {radius_m:g} m; must be positive and at most {LARGEST_M:g} m"
         )
     azimuths = np.arange(0.0, 360.0, 360.0 / CIRCLE_POINTS)
-    return shapely.Polygon(around(center, azimuths, radius_m / math.cos(math.pi / CIRCLE_POINTS)))
+    return shapely.Polygon(short_ring(around(center, azimuths, radius_m / math.cos(math.pi / CIRCLE_POINTS))))
+
+
+def short_ring(places: Sequence[Place] | FloatArray, about_deg: float | None = None) -> FloatArray:
+    """A ring of longitude and latitude that goes the short way round the earth.
+
+    Args:
+        places: (k, 2) of the ring.
+        about_deg: its longitudes are given by the turn that is nearest to this one, if given.
+    """
+    points = np.array(places, dtype=np.float64)
+    if np.ptp(points[:, 0]) > HALF_TURN_DEG:
+        points[:, 0] = short_way(points[:, 0])
+    if about_deg is not None:
+        middle = 0.5 * float(points[:, 0].min() + points[:, 0].max())
+        points[:, 0] += TURN_DEG * round((about_deg - middle) / TURN_DEG)
+    return points
 
 
 def around(center: Place, azimuth_deg: FloatArray, distance_m: float | FloatArray) -> list[Place]:
@@ -63,7 +81,7 @@ def corridor(line: Sequence[Place], width_m: float) -> Any:
 
     latitude = line[0][1]
     stretch = math.cos(math.radians(latitude))
-    plane = shapely.LineString([((x - line[0][0]) * stretch, y - latitude) for x, y in line])
+    plane = shapely.LineString([((x - line[0][0]) * stretch, y - latitude) for x, y in short_ring(line)])
     grown = plane.buffer(width_m / 2.0 / 111_200.0, quad_segs=16)
     return shapely.transform(
         grown, lambda p: np.column_stack((p[:, 0] / stretch + line[0][0], p[:, 1] + latitude))
@@ -76,15 +94,16 @@ def ring(places: Sequence[Place]) -> Any:
 
     if len(set(places)) < 3:
         return None
-    shape = shapely.make_valid(shapely.Polygon(places), method="structure", keep_collapsed=False)
+    shape = shapely.make_valid(shapely.Polygon(short_ring(places)), method="structure", keep_collapsed=False)
     return None if shape.is_empty or shape.area == 0.0 else shape
 
 
-def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]]) -> list[Any]:
+def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]], degrees: bool = False) -> list[Any]:
     """Shapes of many parts at once: each is some polygons, each polygon its outline and then its holes.
 
     Args:
         batch: (k, 2) places of each ring, closed or not; rings with fewer than three places are left out.
+        degrees: they are longitude and latitude: rings go the short way, and those of a part lie together.
 
     Returns:
         A valid shapely geometry for each part, None where it has no area.
@@ -100,6 +119,12 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]]) -> list[Any]:
     found: list[Any] = [None] * len(batch)
     if not polygons:
         return found
+    if degrees:
+        first = {part: float(kept[0][0][0]) for part, kept in reversed(polygons)}
+        polygons = [
+            (part, [short_ring(ring, first[part]) if _apart(ring, first[part]) else ring for ring in kept])
+            for part, kept in polygons
+        ]
     every = [ring for _, rings in polygons for ring in rings]
     lines = shapely.linearrings(
         np.concatenate(every), indices=np.repeat(np.arange(len(every)), [len(r) for r in every])
@@ -117,6 +142,25 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]]) -> list[Any]:
             pieces = list(dict(zip(shapely.to_wkb(shapely.normalize(pieces)), pieces, strict=True)).values())
         found[part] = pieces[0] if len(pieces) == 1 else shapely.union_all(pieces)
     return found
+
+
+def _apart(ring: FloatArray, about_deg: float) -> bool:
+    """Whether a ring reaches farther than half a turn from a longitude."""
+    return bool(abs(ring[:, 0] - about_deg).max() > HALF_TURN_DEG)
+
+
+def together(shape: Any) -> Any:
+    """A shape of longitude and latitude, its pieces at both ends of the map put together."""
+    import shapely
+
+    if shape is None or not shape.bounds[2] - shape.bounds[0] > HALF_TURN_DEG:
+        return shape
+    west = [each.bounds for each in shapely.get_parts(shape)]
+    if any(bounds[2] - bounds[0] > HALF_TURN_DEG for bounds in west):
+        return shape
+    return shapely.transform(
+        shape, lambda p: np.column_stack((np.where(p[:, 0] < 0.0, p[:, 0] + TURN_DEG, p[:, 0]), p[:, 1]))
+    )
 
 
 def on_earth(longitude: float, latitude: float) -> Place:

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from harness.world_files.parts import Contents, Part, Reading, WorldFileError, counted
-from harness.world_files.readers import limits
+from harness.world_files.plane import in_degrees
+from harness.world_files.readers import limits, rings
 
 MAX_FEATURES = 300_000
 
@@ -55,6 +56,8 @@ def _read(path: Path, reading: Reading) -> Contents:
                 shapely.force_2d(shapely.from_wkb(geometries, on_invalid="ignore")), method="structure",
                 keep_collapsed=False,
             )  # fmt: skip
+            if in_degrees(reading.crs or crs):
+                shapes = [rings.together(each) for each in shapes]
             for row, shape in enumerate(shapes):
                 if shape is None or shape.area == 0.0:
                     passed += 1
