@@ -123,7 +123,8 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
             self._own.mission.start_m, self._own.mission.goal_m
         )
         self._to_go_m = status.to_go_m
-        reward += float(status.outcome is Outcome.REACHED) - float(status.outcome in BAD)
+        if not before.done:  # else it has been given
+            reward += float(status.outcome is Outcome.REACHED) - float(status.outcome in BAD)
         truncated = status.outcome is Outcome.TIMEOUT
         return self._observed(status), reward, status.done and not truncated, truncated, self._info(status)
 

@@ -75,6 +75,8 @@ def test_a_collision_costs_and_ends_the_episode() -> None:
     _, total, info = flown(env, seed=1, blind=True)
     assert info["outcome"] == "collision"
     assert total < 0.0
+    _, reward, ended, cut, after = env.step(np.zeros(2, dtype=np.float32))
+    assert (reward, ended, cut, after) == (0.0, True, False, info), "nothing more is flown, nor paid twice"
 
 
 def test_the_time_limit_truncates() -> None:
