@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
 from aircraft.interface import AircraftState
@@ -48,8 +49,9 @@ ROWS = 20
 
 LOG_ROWS = 20_000
 """Of a log with more rows some are left out."""
-FARTHEST_LOG_M = 2e5
-"""A log of elsewhere would not be seen."""
+LONGEST_GAP_S = 10.0
+"""A log without a row for so long, and for `GAP_ROWS` times as long as from row to row, has a gap there."""
+GAP_ROWS = 10.0
 CHORD_ERROR = 1e-2
 """How far a drawn plan may be off the true one, as a share of the turn radius: a pixel of the plan view is more."""
 
@@ -178,15 +180,15 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
     scenario = parse_scenario(run.scenario_yaml, str(run_dir / "scenario.yaml"), ends_checked=False)
     origin = scenario.area.origin
     track = read_log(log, LocalPlane(origin.latitude_deg, origin.longitude_deg)).thinned(LOG_ROWS)
+    frame = look.Frame(
+        scenario.area.bounds_m, scenario.mission.altitude_m, scenario.planner.clearance_m or 0.0
+    )
     away_m = _outside_m(track, scenario.area.bounds_m)
-    if away_m > FARTHEST_LOG_M:
+    if away_m > frame.span_m:  # no view would show it
         raise InputError(
             f"{log}: comes no nearer than {away_m / 1e3:.0f} km to the area of {run_dir}, "
             "whose plane lies on earth where area.origin says"
         )
-    frame = look.Frame(
-        scenario.area.bounds_m, scenario.mission.altitude_m, scenario.planner.clearance_m or 0.0
-    )
     rec = recording_stream(log.name)
     file = RecordingFile(rec, out, thin_blueprint(frame))
     try:
@@ -218,7 +220,8 @@ def _send_track(rec: rr.RecordingStream, track: LogTrack, run: Run, altitude_m: 
     for top, place in ((look.WORLD, position), (look.PLAN, flat)):
         moved = rr.Transform3D.columns(translation=place, quaternion=turned)
         rec.send_columns(f"{top}/aircraft", times, moved)
-    pieces = [position[max(row - 1, 0) : row + 1] for row in range(len(position))]
+    begins = _begins(track.time_s)
+    pieces = [position[row if begins[row] else row - 1 : row + 1] for row in range(len(position))]
     rec.send_columns(
         f"{look.PLAN}/{look.FLOWN}",
         times,
@@ -226,14 +229,20 @@ def _send_track(rec: rr.RecordingStream, track: LogTrack, run: Run, altitude_m: 
     )
     log_trail_style(rec)
     rec.send_columns(f"{look.WORLD}/{look.FLOWN}", times, rr.LineStrips3D.columns(strips=strips_3d(pieces)))
-    whole = lines_2d([position[:, :2]], look.WHOLE_TRACK, 1.5, 15)
-    rec.log(f"{look.PLAN}/{look.WHOLE}", whole, static=True)
+    stretches = np.split(position[:, :2], np.flatnonzero(begins)[1:])
+    rec.log(f"{look.PLAN}/{look.WHOLE}", lines_2d(stretches, look.WHOLE_TRACK, 1.5, 15), static=True)
     series = {"altitude_error/flown": track.up_m - altitude_m, "speed/flown": track.groundspeed_mps}
     cross = cross_track_m(np.column_stack((track.east_m, track.north_m)), planned_points(run)[0])
     if cross is not None:
         series["cross_track/flown"] = cross
     for name, values in series.items():
         rec.send_columns(f"{look.SERIES}/{name}", times, rr.Scalars.columns(scalars=values))
+
+
+def _begins(time_s: FloatArray) -> NDArray[np.bool_]:
+    """(n,) whether a row is the first, or the first after a gap: what was flown meanwhile is not known."""
+    steps_s = np.diff(time_s)
+    return np.append(True, steps_s > max(LONGEST_GAP_S, GAP_ROWS * float(np.median(steps_s))))
 
 
 def cross_track_m(points_m: FloatArray, planned_m: FloatArray) -> FloatArray | None:

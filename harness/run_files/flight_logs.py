@@ -27,6 +27,8 @@ FARTHEST_M: Final = 2e7
 LONGEST_S: Final = 1e7
 """No flight is longer; where a clock was set meanwhile, times are."""
 LEAST_ROWS: Final = 2
+FIX_3D: Final = 3
+"""`Status` of a receiver with a three-dimensional fix, in DataFlash."""
 DATAFLASH: Final = b"\xa3\x95\x80"
 """What a DataFlash log begins with: a message that describes formats."""
 
@@ -148,15 +150,19 @@ def _ulog(path: Path) -> Rows:
         raise InputError(f"{path}: has no topic vehicle_global_position")
     data = log.data_list[0].data
     degrees = 1e-7 if np.issubdtype(np.asarray(data["lat"]).dtype, np.integer) else 1.0
-    return list(
-        zip(
-            (np.asarray(data["timestamp"]) / 1e6).tolist(),
-            (np.asarray(data["lat"]) * degrees).tolist(),
-            (np.asarray(data["lon"]) * degrees).tolist(),
-            np.asarray(data["alt"], dtype=np.float64).tolist(),
-            strict=True,
+    rows = np.column_stack(
+        (
+            np.asarray(data["timestamp"]) / 1e6,
+            np.asarray(data["lat"]) * degrees,
+            np.asarray(data["lon"]) * degrees,
+            np.asarray(data["alt"], dtype=np.float64),
         )
     )
+    valid = np.ones(len(rows), dtype=bool)
+    for name in ("lat_lon_valid", "alt_valid"):  # since PX4 1.16: else a row is what was known once
+        valid &= np.asarray(data.get(name, valid), dtype=bool)
+    found: Rows = [(row[0], row[1], row[2], row[3]) for row in rows[valid].tolist()]
+    return found
 
 
 def _dataflash(path: Path) -> Rows:
@@ -171,6 +177,8 @@ def _dataflash(path: Path) -> Rows:
         log: Any = DFReader_binary(str(path), zero_time_base=True)
         try:
             while (message := log.recv_match(type=list(found))) is not None:
+                if getattr(message, "I", 0) or getattr(message, "Status", FIX_3D) < FIX_3D:
+                    continue  # a second receiver, some metres from the first, or one without a fix
                 row = (message._timestamp, message.Lat, message.Lng, message.Alt)
                 found[message.get_type()].append(tuple(map(float, row)))  # type: ignore[arg-type]
         finally:
@@ -211,27 +219,45 @@ def _igc(path: Path) -> Rows:
 
 
 def _mcap(path: Path) -> Rows:
-    """Messages of the schema foxglove.LocationFix, as protobuf or JSON."""
+    """Messages of the schema foxglove.LocationFix, as protobuf or JSON, of the topic that has most of them.
+
+    A file whose end is missing is read as far as it goes.
+    """
+    from mcap.reader import NonSeekingReader, make_reader
+
+    topics: dict[str, Rows] = {}
+    with path.open("rb") as file:
+        try:
+            _take_fixes(make_reader(file).iter_messages(), topics)
+        except Exception:
+            topics.clear()
+            file.seek(0)
+            with contextlib.suppress(Exception):
+                _take_fixes(NonSeekingReader(file).iter_messages(log_time_order=False), topics)
+            if not topics:
+                raise
+    return max(topics.values(), key=len, default=[])
+
+
+def _take_fixes(messages: Iterator[Any], topics: dict[str, Rows]) -> None:
+    """Adds rows by topic."""
     import json
 
-    from mcap.reader import make_reader
     from mcap_protobuf.decoder import DecoderFactory
 
-    rows: Rows = []
     factory = DecoderFactory()
-    with path.open("rb") as file:
-        for schema, channel, message in make_reader(file).iter_messages():
-            if schema is None or schema.name != "foxglove.LocationFix":
-                continue
-            decode = factory.decoder_for(channel.message_encoding, schema)
-            if decode is not None:
-                fix = decode(message.data)
-                place = (fix.latitude, fix.longitude, fix.altitude)
-            else:
-                plain = json.loads(message.data)
-                place = (plain["latitude"], plain["longitude"], plain.get("altitude", 0.0))
-            rows.append((message.log_time / 1e9, *map(float, place)))  # type: ignore[arg-type]
-    return rows
+    for schema, channel, message in messages:
+        if schema is None or schema.name != "foxglove.LocationFix":
+            continue
+        decode = factory.decoder_for(channel.message_encoding, schema)
+        if decode is not None:
+            fix = decode(message.data)
+            place = (fix.latitude, fix.longitude, fix.altitude)
+        else:
+            plain = json.loads(message.data)
+            place = (plain["latitude"], plain["longitude"], plain.get("altitude", 0.0))
+        row = (message.log_time / 1e9, *map(float, place))
+        topics.setdefault(channel.topic, []).append(row)
 
 
 def _csv(path: Path) -> Rows | LogTrack:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import struct
 from collections.abc import Callable
@@ -172,6 +173,93 @@ def test_a_table_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
     assert (track.east_m.tolist(), track.north_m.tolist()) == ([0.0, 10.0], [10.0, 30.0])
 
 
+def test_rows_that_px4_calls_invalid_are_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "a.ulg"
+    write_ulog(path)
+    plain = b"vehicle_global_position:uint64_t timestamp;double lat;double lon;float alt;"
+    flagged = plain + b"bool lat_lon_valid;bool alt_valid;"
+    whole = path.read_bytes()
+    data = whole.replace(
+        struct.pack("<H", len(plain)) + b"F" + plain, struct.pack("<H", len(flagged)) + b"F" + flagged
+    )
+    head, *rows = data.split(struct.pack("<H", 30) + b"D")
+    assert len(rows) == 20
+    for number, row in enumerate(rows):
+        flags = (number != 3, number != 4)
+        head += struct.pack("<H", 32) + b"D" + row + bytes(flags)
+    path.write_bytes(head)
+    assert len(read_log(path, PLANE).time_s) == 18
+
+
+def test_of_two_receivers_the_first_is_taken_where_it_has_a_fix(tmp_path: Path) -> None:
+    def form(kind: int, name: bytes, size: int, types: bytes, columns: bytes) -> bytes:
+        return b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", kind, size, name, types, columns)
+
+    data = form(128, b"FMT", 89, b"BBnNZ", b"Type,Length,Name,Format,Columns")
+    data += form(141, b"GPS", 3 + 8 + 1 + 1 + 4 + 4 + 4, b"QBBLLf", b"TimeUS,I,Status,Lat,Lng,Alt")
+    for row, (latitude, longitude) in enumerate(degrees()):
+        for receiver, off_deg in ((0, 0.0), (1, 1e-4)):
+            status = 1 if row < 2 else 3
+            at = (round((latitude + off_deg) * 1e7), round(longitude * 1e7), 400.0)
+            data += b"\xa3\x95\x8d" + struct.pack(
+                "<QBBiif", 500_000 * row + receiver + 1, receiver, status, *at
+            )
+    (tmp_path / "a.bin").write_bytes(data)
+    found = read_log(tmp_path / "a.bin", PLANE)
+    assert len(found.time_s) == 18
+    assert np.hypot(found.east_m - TRUTH.east_m[2:], found.north_m - TRUTH.north_m[2:]).max() < 0.05
+
+
+def write_mcap(path: Path) -> None:
+    """Fixes of two receivers as JSON, the second twice as often and 11 m off, in chunks of their own."""
+    from mcap.writer import CompressionType, Writer
+
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=400, compression=CompressionType.NONE)
+        writer.start()
+        schema = writer.register_schema("foxglove.LocationFix", "jsonschema", b"{}")
+        topics = [writer.register_channel(f"/gps{number}", "json", schema) for number in (0, 1)]
+        for row, (latitude, longitude) in enumerate(degrees()):
+            for topic, half, off_deg in ((0, 0, 1e-4), (1, 0, 0.0), (1, 1, 0.0)):
+                if half and row == 19:
+                    continue
+                at = {"latitude": latitude + off_deg, "longitude": longitude, "altitude": 400.0 + row}
+                time_ns = 500_000_000 * row + 250_000_000 * half
+                writer.add_message(topics[topic], time_ns, json.dumps(at).encode(), time_ns)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def test_of_two_topics_with_fixes_the_longer_is_taken(tmp_path: Path) -> None:
+    write_mcap(tmp_path / "a.mcap")
+    found = read_log(tmp_path / "a.mcap", PLANE)
+    assert len(found.time_s) == 39
+    assert np.hypot(found.east_m[::2] - TRUTH.east_m, found.north_m[::2] - TRUTH.north_m).max() < 1e-3
+
+
+def test_a_torn_mcap_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
+    write_mcap(tmp_path / "a.mcap")
+    whole = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "torn.mcap").write_bytes(whole[: len(whole) // 3])
+    found = read_log(tmp_path / "torn.mcap", PLANE)
+    assert 4 <= len(found.time_s) < 39
+    assert found.east_m[0] == pytest.approx(TRUTH.east_m[0], abs=1e-3)
+
+
+def test_what_was_flown_in_a_gap_is_not_drawn(tmp_path: Path, run: Path) -> None:
+    rows = [(time, 500.0 + 10.0 * time, 500.0) for time in (*range(10), *range(40, 50))]
+    text = "".join(f"{time},{east},{north}\n" for time, east, north in rows)
+    (tmp_path / "gap.csv").write_text("time_s,x_m,y_m\n" + text)
+    write_log_recording(tmp_path / "gap.csv", run, tmp_path / "gap.rrd")
+    strips: dict[str, list[float]] = {}
+    for chunk in rr.chunk.RrdReader(str(tmp_path / "gap.rrd")).stream():
+        for name, column in chunk.to_record_batch().to_pydict().items():
+            if name.endswith("LineStrips2D:strips"):
+                lines = [strip for cell in column for strip in cell]
+                strips[str(chunk.entity_path)] = [abs(line[-1][0] - line[0][0]) for line in lines]
+    assert max(strips["/plan/flown"]) == 10.0
+    assert strips["/plan/whole_track"] == [90.0, 90.0]
+
+
 def test_a_long_log_is_thinned_to_its_last_row() -> None:
     row = np.arange(100_001.0)
     track = LogTrack(row, row, row, row).thinned(20_000)
@@ -180,20 +268,27 @@ def test_a_long_log_is_thinned_to_its_last_row() -> None:
     assert len(LogTrack(row[:5], row[:5], row[:5], row[:5]).thinned(20_000).time_s) == 5
 
 
-def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path) -> None:
-    (tmp_path / "near.yaml").write_text(
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short flight, with its recording."""
+    place = tmp_path_factory.mktemp("flown")
+    (place / "near.yaml").write_text(
         "schema: wayproof/scenario/1\nname: near\narea: {bounds_m: [0, 0, 4000, 4000]}\n"
         "mission: {start_m: [500, 500], goal_m: [1500, 1500]}\n"
     )
-    folder = tmp_path / "run"
-    assert main(["fly", str(tmp_path / "near.yaml"), "--out", str(folder), "--quiet"]) == 0
+    assert main(["fly", str(place / "near.yaml"), "--out", str(place / "run"), "--quiet"]) == 0
+    return place / "run"
+
+
+def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path, run: Path) -> None:
+    folder = run
     for form in ("csv", "mcap"):
         log = tmp_path / f"flight.{form}"
         assert main(["export", str(folder), "--format", form, "--out", str(log)]) == 0
-        run = load_run(folder)
+        flown = load_run(folder)
         track = read_log(log, LocalPlane(47.0, 8.0))
-        assert track.time_s[-1] == pytest.approx(run.track.time_s[-1], abs=0.2)
-        off = cross_track_m(np.column_stack((track.east_m, track.north_m)), planned_points(run)[0])
+        assert track.time_s[-1] == pytest.approx(flown.track.time_s[-1], abs=0.2)
+        off = cross_track_m(np.column_stack((track.east_m, track.north_m)), planned_points(flown)[0])
         assert off is not None
         assert np.abs(off).max() < 2.0
         write_log_recording(log, folder, tmp_path / f"{form}.rrd")
@@ -203,6 +298,8 @@ def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path) -> None:
         own = {str(chunk.entity_path) for chunk in rr.chunk.RrdReader(str(tmp_path / f"{form}.rrd")).stream()}
         assert {"/plan/aircraft/shape", "/world/aircraft/shape", "/plan/flown"} <= own
     far = tmp_path / "far.csv"
-    far.write_text("time_s,latitude_deg,longitude_deg\n0,-33,150\n1,-33,150.1\n")
-    with pytest.raises(InputError, match=r"comes no nearer than \d+ km to the area of "):
-        write_log_recording(far, folder, tmp_path / "far.rrd")
+    for place, km in (("-33,150", r"\d+"), ("47.1,8.2", "13")):
+        latitude, longitude = map(float, place.split(","))
+        far.write_text(f"time_s,latitude_deg,longitude_deg\n0,{place}\n1,{latitude},{longitude + 0.01}\n")
+        with pytest.raises(InputError, match=rf"comes no nearer than {km} km to the area of "):
+            write_log_recording(far, folder, tmp_path / "far.rrd")
