@@ -29,6 +29,8 @@ def read_old_mission(text: str, source: str) -> MissionAsRead:
     """
     if text.startswith(WPL):
         return read_waypoints(text, source)
+    if text.lstrip().startswith("<"):
+        raise InputError(f"{source}: is XML, as INAV's missions are; save it as .plan or .waypoints")
     whole = parsed_json(text, source)
     listed = whole.get("items") if isinstance(whole, dict) else None
     if not isinstance(listed, list):

@@ -16,7 +16,8 @@ from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum,
 _NUMBER: Final = re.compile(r"[-+]?\d+(?:\.\d*)?|[-+]?\.\d+")
 _SURFACE: Final = re.compile(r"^(SFC|GND|SURFACE|GROUND|0+(\s*(FT|M))?(\s*(AGL|GND|ASFC|SFC))?)$")
 _NO_END: Final = re.compile(r"^(UNL|UNLTD|UNLIM|UNLIMITED|INF|INFINITE)\b")
-_GROUND: Final = re.compile(r"AGL|GND|SFC|GROUND|RELATIVE")
+_GROUND: Final = re.compile(r"AGL|GND|SFC|GROUND|SURFACE|RELATIVE")
+_REFERENCE: Final = re.compile(r"AGL|GND|SFC|GROUND|SURFACE|RELATIVE|SL|SEA|STD|FL|QNH|WGS|GEOID|TI\b")
 _WORD: Final = re.compile(
     r"\d+(?:[.,]\d*)?|\.\d+|[-+]|AMSL|MSL|METRES|METERS|METER|METRE|MEAN|MTR|FEET|FL|FT|F|"
     r"M(?!\w)|M(?=AMSL|MSL|AGL|ASFC|GND|SFC)|AGL|ASFC|GND|SFC|GROUND|ALT|STD|QNH|ABOVE|SEA|LEVEL|RELATIVE|[()'./]"
@@ -24,38 +25,55 @@ _WORD: Final = re.compile(
 """Words that a limit may consist of. Of others, as `ASK 123.5`, nothing is guessed."""
 _METRES: Final = re.compile(r"\d\s*(M|METRES?|METERS?|MTR)(?=\b|AMSL|MSL|AGL|ASFC|GND|SFC)")
 _LOWER: Final = (
-    "lowerlimit",
-    "lower_limit",
-    "lower",
-    "lower_val",
-    "floor",
-    "bottom",
-    "loweraltitude",
-    "minaltitude",
-    "altmin",
-    "minalt",
+    *(
+        "lowerlimit",
+        "lower_limit",
+        "lower",
+        "lower_val",
+        "floor",
+        "bottom",
+        "loweraltitude",
+        "lower_altitude",
+    ),
+    *("minaltitude", "min_altitude", "altitudemin", "altmin", "alt_min", "minalt", "min_alt", "altitude_min"),
     "lower_limit_altitude",
-    *(f"{name}_{unit}" for name in ("lower", "lower_limit", "floor", "bottom") for unit in ("ft", "m")),
 )
 _UPPER: Final = (
-    "upperlimit",
-    "upper_limit",
-    "upper",
-    "upper_val",
-    "ceiling",
-    "top",
-    "upperaltitude",
-    "maxaltitude",
-    "altmax",
-    "maxalt",
+    *("upperlimit", "upper_limit", "upper", "upper_val", "ceiling", "top", "upperaltitude", "upper_altitude"),
+    *("maxaltitude", "max_altitude", "altitudemax", "altmax", "alt_max", "maxalt", "max_alt", "altitude_max"),
     "upper_limit_altitude",
-    *(f"{name}_{unit}" for name in ("upper", "upper_limit", "ceiling", "top") for unit in ("ft", "m")),
 )
-_FEET: Final = "_ft"
+"""Names of limits; unit and reference may follow, as in `floor_ft_agl`."""
+_AFTER: Final = re.compile(r"(?:_(ft|feet|m|metres|meters|agl|amsl|msl|gnd))+$")
+_BEGINS: Final = {"lower": ("lower", "min", "floor", "bottom"), "upper": ("upper", "max", "ceiling", "top")}
+"""What the names of attributes begin with that belong to one of the limits."""
 _UNITS: Final = ("uom", "unit")
 """What the name of an attribute has that says in what unit a limit is."""
-_REFERENCES: Final = ("refer", "_ref", "code", "datum")
+_BOTH_UNITS: Final = (
+    "uom",
+    "unit",
+    "units",
+    "uomdimensions",
+    "altitudeunit",
+    "altitude_unit",
+    "unitofmeasure",
+)
+_REFERENCES: Final = ("ref", "code", "datum", "type")
 """What the name of an attribute has that says what a limit is counted from, as `lowerReference`, `UPPER_CODE`."""
+_BOTH_REFERENCES: Final = (
+    *(
+        "reference",
+        "altitudereference",
+        "altitude_reference",
+        "verticalreference",
+        "vertical_reference",
+        "datum",
+    ),
+    *("verticaldatum", "vertical_datum", "altituderef", "altitude_ref", "altitudedatum", "altitude_datum"),
+    *("altitudetype", "altitude_type", "heightreference", "height_reference"),
+)
+_GRID: Final = ("apt1_", "map_eff")
+"""What attributes begin with in the facility maps of the FAA."""
 NO_NUMBER: Final = -9000.0
 """Limits so low stand for one that is not known, as -9998 of the FAA's files."""
 _HEIGHT: Final = (
@@ -117,8 +135,10 @@ def limit_of(text: str, feet: bool = True, datum: Datum = Datum.SEA) -> Limit | 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
     """Bottom and top: what is not known is no limit, and limits that are the wrong way round are turned."""
     if lower is None or upper is None:
-        which = "lower" if lower is None else "upper"
-        notes.append(f"{name or 'a part'}: its {which} limit is not known; taken as without one")
+        which = (
+            "lower limit is" if upper is not None else "upper limit is" if lower is not None else "limits are"
+        )
+        notes.append(f"{name or 'a part'}: its {which} not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
     if top == NO_BOTTOM:  # an upper limit of the surface: the zone has no height
         top = Limit(0.0, Datum.GROUND)
@@ -207,29 +227,61 @@ def is_building(tags: Mapping[str, Any]) -> bool:
 
 def has_limits(tags: Mapping[str, Any]) -> bool:
     """Whether attributes give the limits of an airspace."""
-    return any(tags[key] is not None for key in tags if key.lower() in _LOWER or key.lower() in _UPPER)
+    return any(tags[key] is not None and _AFTER.sub("", key.lower()) in (*_LOWER, *_UPPER) for key in tags)
 
 
 def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Limits of an airspace from attributes, named in any case; a number alone is in metres unless a unit says feet."""
+    """Limits of an airspace from attributes, named in any case; a number alone is in metres unless a unit says feet.
+
+    A limit without a reference is taken as above mean sea level, which is noted.
+    """
     tags = {key.lower(): value for key, value in tags.items() if value is not None}
+    if "ceiling" in tags and any(key.startswith(_GRID) for key in tags):
+        return _above_the_grid(tags, notes)
     found: list[Limit | None] = []
+    bare = False
     for names, none, word in ((_LOWER, NO_BOTTOM, "lower"), (_UPPER, NO_TOP, "upper")):
-        key = next((each for each in names if each in tags), None)
-        value = None if key is None else tags[key]
-        units = [each for each in tags if each.startswith(word) and any(u in each for u in _UNITS)]
-        unit = next(
-            (str(tags[each]) for each in (*units, *_UNITS, "uomdimensions") if each in tags), "m"
-        ).lower()
-        if key is not None and key.endswith(_FEET):
-            unit = "ft"
-        reference = next(
-            (str(tags[each]).upper() for each in tags if each.startswith(word) and any(r in each for r in _REFERENCES)),
-            "",
-        )  # fmt: skip
-        datum = Datum.GROUND if _GROUND.search(reference) else Datum.SEA
-        found.append(none if value is None else _limit(value, unit, datum))
+        key = next((each for known in names for each in tags if _AFTER.sub("", each) == known), None)
+        if key is None:
+            found.append(none)
+            continue
+        ends = set(key.split("_"))
+        unit = "ft" if ends & {"ft", "feet"} else _said(tags, word, _UNITS, _BOTH_UNITS) or "m"
+        reference = " ".join(ends & {"agl", "gnd", "amsl", "msl"}) or _said(
+            tags, word, _REFERENCES, _BOTH_REFERENCES
+        )
+        datum = Datum.GROUND if _GROUND.search(reference.upper()) else Datum.SEA
+        limit = _limit(tags[key], unit.lower(), datum)
+        found.append(limit)
+        told = unit.upper() == "FL" or _REFERENCE.search(reference.upper()) is not None
+        bare |= not told and limit is not None and _bare(tags[key], limit)
+    if bare:
+        notes.append(f"{name or 'a part'}: its limits name no reference; taken as above mean sea level")
     return band_of(found[0], found[1], notes, name)
+
+
+def _said(tags: Mapping[str, Any], word: str, has: tuple[str, ...], both: tuple[str, ...]) -> str:
+    """What an attribute says of one of the limits, else one that says it of both; empty where none does."""
+    own = (each for each in tags if each.startswith(_BEGINS[word]) and any(part in each for part in has))
+    return next((str(tags[each]) for each in (*own, *both) if each in tags), "")
+
+
+def _bare(value: Any, limit: Limit) -> bool:
+    """Whether a limit is a height of which nothing says what it is counted from."""
+    if isinstance(value, Mapping):
+        return "referenceDatum" not in value and "reference" not in value
+    if not math.isfinite(limit.height_m) or limit.height_m == 0.0:
+        return False
+    return not re.search(r"FL|SL|AGL|GND|SFC|GROUND|RELATIVE|ALT|STD|QNH|SEA", str(value).upper())
+
+
+def _above_the_grid(tags: Mapping[str, Any], notes: list[str]) -> tuple[Limit, Limit]:
+    """A cell of a facility map of the FAA: its ceiling is the height up to which one may fly."""
+    ceiling = metres_of(tags["ceiling"])
+    if ceiling is None:
+        return NO_BOTTOM, NO_TOP
+    notes.append("cells of a facility map of the FAA: solid above their ceiling, in feet above ground")
+    return (NO_BOTTOM if ceiling <= 0.0 else Limit(ceiling * FOOT_M, Datum.GROUND)), NO_TOP
 
 
 def _limit(value: Any, unit: str, datum: Datum) -> Limit | None:

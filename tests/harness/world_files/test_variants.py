@@ -503,6 +503,18 @@ def test_reading_leaves_the_collection_of_cycles_as_it_was(tmp_path: Path) -> No
         ({"floor_ft": 100, "ceiling_ft": 400}, Limit(100 * FOOT_M), Limit(400 * FOOT_M)),
         ({"floor_m": 100, "ceiling_m": 400}, Limit(100.0), Limit(400.0)),
         ({"minAlt": 50, "maxAlt": 120}, Limit(50.0), Limit(120.0)),
+        (
+            {"minAltitude": 0, "maxAltitude": 120, "altitudeUnit": "m", "reference": "AGL"},
+            NO_BOTTOM, Limit(120.0, Datum.GROUND),
+        ),
+        ({"floor_ft_agl": 100, "ceiling_ft_amsl": 400}, Limit(100 * FOOT_M, Datum.GROUND), Limit(400 * FOOT_M)),
+        (
+            {"minAltitude": 10, "minAltitudeType": "AGL", "maxAltitude": 500, "maxAltitudeType": "QNH"},
+            Limit(10.0, Datum.GROUND), Limit(500.0),
+        ),
+        # a facility map of the FAA: up to the ceiling one may fly
+        ({"CEILING": 200, "UNIT": "Feet", "APT1_FAAID": "SEA"}, Limit(200 * FOOT_M, Datum.GROUND), NO_TOP),
+        ({"CEILING": 0, "UNIT": "Feet", "MAP_EFF": "2026"}, NO_BOTTOM, NO_TOP),
         ({"lower": "GND", "upper": "UNLTD"}, NO_BOTTOM, NO_TOP),
     ],
 )  # fmt: skip
@@ -512,6 +524,27 @@ def test_limits_of_zones_by_the_names_that_authorities_use(
     (part,) = read_any(geojson(tmp_path / "a.geojson", feature(tags))).parts
     assert same(part.bottom, bottom)
     assert same(part.top, top)
+
+
+@pytest.mark.parametrize(
+    ("tags", "said"),
+    [
+        ({"minAlt": 50, "maxAlt": 120}, True),
+        ({"lower": "GND", "upper": "2500 ft"}, True),
+        ({"lower": "GND", "upper": "FL 65"}, False),
+        ({"upper": 120, "upperReference": "AMSL"}, False),
+        ({"ceiling_msl": 120}, False),
+    ],
+)
+def test_a_limit_without_a_reference_is_noted(tags: dict[str, Any], said: bool, tmp_path: Path) -> None:
+    notes = read_any(geojson(tmp_path / "a.geojson", feature({"name": "A", **tags}))).notes
+    assert ("A: its limits name no reference; taken as above mean sea level" in notes) == said
+
+
+def test_limits_that_cannot_be_told_are_both_noted(tmp_path: Path) -> None:
+    odd = {"lower": {"metric": 0}, "upper": {"metric": 9}, "name": "A"}
+    notes = read_any(geojson(tmp_path / "a.geojson", feature(odd))).notes
+    assert "A: its limits are not known; taken as without" in notes
 
 
 @pytest.mark.parametrize("before", ["", "\x1e"])

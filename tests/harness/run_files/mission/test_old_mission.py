@@ -79,6 +79,11 @@ def test_what_is_none_is_told(content: Any, tmp_path: Path) -> None:
         read(tmp_path / "m.mission", content)
 
 
+def test_a_mission_of_inav_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is XML, as INAV's missions are; save it as"):
+        read(tmp_path / "m.mission", '<?xml version="1.0"?><MISSION/>')
+
+
 @pytest.mark.parametrize("name", ["m.waypoints", "m.txt", "m.mission", "m.plan"])
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
 def test_a_mission_is_the_same_in_every_encoding_and_under_every_name(
