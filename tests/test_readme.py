@@ -26,7 +26,7 @@ READMES = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
     for path in (
         ROOT / "README.md",
-        *(each for room in ROOMS for each in sorted((ROOT / room).rglob("README.md"))),
+        *(each for room in ROOMS for each in sorted((ROOT / room).rglob("*.md"))),
     )
 }
 FRONT_DOOR = ROOT / "harness" / "front_door"
@@ -258,8 +258,8 @@ def test_ones_own_planner_as_a_distribution_is_found_and_flown(tmp_path: Path) -
 
     run = tmp_path / "run"
     listed = wayproof("list planners", run.parent, path=tmp_path / "installed")
-    assert "beeline: straight on along its first course" in listed.stdout.splitlines()
-    fly = f"fly my_world.yaml --planner beeline --set planner.beyond_m=700 --out {run}"
+    assert "straight_on: straight on along its first course" in listed.stdout.splitlines()
+    fly = f"fly my_world.yaml --planner straight_on --set planner.beyond_m=700 --out {run}"
     flown = wayproof(f"{fly} --no-recording --quiet", tmp_path, path=tmp_path / "installed")
     assert (flown.returncode, flown.stderr) == (1, "")
     read = load_run(run)

@@ -2,7 +2,7 @@
 
 Besides the sensor's flaws: obstacles that appear ahead, and obstacles that come to the straight line to the goal
 when the aircraft does. `python -m tests.closed_loop.test_hard_conditions` flies whole families and prints
-README's table.
+the table of planner/MEASURED.md.
 """
 
 from __future__ import annotations

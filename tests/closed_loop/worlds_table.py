@@ -1,7 +1,7 @@
-"""The table of public worlds in planner/README.md: `python -m tests.closed_loop.worlds_table [MOST]`.
+"""The table of public worlds in planner/MEASURED.md: `python -m tests.closed_loop.worlds_table [MOST]`.
 
 Each world with a way to the goal, and each without one, is flown in calm air by the Aerosonde and judged by the
-independent referee, which knows the true obstacles. Prints a row for each group, then what the referee or the verdict
+independent referee, which knows the true obstacles. Prints a row for each family, then what the referee or the verdict
 found wrong, and exits with 1 where that is anything. MOST is how many worlds of a family are flown.
 """
 
@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -22,19 +21,22 @@ from harness.run.scenario_flight import fly_to_folder
 from harness.scenario.scenario import load_scenario
 
 SHARED: Final = Path(__file__).parents[3] / "shared"
-GROUPS: Final = {
+FAMILIES: Final[dict[str, tuple[str, ...]]] = {
     "like the paper's": ("paper_like",),
-    "circles: few, more, many": ("circles_low", "circles_mid", "circles_high"),
+    "circles, few": ("circles_low",),
+    "circles, more": ("circles_mid",),
+    "circles, many": ("circles_high",),
     "polygons": ("polygon_field",),
     "U-shaped traps": ("u_trap",),
-    "mazes, corridors of 5 and 8 km": ("maze5", "maze8"),
-    "spirals, slots, dead ends": ("spiral", "slots", "dead_ends"),
-    "forest, CTU, OMPL, others": (
-        "faster_forest",
-        "ctu_dubins",
-        "ompl_circles",
-        ("mrpb", "pythonrobotics", "zhm_rrt2d"),
-    ),
+    "mazes of 5 x 5 cells, corridors of 18.5 km": ("maze5",),
+    "mazes of 8 x 8 cells, corridors of 11 km": ("maze8",),
+    "spirals": ("spiral",),
+    "slots": ("slots",),
+    "dead ends": ("dead_ends",),
+    "forest": ("faster_forest",),
+    "CTU": ("ctu_dubins",),
+    "OMPL": ("ompl_circles",),
+    "others": ("mrpb", "pythonrobotics", "zhm_rrt2d"),
     "without a way": ("enclosed_goal", "enclosed_start", "wall_across"),
     "BARN": ("barn",),
 }
@@ -67,35 +69,31 @@ def judged(world: Path, folder: Path) -> dict[str, Any]:
     }
 
 
-def families(group: tuple[str | tuple[str, ...], ...], most: int) -> Iterator[list[Path]]:
-    """The worlds of each family of a group."""
-    for family in group:
-        names = (family,) if isinstance(family, str) else family
-        every = sorted(path for name in names for path in (SHARED / "worlds" / name).glob("*.json"))
-        yield every[:: max(1, len(every) // most)][:most]
+def worlds(folders: tuple[str, ...], most: int) -> list[Path]:
+    """The worlds of a family, so many at most."""
+    every = sorted(path for name in folders for path in (SHARED / "worlds" / name).glob("*.json"))
+    return every[:: max(1, len(every) // most)][:most]
 
 
-def row(name: str, flown: list[list[dict[str, Any]]]) -> str:
-    """The row of a group, from what was flown of each family, and the outcomes."""
-    every = [world for family in flown for world in family]
-    ratios = [[each["ratio"] for each in family if each["ratio"] is not None] for family in flown]
-    lengths = [f"{np.median(some):.2f} / {np.percentile(some, 95):.2f}" if some else "-" for some in ratios]
-    half, tail = np.median([each["p50_ms"] for each in every]), max(each["p99_ms"] for each in every)
-    numbers = ", ".join(str(len(family)) for family in flown)
-    ends = ", ".join(f"{count} {end}" for end, count in Counter(each["end"] for each in every).most_common())
-    return f"| {name} | {numbers} | {', '.join(lengths)} | {half:.1f}, {tail:.0f} | ({ends})"
+def row(name: str, flown: list[dict[str, Any]]) -> str:
+    """The row of a family, and how its flights ended."""
+    ratios = [each["ratio"] for each in flown if each["ratio"] is not None]
+    length = f"{np.median(ratios):.2f} | {np.percentile(ratios, 95):.2f}" if ratios else "- | -"
+    half, tail = np.median([each["p50_ms"] for each in flown]), max(each["p99_ms"] for each in flown)
+    ends = ", ".join(f"{count} {end}" for end, count in Counter(each["end"] for each in flown).most_common())
+    return f"| {name} | {len(flown)} | {length} | {half:.1f} | {tail:.0f} | ({ends})"
 
 
 def main(most: int) -> int:
     wrong: list[str] = []
     print(
-        "| worlds | number | length over the optimum: median / p95 | planner p50: median, p99: largest, ms |"
+        "| worlds | number | length over the optimum: median | p95 | planner p50: median, ms | p99: largest, ms |"
     )
     with tempfile.TemporaryDirectory() as folder:
-        for name, group in GROUPS.items():
-            flown = [[judged(world, Path(folder)) for world in family] for family in families(group, most)]
+        for name, folders in FAMILIES.items():
+            flown = [judged(world, Path(folder)) for world in worlds(folders, most)]
             print(row(name, flown), flush=True)
-            wrong += [fault for family in flown for world in family for fault in world["faults"]]
+            wrong += [fault for world in flown for fault in world["faults"]]
     print("\n".join(wrong) or "no fault")
     return 1 if wrong else 0
 
