@@ -78,9 +78,8 @@ def load_run(folder: str | Path) -> FlightResult:
     with as_input_errors():
         run = run_folder.load_run(Path(folder))
     track, plans = run_folder.tables(run.folder)
-    source, checked = str(run.folder / run_folder.SCENARIO), "check" in run.metrics
     return FlightResult(
-        parse_scenario(run.scenario_yaml, source, ends_checked=not checked),
+        parse_scenario(run.scenario_yaml, str(run.folder / run_folder.SCENARIO), as_flown=True),
         Metrics.of(run.metrics),
         track,
         plans,

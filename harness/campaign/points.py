@@ -193,7 +193,7 @@ def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
     for number, outcome, folder in runs:
         try:
             run = load_run(folder)
-            scenario = parse_scenario(run.scenario_yaml, str(folder), ends_checked=False)
+            scenario = parse_scenario(run.scenario_yaml, str(folder), as_flown=True)
         except (
             RunFolderError,
             InputError,

@@ -177,7 +177,7 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
     from harness.scenario.scenario import parse_scenario  # half of what it takes to come to a viewer
 
     run = load_run(run_dir)
-    scenario = parse_scenario(run.scenario_yaml, str(run_dir / "scenario.yaml"), ends_checked=False)
+    scenario = parse_scenario(run.scenario_yaml, str(run_dir / "scenario.yaml"), as_flown=True)
     origin = scenario.area.origin
     track = read_log(log, LocalPlane(origin.latitude_deg, origin.longitude_deg)).thinned(LOG_ROWS)
     frame = look.Frame(

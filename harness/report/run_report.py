@@ -35,7 +35,7 @@ def write_report(folder: Path) -> Path:
 
 
 def _written(run: Run, folder: Path) -> Path:
-    scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO), ends_checked=False)
+    scenario = parse_scenario(run.scenario_yaml, str(folder / SCENARIO), as_flown=True)
     optimum = optimum_of(scenario)
     flight = entry(scenario, run, optimum)
     page, manifest = folder / REPORT, run.manifest

@@ -16,12 +16,20 @@ if TYPE_CHECKING:
     from planner.interface import Mission, Planner
 
 
-def resolved(spec: PlannerSpec, mission: Mission) -> PlannerSpec:
+def resolved(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> PlannerSpec:
     """The planner's section with its own keys checked and every default filled in.
+
+    Args:
+        spec: the section.
+        mission: what the planner is told.
+        as_flown: the section is of a run folder, where every default stands already; a planner that was given by a
+            source file, or in Python, need not be here.
 
     Raises:
         KeyFault: there is no such planner or key, or the keys contradict each other or the mission.
     """
+    if as_flown and spec.kind not in planner_kinds():
+        return spec
     with PrintingAside():
         kind = own_keys.named_kind("planner", spec, planner_kinds())
         config = own_keys.resolved_config("planner", spec, kind, PlannerSpec.model_fields, mission)
@@ -32,10 +40,12 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
     """The planner for one flight, from a section that `resolved` returned; nothing is left to compile in it.
 
     Raises:
-        PlannerError: whatever its constructor raised.
+        PlannerError: whatever its constructor raised; or the run of its scenario was read back, and it is not here.
     """
     compile_all()
-    kind = planner_kinds()[spec.kind]
+    kind = planner_kinds().get(spec.kind)
+    if kind is None:
+        raise PlannerError(f"the planner {spec.kind} is not here; give it anew (planner=, or --planner)")
     try:
         with PrintingAside():
             return kind.make(kind.config(**spec.own), mission)

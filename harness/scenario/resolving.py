@@ -27,13 +27,16 @@ POUND_KG: Final = 0.45359237
 Part = TypeVar("Part", bound=Section)
 
 
-def resolve(keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True) -> ScenarioKeys:
+def resolve(
+    keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
+) -> ScenarioKeys:
     """The same flight with every default filled in and every file of obstacles expanded.
 
     Args:
         keys: as they were read.
         folder: where the folder of an aircraft, and files of obstacles, are sought first.
         ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
+        as_flown: the keys are of a run folder, as `planner_keys.resolved` takes it.
 
     Raises:
         KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
@@ -83,7 +86,8 @@ def resolve(keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool =
     scenario, names = _with_files_expanded(scenario, radius_m, folder)
     if ends_checked:
         check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
-    return scenario.updated(planner=planner_keys.resolved(planner, mission_with(scenario, performance)))
+    told = mission_with(scenario, performance)
+    return scenario.updated(planner=planner_keys.resolved(planner, told, as_flown))
 
 
 def _filled(section: Part, **defaults: float) -> Part:

@@ -33,13 +33,19 @@ class Scenario(ScenarioKeys):
     """
 
     @classmethod
-    def of(cls, keys: ScenarioKeys, folder: Path | None = None, ends_checked: bool = True) -> Scenario:
+    def of(
+        cls,
+        keys: ScenarioKeys,
+        folder: Path | None = None,
+        ends_checked: bool = True,
+        as_flown: bool = False,
+    ) -> Scenario:
         """The complete scenario of some keys, as `resolve` has it.
 
         Raises:
             KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
         """
-        complete = resolve(keys, folder, ends_checked)
+        complete = resolve(keys, folder, ends_checked, as_flown)
         scenario = cls.model_construct(keys.model_fields_set, **dict(complete))
         object.__setattr__(scenario, "_given", Given(keys.given, folder))
         return scenario
@@ -88,20 +94,23 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
 
 
 def parse_scenario(
-    text: str, source: str = "scenario", ends_checked: bool = True, folder: Path | None = None
+    text: str, source: str = "scenario", as_flown: bool = False, folder: Path | None = None
 ) -> Scenario:
     """Reads a scenario from text.
 
     Args:
         text: YAML.
         source: what faults name it.
-        ends_checked: start and goal must keep the clearance; False for a scenario that a path was checked in.
+        as_flown: it is that of a run folder: start and goal were checked, if a planner was to keep clear of obstacles,
+            and a planner that was given by a source file, or in Python, need not be here.
         folder: files that it names are looked for there first.
 
     Raises:
         InputError: it is not a scenario.
     """
-    return validated(strict_yaml.parse(text, source), source, folder, ends_checked=ends_checked)
+    return validated(
+        strict_yaml.parse(text, source), source, folder, ends_checked=not as_flown, as_flown=as_flown
+    )
 
 
 def node_of_keys(keys: Mapping[str, Any]) -> Node:
@@ -149,7 +158,13 @@ def scenario_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def validated(root: Node, source: str, folder: Path | None = None, ends_checked: bool = True) -> Scenario:
+def validated(
+    root: Node,
+    source: str,
+    folder: Path | None = None,
+    ends_checked: bool = True,
+    as_flown: bool = False,
+) -> Scenario:
     """A scenario from what was read, every default filled in.
 
     Args:
@@ -157,29 +172,33 @@ def validated(root: Node, source: str, folder: Path | None = None, ends_checked:
         source: what faults name it.
         folder: where the folder of an aircraft, and files of obstacles, are sought first.
         ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
+        as_flown: as `parse_scenario` takes it.
 
     Raises:
         InputError: it is not a scenario.
     """
     try:
-        return scenario_from(root.plain(), folder, ends_checked)
+        return scenario_from(root.plain(), folder, ends_checked, as_flown)
     except KeyFaults as error:
         raise fault_error(error, root, source) from error
 
 
-def scenario_from(plain: Any, folder: Path | None = None, ends_checked: bool = True) -> Scenario:
+def scenario_from(
+    plain: Any, folder: Path | None = None, ends_checked: bool = True, as_flown: bool = False
+) -> Scenario:
     """A scenario from plain values, every default filled in.
 
     Args:
         plain: its keys, as YAML has them.
         folder: as `validated` takes it.
         ends_checked: as `validated` takes it.
+        as_flown: likewise.
 
     Raises:
         KeyFaults: it is not a scenario.
     """
     try:
-        return Scenario.of(ScenarioKeys.model_validate(plain), folder, ends_checked)
+        return Scenario.of(ScenarioKeys.model_validate(plain), folder, ends_checked, as_flown)
     except ValidationError as error:
         raise KeyFaults(faults(error, ScenarioKeys)) from error
     except KeyFault as error:

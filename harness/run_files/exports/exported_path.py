@@ -69,7 +69,7 @@ class ExportedPath:
 
 def scenario_of_run(run: Run) -> Scenario:
     """The scenario that a run flew."""
-    return parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), ends_checked=False)
+    return parse_scenario(run.scenario_yaml, str(run.folder / "scenario.yaml"), as_flown=True)
 
 
 def plane_of(scenario: Scenario) -> LocalPlane:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import harness
+import planner.registry
 import wayproof
 from aircraft.airframes import airframe
 from aircraft.guidance.registry import guidance_kinds
@@ -194,6 +195,27 @@ def test_a_planner_from_a_file_flies_in_python_and_on_the_command_line(
     arguments = ["--planner", f"{source}:Beeline", "--no-recording", "--quiet"]
     assert main(["fly", str(tmp_path / "short.yaml"), *arguments, "--out", str(tmp_path / "b")]) == 0
     assert wayproof.load_run(tmp_path / "b").digest == flown.digest
+
+
+def test_a_run_of_a_planner_that_is_not_here_is_read_and_shown_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in the next process, which has not been given the planner."""
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    source, folder = source_file(tmp_path), tmp_path / "run"
+    (tmp_path / "short.yaml").write_text(SCENARIO)
+    flown = wayproof.fly(tmp_path / "short.yaml", planner=f"{source}:Beeline", out=folder)
+    monkeypatch.setattr(planner.registry, "_registered", {})
+    back = wayproof.load_run(folder)
+    assert (back.digest, back.scenario.planner.kind) == (flown.digest, "planner.py:Beeline")
+    assert main(["report", str(folder)]) == 0
+    for form in ("csv", "gpx", "kml", "geojson", "plan"):
+        assert main(["export", str(folder), "--format", form, "--out", str(tmp_path / f"a.{form}")]) == 0
+    with pytest.raises(
+        wayproof.PlannerError, match=r"the planner planner.py:Beeline is not here; give it anew"
+    ):
+        wayproof.fly(back.scenario)
+    assert wayproof.fly(back.scenario, planner=f"{source}:Beeline").digest == flown.digest
 
 
 def test_a_scenario_file_never_runs_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
