@@ -89,7 +89,7 @@ def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.mark.flights
 def test_the_first_command_flies_the_papers_scenario_and_prints_what_readme_shows(tmp_path: Path) -> None:
-    arguments = FLY.removeprefix(f"{SET_UP}. && .venv/bin/wayproof ")
+    arguments = FLY.removeprefix(f"{SET_UP}-e . && .venv/bin/wayproof ")
     assert arguments == "fly scenarios/paper_circles.yaml"
     flown = wayproof(arguments, tmp_path)
     assert (flown.returncode, flown.stderr) == (0, "")
@@ -229,6 +229,30 @@ def test_ones_own_planner_in_a_file_is_flown_on_the_command_line_and_in_python(t
     assert ran.stdout.splitlines()[0] == f"collision {first['reason']}"
     (again,) = load_run(tmp_path / "runs" / "windy").manifest["command"]
     assert again.startswith("wayproof.fly('my_world', planner='rolling_window', ")
+
+
+@pytest.mark.flights
+def test_ones_own_law_in_a_file_is_compared_on_the_command_line_and_in_python(tmp_path: Path) -> None:
+    (law,) = (each for each in blocks("python", READMES["aircraft/README.md"]) if "LAW = " in each)
+    (tmp_path / "my_law.py").write_text(law)
+    (scenario,) = blocks("yaml")
+    (tmp_path / "my_world.yaml").write_text(scenario)
+    laws = "preview,my_law.py:LAW"
+    flown = wayproof(
+        f"compare my_world.yaml --planners rolling_window --guidance {laws} --no-recording --json", tmp_path
+    )
+    assert (flown.returncode, flown.stderr) == (0, "")
+    rows = json.loads(flown.stdout)["rows"]
+    assert [row["outcome"] for row in rows] == ["reached", "reached"]
+    assert rows[0]["cross_track_max_m"] < rows[1]["cross_track_max_m"]
+    call = f"compare('my_world.yaml', ['rolling_window'], 'in_python', guidance={laws.split(',')})"
+    ran = python(f"import wayproof\nprint(wayproof.{call}.table.to_pylist())", tmp_path)
+    assert (ran.returncode, ran.stderr) == (0, "")
+    assert repr(rows[1]["cross_track_max_m"]) in ran.stdout
+    measured = wayproof("bench tracking --guidance my_law.py:LAW --seeds 1 --json", tmp_path)
+    assert measured.stderr == ""
+    assert measured.returncode in (0, 1)
+    assert json.loads(measured.stdout)["cases"]
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from harness.scenario.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
     from harness.campaign.flight import Answer
+    from harness.scenario.given import LoopPart
 
 
 def compare(
@@ -24,48 +25,68 @@ def compare(
     out: str | Path = "runs/comparison",
     recording: bool = False,
     *,
+    guidance: Sequence[str] | None = None,
     kinematic: bool = False,
     workers: int | None = None,
 ) -> ComparisonResult:
-    """Flies every planner on every scenario, side by side, and writes tables, figures and a report.
+    """Flies every planner (under every guidance law) on every scenario, side by side: tables, figures, a report.
 
     Args:
         scenarios: one or more: scenarios, files, or names of those that come with wayproof.
         planners: kinds, in order; or `FILE.py:NAME`, `MODULE:NAME`.
         out: the comparison's folder.
         recording: whether to record each flight and an overlay of all.
+        guidance: kinds of guidance laws, in order; or `FILE.py:NAME`, `MODULE:NAME`. Default: the scenario's own.
         kinematic: a point that follows every plan exactly flies in place of the aircraft.
         workers: flights at a time; default: one a processor.
 
     Raises:
-        InputError: a scenario, planner or the folder cannot be used; nothing was flown.
+        InputError: a scenario, planner, law or the folder cannot be used; nothing was flown.
     """
     import pyarrow as pa
 
     from harness.comparison.comparison import fly_and_compare
-    from harness.scenario.given import registered
+    from harness.scenario.given import GUIDANCE, PLANNER, is_source
 
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
     loaded = [each if isinstance(each, Scenario) else load_scenario(each) for each in given]
-    if not all(isinstance(each, str) for each in planners):
-        raise InputError(
-            "wayproof: compare flies in processes of its own; give planners by name, as FILE.py:NAME"
-        )
-    try:
-        kinds = [registered(each) for each in planners]
-    except ValueError as error:
-        raise InputError(f"wayproof: planners: {error}") from error
+    kinds = _named(planners, PLANNER, "planners")
+    laws = None if guidance is None else _named(guidance, GUIDANCE, "guidance")
+    chosen = [{"planner.kind": kind} for kind in kinds]
+    if laws is not None:
+        chosen = [keys | {"guidance.kind": law} for keys in chosen for law in laws]
+    of_laws = "" if laws is None else f", guidance={laws}"
     with as_input_errors():
         compared = fly_and_compare(
-            [each.with_({"planner.kind": kind}) for each in loaded for kind in kinds],
+            [each.with_(keys) for each in loaded for keys in chosen],
             Path(out),
             recording=recording,
             kinematic=kinematic,
             workers=workers or os.cpu_count() or 1,
-            command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds})"),
-            sources=[each for each in planners if ":" in each],
+            command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds}{of_laws})"),
+            sources=[each for each in planners if is_source(each)],
+            law_sources=[each for each in guidance or () if is_source(each)],
         )
     return ComparisonResult(pa.Table.from_pylist([asdict(row) for row in compared.rows]), Path(out))
+
+
+def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:
+    """The kinds that names mean: those given as FILE.py:NAME or MODULE:NAME are imported.
+
+    Raises:
+        InputError: one is not a name, or cannot be imported.
+    """
+    from harness.scenario.given import registered
+
+    if isinstance(names, str) or not names or not all(isinstance(each, str) for each in names):
+        raise InputError(
+            f"wayproof: compare flies in processes of its own; give {argument} as a list of names, FILE.py:NAME for "
+            "your own"
+        )
+    try:
+        return [registered(each, part) for each in names]
+    except ValueError as error:
+        raise InputError(f"wayproof: {argument}: {error}") from error
 
 
 def sweep(

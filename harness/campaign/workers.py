@@ -26,9 +26,11 @@ ONE_THREAD: Final = {
     "MALLOC_ARENA_MAX": "1",
     "MALLOC_TRIM_THRESHOLD_": "131072",
 }
-"""Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it; what is freed goes back
-to the system (glibc), so that a worker that records does not grow: each of its threads would keep an arena of its
-own."""
+"""Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it.
+
+What is freed goes back to the system (glibc), so that a worker that records does not grow: each of its threads would
+keep an arena of its own.
+"""
 
 CONNECT_S: Final = 10.0
 SCHEDULER_PORT: Final = 8786

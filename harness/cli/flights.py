@@ -20,6 +20,7 @@ from harness.cli.options import (
     bad_input,
     chosen,
     flag,
+    law_kind,
     load,
     planner_kind,
     print_json,
@@ -198,6 +199,7 @@ def compare(
     from harness.cli.compare_terminal import comparison_bar, print_comparison
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
     from harness.files.errors import RunFolderError, WriteError
+    from harness.scenario.given import is_source
 
     try:
         with comparison_bar(loaded) as report:
@@ -208,7 +210,8 @@ def compare(
                 kinematic=kinematic,
                 workers=workers or os.cpu_count() or 1,
                 progress=report,
-                sources=[kind for kind in named if ":" in kind],
+                sources=[kind for kind in named if is_source(kind)],
+                law_sources=[law for law in laws if law is not None and is_source(law)],
             )
     except (RunFolderError, AircraftError) as error:
         raise bad_input(error) from error
@@ -301,6 +304,7 @@ def bench_tracking(name: str, seeds: int, as_json: bool, guidance: str = "previe
     from harness.bench import tracking
     from harness.cli.terminal import print_grid, step_bar, tracking_rows
 
+    guidance = law_kind(guidance)
     laws = sorted(guidance_kinds())
     if guidance not in laws:
         raise typer.BadParameter(f"there is no guidance law {guidance!r}; known are: {', '.join(laws)}")

@@ -74,6 +74,7 @@ def fly_and_compare(
     progress: Progress | None = None,
     command: str | None = None,
     sources: Sequence[str] = (),
+    law_sources: Sequence[str] = (),
 ) -> Comparison:
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
 
@@ -86,6 +87,7 @@ def fly_and_compare(
         progress: told of every flight, by its index, as it goes on.
         command: what the report says was called; default: the command line.
         sources: planners among them that are given as FILE.py:NAME or MODULE:NAME.
+        law_sources: guidance laws among them that are given likewise.
 
     Raises:
         InputError: a scenario is there twice with the same planner and guidance, or is called as a file of the
@@ -94,7 +96,12 @@ def fly_and_compare(
     """
     jobs = [
         ComparedFlight(
-            each, out / each.name / _folder_of(each, scenarios), recording, kinematic, tuple(sources)
+            each,
+            out / each.name / _folder_of(each, scenarios),
+            recording,
+            kinematic,
+            tuple(sources),
+            tuple(law_sources),
         )
         for each in _distinct(scenarios)
     ]

@@ -30,6 +30,7 @@ class ComparedFlight:
         recording: whether to write `flight.rrd`.
         kinematic: a point that follows the plans exactly flies instead of the aircraft.
         sources: planners that the flight's process has to import, as FILE.py:NAME or MODULE:NAME.
+        law_sources: guidance laws that it has to import, likewise.
     """
 
     scenario: Scenario
@@ -37,6 +38,7 @@ class ComparedFlight:
     recording: bool
     kinematic: bool
     sources: tuple[str, ...] = ()
+    law_sources: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -137,12 +139,14 @@ def _fly(job: ComparedFlight, theirs: Connection) -> None:
 
 def _write(job: ComparedFlight, theirs: Connection) -> None:
     from harness.run.scenario_flight import fly_to_folder, kinematic_loop, make_loop
-    from harness.scenario.given import registered_source
+    from harness.scenario.given import GUIDANCE, registered_source
     from planner.compiled import own_this_process
 
     own_this_process()
     for source in job.sources:
         registered_source(source)
+    for source in job.law_sources:
+        registered_source(source, GUIDANCE)
     fly_to_folder(
         job.scenario,
         job.folder,

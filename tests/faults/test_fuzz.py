@@ -45,8 +45,8 @@ from tests.faults.hostile import (
 from tests.longer import longer
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
-LONGEST_S = 10.0
-"""For one small file, on a machine that others use too."""
+LONGEST_S = 15.0
+"""Seconds of processor time for one small file, the survey of an aircraft that it names included."""
 LONGEST_LINE, MOST_LINES = 600, 5
 
 
@@ -256,7 +256,7 @@ def fuzzed(cases: int, strategy: st.SearchStrategy[Any], holds: Callable[[Any], 
 
 def taken_or_refused(path: Path, read: Callable[[], object]) -> None:
     """A file is read, or refused as a person can use it, in good time."""
-    begun = time.monotonic()
+    begun = time.process_time()
     try:
         read()
     except InputError as error:
@@ -268,7 +268,7 @@ def taken_or_refused(path: Path, read: Callable[[], object]) -> None:
     assert all(line.startswith((str(path), "command line")) for line in lines)
     assert max(map(len, lines)) < LONGEST_LINE + len(str(path))
     assert said.replace("\n", "").isprintable()
-    assert time.monotonic() - begun < LONGEST_S
+    assert time.process_time() - begun < LONGEST_S
 
 
 @pytest.fixture(autouse=True)

@@ -24,8 +24,9 @@ def own_packages() -> Any:
         if found is None or found.parent != root / room:
             what = "does not find it" if found is None else f"finds another one first, {found}"
             raise ImportError(
-                f"wayproof needs its own package {room!r}, and Python {what}: rename that folder or file, or start "
-                "Python in another folder",
+                f"wayproof needs its own package {room!r}, and Python {what}: rename that folder or file, or move the "
+                "script that is run (or start Python) into another folder; a checkout of wayproof is its own after "
+                "`pip install -e`",
                 name=room,
             )
     return import_module("harness")

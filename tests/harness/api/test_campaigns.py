@@ -87,5 +87,14 @@ def test_a_script_needs_no_guard(tmp_path: Path) -> None:
 
 
 def test_objects_are_not_compared() -> None:
-    with pytest.raises(wayproof.InputError, match="by name"):
+    with pytest.raises(wayproof.InputError, match="list of names"):
         wayproof.compare(small(), [object()])  # type: ignore[list-item]
+
+
+def test_what_is_compared_is_named_in_a_list() -> None:
+    with pytest.raises(wayproof.InputError, match="planners as a list of names"):
+        wayproof.compare(small(), "rolling_window")
+    with pytest.raises(wayproof.InputError, match="planners as a list of names"):
+        wayproof.compare(small(), [])
+    with pytest.raises(wayproof.InputError, match=r"guidance: .*no_file.py: no such file"):
+        wayproof.compare(small(), ["rolling_window"], guidance=["no_file.py:LAW"])
