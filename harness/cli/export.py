@@ -56,8 +56,8 @@ def export(
         _write(file.content)
     else:
         out.write_bytes(file.content)
-    if file.left_out is not None:
-        say(file.left_out, err=True)
+    for note in file.notes:
+        say(note, err=True)
     return 0
 
 

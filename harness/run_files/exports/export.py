@@ -14,6 +14,8 @@ from harness.run_files.exports.missions import plan_text, waypoints_text
 from harness.run_files.exports.recordings import acmi_text, mcap_bytes
 from harness.run_files.exports.tables import csv_text
 from harness.run_files.run_folder import Run
+from harness.scenario.scenario import Scenario
+from harness.scenario.sections import Origin
 
 TOLERANCE_M: Final = 0.25
 """How far a point that is left out may be from the path, seen from above."""
@@ -34,15 +36,15 @@ FORMATS: Final = (*MISSIONS, *PATHS, *RECORDINGS)
 
 @dataclass(frozen=True)
 class Exported:
-    """What an exported file holds, and what it leaves out.
+    """What an exported file holds, and what its user should know.
 
     Attributes:
         content: of the file.
-        left_out: a sentence about what the format cannot hold, or None.
+        notes: sentences about what the format cannot hold, and what does not hold of the run.
     """
 
     content: bytes
-    left_out: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 def exported(
@@ -69,17 +71,38 @@ def exported(
         if what != "flown":
             raise RunFolderError(f"a file of the format {form} holds the whole flight; leave --what out")
         content = RECORDINGS[form](run)
-        return Exported(content.encode() if isinstance(content, str) else content)
+        encoded = content.encode() if isinstance(content, str) else content
+        return Exported(encoded, _place_note(scenario_of_run(run)))
     path = path_of(run, what, tolerance_m)
     if len(path.latitude_deg) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")
-    if form in PATHS:
-        return Exported(PATHS[form](path).encode())
-    return _mission(run, form, path, ground_m)
-
-
-def _mission(run: Run, form: str, path: ExportedPath, ground_m: float | None) -> Exported:
     scenario = scenario_of_run(run)
+    note = () if form == "csv" else _place_note(scenario)  # a table has the metres of the plane, too
+    if form in PATHS:
+        return Exported(PATHS[form](path).encode(), note)
+    mission = _mission(run, scenario, form, path, ground_m)
+    return Exported(mission.content, (*_outcome_note(run), *note, *mission.notes))
+
+
+def _place_note(scenario: Scenario) -> tuple[str, ...]:
+    """Said of a file that lies somewhere on earth, where nobody said where."""
+    origin = scenario.area.origin
+    if origin != Origin():
+        return ()
+    return (
+        f"area.origin is not given: the file lies about {origin.latitude_deg:g}, {origin.longitude_deg:g}",
+    )
+
+
+def _outcome_note(run: Run) -> tuple[str, ...]:
+    """Said of a mission, which somebody may fly."""
+    if run.metrics["outcome"] == "reached":
+        return ()
+    ended = f"{run.metrics['outcome'].replace('_', ' ')}: {run.metrics['reason']}"
+    return (f"the run did not reach its goal, and its mission would not either ({ended})",)
+
+
+def _mission(run: Run, scenario: Scenario, form: str, path: ExportedPath, ground_m: float | None) -> Exported:
     if ground_m is not None and not ground_m < path.held_altitude_m:
         raise RunFolderError(
             f"--ground-m is {ground_m:g} m, the run flew at {path.held_altitude_m:g} m; the ground must lie below"
@@ -87,9 +110,7 @@ def _mission(run: Run, form: str, path: ExportedPath, ground_m: float | None) ->
     if form == "waypoints":
         return Exported(waypoints_text(path, plane_of(scenario), ground_m).encode())
     others = sum(not obstacle.fixed for obstacle in scenario.obstacles)
-    left_out = (
-        f"not among the plan's fences: {counted(others, 'obstacle')} that moves or appears"
-        if others
-        else None
+    left_out = (f"not among the plan's fences: {counted(others, 'obstacle')} that moves or appears",)
+    return Exported(
+        plan_text(path, scenario, plane_of(scenario), ground_m).encode(), left_out if others else ()
     )
-    return Exported(plan_text(path, scenario, plane_of(scenario), ground_m).encode(), left_out)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -26,9 +27,11 @@ from scipy.spatial.transform import Rotation
 
 from harness.cli.app import main
 from harness.flight.record import FloatArray
+from harness.run_files.exports.export import FORMATS
 from harness.run_files.exports.exported_path import planned_points
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.scenario import parse_scenario
+from harness.scenario.sections import Origin
 
 Export = Callable[..., str]
 
@@ -392,6 +395,34 @@ def test_standard_output_has_the_file_and_nothing_else(
     capsys.readouterr()
     assert main(["export", str(run.folder), "--format", "geojson", "--what", "planned"]) == 0
     assert capsys.readouterr() == (written, "")
+
+
+def test_what_its_user_should_know_is_said(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A file of degrees lies somewhere, though nobody said where; a mission may be flown."""
+    copy = tmp_path / "copy"
+    shutil.copytree(run.folder, copy)
+    place = "area.origin is not given: the file lies about 47, 8\n"
+    text = run.scenario_yaml.replace("latitude_deg: 61.0", "latitude_deg: 47.0").replace("179.5", "8.0")
+    assert parse_scenario(text).area.origin == Origin()
+    (copy / "scenario.yaml").write_text(text)
+    ended: dict[str, Any] = {"outcome": "collision", "reason": "inside an obstacle by 2.4 m"}
+    (copy / "metrics.json").write_text(json.dumps({**run.metrics, **ended}))
+    failed = (
+        "the run did not reach its goal, and its mission would not either (collision: inside an obstacle by"
+    )
+    for form in FORMATS:
+        capsys.readouterr()
+        out = ["--out", str(tmp_path / f"a.{form}")]
+        assert main(["export", str(copy), "--format", form, *out]) == 0
+        said = capsys.readouterr().err
+        assert (place in said) == (form != "csv")
+        assert (failed in said) == (form in ("plan", "waypoints"))
+        assert main(["export", str(run.folder), "--format", form, *out]) == 0
+        said = capsys.readouterr().err
+        assert place not in said
+        assert failed not in said
 
 
 @pytest.mark.parametrize(
