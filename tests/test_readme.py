@@ -31,7 +31,7 @@ READMES = {
 }
 FRONT_DOOR = ROOT / "harness" / "front_door"
 README = READMES["README.md"]
-CAMPAIGNS, HARNESS = READMES["harness/campaign/README.md"], READMES["harness/README.md"]
+CAMPAIGNS, FALSIFY = READMES["harness/campaign/README.md"], READMES["harness/falsify/README.md"]
 SET_UP = "python3 -m venv .venv && .venv/bin/pip install -q -c constraints.txt "
 MOST_LINES = 250
 FLY, TESTS = (line for line in README.splitlines() if line.startswith(SET_UP))
@@ -196,8 +196,8 @@ def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tm
 
 @pytest.mark.flights
 def test_the_breaking_point_is_found_as_shown(tmp_path: Path) -> None:
-    (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", HARNESS)
-    (shown,) = (block for block in blocks("text", HARNESS) if "mildest found" in block)
+    (command,) = re.findall(r"`wayproof (falsify aerosonde_forest [^`]+)`", FALSIFY)
+    (shown,) = (block for block in blocks("text", FALSIFY) if "mildest found" in block)
     searched = wayproof(command.replace("--runs 24", "--runs 8"), tmp_path, timeout_s=600)
     assert (searched.returncode, searched.stderr) == (0, "")
     names = [line[:29].strip() for line in shown.splitlines()[2:5]]

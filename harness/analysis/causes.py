@@ -1,4 +1,9 @@
-"""Why what was planned could not be tracked: the limit that the aircraft was at while the error grew."""
+"""Why what was planned could not be tracked: the limit that the aircraft was at while the error grew.
+
+`harness.analysis.trackability.Leg` lists the causes. Two that are easily mistaken for one another: in "turn radius too
+tight" the plan has a radius below V^2 / (g tan bank limit), which no guidance could fly; in "bank limit" the radius is
+feasible, and guidance asked for all the bank there is nonetheless.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +82,7 @@ def _before_peak(track: Track, peak: int, threshold_m: float) -> Track:
 
 
 def _lateral_cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> str:
-    """Why the cross-track error became large, from the rows before its peak."""
+    """Why the cross-track error became large, from the rows before its peak: the first cause that applies."""
     error = np.abs(lead.cross_track_m)
     begins = int(np.searchsorted(track.plan_index, lead.plan_index[-1]))
     at_start = abs(float(track.cross_track_m[begins]))

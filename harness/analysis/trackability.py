@@ -40,28 +40,37 @@ class Leg:
         corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
         max_deviation_m: largest distance from the path as given; None where a planner made the path.
         trackable: whether all of them stayed within what they may be.
-        cause: why not; None where trackable. The first that applies of:
-            "lost control";
-            "navigation error": what is too large of the true cross-track or altitude error is not too large of the
-            believed one: the aircraft did what it was to do, elsewhere;
+        cause: why not; None where trackable. Of several limits that were exceeded the first counts: cross-track error,
+            load factor, airspeed, altitude, distance from the path as given.
+
+            "lost control": the flight ended so, before any other.
+
+            Of the cross-track error, the first that applies, as `harness.analysis.causes` tells them:
+            "navigation error": what the aircraft believed of the error stayed within the limit (of the altitude too);
             "planner too late": the aircraft was off the plan already when it took effect;
-            "sensor horizon": a turn too tight, near an obstacle that the sensor shows too late for any other;
-            "turn radius too tight": the plan bends more than the bank limit allows in calm air, or is further from
-            the path as given than it may be, which it is at corners;
-            "climb too steep", "descent too steep": the altitude is off, and the path asks for more than the fastest
-            climb or descent of the aircraft;
-            "speed or throttle saturation": the airspeed is off by more than it may be, or the throttle at a
-            stop while altitude is lost;
-            "actuator" in place of these: the servo of elevator or throttle was at its rate limit for longer than the
-            throttle command at a stop;
-            "wind drift": the bank is used up in a turn that only the wind makes too tight, or the aircraft is
-            off downwind in a cross-wind;
-            "bank limit": the guidance asked for all the bank there is, for longer than the aircraft rolled as
+            "sensor horizon": a radius below V^2 / (g tan bank limit), near an obstacle that the sensor shows too late
+            for any other;
+            "turn radius too tight": such a radius, elsewhere;
+            "actuator", "speed or throttle saturation": the airspeed is off by more than it may be, as below;
+            "wind drift": the bank was at its limit, on a radius that only the wind makes too tight;
+            "bank limit": the bank command was at its limit on a feasible radius, for longer than the aircraft rolled as
             fast as it may;
+            "wind drift": the aircraft is off downwind in a cross-wind;
             "actuator": the servo of aileron or rudder was at its rate limit;
             "roll rate": the aircraft rolled as fast as it may;
             "load factor": it is larger than it may be;
             "tracking error": none of these.
+
+            Of the load factor: "load factor".
+
+            Of the airspeed: "actuator" where the servo of elevator or throttle was at its rate limit for longer than
+            the throttle command at a stop, else "speed or throttle saturation".
+
+            Of the altitude: "climb too steep", "descent too steep": the path asks for more than the fastest climb or
+            descent of the aircraft; "actuator" as for the airspeed; "speed or throttle saturation": the throttle was at
+            a stop; "tracking error": none of these.
+
+            Of the distance from the path as given: "turn radius too tight": it is too large at corners.
     """
 
     start_s: float

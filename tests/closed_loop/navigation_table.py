@@ -1,4 +1,4 @@
-"""The table of navigation in harness/README.md: `python -m tests.closed_loop.navigation_table [MOST]`.
+"""The table of navigation in harness/flight/README.md: `python -m tests.closed_loop.navigation_table [MOST]`.
 
 Public worlds in wind of 30 % and moderate turbulence, each flown with every kind of navigation. Prints a row for each
 family; MOST is how many worlds of a family are flown.
