@@ -1,4 +1,4 @@
-"""The table of the fleet in aircraft/README.md: `python -m tests.closed_loop.fleet_table [LOG] [AIRCRAFT...]`.
+"""The table of the fleet in aircraft/MEASURED.md: `python -m tests.closed_loop.fleet_table [LOG] [AIRCRAFT...]`.
 
 Every listed aircraft flies worlds that are the same in units of its own turn radius in calm air: discs, clearance, and
 the sensing range, which grows with the radius that the law needs. Prints a row for each aircraft, with a cell for each

@@ -1,4 +1,4 @@
-"""The table of guidance laws in wind in aircraft/README.md: `python -m tests.closed_loop.laws_table [MOST] [LOG]`.
+"""The table of guidance laws in wind in aircraft/MEASURED.md: `python -m tests.closed_loop.laws_table [MOST] [LOG]`.
 
 Each law flies the Aerosonde through public worlds in wind of 30 % of the airspeed: the plan itself, and for npfg and L1
 the plan as a mission of waypoints too. Prints a row for each, with the collisions and the least clearance of each

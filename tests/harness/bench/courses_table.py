@@ -1,4 +1,4 @@
-"""The tables of courses of 14 turns in aircraft/README.md: `python -m tests.harness.bench.courses_table`.
+"""The tables of courses of 14 turns in aircraft/MEASURED.md: `python -m tests.harness.bench.courses_table`.
 
 It takes [TABLE] [SEEDS]. TABLE is `laws`, `servos` or `aircraft`; all three without one. Each cell is the worst of
 SEEDS courses, flown with the default step rate.
