@@ -78,14 +78,7 @@ def blueprint(
     plan: rrb.Container | rrb.View = plan_view(frame, runs)
     if on_earth:
         plan = rrb.Tabs(plan, rrb.MapView(origin=MAP, name="Map"), active_tab=0)
-    events = rrb.TextLogView(
-        origin=EVENTS,
-        name="Events",
-        columns=rrb.TextLogColumns(
-            timeline_columns=[rrb.encodings.TimelineColumn(TIMELINE, visible=False)],
-            text_log_columns=["Body"],
-        ),
-    )
+    events = _events_view()
     about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
     colours = rrb.TextDocumentView(origin=COLOURS, name="Colours")
     states = rrb.StateTimelineView(origin=STATES, name="States", time_view=_whole_flight())
@@ -132,7 +125,7 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
     """
     lanes = sum(each.startswith(f"/{STATES}/") for each in entities)
     if not lanes and len(runs) == 1:
-        return thin_blueprint(frame)
+        return thin_blueprint(frame, lean=False)
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
     without = [name for _, names in PLOTS for name in names if name not in drawn]
     on_earth = any(each.startswith(f"/{MAP}/") for each in entities)
@@ -149,12 +142,28 @@ THIN_SERIES: Final = ("cross_track", "clearance", "bank")
 """Time series of a thin recording."""
 
 
-def thin_blueprint(frame: Frame) -> Layout:
+def _events_view() -> rrb.TextLogView:
+    """The log of events: one column, for each event says its time."""
+    return rrb.TextLogView(
+        origin=EVENTS,
+        name="Events",
+        columns=rrb.TextLogColumns(
+            timeline_columns=[rrb.encodings.TimelineColumn(TIMELINE, visible=False)],
+            text_log_columns=["Body"],
+        ),
+    )
+
+
+def thin_blueprint(frame: Frame, lean: bool = True) -> Layout:
     """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series.
 
-    Every component of a layout takes 1.5 kB of the file, most of that in its table of contents: there are few.
+    Args:
+        frame: what to frame the views on.
+        lean: it lies in the file, where every component of a layout takes 1.5 kB, most of that in the table of
+            contents: there are few. Else events have one column, and the bank a plot high enough for numbers.
     """
-    events = rrb.TextLogView(origin=EVENTS, name="Events")
+    events = rrb.TextLogView(origin=EVENTS, name="Events") if lean else _events_view()
+    shares = None if lean else [share for share, _ in PLOTS]
     about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
     return Layout(
         rrb.Horizontal(
@@ -163,7 +172,7 @@ def thin_blueprint(frame: Frame) -> Layout:
                 rrb.Horizontal(events, about),
                 row_shares=[12, 5],
             ),
-            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES, background=False)),
+            rrb.Vertical(*series_views(frame, ("",), THIN_SERIES, background=False), row_shares=shares),
             column_shares=[13, 6],
         ),
         rrb.TimePanel(timeline=TIMELINE, play_state="paused", state="collapsed", playback_speed=60.0),

@@ -23,6 +23,7 @@ from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.recording import catalog as catalogs
 from harness.recording.blueprint import Frame
 from harness.recording.catalog import catalog, table_screenshot
+from harness.recording.layout import layout_of, thin_blueprint
 from harness.recording.properties import properties_of, run_properties, severity
 from harness.recording.thin import ThinLog
 from harness.recording.viewer import NO_DRIVER, SETTLE_S, ViewerError
@@ -167,6 +168,19 @@ def test_a_run_of_the_table_opens_in_our_layout(campaign: Path) -> None:
     with catalog("small", recordings_of(campaign)) as served:
         assert served.dataset.default_blueprint() is not None
         assert served.dataset.default_segment_table_blueprint() is not None
+
+
+def test_only_the_layout_inside_a_thin_file_is_lean() -> None:
+    """The table's own takes no room of a file: its events are one column, its bank is numbered."""
+    frame = Frame((0.0, 0.0, 100.0, 100.0), 300.0, 40.0)
+    lean, roomy = thin_blueprint(frame), layout_of(frame, {"/series/bank/flown"})
+    layouts: tuple[tuple[Any, bool, list[int] | None], ...] = ((lean, False, None), (roomy, True, [4, 4, 5]))
+    for layout, one_column, shares in layouts:
+        left, plots = layout.root_container.contents
+        events = left.contents[1].contents[0]
+        assert ("TextLogColumns" in events.properties) == one_column
+        assert plots.row_shares == shares
+        layout.let_go()
 
 
 def test_the_layout_of_all_runs_is_framed_on_all_of_them() -> None:
