@@ -60,8 +60,8 @@ class LinearMotions:
         return within
 
 
-def gaps_to(boxes: FloatArray, east: float, north: float) -> FloatArray:
-    """(n,) signed distances from a point to rounded boxes (5, n).
+def gaps_to(boxes: FloatArray, east: float | FloatArray, north: float | FloatArray) -> FloatArray:
+    """(n,) signed distances from a point to rounded boxes (5, n); (n, k) from k points to (5, n, 1).
 
     A shape inside a box is never nearer than the box (formula: Quilez, "2D distance functions").
     """

@@ -40,6 +40,10 @@ NO_EDGES = np.zeros((4, 0))
 _BLOCK_ROWS = 256
 # What bounds are given to spare, for rounding.
 _ROUNDING_M = 1e-6
+# Of so few obstacles the exact distance is sooner known than which of them are nearest.
+_SOME = 8
+# Points and boxes that are compared at once: some tens of megabytes.
+_PAIRS_AT_ONCE = 1_000_000
 # The boxes of no more obstacles than these are compared all at once, which is sooner done than to ask the tree.
 _FEW = 512
 
@@ -301,12 +305,30 @@ class World:
         nearest = float(probe.distance(np.array([[east, north]]), np.zeros(1))[0])
         return max(nearest, 0.0) + 2.0 * slack + _ROUNDING_M
 
+    def _contenders(self, listed: list[int], points: FloatArray) -> list[int]:
+        """Those of some standing obstacles that may be the nearest to one of the points.
+
+        An obstacle touches all sides of its box, so it is no farther from a point than the box and its diagonal are.
+        """
+        if len(listed) <= _SOME:
+            return listed
+        boxes = self._boxes[:, listed, None]
+        diagonals = 2.0 * (np.hypot(boxes[2], boxes[3]) + boxes[4])
+        kept = np.zeros(len(listed), dtype=np.bool_)
+        at_once = max(_PAIRS_AT_ONCE // len(listed), 1)
+        for first in range(0, len(points), at_once):
+            east, north = points[first : first + at_once].T
+            gaps = gaps_to(boxes, east, north)
+            reach = (np.maximum(gaps, 0.0) + diagonals).min(axis=0) + _ROUNDING_M
+            kept |= (gaps <= reach).any(axis=1)
+        return [index for index, may in zip(listed, kept.tolist(), strict=True) if may]
+
     def _block_clearance(self, points: FloatArray, times: FloatArray) -> FloatArray:
         """`clearance` for finite rows near one another."""
         low, high = points.min(axis=0), points.max(axis=0)
         (east, north), half_m = ((low + high) / 2).tolist(), math.hypot(*(high - low)) / 2
         result = np.full(len(points), math.inf)
-        for index in self._nearest(east, north, half_m):
+        for index in self._contenders(self._nearest(east, north, half_m), points):
             np.minimum(result, self.obstacles[index].distance(points, times), out=result)
         if len(self._changing):
             start, stop = float(times.min()), float(times.max())

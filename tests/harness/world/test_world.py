@@ -342,6 +342,32 @@ def test_exact_geometry_is_asked_only_of_obstacles_that_may_be_nearest(
     assert not set(asked) & set(far)
 
 
+@pytest.mark.parametrize("count", [9, 3000])
+def test_of_many_obstacles_as_far_away_few_are_asked_and_the_answer_is_the_same(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ring of small ones about a track: all are candidates for the block, one or two for a row."""
+    rng = np.random.default_rng(3)
+    turns = np.arange(count) * math.tau / count
+    ring = [
+        Obstacle(star(rng, 9000.0 * math.cos(turn), 9000.0 * math.sin(turn), 12.0)) for turn in turns.tolist()
+    ]
+    world = World(ring, (-1e4, -1e4, 1e4, 1e4))
+    points, times = np.column_stack((np.linspace(-300.0, 300.0, 200), np.full(200, 80.0))), np.zeros(200)
+    wanted = np.min([each.distance(points, times) for each in ring], axis=0)
+    asked = 0
+    exact = Polygon.distance
+
+    def spy(self: Polygon, east_m: FloatArray, north_m: FloatArray) -> FloatArray:
+        nonlocal asked
+        asked += 1
+        return exact(self, east_m, north_m)
+
+    monkeypatch.setattr(Polygon, "distance", spy)
+    assert np.array_equal(world.clearance(points, times), wanted)
+    assert asked < max(0.7 * count, 10)
+
+
 def test_from_scenario_takes_shape_motion_and_window() -> None:
     circle = scenario_obstacles.Circle(center_m=(1.0, 2.0), radius_m=3.0)
     polygon = scenario_obstacles.Polygon(vertices_m=((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))
