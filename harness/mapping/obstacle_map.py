@@ -34,6 +34,9 @@ FOLLOWED = 0.75
 """this share of both where somebody has followed the rays already, and"""
 ASTIR = 0.25
 """this one while something moves, comes or goes."""
+PLACED_ANEW, NEARER, OFF = 8.0, 0.7, 0.01
+"""Where poses err, an edge is moved that is within so many clearances, seen from this share of the least range at which
+it was seen before, and off by this share of the clearance."""
 LOOK_THROUGH_EVERY = 6
 """Every so many scans, from the first on, the points in range are asked whether they were looked through; every
 other time only where none was the last time."""
@@ -49,6 +52,8 @@ class ObstacleMap:
         range_m: sensing range.
         doubtful: the sensor may return what is not there: a single hit is not believed.
         revision: to count from, where it follows another map.
+        shifted: the poses of scans err. An edge is the more misplaced the further away it was seen from, so one that
+            is seen from nearer by is moved to where it is seen now.
     """
 
     def __init__(
@@ -58,6 +63,7 @@ class ObstacleMap:
         range_m: float,
         doubtful: bool = True,
         revision: int = 0,
+        shifted: bool = False,
     ) -> None:
         grid = EdgeGrid.over(bounds_m, clearance_m)
         self._cell, self._origin, self._nx, self._ny = grid.cell_m, grid.corner, grid.columns, grid.rows
@@ -74,6 +80,8 @@ class ObstacleMap:
         self._clearance, self._near_by = clearance_m, DETAIL[0][0] * clearance_m
         self._range = range_m
         self._doubtful, self._first_score = doubtful, 1 if doubtful else CONFIRMED
+        self._shifted, self._scanned_at = shifted, 0j  # the latter: from where the scan before was taken
+        self._seen_from_m = np.zeros(0)  # by slot: least range at which it was seen, where poses err
         self.revision = revision
         """Grows with every change of the set of edge points."""
         self.last_removal_revision = revision
@@ -142,6 +150,8 @@ class ObstacleMap:
         hits, places = self._hits(scan, ignored)
         if not len(hits):
             return
+        if self._shifted:
+            self._place_anew(scan, scan.ranges_m[hits], places)
         if not self._holds(scan):
             column, row = self._column_and_row(places)
             on_grid = (column >= 0) & (column < self._nx) & (row >= 0) & (row < self._ny)
@@ -172,6 +182,34 @@ class ObstacleMap:
                     again.append((fine[sure], at[sure]))
         for each in ((cells, found), *again):
             self._count_hits(*each)
+
+    def _place_anew(self, scan: RangeScan, ranges_m: FloatArray, places: ComplexArray) -> None:
+        """Moves edges to where they are seen now, within their cells, if that is from much nearer by than before.
+
+        Args:
+            scan: the scan.
+            ranges_m: (n,) of its hits,
+            places: (n,) and where they are, from the corner of the grid.
+        """
+        new = self._points[len(self._seen_from_m) : self._count]  # came in with the scan before
+        self._seen_from_m = np.concatenate((self._seen_from_m, np.abs(new - self._scanned_at)))
+        self._scanned_at = complex(scan.east_m, scan.north_m)
+        column, row = self._column_and_row(places)
+        near = (ranges_m < PLACED_ANEW * self._clearance) & (column >= 0) & (column < self._nx)
+        among = (near & (row >= 0) & (row < self._ny)).nonzero()[0]
+        cells, first = np.unique(column[among] * self._ny + row[among], return_index=True)
+        held = self._slot[cells] >= 0
+        hits, slots = among[first[held]], self._slot[cells[held]]
+        nearer = ranges_m[hits] < NEARER * self._seen_from_m[slots]
+        hits, slots = hits[nearer], slots[nearer]
+        self._seen_from_m[slots] = ranges_m[hits]
+        found = places[hits] + self._origin
+        off = np.abs(self._points[slots] - found) > OFF * self._clearance
+        self._points[slots[off]] = found[off]
+        moved = slots[off & (self._score[self._key[slots]] >= CONFIRMED)]
+        if len(moved):
+            self.revision += 1
+            self._since[moved] = self.last_removal_revision = self.revision
 
     def _hits(self, scan: RangeScan, ignored: BoolArray | None) -> tuple[IntArray, ComplexArray]:
         """Rays that met an edge, and where they did, from the corner of the grid."""

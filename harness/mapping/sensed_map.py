@@ -96,7 +96,7 @@ class SensedMap:
                 stands=edges.stands,
             )
         else:
-            self._edges = ObstacleMap(*self._area, self._false_returns, revision)
+            self._edges = ObstacleMap(*self._area, self._false_returns, revision, self._pose_error > 0.0)
             self._moving = MovingObstacles(self._clearance, self._shifted, self._false_returns)
 
     def start_over(self, time_s: float) -> None:

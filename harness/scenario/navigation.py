@@ -172,7 +172,8 @@ class Navigation(Section):
     margin_m: float = key(
         "What the planner keeps from obstacles beyond planner.clearance_m.",
         unit="m",
-        derived="3 sigma, the bias, and the drift of the longest outage, or of half a turn where that is less",
+        derived="3 sigma, the bias, the drift of the longest outage, or of half a turn where that is less, and what 3 "
+        "sigma of the heading misplace an edge by that is one clearance away, or as far as it takes to turn aside",
         ge=0,
         le=MAX_ERROR_M,
     )
@@ -208,6 +209,8 @@ def planning_margin_m(
     time_limit_s: float,
     k: float = SIGMAS,
     unseen_m: float = math.inf,
+    clearance_m: float = 0.0,
+    turn_radius_m: float = 0.0,
 ) -> float:
     """What clearance must have on top, so that the true aircraft keeps it where the believed one does.
 
@@ -217,6 +220,13 @@ def planning_margin_m(
     an error whose two components are normal with the same sigma, 1 - exp(-k^2 / 2) of all errors are within k sigma:
     98.9 % for 3.
 
+    A heading error turns the scan about the aircraft: an edge at distance d is misplaced by d times the error, square
+    to where it is seen. An edge that is passed at the clearance c is beside the aircraft then, and its error lies along
+    the way. Before, the map places it anew whenever it is seen from 0.7 of the distance
+    (`harness.mapping.obstacle_map`), the last time within c / 0.7. That is sqrt(1 / 0.7^2 - 1) c, one clearance, before
+    it is passed. An aircraft with turn radius R needs more than that where 4 R e is more: so far it flies while it
+    turns aside by e times that way, left and right. k sigma of the heading times the longer way is added.
+
     Args:
         navigation: its errors.
         speed_mps: greatest speed over the ground, wind included.
@@ -224,6 +234,8 @@ def planning_margin_m(
         k: sigmas.
         unseen_m: what is passed was seen no longer ago than this distance flown; a scenario has half a turn, during
             which a sensor that looks ahead may lose sight of it.
+        clearance_m: wanted distance from obstacles,
+        turn_radius_m: and that of plans, for the heading; where both are 0 it is left out.
 
     Returns:
         The margin in metres; 0 for perfect navigation.
@@ -233,4 +245,6 @@ def planning_margin_m(
         default=0.0,
     )
     drift_m = navigation.drift_share * min(speed_mps * longest_s, unseen_m)
-    return k * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m) + drift_m
+    turned_rad = k * math.radians(navigation.heading_sigma_deg)
+    turned_m = turned_rad * max(clearance_m, 4.0 * turn_radius_m * turned_rad)
+    return k * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m) + drift_m + turned_m

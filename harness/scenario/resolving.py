@@ -67,7 +67,14 @@ def resolve(
         least_width_m=max(planner.clearance_m, LEAST_CLEARANCE * radius_m),
     )
     fastest_mps, unseen_m = aircraft.airspeed_mps + wind_mps, math.pi * radius_m
-    margin_m = planning_margin_m(keys.navigation, fastest_mps, mission.time_limit_s, unseen_m=unseen_m)
+    margin_m = planning_margin_m(
+        keys.navigation,
+        fastest_mps,
+        mission.time_limit_s,
+        unseen_m=unseen_m,
+        clearance_m=planner.clearance_m,
+        turn_radius_m=radius_m,
+    )
     navigation = _filled(keys.navigation, margin_m=margin_m)
     limits = _filled(
         keys.trackability, cross_track_m=tolerance_m(planner.clearance_m, performance.tracking_error_m)

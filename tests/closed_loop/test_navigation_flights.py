@@ -98,7 +98,12 @@ def test_metrics_have_the_error_and_its_cause(scenario: Scenario, flight: Flight
 def test_the_plan_keeps_the_margin_beyond_the_clearance(scenario: Scenario) -> None:
     wanted, margin = scenario.planner.clearance_m, scenario.navigation.margin_m
     radius_m = mission_of(scenario).turn_radius_m
-    assert margin == pytest.approx(3.0 * 4.7 + 0.03 * min(25.0 * 60.0, math.pi * radius_m))
+    turned_rad = 3.0 * math.radians(1.0)
+    assert margin == pytest.approx(
+        3.0 * 4.7
+        + 0.03 * min(25.0 * 60.0, math.pi * radius_m)
+        + turned_rad * max(wanted, 4.0 * radius_m * turned_rad)
+    )
     assert mission_of(scenario).clearance_m == pytest.approx(wanted + margin)
     assert flight_limits(scenario).clearance_m == wanted
     given = scenario.with_({"navigation.margin_m": 3.0})

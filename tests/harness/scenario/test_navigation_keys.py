@@ -105,3 +105,19 @@ def test_the_margin_is_sigmas_bias_and_the_longest_outage(
 ) -> None:
     navigation = Navigation.model_validate(keys)
     assert planning_margin_m(navigation, 25.0, 1000.0, k) == pytest.approx(margin_m)
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "clearance_m", "radius_m", "along_m"),
+    [
+        (1.0, 300.0, 187.0, 300.0),
+        (1.0, 20.0, 187.0, 4.0 * 187.0 * 3.0 * math.radians(1.0)),  # 39 m to turn aside by 2 m
+        (0.0, 300.0, 187.0, 0.0),
+    ],
+)
+def test_the_margin_has_what_the_heading_misplaces_an_edge_by_before_the_plan_is_mended(
+    heading_deg: float, clearance_m: float, radius_m: float, along_m: float
+) -> None:
+    navigation = Navigation(kind="rtk", heading_sigma_deg=heading_deg)
+    margin_m = planning_margin_m(navigation, 25.0, 1000.0, clearance_m=clearance_m, turn_radius_m=radius_m)
+    assert margin_m == pytest.approx(3.0 * 0.017 + 3.0 * math.radians(heading_deg) * along_m)
