@@ -204,6 +204,8 @@ def _count_free(
 
 def _disc(cells: int) -> BoolArray:
     """(2 k + 1, 2 k + 1) which cells lie within k cells of the middle one."""
-    away = np.arange(-cells, cells + 1) ** 2
-    disc: BoolArray = away[:, None] + away <= cells * cells
+    away = np.arange(-cells, cells + 1)
+    # Row by row, so that of a large disc nothing but the answer takes room.
+    halves = np.floor(np.sqrt(cells * cells - away * away)).astype(np.int64)
+    disc: BoolArray = np.abs(away) <= halves[:, None]
     return disc

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.mapping.free_space import FreeSpace
+from harness.mapping.free_space import FreeSpace, _disc
 from harness.mapping.scan import RangeScan
 from harness.world.world import Circle
 from tests.harness.looking import (
@@ -244,3 +245,16 @@ def test_what_has_appeared_hides_what_is_behind_it_on_both_its_sides_and_no_more
     half = math.asin(1.5 * FREE_CELL / away)
     assert not free[(aside < half - off) & (distance > away - 0.25 * FREE_CELL)].any()
     assert free[(aside > half + off + 2.0 * scan.spacing_rad) | (distance < away - 1.75 * FREE_CELL)].all()
+
+
+def test_a_disc_of_cells_takes_no_more_room_than_its_answer() -> None:
+    """Numbers of eight bytes for each of its cells took a gigabyte where the range is longer than a wide area."""
+    for cells in (0, 1, 7, 50, 999):
+        away = np.arange(-cells, cells + 1) ** 2
+        assert np.array_equal(_disc(cells), away[:, None] + away <= cells * cells)
+    tracemalloc.start()
+    try:
+        disc = _disc(1500)
+        assert tracemalloc.get_traced_memory()[1] < 1.2 * disc.size
+    finally:
+        tracemalloc.stop()
