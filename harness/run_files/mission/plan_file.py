@@ -137,13 +137,22 @@ def _with_place(params: list[Any], place: list[Any]) -> list[Any]:
 
 
 def _landing(item: dict[str, Any], key: str, source: str, number: int, land: int) -> Iterator[Item]:
-    """A landing pattern: where it descends in a turn or on the way, and where it lands."""
-    relative = item.get("altitudesAreRelative", True)
-    if not isinstance(relative, bool):
-        raise InputError(f"{source}: {key}.altitudesAreRelative: must be true or false")
-    frame = RELATIVE if relative else ABSOLUTE
+    """A landing pattern: where it descends in a turn or on the way, and where it lands.
+
+    Its earlier versions have `loiterCoordinate` for the approach, and each altitude says what it is above.
+    """
+    approach_name = "landingApproachCoordinate"
+    if approach_name not in item and "loiterCoordinate" in item:
+        approach_name = "loiterCoordinate"
+    frames = []
+    for name in ("loiterAltitudeRelative", "landAltitudeRelative"):
+        name = name if name in item and "altitudesAreRelative" not in item else "altitudesAreRelative"
+        relative = item.get(name, True)
+        if not isinstance(relative, bool):
+            raise InputError(f"{source}: {key}.{name}: must be true or false")
+        frames.append(RELATIVE if relative else ABSOLUTE)
     places = []
-    for name in ("landingApproachCoordinate", "landCoordinate"):
+    for name in (approach_name, "landCoordinate"):
         place = item.get(name)
         if not isinstance(place, list) or len(place) != 3:
             raise InputError(f"{source}: {key}.{name}: must be [latitude, longitude, altitude]")
@@ -156,8 +165,8 @@ def _landing(item: dict[str, Any], key: str, source: str, number: int, land: int
     command = commands.LOITER_TO_ALTITUDE if turning else commands.WAYPOINT
     place = f"{source}: {key}"
     yield Item(place, number, commands.LAND_START, 2, (0.0,) * 7)
-    yield Item(place, number + 1, command, frame, (*first, *approach))
-    yield Item(place, number + 2, land, frame, (0.0, 0.0, 0.0, 0.0, *landing))
+    yield Item(place, number + 1, command, frames[0], (*first, *approach))
+    yield Item(place, number + 2, land, frames[1], (0.0, 0.0, 0.0, 0.0, *landing))
 
 
 def _fences(geofence: Any, source: str, inside_all: bool) -> Fences:

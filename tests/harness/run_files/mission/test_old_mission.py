@@ -24,7 +24,7 @@ def old(command: int, *place: float, number: int, **more: Any) -> dict[str, Any]
     return {**given, **params, "autoContinue": True, **more}
 
 
-VERSION_1 = {
+VERSION_1: dict[str, Any] = {
     "MAV_AUTOPILOT": 3,
     "version": "1.0",
     "items": [
@@ -35,7 +35,7 @@ VERSION_1 = {
     "complexItems": [{"complexItemType": "survey", "id": 2, "polygon": []}],
     "plannedHomePosition": old(16, 47.0, 8.0, 400, number=0, frame=0),
 }
-VERSION_2 = {
+VERSION_2: dict[str, Any] = {
     "fileType": "Mission",
     "version": 2,
     "items": [
@@ -77,6 +77,34 @@ def test_a_mission_of_version_2(tmp_path: Path) -> None:
 def test_what_is_none_is_told(content: Any, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"m\.mission: items: is missing"):
         read(tmp_path / "m.mission", content)
+
+
+@pytest.mark.parametrize(
+    ("more", "above"),
+    [
+        ({"altitudesAreRelative": True}, ["home", "home"]),
+        ({"altitudesAreRelative": False}, ["sea", "sea"]),
+        ({"loiterAltitudeRelative": False, "landAltitudeRelative": True}, ["sea", "home"]),
+    ],
+)
+def test_a_landing_pattern_of_earlier_plans(more: dict[str, Any], above: list[str], tmp_path: Path) -> None:
+    landing = {
+        **{"type": "ComplexItem", "complexItemType": "fwLandingPattern", "landCoordinate": [47.0, 8.0, 0]},
+        **{"loiterCoordinate": [47.01, 8.0, 40], "loiterRadius": 75, "loiterClockwise": False, **more},
+    }
+    mission = {"items": [*VERSION_2["items"], landing], "plannedHomePosition": [47.0, 8.0, 400]}
+    found = read(tmp_path / "m.plan", {"fileType": "Plan", "mission": mission})
+    assert found.mission is not None
+    loiter, land = found.mission.program.steps[-2:]
+    assert (loiter.position, loiter.height_m, land.position, land.landing) == (
+        (47.01, 8.0),
+        40,
+        (47.0, 8.0),
+        True,
+    )
+    assert loiter.loiter is not None
+    assert (loiter.loiter.radius_m, loiter.loiter.clockwise) == (75.0, False)
+    assert [loiter.above, land.above] == above
 
 
 def test_a_mission_of_inav_is_named(tmp_path: Path) -> None:
