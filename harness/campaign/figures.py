@@ -6,6 +6,7 @@ Drawn without a screen.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -27,6 +28,10 @@ PANEL_IN = 1.5
 """Height of a panel of small multiples."""
 MAPS_A_ROW, MAP_TITLE_IN = 3, 0.45
 """Maps of failures beside one another, and what each has above and below it."""
+MAP_TICKS_IN = 0.3
+"""What each has beside it."""
+ROW_LETTERS = 56
+"""So many letters of names below panels are as wide as the figure."""
 LABEL_LETTERS = 32
 """A longer label of a group loses its middle, for it takes room from what is drawn."""
 
@@ -89,10 +94,11 @@ def scatter(points: RunPoints) -> Figure | None:
     if not points.varied or not points.figures:
         return None
     rows, columns = len(points.figures), len(points.varied)
-    with styled(0.5 + PANEL_IN * rows) as figure:
+    names = [_wrapped(key, ROW_LETTERS // columns) for key in points.varied]
+    with styled(0.5 + PANEL_IN * rows + ROW_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
         for row, (label, values) in enumerate(points.figures.items()):
-            for column, (key, numbers) in enumerate(points.varied.items()):
+            for column, numbers in enumerate(points.varied.values()):
                 axes = grid[row][column]
                 for among, marker, shade in (
                     (points.reached, ".", colour(0)),
@@ -103,7 +109,7 @@ def scatter(points: RunPoints) -> Figure | None:
                 if column == 0:
                     axes.set_ylabel(label)
                 if row == rows - 1:
-                    axes.set_xlabel(_short(key))
+                    axes.set_xlabel(names[column])
     return figure
 
 
@@ -113,7 +119,7 @@ def where_failed(failed: Sequence[Failure]) -> Figure:
     rows = math.ceil(len(failed) / columns)
     bounds = [each.scene.bounds_m for each in failed]
     shape = max((ymax - ymin) / (xmax - xmin) for xmin, ymin, xmax, ymax in bounds)
-    with styled(rows * (min(shape, 2.0) * WIDTH_IN / columns + MAP_TITLE_IN)) as figure:
+    with styled(rows * (min(shape, 2.0) * (WIDTH_IN / columns - MAP_TICKS_IN) + MAP_TITLE_IN)) as figure:
         grid = figure.subplots(rows, columns, squeeze=False).flat
         for each, axes in zip(failed, grid, strict=False):  # in this order: the other takes one axes too many
             draw_map(axes, each.scene)
@@ -128,9 +134,18 @@ def where_failed(failed: Sequence[Failure]) -> Figure:
     return figure
 
 
-def _short(label: str) -> str:
-    end = (LABEL_LETTERS - len("...")) // 2
-    return label if len(label) <= LABEL_LETTERS else f"{label[:end]}...{label[-end:]}"
+def _short(label: str, letters: int = LABEL_LETTERS) -> str:
+    end = (letters - len("...")) // 2
+    return label if len(label) <= letters else f"{label[:end]}...{label[-end:]}"
+
+
+def _wrapped(key: str, letters: int) -> str:
+    """A key path over several lines, broken behind its dots; names of neighbours do not run into each other."""
+    lines = [""]
+    for part in re.findall(r"[^.]+\.?", key):
+        lines += [""] if lines[-1] and len(lines[-1] + part) > letters else []
+        lines[-1] += _short(part, letters)
+    return "\n".join(lines)
 
 
 def _height_in(planners: Sequence[str]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.campaign.figures import LABEL_LETTERS, lengths, success, where_failed
+from harness.campaign.figures import LABEL_LETTERS, lengths, scatter, success, where_failed
 from harness.campaign.groups import Axis
-from harness.campaign.points import MOST_FAILURES, failures
+from harness.campaign.points import MOST_FAILURES, RunPoints, failures
 from harness.campaign.summary import CURVE_POINTS, Cell, Table
 from harness.report.figure_style import svg
 from harness.run.scenario_flight import fly_to_folder, kinematic_loop
@@ -69,6 +70,23 @@ def test_names_are_drawn_as_they_are_and_without_a_word() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         svg(success(table(labels, ("bug2",))))
+
+
+def test_names_below_panels_do_not_run_into_each_other() -> None:
+    keys = (
+        "environment.wind.speed_mps",
+        "environment.wind.from_deg",
+        "sensor.range_noise_m",
+        "obstacles.0.n" + 30 * "x",
+    )
+    runs = np.arange(3.0)
+    points = RunPoints(dict.fromkeys(keys, runs), {"length / optimum": runs}, np.ones(3, dtype=bool))
+    figure = scatter(points)
+    assert figure is not None
+    svg(figure)
+    boxes = [axes.xaxis.label.get_window_extent() for axes in figure.axes]
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
+    assert figure.axes[0].get_xlabel() == "environment.\nwind.speed_mps"
 
 
 @pytest.fixture
