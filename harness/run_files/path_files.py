@@ -158,7 +158,7 @@ def given_points(points: Any) -> PathAsGiven:
     """A drawn path from points in the local plane.
 
     Args:
-        points: (n, 2) east, north in metres; a third column, the altitude above mean sea level, is the same at all.
+        points: (n, 2) east, north in metres; (n, 3) with the altitude above mean sea level, linear along legs.
 
     Raises:
         InputError: they are no such array, not finite, too far, or all in one place.
@@ -166,9 +166,13 @@ def given_points(points: Any) -> PathAsGiven:
     try:
         array = np.array(points, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"path: is no array of numbers ({error}); must be (n, 2): east, north") from error
+        raise InputError(
+            f"path: is no array of numbers ({error}); must be (n, 2), or (n, 3) with altitudes: metres"
+        ) from error
     if array.ndim != 2 or array.shape[1] not in (2, 3) or len(array) < 2:
-        raise InputError(f"path: has the shape {array.shape}; must be (n, 2), n at least 2: east, north")
+        raise InputError(
+            f"path: has the shape {array.shape}; must be (n, 2), or (n, 3) with altitudes, n at least 2"
+        )
     if not np.isfinite(array).all():
         raise InputError("path: holds a number that is not finite; must be metres")
     points = array[:, :2].copy()
