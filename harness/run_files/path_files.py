@@ -25,10 +25,10 @@ from harness.run_files.given_path import SAME_PLACE_M
 from harness.run_files.igc_path import read_igc
 from harness.run_files.map_paths import read_gpx, read_kml
 from harness.run_files.mission.flying import GivenMission
-from harness.run_files.mission.items import MissionAsRead
+from harness.run_files.mission.items import HOME, MissionAsRead
 from harness.run_files.mission.old_mission import read_old_mission
 from harness.run_files.mission.plan_file import read_plan
-from harness.run_files.mission.program import program
+from harness.run_files.mission.program import Program, program
 from harness.run_files.mission.wpl_file import WPL, read_waypoints
 from harness.run_files.path_as_read import PathAsRead
 from harness.scenario.sections import ALTITUDES_M
@@ -150,8 +150,16 @@ def _mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
         origin_deg=origin,
         mission=GivenMission(flown, places, found.home_altitude_m),
         fences=_fences(found.fences, origin, source),
-        notes=found.notes,
+        notes=(*found.notes, *_without_home(found, flown)),
     )
+
+
+def _without_home(found: MissionAsRead, flown: Program) -> tuple[str, ...]:
+    """What is to be said of altitudes above a home that the file does not have."""
+    if found.home is not None or flown.local:
+        return ()
+    above = [step for step in flown.steps if step.above == HOME and step.height_m is not None]
+    return ("has no home: altitudes above home are counted from the sea",) if above else ()
 
 
 def given_points(points: Any) -> PathAsGiven:

@@ -120,6 +120,7 @@ NAMES: Final = {
     5002: "corner of an exclusion fence",
     5003: "circular inclusion fence",
     5004: "circular exclusion fence",
+    5005: "circular inclusion fence about home",
     5100: "rally point",
     1000: "gimbal pitch and yaw",
     1001: "gimbal configure",

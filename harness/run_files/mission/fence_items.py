@@ -17,18 +17,23 @@ from harness.run_files.mission.items import Item
 RETURN_POINT: Final = 5000
 CORNERS: Final = {5001: True, 5002: False}
 """Corner of an area to stay inside of, and of one to stay out of; the first parameter counts the corners."""
-CIRCLES: Final = {5003: True, 5004: False}
-"""A circle to stay inside of, and one to stay out of; the first parameter is the radius."""
+HOME_CIRCLE: Final = 5005
+CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
+"""A circle to stay inside of, and one to stay out of, and one about home; the first parameter is the radius."""
 RALLY_POINT: Final = 5100
 APART: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
 """Commands of items that are no part of the mission."""
 
 
-def fences_of(items: Sequence[Item]) -> Fences:
+def fences_of(items: Sequence[Item], home: tuple[float, float] | None = None) -> Fences:
     """The fences among some items, in degrees. An aircraft must be inside of all inclusion fences, as ArduPilot has it.
 
+    Args:
+        items: in order.
+        home: its latitude and longitude.
+
     Raises:
-        InputError: one has fewer corners than it says, or a circle has no radius.
+        InputError: one has fewer corners than it says, or a circle has no radius or no place.
     """
     found: list[Fence] = []
     pending: list[Item] = []
@@ -38,7 +43,7 @@ def fences_of(items: Sequence[Item]) -> Fences:
         if pending and item.command != pending[0].command:
             raise _torn(pending)
         if item.command in CIRCLES:
-            found.append(_circle(item))
+            found.append(_circle(item, home))
             continue
         pending.append(item)
         if len(pending) >= pending[0].params[0]:
@@ -82,10 +87,13 @@ def _polygon(corners: Sequence[Item]) -> Fence:
     return Fence(name, CORNERS[corners[0].command], (tuple(item.params[4:6] for item in corners),))  # type: ignore[misc]
 
 
-def _circle(item: Item) -> Fence:
+def _circle(item: Item, home: tuple[float, float] | None) -> Fence:
     radius = item.params[0]
     if not radius > 0.0:
         raise InputError(
             f"{item.place}: item {item.number} is a fence of radius {radius:g} m; must be greater than 0"
         )
-    return Fence(f"item {item.number}", CIRCLES[item.command], center=item.params[4:6], radius_m=radius)  # type: ignore[arg-type]
+    center = home if item.command == HOME_CIRCLE else item.params[4:6]
+    if center is None:
+        raise InputError(f"{item.place}: item {item.number} is a fence about home, which has no position")
+    return Fence(f"item {item.number}", CIRCLES[item.command], center=center, radius_m=radius)  # type: ignore[arg-type]

@@ -5,10 +5,11 @@ The format: https://mavlink.io/en/file_formats/#mission_plain_text_file
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from harness.files.input_file import InputError
-from harness.run_files.mission import fence_items
+from harness.run_files.mission import commands, fence_items
 from harness.run_files.mission.items import Item, MissionAsRead
 from harness.run_files.read_values import finite, whole
 
@@ -21,7 +22,7 @@ RALLY: Final = "RALLY"
 
 
 def read_waypoints(text: str, source: str) -> MissionAsRead:
-    """The mission of a plain-text file; its first item is home, lines that begin with # are comments.
+    """The mission of a plain-text file; its first item is home if it is a waypoint, lines after # are comments.
 
     Items of fences that stand among those of the mission are fences; rally points are counted.
 
@@ -50,12 +51,9 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
         items.append(Item(place, index, command, frame, tuple(params)))
     if not items:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
-    home, *others = items
-    again = next((item for item in others if item.number == home.number), None)
-    if again is not None:
-        raise InputError(
-            f"{again.place}: item {home.number} is there twice, first as home; numbers must differ"
-        )
+    items, notes = _numbered(items)
+    home = items[0] if items[0].command == commands.WAYPOINT else None
+    others = items[1:] if home is not None else items
     flown = tuple(item for item in others if item.command not in fence_items.APART)
     if not flown and (instead := fence_items.nothing_but(others)):
         raise InputError(f"{source}: has no items to fly to, but {instead}")
@@ -63,11 +61,33 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     return MissionAsRead(
         source,
         flown,
-        home.position,
-        home.params[6],
-        fence_items.fences_of(others),
-        fence_items.rally_note(rally),
+        None if home is None else home.position,
+        0.0 if home is None else home.params[6],
+        fence_items.fences_of(others, None if home is None else home.position),
+        (*notes, *fence_items.rally_note(rally)),
     )
+
+
+def _numbered(items: list[Item]) -> tuple[list[Item], tuple[str, ...]]:
+    """Items with numbers that can be jumped to.
+
+    Autopilots count the items of a file by their lines. The numbers that stand there are kept unless that matters:
+    where some are left out and there is a jump.
+
+    Raises:
+        InputError: that of home is there again.
+    """
+    numbers = [item.number for item in items]
+    again = next((item for item in items[1:] if item.number == numbers[0]), None)
+    if again is not None:
+        raise InputError(
+            f"{again.place}: item {numbers[0]} is there twice, first as home; numbers must differ"
+        )
+    gaps = numbers != list(range(numbers[0], numbers[0] + len(numbers)))
+    if not gaps or len(set(numbers)) < len(numbers) or all(item.command != commands.JUMP for item in items):
+        return items, ()
+    counted = [replace(item, number=number) for number, item in enumerate(items)]
+    return counted, ("some numbers of its items are left out: counted by lines from 0, as autopilots do",)
 
 
 def _meant(lines: list[str]) -> str:

@@ -17,7 +17,7 @@ PX4: Final = 12
 FENCE_COMMANDS: Final = {5001: True, 5002: False, 5003: True, 5004: False}
 """MAV_CMD_NAV_FENCE_*: vertex of an inclusion and exclusion polygon, inclusion and exclusion circle."""
 CIRCLES: Final = (5003, 5004)
-RALLY_POINT: Final = 5100
+HOME_CIRCLE, RALLY_POINT = 5005, 5100
 
 
 def read_plan(path: Path, reading: Reading) -> Contents:
@@ -97,6 +97,10 @@ def _items(rows: list[list[str]]) -> list[tuple[Any, bool]]:
                 f"has a fence of {len(pending)} corners that should have more; it may be torn"
             )
         before = command
+        if command == HOME_CIRCLE:
+            raise WorldFileError(
+                "has a fence about home, whose place it does not say; give a circle with a place"
+            )
         if command not in FENCE_COMMANDS:
             continue
         if command in CIRCLES:

@@ -41,6 +41,40 @@ def test_fences_of_a_mission_are_fences_and_rally_points_are_named() -> None:
     )
 
 
+def test_a_fence_about_home(tmp_path: Path) -> None:
+    (circle,) = read_waypoints(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)), "m.txt").fences.every
+    assert (circle.inclusion, circle.center, circle.radius_m) == (True, (47.0, 8.0), 50.0)
+    path = tmp_path / "fence.txt"
+    path.write_text("QGC WPL 110\n0 0 0 5005 50 0 0 0 0 0 0 0\n")
+    with pytest.raises(InputError, match="no items to fly to, but a fence of 1 item"):
+        read_path(path)
+    with pytest.raises(WorldFileError, match="has a fence about home, whose place it does not say"):
+        read_world(path, None, Reading())
+
+
+def test_a_first_item_that_is_no_waypoint_is_no_home(tmp_path: Path) -> None:
+    lines = wpl((22, 15.0, 47.0, 8.0), *WAYPOINTS).splitlines()
+    path = tmp_path / "m.waypoints"
+    path.write_text("\n".join((lines[0], *lines[2:])))
+    found = read_path(path)
+    assert found.mission is not None
+    assert [step.item for step in found.mission.program.steps] == [1, 2, 3]
+    assert "has no home: altitudes above home are counted from the sea" in found.notes
+    assert read_waypoints(wpl(*INSIDE, *WAYPOINTS).replace("\t16\t0", "\t5001\t5", 1), "m").fences.every
+
+
+def test_items_are_counted_by_lines_where_their_numbers_leave_it_open() -> None:
+    text = wpl(*WAYPOINTS, (16, 0.0, 47.04, 8.0), (177, 2.0, 0.0, 0.0))
+    assert read_waypoints(text, "m").notes == ()
+    head, *rows = text.splitlines()
+    gap = "\n".join((head, *rows[:2], "9" + rows[2][1:], *rows[3:]))
+    found = read_waypoints(gap, "m")
+    assert [item.number for item in found.items] == [1, 2, 3, 4]
+    assert "counted by lines from 0, as autopilots do" in found.notes[0]
+    without_jump = read_waypoints(gap.rpartition("\n")[0], "m")
+    assert [item.number for item in without_jump.items] == [1, 9, 3]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
