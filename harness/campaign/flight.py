@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import errno
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -105,12 +106,22 @@ def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
         command=job.again or None,
     )
     if job.recordings in ("all", "thin"):
-        return recorded(thin=job.recordings == "thin")
+        try:
+            return recorded(thin=job.recordings == "thin")
+        finally:
+            _give_memory_back()
     found = metrics(fly(make_loop(scenario)), flight_limits(scenario))
     if job.recordings == "failures" and found["outcome"] != "reached":
         # Failures are few: to fly them again costs less than to record every flight.
         recorded()
     return found
+
+
+def _give_memory_back() -> None:
+    """Gives what is free to the system, where C's library is glibc: a process that records keeps growing otherwise."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def _optimum_m(scenario: Scenario) -> float | None:

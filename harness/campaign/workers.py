@@ -21,16 +21,10 @@ from harness.files.strict_yaml import InputError
 from harness.files.versions import versions
 from planner.compiled import own_this_process
 
-ONE_THREAD: Final = {
-    **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"),
-    "MALLOC_ARENA_MAX": "1",
-    "MALLOC_TRIM_THRESHOLD_": "131072",
-}
-"""Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it.
-
-What is freed goes back to the system (glibc), so that a worker that records does not grow: each of its threads would
-keep an arena of its own.
-"""
+ONE_THREAD: Final = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS"), "1"
+)
+"""Environment of a worker: one flight a processor, and no threads of numpy or Arrow beside it."""
 
 CONNECT_S: Final = 10.0
 SCHEDULER_PORT: Final = 8786
