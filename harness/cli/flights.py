@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -199,6 +200,7 @@ def compare(
     from harness.cli.compare_terminal import comparison_bar, print_comparison
     from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
     from harness.files.errors import RunFolderError, WriteError
+    from harness.run_files.run_folder import OVERLAY
     from harness.scenario.given import is_source
 
     try:
@@ -225,6 +227,8 @@ def compare(
     else:
         print_comparison(comparison.rows)
         say(f"report: {out / 'report.html'}")
+        for overlay in sorted(out.glob(f"*/{OVERLAY}"))[:1]:
+            say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
     return 0 if comparison.all_reached else FAILED
 
 

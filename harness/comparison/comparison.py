@@ -24,7 +24,7 @@ from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
 from harness.report.chapters import ReportedFlight, chapter, entry, optimum_of
-from harness.run_files.run_folder import RECORDING, REPORT, load_run
+from harness.run_files.run_folder import OVERLAY, RECORDING, REPORT, load_run
 from harness.scenario.scenario import Scenario
 from harness.world.optimum import Optimum
 
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 SCHEMA = "wayproof/comparison/1"
 INDEX, CSV, MARKDOWN = "comparison.json", "comparison.csv", "comparison.md"
-OVERLAY = "overlay.rrd"
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -70,26 +71,31 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         file.end()
 
 
-def send_recording(recording: Path, runs: int, address: str) -> None:
+def send_recording(recording: Path, address: str) -> None:
     """Sends a recording, or an overlay, with its layout to a viewer that listens.
 
     Args:
         recording: the file.
-        runs: how many it overlays; 1 for the recording of a run.
         address: of the viewer, `rerun+http://...`.
 
     Raises:
         RunFolderError: the recording cannot be read.
     """
     chunks = _chunks(recording)
-    names = [f"runs/{place}/" for place in range(runs)] if runs > 1 else [""]
+    entities = {chunk.entity_path for chunk in chunks}
     with recording_stream(str(recording)) as rec:
-        layout = layout_of(_frame(chunks, recording), {chunk.entity_path for chunk in chunks}, names)
+        layout = layout_of(_frame(chunks, recording), entities, runs_in(entities))
         rec.connect_grpc(address, default_blueprint=layout)
         layout.let_go()
         rec.send_chunks(chunks)
         rec.flush()
         rec.disconnect()
+
+
+def runs_in(entities: Collection[str]) -> list[str]:
+    """The runs that a recording with these entities holds, as `layout_of` takes them."""
+    places = {int(found[1]) for each in entities if (found := re.match(rf"/{look.PLAN}/runs/(\d+)/", each))}
+    return [f"runs/{place}/" for place in sorted(places)] or [""]
 
 
 def _chunks(recording: Path) -> list[rr.chunk.Chunk]:

@@ -28,7 +28,7 @@ from harness.recording.blueprint import TIMELINE
 from harness.recording.overlay import send_recording, write_overlay
 from harness.recording.thin import write_log_recording
 from harness.run_files.flight_logs import READERS
-from harness.run_files.run_folder import RECORDING, recording_of
+from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
 LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
@@ -36,6 +36,7 @@ SETTLE_S = 1.5
 """The viewer draws a new time within a few frames; a software renderer needs about a second for them."""
 
 
+ALONE = ".rrd"
 LOG = "viewer.log"
 NO_SCREEN = (
     "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); `wayproof view --web` "
@@ -59,7 +60,7 @@ def open_viewer(
 
     Args:
         run_dirs: run folders, incomplete ones too; after the first also flight logs of other tools, which are shown in
-            its plane.
+            its plane. Alone: a recording, or the folder of a comparison, of which the overlay is shown.
         web: in a browser instead of a window; served until interrupted.
         tell: is told the address for the browser.
 
@@ -68,9 +69,14 @@ def open_viewer(
         InputError: a flight log cannot be read.
         ViewerError: there is no screen, or the viewer does not start.
     """
+    if len(run_dirs) == 1:
+        run_dirs = [_overlay_of(run_dirs[0])]
     for each in run_dirs:
-        if each.suffix.lower() in READERS and not each.exists():
+        ending = each.suffix.lower()
+        if ending in (*READERS, ALONE) and not each.exists():
             raise InputError(f"{each}: there is no such file")
+        if ending == ALONE and len(run_dirs) > 1:
+            raise InputError(f"{each}: a recording is opened alone; run folders are overlaid")
         if not each.is_file():
             recording_of(each)
     if not web:
@@ -84,7 +90,7 @@ def open_viewer(
         if web:
             with (
                 contextlib.suppress(KeyboardInterrupt),
-                served(shown, len(recordings), Path(scratch)) as (viewer, address),
+                served(shown, Path(scratch)) as (viewer, address),
             ):
                 tell(address)
                 webbrowser.open(address)
@@ -96,9 +102,23 @@ def open_viewer(
                 raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_words(scratch)}")
 
 
+def _overlay_of(folder: Path) -> Path:
+    """The overlay in the folder of a comparison; any other path as it is."""
+    if (folder / RECORDING).exists():
+        return folder
+    overlays = sorted([*folder.glob(OVERLAY), *folder.glob(f"*/{OVERLAY}")])
+    if len(overlays) > 1:
+        raise RunFolderError(
+            f"{folder} compares several scenarios; name one of {', '.join(map(str, overlays))}"
+        )
+    return overlays[0] if overlays else folder
+
+
 def _recordings(run_dirs: Sequence[Path], scratch: Path) -> list[Path]:
     """The recordings of runs, and those made of flight logs."""
     recordings = []
+    if run_dirs[0].suffix.lower() == ALONE and run_dirs[0].is_file():
+        return [*run_dirs]
     for number, each in enumerate(run_dirs):
         if not each.is_file():
             recordings.append(recording_of(each))
@@ -117,12 +137,11 @@ def need_screen() -> None:
 
 
 @contextlib.contextmanager
-def served(rrd: Path, runs: int, scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def served(rrd: Path, scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Serves a recording to browsers of this machine; gives the server and the address to open.
 
     Args:
-        rrd: the recording.
-        runs: how many it overlays.
+        rrd: the recording, or an overlay.
         scratch: an empty folder for the viewer's settings.
 
     Raises:
@@ -130,7 +149,7 @@ def served(rrd: Path, runs: int, scratch: Path) -> Iterator[tuple[subprocess.Pop
     """
     with web_viewer(scratch) as (viewer, address, source):
         # A viewer that serves a file keeps a processor busy; one that is sent it does not.
-        send_recording(rrd, runs, source)
+        send_recording(rrd, source)
         yield viewer, address_of(address, source)
 
 

@@ -45,6 +45,8 @@ TRACK = "track.parquet"
 PLANS = "plans.parquet"
 METRICS = "metrics.json"
 RECORDING = "flight.rrd"
+OVERLAY: Final = "overlay.rrd"
+"""What a comparison writes for each of its scenarios: the recordings of its runs in one."""
 REPORT = "report.html"
 REPORT_FILES = tuple(
     f"{stem}.{kind}"

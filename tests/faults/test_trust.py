@@ -93,7 +93,7 @@ def sockets(pids: list[int]) -> list[tuple[str, int]]:
 
 
 def test_the_viewer_is_served_to_this_machine_alone(a_run: Path, tmp_path: Path) -> None:
-    with served(a_run / "flight.rrd", 1, tmp_path) as (viewer, address):
+    with served(a_run / "flight.rrd", tmp_path) as (viewer, address):
         listening = sockets([viewer.pid, os.getpid()])
         assert len(listening) >= 2
         assert {host for host, _ in listening} == {"127.0.0.1"}

@@ -3,12 +3,15 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -21,13 +24,15 @@ from aircraft.interface import AircraftState
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
 from harness.flight.observer import Caution
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
+from harness.recording import viewer
 from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
 from harness.recording.layout import series_views
 from harness.recording.log import RerunLog
-from harness.recording.overlay import write_overlay
+from harness.recording.overlay import runs_in, write_overlay
 from harness.recording.scene import quaternions
 from harness.recording.states import mode_of
 from harness.recording.viewer import (
@@ -560,6 +565,36 @@ def test_view_says_what_is_missing(tmp_path: Path) -> None:
         screenshot(tmp_path / "none.rrd", tmp_path / "a.png")
 
 
+def test_a_comparison_is_viewed_as_its_overlay(
+    recording: tuple[Path, Flight], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder, or the overlay itself, which no run folder is beside."""
+    shown: list[Path] = []
+
+    @contextmanager
+    def nobody(rrd: Path, scratch: Path) -> Iterator[Any]:
+        shown.append(rrd)
+        yield SimpleNamespace(wait=lambda: 0), "address"
+
+    monkeypatch.setattr(viewer, "served", nobody)
+    monkeypatch.setattr("webbrowser.open", lambda address: True)
+    overlay = tmp_path / "straight" / "overlay.rrd"
+    overlay.parent.mkdir()
+    write_overlay([recording[0], recording[0]], ["first", "second"], overlay)
+    for path in (tmp_path, overlay.parent, overlay):
+        open_viewer([path], web=True)
+    assert shown == [overlay] * 3
+    assert runs_in(list(read(overlay))) == ["runs/0/", "runs/1/"]
+    assert runs_in(list(read(recording[0]))) == [""]
+    with pytest.raises(InputError, match="a recording is opened alone; run folders are overlaid"):
+        open_viewer([recording[0].parent, overlay], web=True)
+    with pytest.raises(InputError, match="there is no such file"):
+        open_viewer([tmp_path / "none.rrd"], web=True)
+    shutil.copytree(overlay.parent, tmp_path / "turned")
+    with pytest.raises(RunFolderError, match=r"compares several scenarios; name one of .*overlay\.rrd, "):
+        open_viewer([tmp_path], web=True)
+
+
 def test_view_says_that_there_is_no_screen(
     recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -573,7 +608,7 @@ def test_view_says_that_there_is_no_screen(
 def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
     recording: tuple[Path, Flight], tmp_path: Path
 ) -> None:
-    with served(recording[0], 1, tmp_path) as (viewer, address):
+    with served(recording[0], tmp_path) as (viewer, address):
         assert address.startswith("http://127.0.0.1:")
         assert "rerun%2Bhttp%3A%2F%2F127.0.0.1" in address
         with urllib.request.urlopen(address, timeout=10) as answer:
