@@ -6,14 +6,13 @@ https://docs.px4.io/main/en/flight_modes_fw/mission.html.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
 
 from harness.files.input_file import InputError
 from harness.run_files.mission import commands
-from harness.run_files.mission.items import GROUND, HOME, LOCAL, SEA, Item, MissionAsRead
+from harness.run_files.mission.items import GROUND, HOME, LOCAL, Item, MissionAsRead
 
 MOST_STEPS: Final = 20_000
 """A mission whose jumps make it longer is refused."""
@@ -24,6 +23,7 @@ MOST_TURNS: Final = 1000
 MOST_LOITER_S: Final = 86_400.0
 MOST_RADIUS_M: Final = 50_000.0
 MOST_HEIGHT_M: Final = 50_000.0
+DEGREE_M: Final = 111_200.0
 """Beyond these an item is taken for a mistake."""
 
 SIDE_ALONE_M: Final = 1.0
@@ -305,14 +305,23 @@ class _Run:
             self._tell(item, NOT_FLOWN, "in the air already")
             return None
         step = self._step(item)
-        position = step.position or self.home
+        position, why = step.position or self.home, commands.TAKEOFFS[item.command]
         if position is None:
             self._tell(item, NOT_FLOWN, "neither it nor home has a position")
             return None
-        self._tell(item, FLOWN, commands.TAKEOFFS[item.command])
+        if item.command == commands.VTOL_TAKEOFF and self._is_far(position):
+            position, why = self.home, f"{why}, at home: the place it names is far from there"
+        self._tell(item, FLOWN, why)
         return MissionStep(
             item.number, step.name, position, item.height_m, item.above, airspeed_mps=self.airspeed_mps
         )
+
+    def _is_far(self, position: tuple[float, float]) -> bool:
+        """Whether a place is so far from home that a vertical takeoff cannot be meant to be there."""
+        if self.home is None:
+            return False
+        most = MOST_RADIUS_M if self.local else MOST_RADIUS_M / DEGREE_M
+        return max(abs(position[0] - self.home[0]), abs(position[1] - self.home[1])) > most
 
     def _loiter(self, item: Item) -> MissionStep | None:
         if item.position is None and not self.steps:
@@ -378,18 +387,3 @@ def _bounded(item: Item, verb: str, value: float, most: float, unit: str) -> flo
             f"{item.place}: item {item.number} {verb} {value:g} {unit}; must be at most {most:g} {unit}"
         )
     return value
-
-
-def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, before_m: float) -> float:
-    """Altitude of a step above mean sea level.
-
-    Args:
-        step: the step.
-        home_altitude_m: of home, above mean sea level.
-        ground_m: of the ground below it, above mean sea level; NaN where it is not known.
-        before_m: of the step before, NaN at the first.
-    """
-    if step.height_m is None:
-        return before_m if math.isfinite(before_m) else home_altitude_m
-    base = {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
-    return step.height_m + base

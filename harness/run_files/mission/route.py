@@ -29,8 +29,8 @@ from harness.run_files.mission.circle import (
     towards,
 )
 from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute
-from harness.run_files.mission.items import GROUND
-from harness.run_files.mission.program import MissionStep, altitude_m
+from harness.run_files.mission.items import GROUND, HOME, SEA
+from harness.run_files.mission.program import MissionStep
 
 LANDING_HEIGHT_M: Final = 15.0
 """A landing is flown down to this height above its place; flare and touchdown are not."""
@@ -183,6 +183,7 @@ class _Build:
         climbs = loiter.turns is None and loiter.time_s is None
         before = self._altitude_m if math.isfinite(self._altitude_m) else altitude
         entry = before if climbs else altitude
+        self._altitude_m = before
         self._join(step, center, radius, side, turn_m, entry)
         length = self._climbing_m(altitude) if climbs else 0.0
         if loiter.turns is not None:
@@ -348,3 +349,18 @@ def _on_circle(pose: Pose, center: complex, radius: float, side: int) -> bool:
     if abs(abs(pose[0] - center) - radius) > SAME_PLACE_M:
         return False
     return abs(direction_on(pose[0], center, side) - pose[1]) < 1e-3
+
+
+def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, before_m: float) -> float:
+    """Altitude of a step above mean sea level.
+
+    Args:
+        step: the step.
+        home_altitude_m: of home, above mean sea level.
+        ground_m: of the ground below it, above mean sea level; NaN where it is not known.
+        before_m: of the step before, NaN at the first.
+    """
+    if step.height_m is None:
+        return before_m if math.isfinite(before_m) else home_altitude_m
+    base = {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
+    return step.height_m + base

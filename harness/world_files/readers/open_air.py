@@ -28,8 +28,8 @@ from harness.world_files.readers import limits, rings
 from harness.world_files.readers.rings import NAUTICAL_MILE_M, Place
 
 _COORDINATE: Final = re.compile(
-    r"(\d+(?:\.\d+)?)(?::(\d+(?:\.\d+)?))?(?::(\d+(?:\.\d+)?))?\s*([NS])[\s,]*"
-    r"(\d+(?:\.\d+)?)(?::(\d+(?:\.\d+)?))?(?::(\d+(?:\.\d+)?))?\s*([EW])",
+    r"(\d+(?:\.\d+)?)(?:[:\s°']+(\d+(?:\.\d+)?))?(?:[:\s']+(\d+(?:\.\d+)?))?[\s\"']*([NS])[\s,]*"
+    r"(\d+(?:\.\d+)?)(?:[:\s°']+(\d+(?:\.\d+)?))?(?:[:\s']+(\d+(?:\.\d+)?))?[\s\"']*([EW])",
     re.IGNORECASE,
 )
 CLOSED: Final = ("AC", "AN", "AL", "AH", "DP", "DC", "DA", "DB", "DY", "V")

@@ -269,6 +269,25 @@ def test_limits_of_openair(text: str, limit: Limit, tmp_path: Path) -> None:
     assert same(part.top, limit)
 
 
+@pytest.mark.parametrize(
+    "place",
+    [
+        "47:26:36 N 007:03:42 E",
+        "47:26:36N 007:03:42E",
+        "47 26 36 N 007 03 42 E",
+        "47 26 36N, 7 03 42E",
+        "47\N{DEGREE SIGN}26'36\"N , 007\N{DEGREE SIGN}03'42\"E",
+        "47:26.6N 007:03.7E",
+    ],
+)
+def test_places_of_openair(place: str, tmp_path: Path) -> None:
+    text = (
+        f"AC R\nAN A\nAL GND\nAH 900m MSL\nDP {place}\nDP 47:40:00 N 007:10:00 E\nDP 47:40:00 N 007:30:00 E\n"
+    )
+    (part,) = read_any(written(tmp_path / "a.txt", text)).parts
+    assert part.footprint.bounds[:2] == pytest.approx((7.0 + 3.7 / 60, 47.0 + 26.6 / 60), abs=1e-9)
+
+
 def test_openair_names_what_it_passes_over(tmp_path: Path) -> None:
     text = (
         SPACE.format("GND", "FL65")

@@ -9,7 +9,8 @@ import pytest
 from harness.files.input_file import InputError
 from harness.run_files.fences import Fences
 from harness.run_files.mission.items import Item, MissionAsRead
-from harness.run_files.mission.program import Program, Told, altitude_m, program
+from harness.run_files.mission.program import Program, Told, program
+from harness.run_files.mission.route import altitude_m
 
 HOME = (47.0, 8.0)
 
@@ -134,3 +135,10 @@ def test_a_radius_of_one_metre_is_a_side(radius: float) -> None:
 def test_a_distance_to_pass_by_is_named() -> None:
     done = run(at(1), at(2, third=80.0))
     assert told(done)[2] == ("flown", "passing by or beyond it, 80 m, is not flown")
+
+
+def test_a_vertical_takeoff_far_from_home_is_at_home() -> None:
+    done = run(item(1, 84, 0.0, 0.0, 0.0, 0.0, 8.0, 1.8, 50.0), at(2))
+    assert done.steps[0].position == HOME
+    assert told(done)[1][1].endswith("at home: the place it names is far from there")
+    assert run(at(1, 84), at(2)).steps[0].position == (47.01, 8.0)

@@ -148,3 +148,9 @@ def test_above_ground_the_ground_is_followed() -> None:
 def test_all_items_in_one_place_are_no_path() -> None:
     with pytest.raises(InputError, match="m: all its items are in one place"):
         route((step(1), 5j), (step(2), 5j))
+
+
+def test_a_mission_may_begin_on_a_circle_to_an_altitude() -> None:
+    made = route((step(1, 300.0, loiter=Loiter(100.0, True)), 50 + 0j), (step(2, 200.0), 2000j))
+    assert made.profile.altitude_m[0] == altitude(made, 1) == 700.0
+    assert altitude(made, 2) == 600.0
