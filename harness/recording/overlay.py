@@ -66,7 +66,11 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
         laned = [p for p, own in enumerate(chunks) if any(chunk.entity_path == lane for chunk in own)]
         _end_lanes(rec, names, figures, laned)
         logs = ["/" + look.SUMMARY not in {chunk.entity_path for chunk in own} for own in chunks]
-        summary = _summary(names, figures, ["log" if each else "unfinished" for each in logs])
+        without = [
+            "log" if log else "none" if each else "unfinished"
+            for log, each in zip(logs, figures, strict=True)
+        ]
+        summary = _summary(names, figures, without)
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
 
@@ -205,7 +209,7 @@ def _end_lanes(
 
 
 def _metrics(chunks: Sequence[rr.chunk.Chunk]) -> dict[str, Any]:
-    """The figures that a recording carries; empty where its run did not end, or it is of a log."""
+    """The figures that a recording carries; empty where its run did not end, few of a log."""
     found = {
         chunk.entity_path.rpartition("/")[2]: {
             name.rpartition(":")[2]: cells[0][0]
@@ -236,7 +240,7 @@ def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]], without
     Args:
         names: of the runs.
         figures: of each, as `_metrics` gives them.
-        without: what is said of each where it has none.
+        without: what is said of each where it has no such figure.
     """
     labels: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "outcome": lambda m: m["outcome"],
@@ -245,18 +249,15 @@ def _summary(names: Sequence[str], figures: Sequence[Mapping[str, Any]], without
         "least clearance, m": lambda m: number(m["min_clearance_m"]),
         "cross-track max, m": lambda m: number(m["cross_track_m"]["max"]),
         "heading change flown, deg": lambda m: number(m["smoothness"]["flown"]["heading_change_deg"]),
-        "trackable": lambda m: "yes" if m["trackable"] else "no",
-        "replans": lambda m: str(m["replans"]),
+        "trackable": lambda m: {None: "", True: "yes", False: "no"}[m["trackable"]],
+        "replans": lambda m: "" if m["replans"] is None else str(m["replans"]),
         "search p99, ms": lambda m: number(m["compute_ms"]["p99"]),
     }
     rows = [
         " | ".join(
             [
                 label,
-                *(
-                    (of(each) or "none") if each else what
-                    for each, what in zip(figures, without, strict=True)
-                ),
+                *((each and of(each)) or what for each, what in zip(figures, without, strict=True)),
             ]
         )
         for label, of in labels.items()

@@ -52,6 +52,8 @@ LOG_ROWS = 20_000
 LONGEST_GAP_S = 10.0
 """A log without a row for so long, and for `GAP_ROWS` times as long as from row to row, has a gap there."""
 GAP_ROWS = 10.0
+BEYOND_M = 0.1
+"""A place so far along the line beyond an end of what was planned is beyond it."""
 CHORD_ERROR = 1e-2
 """How far a drawn plan may be off the true one, as a share of the turn radius: a pixel of the plan view is more."""
 
@@ -237,6 +239,14 @@ def _send_track(rec: rr.RecordingStream, track: LogTrack, run: Run, altitude_m: 
         series["cross_track/flown"] = cross
     for name, values in series.items():
         rec.send_columns(f"{look.SERIES}/{name}", times, rr.Scalars.columns(scalars=values))
+    steps_m = np.hypot(np.diff(track.east_m), np.diff(track.north_m))
+    known: dict[str, Value] = {
+        "flown_length_m": float(steps_m.sum()),
+        "flight_time_s": float(track.time_s[-1]),
+    }
+    if cross is not None and np.isfinite(cross).any():
+        known["cross_track_max_m"] = float(np.nanmax(np.abs(cross)))
+    send_properties(rec, RUN, known)
 
 
 def _begins(time_s: FloatArray) -> NDArray[np.bool_]:
@@ -247,6 +257,8 @@ def _begins(time_s: FloatArray) -> NDArray[np.bool_]:
 
 def cross_track_m(points_m: FloatArray, planned_m: FloatArray) -> FloatArray | None:
     """(n,) distance of (n, 2) points from the nearest part of what was planned, positive right of it.
+
+    NaN before its beginning and beyond its end.
 
     Args:
         points_m: east and north.
@@ -267,4 +279,6 @@ def cross_track_m(points_m: FloatArray, planned_m: FloatArray) -> FloatArray | N
     )
     (east, north), (off_east, off_north) = (after - before).T, (points_m - near).T
     off_m: FloatArray = np.copysign(shapely.distance(line, places), off_east * north - off_north * east)
-    return off_m
+    past = off_east * east + off_north * north
+    outside = ((along_m <= 0.0) & (past < -BEYOND_M)) | ((along_m >= line.length) & (past > BEYOND_M))
+    return np.where(outside, np.nan, off_m)

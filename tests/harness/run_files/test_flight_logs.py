@@ -142,12 +142,22 @@ def test_a_log_that_is_not_there_is_told_as_one(tmp_path: Path, capsys: pytest.C
 
 
 def test_cross_track_is_positive_right_of_what_was_flown_of_the_plans() -> None:
-    """Towards north, then east; what lies beyond the end is as far as the end is."""
+    """Towards north, then east; where nothing was planned there is no error."""
     planned = np.array([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)])
-    points = np.array([(30.0, 500.0), (-20.0, 400.0), (500.0, 990.0), (500.0, 1040.0), (0.0, 700.0)])
+    points = np.array(
+        [
+            (30.0, 500.0),
+            (-20.0, 400.0),
+            (500.0, 990.0),
+            (500.0, 1040.0),
+            (0.0, 700.0),
+            (3.0, -50.0),
+            (1100.0, 990.0),
+        ]
+    )
     off = cross_track_m(points, planned)
     assert off is not None
-    np.testing.assert_allclose(off, [30.0, -20.0, 10.0, -40.0, 0.0])
+    np.testing.assert_allclose(off, [30.0, -20.0, 10.0, -40.0, 0.0, np.nan, np.nan])
     assert cross_track_m(points, planned[:1]) is None
 
 
@@ -280,6 +290,15 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place / "run"
 
 
+def summary_of(recording: Path) -> str:
+    """The page beside the events."""
+    for chunk in rr.chunk.RrdReader(str(recording)).stream():
+        if str(chunk.entity_path) == "/summary":
+            cells = chunk.to_record_batch().to_pydict()
+            return str(next(cell for name, cell in cells.items() if name.endswith("text"))[0][0])
+    return ""
+
+
 def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path, run: Path) -> None:
     folder = run
     for form in ("csv", "mcap"):
@@ -290,11 +309,23 @@ def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path, run: Path) -> None
         assert track.time_s[-1] == pytest.approx(flown.track.time_s[-1], abs=0.2)
         off = cross_track_m(np.column_stack((track.east_m, track.north_m)), planned_points(flown)[0])
         assert off is not None
-        assert np.abs(off).max() < 2.0
+        assert np.nanmax(np.abs(off)) < 2.0
+        assert form == "csv" or np.isfinite(off).mean() > 0.9
         write_log_recording(log, folder, tmp_path / f"{form}.rrd")
         shown = tmp_path / f"{form}-overlay.rrd"
         write_overlay([folder / "flight.rrd", tmp_path / f"{form}.rrd"], ["run", "log"], shown)
         assert shown.stat().st_size > 50_000
+        rows = {
+            row.split(" | ")[0]: row.split(" | ")[1:]
+            for row in summary_of(shown).splitlines()
+            if " | " in row
+        }
+        for name, near in (("| flown, km", 0.05), ("| time, s", 0.3)):
+            of_run, of_log = (float(each.strip("| ")) for each in rows[name])
+            assert of_log == pytest.approx(of_run, abs=near)
+        assert float(rows["| cross-track max, m"][1].strip("| ")) < 2.0
+        assert rows["| outcome"] == ["reached", "log |"]
+        assert rows["| trackable"] == ["yes", "log |"]
         own = {str(chunk.entity_path) for chunk in rr.chunk.RrdReader(str(tmp_path / f"{form}.rrd")).stream()}
         assert {"/plan/aircraft/shape", "/world/aircraft/shape", "/plan/flown"} <= own
     far = tmp_path / "far.csv"
