@@ -45,6 +45,7 @@ _UPPER: Final = (
 )
 """Names of limits; unit and reference may follow, as in `floor_ft_agl`."""
 _AFTER: Final = re.compile(r"(?:_(ft|feet|m|metres|meters|agl|amsl|msl|gnd))+$")
+_METRES_AFTER: Final = frozenset(("m", "metres", "meters"))
 _BEGINS: Final = {"lower": ("lower", "min", "floor", "bottom"), "upper": ("upper", "max", "ceiling", "top")}
 """What the names of attributes begin with that belong to one of the limits."""
 _UNITS: Final = ("uom", "unit")
@@ -239,14 +240,16 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     if "ceiling" in tags and any(key.startswith(_GRID) for key in tags):
         return _above_the_grid(tags, notes)
     found: list[Limit | None] = []
-    bare = False
+    bare = alone = False
     for names, none, word in ((_LOWER, NO_BOTTOM, "lower"), (_UPPER, NO_TOP, "upper")):
         key = next((each for known in names for each in tags if _AFTER.sub("", each) == known), None)
         if key is None:
             found.append(none)
             continue
         ends = set(key.split("_"))
-        unit = "ft" if ends & {"ft", "feet"} else _said(tags, word, _UNITS, _BOTH_UNITS) or "m"
+        unit = "ft" if ends & {"ft", "feet"} else _said(tags, word, _UNITS, _BOTH_UNITS)
+        alone |= not unit and not ends & _METRES_AFTER and _is_number(tags[key])
+        unit = unit or "m"
         reference = " ".join(ends & {"agl", "gnd", "amsl", "msl"}) or _said(
             tags, word, _REFERENCES, _BOTH_REFERENCES
         )
@@ -255,6 +258,8 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
         found.append(limit)
         told = unit.upper() == "FL" or _REFERENCE.search(reference.upper()) is not None
         bare |= not told and limit is not None and _bare(tags[key], limit)
+    if alone:
+        notes.append(f"{name or 'a part'}: its limits name no unit; taken as metres")
     if bare:
         notes.append(f"{name or 'a part'}: its limits name no reference; taken as above mean sea level")
     return band_of(found[0], found[1], notes, name)
@@ -264,6 +269,14 @@ def _said(tags: Mapping[str, Any], word: str, has: tuple[str, ...], both: tuple[
     """What an attribute says of one of the limits, else one that says it of both; empty where none does."""
     own = (each for each in tags if each.startswith(_BEGINS[word]) and any(part in each for part in has))
     return next((str(tags[each]) for each in (*own, *both) if each in tags), "")
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a limit is a number other than zero, and says nothing of its unit."""
+    try:
+        return not isinstance(value, Mapping) and float(value) not in (0.0, -9998.0)
+    except (TypeError, ValueError):
+        return False
 
 
 def _bare(value: Any, limit: Limit) -> bool:

@@ -560,6 +560,21 @@ def test_a_limit_without_a_reference_is_noted(tags: dict[str, Any], said: bool, 
     assert ("A: its limits name no reference; taken as above mean sea level" in notes) == said
 
 
+@pytest.mark.parametrize(
+    ("tags", "said"),
+    [
+        ({"minAlt": 2000, "maxAlt": "3700"}, True),
+        ({"minAlt": 0, "maxAlt": "2500 ft"}, False),
+        ({"maxAlt": 120, "altitudeUnit": "m"}, False),
+        ({"ceiling_m": 120}, False),
+        ({"upper": 120, "UPPER_UOM": "FT"}, False),
+    ],
+)
+def test_a_limit_without_a_unit_is_noted(tags: dict[str, Any], said: bool, tmp_path: Path) -> None:
+    notes = read_any(geojson(tmp_path / "a.geojson", feature({"name": "A", **tags}))).notes
+    assert ("A: its limits name no unit; taken as metres" in notes) == said
+
+
 def test_limits_that_cannot_be_told_are_both_noted(tmp_path: Path) -> None:
     odd = {"lower": {"metric": 0}, "upper": {"metric": 9}, "name": "A"}
     notes = read_any(geojson(tmp_path / "a.geojson", feature(odd))).notes
