@@ -16,7 +16,7 @@ import numpy as np
 
 from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import FOOT_M, Contents, FloatArray, Raster, Reading, WorldFileError
-from harness.world_files.plane import vertical_unit_m
+from harness.world_files.plane import flat_crs, vertical_unit_m
 
 MAX_CELLS: Final = 60_000_000
 """Half a gigabyte of heights while they are read."""
@@ -182,6 +182,7 @@ def _crs(keys: dict[int, int]) -> str:
     for key in (PROJECTED_CRS, GEOGRAPHIC_CRS):
         code = keys.get(key, 0)
         if 0 < code < USER_DEFINED:
+            flat_crs(f"EPSG:{code}")  # newer than PROJ's list here, perhaps: then GDAL may know it
             return f"EPSG:{code}"
     raise WorldFileError(
         f"names no coordinate reference system by its EPSG number; give crs, as EPSG:32632, or {MISSING}"

@@ -26,7 +26,7 @@ from harness.world_files.parts import (
     Reading,
     WorldFileError,
 )
-from tests.harness.world_files.making import feature, geojson, osm
+from tests.harness.world_files.making import feature, geojson, geotiff, osm
 
 pytestmark = pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")  # of rasterio's own
 
@@ -95,6 +95,22 @@ def test_a_geotiff_lies_where_rasterio_has_it(crs: str, kind: str, tmp_path: Pat
     with rasterio.open(path) as file:
         assert found.terrain.affine == pytest.approx(tuple(file.transform)[:6])
     assert CRS(found.crs) == CRS(crs)
+
+
+def test_a_system_that_only_gdal_knows_is_asked_of_gdal(tmp_path: Path) -> None:
+    """The EPSG registry grows: 11022 is the UTM zone of Norway's heights since its version 12."""
+    rasterio = pytest.importorskip("rasterio")
+    from pyproj import CRS
+
+    heights = np.full((4, 5), 300.0)
+    path = geotiff(tmp_path / "a.tif", heights, (500_000.0, 6_600_000.0), 10.0, 11022)
+    with rasterio.open(path) as source:
+        if source.crs is None or not source.crs.is_projected:
+            pytest.skip("this GDAL does not know it either")
+    found = read_any(path)
+    assert CRS.from_user_input(found.crs).is_projected
+    assert found.terrain is not None
+    assert found.terrain.values.tolist() == heights.tolist()
 
 
 def test_a_picture_is_no_terrain(tmp_path: Path) -> None:
