@@ -188,18 +188,17 @@ def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
     from harness.run_files.run_folder import load_run
     from harness.scenario.performance import mission_of
     from harness.scenario.scenario import parse_scenario
+    from harness.scenario.validation import KeyFault
     from harness.world.world import World
 
     for number, outcome, folder in runs:
         try:
             run = load_run(folder)
             scenario = parse_scenario(run.scenario_yaml, str(folder), as_flown=True)
-        except (
-            RunFolderError,
-            InputError,
-        ):  # it broke off, or is of other versions: there is nothing to draw
+            mission = mission_of(scenario)
+        except (RunFolderError, InputError, KeyFault):
+            # It broke off, is of other versions, or of a guidance law that is not here: there is nothing to draw.
             continue
-        mission = mission_of(scenario)
         scene = FigureScene(
             name=scenario.name,
             bounds_m=mission.bounds_m,

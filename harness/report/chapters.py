@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from harness.analysis.planned import PlannedRows, planned_rows
 from harness.analysis.rows import Row, number, row_of
+from harness.files.errors import RunFolderError
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario
+from harness.scenario.validation import KeyFault
 from harness.world.optimum import Optimum, shortest_path
 from harness.world.world import World
 
@@ -54,7 +56,7 @@ def entry(
         GIVEN if "check" in run.metrics else scenario.planner.kind,
         run.metrics,
         optimum_m=optimum.length_m,
-        turn_radius_m=performance_of(scenario).turn_radius_m,
+        turn_radius_m=_turn_radius_m(scenario, run),
         tightest_1pm=planned.tightest_1pm,
         kinematic=kinematic,
         guidance=guidance,
@@ -109,7 +111,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     from harness.report import figures
     from harness.report.page import Chapter
 
-    scene, drawn = _scene(scenario, optimum), _drawn(flight)
+    scene, drawn = _scene(scenario, optimum, flight.run), _drawn(flight)
     assert drawn is not None
     assert flight.run is not None
     folder = flight.run.folder
@@ -134,7 +136,18 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
 
 
-def _scene(scenario: Scenario, optimum: Optimum) -> FigureScene:
+def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
+    """The smallest radius that a plan may ask for: as the run has it, for its guidance law may not be here."""
+    kept = run.manifest.get("turn_radius_m") if run is not None else None
+    if isinstance(kept, int | float) and kept > 0.0:
+        return float(kept)
+    try:
+        return performance_of(scenario).turn_radius_m
+    except KeyFault as error:
+        raise RunFolderError(f"{'.'.join(map(str, error.loc))}: {error}") from error
+
+
+def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> FigureScene:
     from harness.report.figures import FigureScene
 
     mission = scenario.mission
@@ -146,7 +159,7 @@ def _scene(scenario: Scenario, optimum: Optimum) -> FigureScene:
         goal_m=mission.goal_m,
         goal_radius_m=mission.goal_radius_m,
         clearance_m=scenario.planner.clearance_m,
-        turn_radius_m=performance_of(scenario).turn_radius_m,
+        turn_radius_m=_turn_radius_m(scenario, run),
         optimum_m=optimum.points_m,
         navigation_margin_m=scenario.navigation.margin_m or 0.0,
     )

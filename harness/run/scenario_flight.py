@@ -229,7 +229,8 @@ def fly_to_folder(
     try:
         with ExitStack() as stack:
             told = [command or shlex.join(sys.argv)]
-            folder = stack.enter_context(RunFolder.create(out, text, told, _sources(scenario)))
+            radius_m = loop.mission.turn_radius_m
+            folder = stack.enter_context(RunFolder.create(out, text, told, _sources(scenario), radius_m))
             observers = [*watching]
             log = _recording(scenario, text, loop, folder, pilot, identity, thin) if recording else None
             if log is not None:

@@ -102,7 +102,12 @@ class RunFolder:
 
     @classmethod
     def create(
-        cls, path: Path, scenario_yaml: str, command: Sequence[str], sources: Sequence[Mapping[str, str]] = ()
+        cls,
+        path: Path,
+        scenario_yaml: str,
+        command: Sequence[str],
+        sources: Sequence[Mapping[str, str]] = (),
+        turn_radius_m: float | None = None,
     ) -> RunFolder:
         """Makes the folder, marked incomplete, with scenario and manifest; removes a former run's files.
 
@@ -111,6 +116,8 @@ class RunFolder:
             scenario_yaml: the scenario as flown, all defaults filled in.
             command: command line, for the manifest.
             sources: path and SHA-256 of each file that obstacles were made of, for the manifest.
+            turn_radius_m: smallest radius that a plan may ask for, for the manifest: to find it out anew the guidance
+                law may have to be flown.
 
         Raises:
             RunFolderError: the path is a file, a folder with other things in it or that another process is
@@ -122,6 +129,7 @@ class RunFolder:
             "command": list(command),
             "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
             **({"sources": [dict(each) for each in sources]} if sources else {}),
+            **({} if turn_radius_m is None else {"turn_radius_m": turn_radius_m}),
             "versions": versions(DISTRIBUTIONS),
             "platform": {
                 "system": platform.platform(),

@@ -18,16 +18,24 @@ if TYPE_CHECKING:
     from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
 
 
-def resolved(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceSpec:
+def is_here(spec: GuidanceSpec) -> bool:
+    """Whether the law is; of one that was given by a source file, or in Python, another process knows nothing."""
+    return spec.kind in guidance_kinds()
+
+
+def resolved(spec: GuidanceSpec, aircraft: AircraftSpec, as_flown: bool = False) -> GuidanceSpec:
     """The guidance section with its own keys checked and every default filled in.
 
     Args:
         spec: the section.
         aircraft: what flies, its airspeed filled in.
+        as_flown: the section is of a run folder, where every default stands already; the law need not be here.
 
     Raises:
         KeyFault: there is no such law or key, or the keys contradict each other.
     """
+    if as_flown and not is_here(spec):
+        return spec
     with PrintingAside():
         kind = own_keys.named_kind("guidance", spec, guidance_kinds())
         config = own_keys.resolved_config(
@@ -104,6 +112,10 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
 
 
 def _made_of(spec: GuidanceSpec) -> tuple[GuidanceKind, Any]:
+    if not is_here(spec):
+        raise KeyFault(
+            ("guidance", "kind"), f"{spec.kind} is not here; give it anew (guidance=, or --guidance)"
+        )
     kind = guidance_kinds()[spec.kind]
     return kind, kind.config(**spec.own)
 

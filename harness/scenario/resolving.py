@@ -36,7 +36,7 @@ def resolve(
         keys: as they were read.
         folder: where the folder of an aircraft, and files of obstacles, are sought first.
         ends_checked: start and goal must keep the clearance from obstacles and lie in the area.
-        as_flown: the keys are of a run folder, as `planner_keys.resolved` takes it.
+        as_flown: the keys are of a run folder, as `planner_keys.resolved` and `guidance_keys.resolved` take it.
 
     Raises:
         KeyFault: keys contradict each other, or the aircraft cannot do what they ask for.
@@ -46,8 +46,10 @@ def resolve(
     mission = _ends_in_plane(keys.mission, keys.area)
     aircraft = keys.aircraft.model_copy(update={"model": model_or_folder(keys.aircraft.model, folder)})
     aircraft = _filled(aircraft, airspeed_mps=_cruise_mps(aircraft))
-    guidance = guidance_keys.resolved(keys.guidance, aircraft)
+    guidance = guidance_keys.resolved(keys.guidance, aircraft, as_flown)
     scenario = keys.updated(simulation=simulation, mission=mission, aircraft=aircraft, guidance=guidance)
+    if as_flown and not guidance_keys.is_here(guidance):
+        return scenario  # what follows from how the law tracks stands there
 
     performance = performance_of(scenario)
     radius_m, wind_mps = performance.turn_radius_m, wind_mps_of(scenario)

@@ -102,7 +102,7 @@ def parse_scenario(
         text: YAML.
         source: what faults name it.
         as_flown: it is that of a run folder: start and goal were checked, if a planner was to keep clear of obstacles,
-            and a planner that was given by a source file, or in Python, need not be here.
+            and a planner or guidance law that was given by a source file, or in Python, need not be here.
         folder: files that it names are looked for there first.
 
     Raises:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import aircraft.guidance.registry
 import harness
 import planner.registry
 import wayproof
@@ -122,7 +123,9 @@ def test_a_planner_is_given_as_an_object(how: str) -> None:
 
 
 @pytest.mark.flights
-def test_a_guidance_law_is_given_as_a_class(run: wayproof.FlightResult, tmp_path: Path) -> None:
+def test_a_guidance_law_is_given_as_a_class(
+    run: wayproof.FlightResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     class Gentle:
         """The default law at half the bank."""
 
@@ -142,12 +145,26 @@ def test_a_guidance_law_is_given_as_a_class(run: wayproof.FlightResult, tmp_path
     assert gentle.digest != run.digest
     assert gentle.scenario.guidance.kind.endswith(":test_a_guidance_law_is_given_as_a_class.Gentle")
     assert "Gentle" in gentle.manifest["command"][0]
-    aircraft = airframe("aerosonde").guidance_limits(25.0)
-    again = wayproof.fly(small(), guidance=Gentle(aircraft))
-    assert again.digest == wayproof.fly(small(), guidance=Gentle(aircraft)).digest == gentle.digest
+    limits = airframe("aerosonde").guidance_limits(25.0)
+    again = wayproof.fly(small(), guidance=Gentle(limits))
+    assert again.digest == wayproof.fly(small(), guidance=Gentle(limits)).digest == gentle.digest
     for given, said in (("nix", "guidance.kind: is 'nix'; must be one of preview"), (3, "this is a int")):
         with pytest.raises(wayproof.InputError, match=said):
             wayproof.fly(small(), guidance=given)
+    radius_m = mission_of(gentle.scenario).turn_radius_m
+    # In another process, which has not been given the law.
+    monkeypatch.setattr(aircraft.guidance.registry, "_registered", {})
+    back = wayproof.load_run(tmp_path / "run")
+    assert (back.digest, back.scenario.guidance) == (gentle.digest, gentle.scenario.guidance)
+    assert main(["report", str(tmp_path / "run")]) == 0
+    assert back.manifest["turn_radius_m"] == radius_m > mission_of(small()).turn_radius_m
+    assert (
+        f"turn radius R {back.manifest['turn_radius_m']:.1f} m"
+        in (tmp_path / "run" / "report.html").read_text()
+    )
+    assert main(["export", str(tmp_path / "run"), "--format", "plan", "--out", str(tmp_path / "a.plan")]) == 0
+    with pytest.raises(wayproof.InputError, match=r"guidance\.kind: .*Gentle is not here; give it anew"):
+        wayproof.fly(back.scenario)
 
 
 @pytest.mark.flights
