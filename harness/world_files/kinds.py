@@ -50,7 +50,13 @@ KINDS: Final[dict[str, Reader]] = {
 """Readers by the name of their kind."""
 
 VECTOR_ENDINGS: Final = (".gpkg", ".shp", ".dxf", ".fgb", ".gml", ".tab", ".gdb")
-PACKED: Final = {".hgt": "srtm", ".kml": "kml", "elevation.npy": "numpy_dem"}
+PACKED: Final = {
+    ".hgt": "srtm",
+    ".kml": "kml",
+    "elevation.npy": "numpy_dem",
+    ".shp": "vector",
+    ".gpkg": "vector",
+}
 """What a ZIP archive is by what lies in it."""
 ROOTS: Final = {"osm": "osm", "kml": "kml", "sdf": "gazebo_world", "gazebo": "gazebo_world"}
 """What an XML file is by its first element."""
@@ -132,7 +138,12 @@ def _binary(path: Path, first: bytes, ending: str) -> str | None:
         return "geotiff"
     if first[:2] == b"PK":
         names = _names(path)
-        return next((kind for end, kind in PACKED.items() if any(name.endswith(end) for name in names)), None)
+        for end, kind in PACKED.items():
+            if any(name.endswith(end) for name in names):
+                return kind
+        if ending == ".zip":
+            held = next((name.rpartition("/")[2][:40] for name in names if not name.endswith("/")), "nothing")
+            raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
     if ending == ".hgt" or path.name.lower().endswith(".hgt.gz"):
         return "srtm"
     if b"OSMHeader" in first[:64]:

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import warnings
+import zipfile
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
+from harness.world_files.bounded import MAX_BYTES
 from harness.world_files.parts import Contents, Part, Reading, WorldFileError, counted
 from harness.world_files.plane import in_degrees
 from harness.world_files.readers import limits, rings
 
 MAX_FEATURES = 300_000
+PACKED = (".shp", ".gpkg")
+"""What of an archive is read."""
+DRAWINGS = (".dxf", ".dwg")
+"""Files that never say where on earth they lie."""
 
 
 def read(path: Path, reading: Reading) -> Contents:
@@ -38,15 +44,16 @@ def _read(path: Path, reading: Reading) -> Contents:
     unknown = Counter[str]()
     parts: list[Part] = []
     crs: str | None = None
-    passed = 0
+    passed = bare = 0
+    source = _source(path)
     try:
         warnings.simplefilter("ignore")
-        for layer in np.atleast_2d(pyogrio.list_layers(path))[:, 0]:
-            if pyogrio.read_info(path, layer=layer)["features"] > MAX_FEATURES:
+        for layer in np.atleast_2d(pyogrio.list_layers(source))[:, 0]:
+            if pyogrio.read_info(source, layer=layer)["features"] > MAX_FEATURES:
                 raise WorldFileError(
                     f"has more than {MAX_FEATURES:,} features; cut the area of interest out of it"
                 )
-            meta, _, geometries, columns = pyogrio.raw.read(path, layer=layer, on_invalid="ignore")
+            meta, _, geometries, columns = pyogrio.raw.read(source, layer=layer, on_invalid="ignore")
             if len(geometries) and crs is not None and meta["crs"] != crs:
                 raise WorldFileError(
                     "has layers in different coordinate reference systems; put them into files of their own"
@@ -65,12 +72,14 @@ def _read(path: Path, reading: Reading) -> Contents:
                 tags = {str(name): column[row] for name, column in zip(meta["fields"], columns, strict=True)}
                 tags = {name: value for name, value in tags.items() if value is not None and value == value}
                 parts.append(_part(tags, shape, reading, notes, unknown))
+                bare += not (parts[-1].rigid or limits.has_limits(tags))
     except (DataSourceError, DataLayerError, ValueError, RuntimeError, OSError, MemoryError) as error:
         if isinstance(error, WorldFileError):
             raise
         raise WorldFileError(f"cannot be read by GDAL ({' '.join(str(error).split())[:100]})") from error
     if not parts:
         raise WorldFileError("has no polygon; must have some")
+    notes += _told(path, reading.crs or crs, bare)
     notes += limits.building_notes(unknown, reading)
     if passed:
         notes.append(f"{counted(passed, 'shape')} without an area passed over")
@@ -85,3 +94,42 @@ def _part(
     if limits.is_building(plain):
         return limits.building(plain, shape, reading, unknown, name)
     return Part(shape, *limits.limits(plain, notes, name), name=name)
+
+
+def _source(path: Path) -> Path | str:
+    """What GDAL opens: the file, or the first in an archive.
+
+    Raises:
+        WorldFileError: it unpacks to too much.
+    """
+    if path.suffix.lower() != ".zip":
+        return path
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except (zipfile.BadZipFile, OSError, ValueError) as error:
+        raise WorldFileError("is a damaged ZIP archive; get it again") from error
+    if sum(each.file_size for each in members) > MAX_BYTES:
+        raise WorldFileError(
+            f"unpacks to more than {MAX_BYTES // 10**6} MB; cut the area of interest out of it"
+        )
+    inner = next((each.filename for each in members if each.filename.lower().endswith(PACKED)), None)
+    if inner is None:
+        raise WorldFileError(f"is a ZIP archive without a {' or '.join(PACKED)} file")
+    return f"/vsizip/{path.absolute()}/{inner}"
+
+
+def _told(path: Path, crs: str | None, bare: int) -> list[str]:
+    """What is to be said of where a file lies, and of polygons without heights.
+
+    Raises:
+        WorldFileError: nothing says where it lies; a drawing is taken as metres.
+    """
+    notes = []
+    if crs is None and path.suffix.lower() not in DRAWINGS:
+        raise WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
+    if crs is None:
+        notes.append("a drawing names no place on earth: taken as metres in a plane of its own")
+    if bare:
+        notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
+    return notes

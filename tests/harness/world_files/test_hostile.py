@@ -86,7 +86,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     ),
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
     "a torn ZIP": (data("a.zip", b"PK\x03\x04" + bytes(30)), "is a damaged ZIP archive"),
-    "a ZIP of something": (lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"), "is of no kind"),
+    "a ZIP of something": (
+        lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
+        "is a ZIP archive with 'readme.txt'",
+    ),
     "a torn tile": (data("N46E009.hgt", bytes(1000)), "it may be torn"),
     "a nameless tile": (data("tile.hgt", bytes(2 * 1201 * 1201)), "its name must say where it lies"),
     "a torn TIFF": (_torn_tiff, "cannot be read"),
