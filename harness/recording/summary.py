@@ -42,6 +42,8 @@ def summary(scene: Scene, metrics: Mapping[str, Any] | None) -> str:
     if metrics is None:
         lines += ["Still flying, or stopped before the end.", ""]
     else:
+        if "check" in metrics:
+            lines += [f"**Flown as given: {escaped(metrics['check']['verdict'])}**", ""]
         lines += [f"**{metrics['outcome'].replace('_', ' ')}**: {escaped(metrics['reason'])}", ""]
         rows = [f"| {name} | {escaped(value)} |" for name, value in figures(scene, metrics).items()]
         lines += [rows[0], "|---|---|", *rows[1:], ""]

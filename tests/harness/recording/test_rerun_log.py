@@ -35,6 +35,7 @@ from harness.recording.log import RerunLog
 from harness.recording.overlay import runs_in, write_overlay
 from harness.recording.scene import quaternions
 from harness.recording.states import mode_of
+from harness.recording.summary import summary
 from harness.recording.viewer import (
     NO_DRIVER,
     ViewerError,
@@ -407,6 +408,14 @@ def test_events_and_summary(recording: tuple[Path, Flight]) -> None:
     assert figures["outcome"] == "reached"
 
 
+def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Path, Flight]) -> None:
+    """That the aircraft reached the end of the path is no answer."""
+    figures = {**metrics(recording[1], LIMITS), "check": {"verdict": "no: turn radius too tight (2 legs)"}}
+    page = summary(SCENE, figures)
+    assert page.index("**Flown as given: no: turn radius too tight (2 legs)**") < page.index("**reached**")
+    assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
+
+
 def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     (centre,) = column(entities, "/world/true_obstacles/circles", "centers")[0]
@@ -533,8 +542,8 @@ def test_overlay_keeps_every_track_and_one_world(
     told = [str(text) for (text,) in column(entities, "/events", "text")]
     assert "first, t = 100 s: goal reached" in told
     assert "second, t = 100 s: goal reached" in told
-    (((summary,),)) = (column(entities, "/summary", "text")[-1],)
-    assert "| outcome | reached | reached |" in str(summary)
+    (((page,),)) = (column(entities, "/summary", "text")[-1],)
+    assert "| outcome | reached | reached |" in str(page)
     for lane in ("planner", "tracking"):
         assert column(entities, f"/states/1-first/{lane}", "state")[-1] == ["over: reached"]
         assert "over: reached" in column(entities, f"/states/1-first/{lane}", "values")[-1]
