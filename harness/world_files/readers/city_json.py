@@ -5,6 +5,7 @@ Heights are those of the file's vertical datum, taken as mean sea level.
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -27,6 +28,8 @@ DEEPEST: Final = 5
 AREAS: Final = ("Surface", "Solid")
 """Ends of the types of geometry that are taken; points and lines are not solid."""
 MOST_NAMED: Final = 4
+ROOFS: Final = ("b3_h_dak_max", "b3_h_nok", "h_dak_max")
+"""Attributes of 3DBAG with the height of the roof above the datum, for buildings whose geometry is flat."""
 LOW_M: Final = 0.1
 """An object that is lower is a footprint."""
 FLAT: Final = 1e-9
@@ -191,8 +194,12 @@ def _parts(
     ):
         if footprint is not None:
             if top - bottom < LOW_M:
-                high_m = limits.building(each.attributes, footprint, reading, unknown).top.height_m
-                top = bottom + high_m
+                roof_m = max(limits.metres_of(each.attributes.get(key)) or -math.inf for key in ROOFS)
+                if roof_m > bottom:
+                    top = roof_m
+                else:
+                    high_m = limits.building(each.attributes, footprint, reading, unknown).top.height_m
+                    top = bottom + high_m
             parts.append(Part(footprint, Limit(bottom), Limit(top), name=each.name[:40]))
     notes += limits.building_notes(unknown, reading)
     return parts

@@ -449,7 +449,12 @@ SQUARE_M = [[0.0, 0.0, 7.0], [10.0, 0.0, 7.0], [10.0, 10.0, 7.0], [0.0, 10.0, 7.
 
 
 def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_path: Path) -> None:
-    objects = {"a": floor(measuredHeight=12.5), "b": floor(), "c": floor("MultiLineString")}
+    objects = {
+        "a": floor(measuredHeight=12.5),
+        "b": floor(),
+        "c": floor("MultiLineString"),
+        "d": floor(b3_h_dak_max=21.5),
+    }
     path = written(
         tmp_path / "a.city.json", json.dumps(city("urn:ogc:def:crs:EPSG::7415", objects, SQUARE_M))
     )
@@ -457,6 +462,7 @@ def test_a_city_object_that_is_a_footprint_is_as_high_as_its_attributes_say(tmp_
     assert [(part.name, part.bottom, part.top) for part in found.parts] == [
         ("a", Limit(7.0), Limit(19.5)),
         ("b", Limit(7.0), Limit(13.0)),
+        ("d", Limit(7.0), Limit(21.5)),
     ]
     assert found.crs == "EPSG:7415"
     assert any("1 building without height" in note for note in found.notes)
