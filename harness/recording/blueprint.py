@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -175,6 +175,7 @@ class Scene:
         ground: heights of the true ground, where they are known.
         origin_deg: latitude and longitude of the plane's origin, where it was given.
         believes: whether the aircraft does not know its state exactly.
+        profile: altitudes to be held at places along the path, above mean sea level; None: one all along.
     """
 
     name: str
@@ -187,6 +188,13 @@ class Scene:
     ground: HeightField | None = None
     origin_deg: tuple[float, float] | None = None
     believes: bool = False
+    profile: Callable[[FloatArray], FloatArray] | None = None
+
+    def held_m(self, arc_length_m: FloatArray) -> FloatArray:
+        """(n,) altitudes to be held at places along the path, above mean sea level."""
+        if self.profile is None:
+            return np.full(len(arc_length_m), self.altitude_m)
+        return self.profile(np.nan_to_num(arc_length_m))
 
     @property
     def base_m(self) -> float:

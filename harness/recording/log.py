@@ -169,7 +169,7 @@ class RerunLog:
         for lane, changes in self._states.changes(block).items():
             send_changes(self._rec, lane, changes)
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
-        send_curves(self._rec, curves(block, self._scene.altitude_m), block.time_s)
+        send_curves(self._rec, curves(block, self._scene.held_m(block.arc_length_m)), block.time_s)
         send_levels(self._rec, self._scene, block.time_s)
         if block.has_beliefs:
             self._believed_point = send_believed(self._rec, block, self._piece_rows, self._believed_point)
@@ -257,7 +257,7 @@ class RerunLog:
         self._scans, self._plans = [], []
         self._tracked.send(self._rec)
         self._returns.send(self._rec)
-        send_plans(self._rec, plans, self._scene.altitude_m, self._chord_error_m)
+        send_plans(self._rec, plans, self._scene.held_m, self._chord_error_m)
         if scans:
             points = [returns_m(scan) for scan in scans]
             self._rec.send_columns(

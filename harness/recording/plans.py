@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import rerun as rr
@@ -60,14 +60,17 @@ def log_plan_style(rec: rr.RecordingStream, thin: bool = False) -> None:
 
 
 def send_plans(
-    rec: rr.RecordingStream, plans: Sequence[AcceptedPlan], altitude_m: float, chord_error_m: float
+    rec: rr.RecordingStream,
+    plans: Sequence[AcceptedPlan],
+    held_m: Callable[[FloatArray], FloatArray],
+    chord_error_m: float,
 ) -> None:
     """Draws plans, each from the time on at which it takes effect.
 
     Args:
         rec: where to.
         plans: in order of time; none draws nothing.
-        altitude_m: of the path in the 3-D view.
+        held_m: altitudes of the path in the 3-D view, from arc lengths.
         chord_error_m: how far a drawn path may be off the true one.
     """
     if not plans:
@@ -107,10 +110,16 @@ def send_plans(
         times,
         rr.Points2D.columns(positions=np.concatenate(met)).partition([len(each) for each in met]),
     )
-    level = [np.column_stack((path, np.full(len(path), altitude_m))) for path in paths]
-    rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(level)))
+    steep = [np.column_stack((path, held_m(_along(path)))) for path in paths]
+    rec.send_columns(f"{look.WORLD}/chosen", times, rr.LineStrips3D.columns(strips=strips_3d(steep)))
     for entity, values in (
         (look.SEARCH, [each.compute_ms for each in plans]),
         (look.DELAYS, [each.delay_s for each in plans]),
     ):
         rec.send_columns(f"{look.SERIES}/{entity}", times, rr.Scalars.columns(scalars=np.array(values)))
+
+
+def _along(path: FloatArray) -> FloatArray:
+    """(n,) lengths from the begin of a polyline to its points."""
+    along: FloatArray = np.append(0.0, np.cumsum(np.hypot(*np.diff(path, axis=0).T)))
+    return along

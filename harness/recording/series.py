@@ -26,12 +26,12 @@ def thin_curves(block: Track) -> dict[str, FloatArray]:
     }
 
 
-def curves(block: Track, altitude_m: float) -> dict[str, FloatArray]:
+def curves(block: Track, altitude_m: FloatArray) -> dict[str, FloatArray]:
     """The curves of a whole recording, by entity below SERIES.
 
     Args:
         block: rows of the track.
-        altitude_m: to be held, above mean sea level.
+        altitude_m: (n,) to be held at each, above mean sea level.
     """
     return {
         **thin_curves(block),

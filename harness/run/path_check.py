@@ -257,6 +257,7 @@ def fly_check(
         flown_by=flown_by,
         measured_by=partial(measured, check),
         command=command,
+        profile=None if check.plan.profile.level else check.plan.profile.altitudes,
     )
     return CheckedPath(check, figures, out)
 

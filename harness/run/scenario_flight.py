@@ -38,6 +38,7 @@ from harness.scenario.scenario import Scenario, dump_scenario
 from harness.scenario.sections import Environment, Origin
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
+from planner.interface import FloatArray
 
 if TYPE_CHECKING:
     from harness.recording.blueprint import Scene
@@ -201,6 +202,7 @@ def fly_to_folder(
     flown_by: Fly = fly,
     measured_by: Callable[[Flight, FlightLimits], dict[str, Any]] = metrics,
     command: str | None = None,
+    profile: Callable[[FloatArray], FloatArray] | None = None,
 ) -> dict[str, Any]:
     """Flies a scenario into a run folder and returns the content of its `metrics.json`.
 
@@ -218,6 +220,7 @@ def fly_to_folder(
         flown_by: flies the parts to an end.
         measured_by: gives the content of `metrics.json`.
         command: what the manifest says was called; default: the command line.
+        profile: altitudes to be held at arc lengths along the path, for the recording; None: the mission's.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed; nothing is written.
@@ -232,7 +235,8 @@ def fly_to_folder(
             radius_m = loop.mission.turn_radius_m
             folder = stack.enter_context(RunFolder.create(out, text, told, _sources(scenario), radius_m))
             observers = [*watching]
-            log = _recording(scenario, text, loop, folder, pilot, identity, thin) if recording else None
+            scene = replace(scene_of(scenario, loop, text, pilot), profile=profile) if recording else None
+            log = None if scene is None else _recording(scene, loop, folder, identity, thin)
             if log is not None:
                 stack.callback(log.end)
                 observers.append(log)
@@ -257,19 +261,10 @@ def _sources(scenario: Scenario) -> list[dict[str, str]]:
     return [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
 
 
-def _recording(
-    scenario: Scenario,
-    text: str,
-    loop: Loop,
-    folder: RunFolder,
-    pilot: str | None,
-    identity: str | None,
-    thin: bool,
-) -> Any:
+def _recording(scene: Scene, loop: Loop, folder: RunFolder, identity: str | None, thin: bool) -> Any:
     from harness.recording.log import RerunLog
     from harness.recording.thin import ThinLog
 
-    scene = scene_of(scenario, loop, text, pilot)
     if thin:
         return ThinLog(folder.recording_path, scene, identity or scene.name)
     return RerunLog(folder.recording_path, scene, identity or scene.name, moving=lambda: loop.seen.moving)

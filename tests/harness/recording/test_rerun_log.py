@@ -187,6 +187,22 @@ def test_series_hold_the_track(recording: tuple[Path, Flight]) -> None:
     assert seconds(entities, "/series/bank/flown")[-1] == 100.0
 
 
+def test_a_path_that_climbs_is_drawn_and_held_against_at_its_altitudes(
+    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    scene = replace(SCENE, profile=lambda along: 300.0 + 0.1 * along)
+    log = RerunLog(tmp_path / "flight.rrd", scene, recording_id="a")
+    log.on_plan(make_plan([(0, 0, 0, 1, 0.0, 2500.0)]), STATE)
+    track = make_track(101)
+    log.on_block(track)
+    log.close()
+    entities = read(tmp_path / "flight.rrd")
+    error = np.array(column(entities, "/series/altitude_error/flown", "scalars"), dtype=np.float64).ravel()
+    np.testing.assert_allclose(error, track.up_m - 300.0 - 0.1 * track.arc_length_m)
+    ((strip,),) = column(entities, "/world/chosen", "strips")
+    np.testing.assert_allclose(np.array(strip)[[0, -1]], [[0.0, 0.0, 300.0], [0.0, 2500.0, 550.0]])
+
+
 def test_pose_and_trail_follow_the_track(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     position = np.array(column(entities, "/world/aircraft", "translation"), dtype=np.float64).reshape(-1, 3)
