@@ -28,9 +28,15 @@ def view(
     For example: wayproof view runs/paper_circles/rolling_window-aerosonde-1
     """
     from harness.campaign.results import INDEX
+    from harness.files.input_file import InputError
 
-    if len(runs) == 1 and (runs[0] / INDEX).is_file():
-        return 0 if open_campaign(runs[0], web) else FAILED
+    campaign = next((each for each in runs if (each / INDEX).is_file()), None)
+    if campaign is not None and len(runs) > 1:
+        raise InputError(
+            f"{campaign}: the folder of a campaign is opened alone; its runs are in {campaign / 'runs'}"
+        )
+    if campaign is not None:
+        return 0 if open_campaign(campaign, web) else FAILED
     return 0 if open_viewer(runs, web) else FAILED
 
 

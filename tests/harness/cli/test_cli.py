@@ -222,6 +222,13 @@ def test_bad_usage_is_one_line_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_campaign_is_viewed_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "campaign.json").write_text("{}")
+    assert main(["view", str(tmp_path / "runs" / "3"), str(tmp_path)]) == 2
+    said = f"{tmp_path}: the folder of a campaign is opened alone; its runs are in {tmp_path / 'runs'}\n"
+    assert capsys.readouterr().err == said
+
+
 def test_bad_usage_in_a_process_of_its_own(tmp_path: Path) -> None:
     run = wayproof("fly", "paper_circles", "--set", "sensor.rays=2", folder=tmp_path)
     assert run.returncode == 2
