@@ -19,7 +19,7 @@ from harness.report.page import Picture, rendered
 
 PAGE = "summary.html"
 PLAIN = "summary.json"
-SCHEMA = "wayproof/campaign-summary/1"
+SCHEMA = "wayproof/campaign-summary/2"
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:
