@@ -105,8 +105,14 @@ CASES: Final = (
     Case("severe, wind 30 %", Tracking(1.0, 4.0, 2.0, 0.05), 0.3, "tustin", "severe"),
     Case("gnss", None, navigation="gnss"),
 )
-LIMIT_FACTORS: Final = {"aerosonde": 1.0, "c172p": 4.0, "T38": 8.0}
-"""By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified."""
+LIMIT_FACTORS: Final = {
+    "aerosonde": 1.0,
+    **dict.fromkeys(("c172p", "c172r", "c172x", "t6texan2"), 4.0),
+    **dict.fromkeys(("DHC6", "OV10", "T38", "A4", "F80C", "F4N", "global5000", "737", "A320", "B747"), 8.0),
+    **dict.fromkeys(("T37", "787-8", "MD11"), 16.0),
+}
+"""By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified: the least of 1,
+4, 8 and 16 of which no more than about half is flown."""
 
 
 def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
