@@ -112,7 +112,7 @@ LIMIT_FACTORS: Final = {
     **dict.fromkeys(("T37", "787-8", "MD11"), 16.0),
 }
 """By how much the limits of the Aerosonde are multiplied, for the aircraft whose tracking is verified: the least of 1,
-4, 8 and 16 of which no more than about half is flown."""
+4, 8 and 16 of which no more than two thirds is flown."""
 
 
 def course(seed: int, radius_m: float, turns: int = TURNS) -> Route:
