@@ -32,6 +32,9 @@ COUNTS = "Array(intp, 1, 'C', readonly=True)"
 BOOLS_OUT, COUNTS_OUT, FLOATS_OUT, PLACES_OUT = "boolean[::1]", "intp[::1]", "float64[::1]", "complex128[::1]"
 """Arrays that a function changes."""
 
+STARTS_BYTES = 2500
+"""A second process starts in about the time in which so much byte code is compiled."""
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -182,7 +185,7 @@ def _half(functions: Sequence[Compiled[..., Any]]) -> set[str]:
     sizes: Counter[str] = Counter()
     for each in functions:
         sizes[each.__module__] += each.size
-    here, there = 0, 0
+    here, there = 0, STARTS_BYTES
     names = set()
     for name, size in sizes.most_common():
         if here <= there:
