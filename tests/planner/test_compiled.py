@@ -177,26 +177,31 @@ print(made.anew)
 
 
 def test_another_process_compiles_some_of_them(tmp_path: Path) -> None:
-    """Of three modules one is compiled elsewhere; all are compiled here where that cannot be, or fails."""
+    """Of three modules one is compiled elsewhere; all here where that cannot be, fails, or takes less than to start."""
     source = """
 import importlib, os, sys
+import planner.compiled
 from planner.compiled import compile_all
-for folder, processors, python in (
-    ("two", 2, sys.executable), ("one", 1, sys.executable), ("fails", 2, "/bin/false"), ("missing", 2, "/no/such/file")
+for folder, processors, python, starts_bytes in (
+    ("two", 2, sys.executable, 0),
+    ("one", 1, sys.executable, 0),
+    ("fails", 2, "/bin/false", 0),
+    ("missing", 2, "/no/such/file", 0),
+    ("little", 2, sys.executable, planner.compiled.STARTS_BYTES),
 ):
-    os.cpu_count, sys.executable = lambda: processors, python
+    os.cpu_count, sys.executable, planner.compiled.STARTS_BYTES = lambda: processors, python, starts_bytes
     made = [importlib.import_module(f"{folder}.{name}").it for name in "abc"]
     compile_all()
     print(folder, *(each(1.0) for each in made), sum(each.anew for each in made))
 """
-    for folder in ("two", "one", "fails", "missing"):
+    here = {"two": "2", "one": "3", "fails": "3", "missing": "3", "little": "3"}
+    for folder in here:
         (tmp_path / folder).mkdir()
         for number, name in enumerate("abc"):
             text = f"@compiled('float64')\ndef it(x):\n    return x + {number}\n"
             (tmp_path / folder / f"{name}.py").write_text(f"from planner.compiled import compiled\n{text}")
     paths = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": f"{os.getcwd()}{os.pathsep}{tmp_path}"}
     said = ran(source, tmp_path, **paths)
-    here = {"two": "2", "one": "3", "fails": "3", "missing": "3"}
     assert said == [word for folder in here for word in (folder, "1.0", "2.0", "3.0", here[folder])]
 
 
