@@ -15,6 +15,7 @@ from harness.run_files.run_folder import load_run
 
 REAL = Path(__file__).parents[3].parent / "shared" / "real"
 MISSIONS = sorted((REAL / "missions").glob("*")) if REAL.is_dir() else []
+needs_missions = pytest.mark.skipif(not MISSIONS, reason="the real missions are not beside the checkout")
 CANBERRA = "obstacles=[{file: {path: %s}}]" % (REAL / "terrain" / "S36E149.hgt.zip")
 
 NORTH_M = 111_200.0
@@ -204,7 +205,8 @@ def test_a_mutilated_mission_is_refused_in_a_line(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("path", MISSIONS, ids=lambda path: path.name)
+@needs_missions
+@pytest.mark.parametrize("path", MISSIONS or [REAL / "missions"], ids=lambda path: path.name)
 @pytest.mark.parametrize("keep", [0.15, 0.4, 0.7, 0.95])
 def test_a_real_mission_cut_off_is_refused_in_a_line_or_flown_so_far(
     path: Path, keep: float, tmp_path: Path
@@ -222,7 +224,7 @@ def test_a_real_mission_cut_off_is_refused_in_a_line_or_flown_so_far(
     assert told or path.suffix == ".txt"
 
 
-@pytest.mark.skipif(not MISSIONS, reason="the real missions lie beside the checkout")
+@needs_missions
 def test_real_missions_over_their_terrain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = REAL / "missions" / "ardupilot_ap-terrain.txt"
     _, metrics = flown(path, tmp_path / "run", "--set", CANBERRA, capsys=capsys)
