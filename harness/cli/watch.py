@@ -137,13 +137,13 @@ def _viewer(web: bool) -> Iterator[tuple[str, Callable[[], None]]]:
 
 
 def _tell_place(scenario: Scenario) -> None:
-    """Says where the flight is shown if the scenario does not."""
+    """Says where the flight is shown if that may not be where it was meant to be."""
     from harness.scenario.sections import Origin
 
     origin = scenario.area.origin
     if origin == Origin():
         say(
-            f"area.origin is not given: the ground station shows the flight about {origin.latitude_deg:g}, "
+            f"area.origin is the default: the ground station shows the flight about {origin.latitude_deg:g}, "
             f"{origin.longitude_deg:g}",
             err=True,
         )

@@ -48,7 +48,7 @@ def damage(draw: st.DrawFn, whole: Path, name: str) -> bytes:
     )
 
 
-NOTES = ("the run did not reach its goal", "area.origin is not given")
+NOTES = ("the run did not reach its goal", "area.origin is the default")
 """How what is said of a file that was written begins."""
 
 

@@ -85,12 +85,12 @@ def exported(
 
 
 def _place_note(scenario: Scenario) -> tuple[str, ...]:
-    """Said of a file that lies somewhere on earth, where nobody said where."""
+    """Said of a file that lies where the default origin is: of a run nobody knows any more whether it was given."""
     origin = scenario.area.origin
     if origin != Origin():
         return ()
     return (
-        f"area.origin is not given: the file lies about {origin.latitude_deg:g}, {origin.longitude_deg:g}",
+        f"area.origin is the default: the file lies about {origin.latitude_deg:g}, {origin.longitude_deg:g}",
     )
 
 

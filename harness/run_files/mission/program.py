@@ -6,6 +6,7 @@ https://docs.px4.io/main/en/flight_modes_fw/mission.html.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Final
@@ -23,8 +24,9 @@ MOST_TURNS: Final = 1000
 MOST_LOITER_S: Final = 86_400.0
 MOST_RADIUS_M: Final = 50_000.0
 MOST_HEIGHT_M: Final = 50_000.0
-DEGREE_M: Final = 111_200.0
 """Beyond these an item is taken for a mistake."""
+DEGREE_M: Final = 111_200.0
+"""Length of a degree of latitude."""
 
 SIDE_ALONE_M: Final = 1.0
 """A radius of 1 m or less says which way round, and no more: ArduPlane hands back 1 or -1 where it has none."""
@@ -320,8 +322,10 @@ class _Run:
         """Whether a place is so far from home that a vertical takeoff cannot be meant to be there."""
         if self.home is None:
             return False
-        most = MOST_RADIUS_M if self.local else MOST_RADIUS_M / DEGREE_M
-        return max(abs(position[0] - self.home[0]), abs(position[1] - self.home[1])) > most
+        north, east = (there - here for there, here in zip(position, self.home, strict=True))
+        if self.local:
+            return max(abs(north), abs(east)) > MOST_RADIUS_M
+        return max(abs(north), abs(math.remainder(east, 360.0))) > MOST_RADIUS_M / DEGREE_M
 
     def _loiter(self, item: Item) -> MissionStep | None:
         if item.position is None and not self.steps:

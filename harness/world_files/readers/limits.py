@@ -25,24 +25,15 @@ _WORD: Final = re.compile(
 """Words that a limit may consist of. Of others, as `ASK 123.5`, nothing is guessed."""
 _METRES: Final = re.compile(r"\d\s*(M|METRES?|METERS?|MTR)(?=\b|AMSL|MSL|AGL|ASFC|GND|SFC)")
 _LOWER: Final = (
-    *(
-        "lowerlimit",
-        "lower_limit",
-        "lower",
-        "lower_val",
-        "floor",
-        "bottom",
-        "loweraltitude",
-        "lower_altitude",
-    ),
-    *("minaltitude", "min_altitude", "altitudemin", "altmin", "alt_min", "minalt", "min_alt", "altitude_min"),
+    "lowerlimit", "lower_limit", "lower", "lower_val", "floor", "bottom", "loweraltitude", "lower_altitude",
+    "minaltitude", "min_altitude", "altitudemin", "altmin", "alt_min", "minalt", "min_alt", "altitude_min",
     "lower_limit_altitude",
-)
+)  # fmt: skip
 _UPPER: Final = (
-    *("upperlimit", "upper_limit", "upper", "upper_val", "ceiling", "top", "upperaltitude", "upper_altitude"),
-    *("maxaltitude", "max_altitude", "altitudemax", "altmax", "alt_max", "maxalt", "max_alt", "altitude_max"),
+    "upperlimit", "upper_limit", "upper", "upper_val", "ceiling", "top", "upperaltitude", "upper_altitude",
+    "maxaltitude", "max_altitude", "altitudemax", "altmax", "alt_max", "maxalt", "max_alt", "altitude_max",
     "upper_limit_altitude",
-)
+)  # fmt: skip
 """Names of limits; unit and reference may follow, as in `floor_ft_agl`."""
 _AFTER: Final = re.compile(r"(?:_(ft|feet|m|metres|meters|agl|amsl|msl|gnd))+$")
 _METRES_AFTER: Final = frozenset(("m", "metres", "meters"))
@@ -51,28 +42,15 @@ _BEGINS: Final = {"lower": ("lower", "min", "floor", "bottom"), "upper": ("upper
 _UNITS: Final = ("uom", "unit")
 """What the name of an attribute has that says in what unit a limit is."""
 _BOTH_UNITS: Final = (
-    "uom",
-    "unit",
-    "units",
-    "uomdimensions",
-    "altitudeunit",
-    "altitude_unit",
-    "unitofmeasure",
-)
+    "uom", "unit", "units", "uomdimensions", "altitudeunit", "altitude_unit", "unitofmeasure",
+)  # fmt: skip
 _REFERENCES: Final = ("ref", "code", "datum", "type")
 """What the name of an attribute has that says what a limit is counted from, as `lowerReference`, `UPPER_CODE`."""
 _BOTH_REFERENCES: Final = (
-    *(
-        "reference",
-        "altitudereference",
-        "altitude_reference",
-        "verticalreference",
-        "vertical_reference",
-        "datum",
-    ),
-    *("verticaldatum", "vertical_datum", "altituderef", "altitude_ref", "altitudedatum", "altitude_datum"),
-    *("altitudetype", "altitude_type", "heightreference", "height_reference"),
-)
+    "reference", "altitudereference", "altitude_reference", "verticalreference", "vertical_reference", "datum",
+    "verticaldatum", "vertical_datum", "altituderef", "altitude_ref", "altitudedatum", "altitude_datum",
+    "altitudetype", "altitude_type", "heightreference", "height_reference",
+)  # fmt: skip
 _GRID: Final = ("apt1_", "map_eff")
 """What attributes begin with in the facility maps of the FAA."""
 NO_NUMBER: Final = -9000.0

@@ -284,7 +284,7 @@ def test_fly_is_paced_at_real_time_or_faster(
     assert main(["fly", "aerosonde_forest", "--mavlink", to, *limited, str(tmp_path / "run")]) == 1
     assert time.monotonic() - begun_s >= 3.0
     said = capsys.readouterr().err
-    assert "area.origin is not given: the ground station shows the flight about 47, 8" in said
+    assert "area.origin is the default: the ground station shows the flight about 47, 8" in said
     assert {"HEARTBEAT", "GLOBAL_POSITION_INT"} <= {message.get_type() for message in station.listen()}
 
 
