@@ -44,6 +44,9 @@ FOLLOWED_M: Final = 50.0
 ARC_RAD: Final = math.pi / 2
 """Longest arc of a circle in one segment."""
 
+SAME_DIRECTION: Final = 1e-5
+"""Directions that differ by less, in radians, are no corner."""
+
 SAMPLE_M: Final = 5.0
 """Points along circles are this close together, where a track is compared with them."""
 
@@ -211,7 +214,7 @@ class _Build:
         """Gets onto a circle."""
         here, heading = self._here(), self._heading()
         touch = joins_at(here, center, radius, side) if here is not None else None
-        if here is not None and touch is not None and self._run:
+        if here is not None and touch is not None and self._run and not self._kinks(touch):
             self._add(_Vertex(touch, altitude, None))
             self.flush()
         elif here is not None and heading is not None:
@@ -225,6 +228,13 @@ class _Build:
             self._pose = center + radius * out, direction_on(center + out, center, side)
         assert self._pose is not None
         self._waypoints.append((self._pose[0], self._length_m))
+
+    def _kinks(self, place: complex) -> bool:
+        """Whether a line from the end of the circle that was flown last leads to a place only after a turn."""
+        if self._pose is None or len(self._run) > 1 or abs(place - self._pose[0]) <= SAME_PLACE_M:
+            return False
+        ahead = (place - self._pose[0]) / abs(place - self._pose[0])
+        return abs(ahead - self._pose[1]) > SAME_DIRECTION
 
     def _target(self, number: int, center: complex, radius: float, side: int) -> complex | None:
         """What the aircraft turns to as it leaves a circle; None where it goes on round it or straight."""

@@ -154,3 +154,12 @@ def test_a_mission_may_begin_on_a_circle_to_an_altitude() -> None:
     made = route((step(1, 300.0, loiter=Loiter(100.0, True)), 50 + 0j), (step(2, 200.0), 2000j))
     assert made.profile.altitude_m[0] == altitude(made, 1) == 700.0
     assert altitude(made, 2) == 600.0
+
+
+@pytest.mark.parametrize("wide_m", [60.0, 400.0])
+def test_a_circle_inside_another_or_about_it_is_joined_by_a_turn(wide_m: float) -> None:
+    for side, other in itertools.product((True, False), repeat=2):
+        for center in (1000j, 30 + 1000j, 200 + 1100j):
+            first, second = Loiter(150.0, side, turns=1.2), Loiter(wide_m, other, turns=1.0)
+            made = route((step(1), 0j), (step(2, loiter=first), 1000j), (step(3, loiter=second), center))
+            assert abs(complex(*made.way.given_m[-1, :2]) - center) == pytest.approx(wide_m, abs=0.1)
