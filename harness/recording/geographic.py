@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MOST_CORNERS: Final = 60_000
 """Of all outlines on the map together; more are left out, the smallest obstacles first."""
+TURN_DEG: Final = 360.0
 
 
 def globe(rec: rr.RecordingStream, scene: Scene) -> Globe | None:
@@ -84,4 +85,7 @@ class Globe:
             )
 
     def _lat_lon(self, points_m: FloatArray) -> FloatArray:
-        return np.array([self._plane.geodetic(east, north) for east, north in points_m[:, :2].tolist()])
+        """(n, 2) degrees; longitudes by the turn that is nearest to the origin's: no line leads round the earth."""
+        places = np.array([self._plane.geodetic(east, north) for east, north in points_m[:, :2].tolist()])
+        places[:, 1] += TURN_DEG * np.round((self._plane.longitude_deg - places[:, 1]) / TURN_DEG)
+        return places
