@@ -113,7 +113,7 @@ def open_viewer(runs: Sequence[Path], web: bool = False) -> bool:
     from harness.recording.viewer import ViewerError, open_viewer
 
     try:
-        open_viewer(runs, web, lambda address: say(f"{address} (Ctrl-C ends it)", err=True))
+        open_viewer(runs, web, lambda told: say(told, err=True))
     except RunFolderError as error:
         raise bad_input(error) from error
     except ViewerError as error:

@@ -162,7 +162,7 @@ class ThinLog:
         )
 
 
-def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
+def write_log_recording(log: Path, run_dir: Path, out: Path) -> tuple[str, ...]:
     """Writes the recording of a flight log beside a run's.
 
     Its track, altitude error, speed and cross-track error against the plans of the run are drawn; both begin at t = 0.
@@ -171,6 +171,9 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
         log: the log (`harness.run_files.flight_logs`).
         run_dir: the run's folder: its plane, its altitude, its plans.
         out: the file to write.
+
+    Returns:
+        What of the log is not there, one sentence each.
 
     Raises:
         InputError: the log cannot be read.
@@ -203,6 +206,7 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> None:
         _send_track(rec, track, run, frame.altitude_m)
     finally:
         file.end()
+    return track.notes
 
 
 def _outside_m(track: LogTrack, bounds_m: tuple[float, float, float, float]) -> float:

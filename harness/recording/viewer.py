@@ -54,7 +54,7 @@ class ViewerError(RuntimeError):
 
 
 def open_viewer(
-    run_dirs: Sequence[Path], web: bool = False, tell: Callable[[str], None] = lambda address: None
+    run_dirs: Sequence[Path], web: bool = False, tell: Callable[[str], None] = lambda told: None
 ) -> None:
     """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
 
@@ -62,7 +62,7 @@ def open_viewer(
         run_dirs: run folders, incomplete ones too; after the first also flight logs of other tools, which are shown in
             its plane. Alone: a recording, or the folder of a comparison, of which the overlay is shown.
         web: in a browser instead of a window; served until interrupted.
-        tell: is told the address for the browser.
+        tell: is told the address for the browser, and what of a flight log is not there.
 
     Raises:
         RunFolderError: a folder has no recording.
@@ -82,7 +82,7 @@ def open_viewer(
     if not web:
         need_screen()
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
-        recordings = _recordings(run_dirs, Path(scratch))
+        recordings = _recordings(run_dirs, Path(scratch), tell)
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
@@ -92,7 +92,7 @@ def open_viewer(
                 contextlib.suppress(KeyboardInterrupt),
                 served(shown, Path(scratch)) as (viewer, address),
             ):
-                tell(address)
+                tell(f"{address} (Ctrl-C ends it)")
                 webbrowser.open(address)
                 viewer.wait()
             return
@@ -114,8 +114,8 @@ def _overlay_of(folder: Path) -> Path:
     return overlays[0] if overlays else folder
 
 
-def _recordings(run_dirs: Sequence[Path], scratch: Path) -> list[Path]:
-    """The recordings of runs, and those made of flight logs."""
+def _recordings(run_dirs: Sequence[Path], scratch: Path, tell: Callable[[str], object]) -> list[Path]:
+    """The recordings of runs, and those made of flight logs; tells what of a log is not there."""
     recordings = []
     if run_dirs[0].suffix.lower() == ALONE and run_dirs[0].is_file():
         return [*run_dirs]
@@ -126,7 +126,8 @@ def _recordings(run_dirs: Sequence[Path], scratch: Path) -> list[Path]:
         if run_dirs[0].is_file():
             raise RunFolderError(f"{each} is a flight log; name the run beside which it is to be shown first")
         recordings.append(scratch / f"log-{number}.rrd")
-        write_log_recording(each, run_dirs[0], recordings[-1])
+        for note in write_log_recording(each, run_dirs[0], recordings[-1]):
+            tell(f"{each}: {note}")
     return recordings
 
 

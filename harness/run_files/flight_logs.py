@@ -6,16 +6,19 @@ import contextlib
 import csv
 import io
 import math
+import mmap
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
+from harness.files.wording import counted
 from harness.flight.record import FloatArray
 
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
@@ -29,8 +32,16 @@ LONGEST_S: Final = 1e7
 LEAST_ROWS: Final = 2
 FIX_3D: Final = 3
 """`Status` of a receiver with a three-dimensional fix, in DataFlash."""
+ULOG_HEADER: Final = 16
+ULOG_KINDS: Final = frozenset(b"BFIMPQARDLCSO")
+"""Bytes before the messages of a ULog, and the kinds of those."""
 DATAFLASH: Final = b"\xa3\x95\x80"
 """What a DataFlash log begins with: a message that describes formats."""
+LAST_PAGE: Final = 528
+"""Bytes at the end of a DataFlash log that may hold anything: it is written in pages."""
+DAMAGED: Final = "damaged: what cannot be read of it is passed over"
+TORN: Final = "damaged, or torn: read as far as it goes"
+UNINDEXED: Final = "its index is damaged, or missing: read without it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,19 +53,24 @@ class LogTrack:
         east_m: (n,) in the plane of the run beside which it is shown.
         north_m: (n,).
         up_m: (n,) altitude as the log has it, above mean sea level where it says so.
+        notes: on what of the log is not there, one sentence each.
     """
 
     time_s: FloatArray
     east_m: FloatArray
     north_m: FloatArray
     up_m: FloatArray
+    notes: tuple[str, ...] = ()
 
     def thinned(self, most: int) -> LogTrack:
         """Every so many of its rows, and the last, that no more than about `most` are left."""
         rows = np.unique(
             np.append(np.arange(0, len(self.time_s), -(-len(self.time_s) // most)), len(self.time_s) - 1)
         )
-        return LogTrack(self.time_s[rows], self.east_m[rows], self.north_m[rows], self.up_m[rows])
+        time_s, east_m, north_m, up_m = (
+            each[rows] for each in (self.time_s, self.east_m, self.north_m, self.up_m)
+        )
+        return LogTrack(time_s, east_m, north_m, up_m, self.notes)
 
     @property
     def groundspeed_mps(self) -> FloatArray:
@@ -98,10 +114,11 @@ def read_log(path: Path, plane: LocalPlane) -> LogTrack:
     size, most = path.stat().st_size, MAX_TEXT_BYTES if reader in (_csv, _igc) else MAX_BYTES
     if size > most:
         raise InputError(f"{path}: has {size / 1e6:.0f} MB; at most {most / 1e6:g} MB are read")
+    notes: list[str] = []
     try:
         # Of a damaged file libraries print a line for each byte.
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-            rows = reader(path)
+            rows = reader(path, notes)
     except ImportError as error:
         raise InputError(f"{path}: {NEEDS_LOGS} ({error.name})") from error
     except InputError:
@@ -109,7 +126,7 @@ def read_log(path: Path, plane: LocalPlane) -> LogTrack:
     except Exception as error:  # whatever a library says of a damaged file
         text = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"{path}: cannot be read as {path.suffix} ({text})") from error
-    return _track(rows, plane, path)
+    return replace(_track(rows, plane, path), notes=tuple(notes))
 
 
 def _track(rows: Rows | LogTrack, plane: LocalPlane, path: Path) -> LogTrack:
@@ -140,12 +157,14 @@ def _on_earth(latitude_deg: float, longitude_deg: float) -> bool:
     return there and (latitude_deg, longitude_deg) != (0.0, 0.0)
 
 
-def _ulog(path: Path) -> Rows:
+def _ulog(path: Path, notes: list[str]) -> Rows:
     """PX4: the estimator's global position, https://docs.px4.io (ULog file format)."""
     from pyulog import ULog
 
     with path.open("rb") as file:
         log = ULog(file, ["vehicle_global_position"])
+    if log.file_corruption or not _is_whole(path):
+        notes.append(DAMAGED)
     if not log.data_list:
         raise InputError(f"{path}: has no topic vehicle_global_position")
     data = log.data_list[0].data
@@ -165,7 +184,18 @@ def _ulog(path: Path) -> Rows:
     return found
 
 
-def _dataflash(path: Path) -> Rows:
+def _is_whole(path: Path) -> bool:
+    """Whether a ULog is a row of messages up to its end: two bytes of size, one of kind, and so many more."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        place, end = ULOG_HEADER, len(data)
+        while place + 3 <= end:
+            if data[place + 2] not in ULOG_KINDS:
+                return False
+            place += 3 + data[place] + 256 * data[place + 1]
+    return place == end
+
+
+def _dataflash(path: Path, notes: list[str]) -> Rows:
     """ArduPilot: the estimator's position (POS), or the receiver's (GPS) where there is none."""
     from pymavlink.DFReader import DFReader_binary
 
@@ -184,6 +214,9 @@ def _dataflash(path: Path) -> Rows:
         finally:
             log.data_map.close()
             log.filehandle.close()
+    held = sum(len(places) * log.formats[kind].len for kind, places in enumerate(log.offsets) if len(places))
+    if log.data_len - held > LAST_PAGE:
+        notes.append(DAMAGED)
     return found["POS"] or found["GPS"]
 
 
@@ -200,15 +233,21 @@ def _silent() -> Iterator[None]:
             os.close(before)
 
 
-def _igc(path: Path) -> Rows:
+def _igc(path: Path, notes: list[str]) -> Rows:
     """Gliders: fixes with the receiver's altitude, or the pressure altitude where that is 0."""
     from aerofiles.igc import Reader
 
     with path.open(encoding="latin-1") as file:
         parsed = Reader(skip_duplicates=True).read(file)
+    broken, fixes = parsed["fix_records"]
+    if broken:
+        notes.append(f"{counted(len(broken), 'B record')} that cannot be read passed over")
+    satellites = any(fix["gps_alt"] for fix in fixes)
+    if satellites and not all(fix["gps_alt"] for fix in fixes):
+        notes.append("where its receiver has no altitude, that of its barometer is shown, if there is one")
     rows: Rows = []
     days = 0.0
-    for fix in parsed["fix_records"][1]:
+    for fix in fixes:
         clock = fix["time"]
         time_s = days + 3600.0 * clock.hour + 60.0 * clock.minute + clock.second
         if rows and time_s < rows[-1][0] - 43_200.0:
@@ -218,49 +257,66 @@ def _igc(path: Path) -> Rows:
     return rows
 
 
-def _mcap(path: Path) -> Rows:
+def _mcap(path: Path, notes: list[str]) -> Rows:
     """Messages of the schema foxglove.LocationFix, as protobuf or JSON, of the topic that has most of them.
 
-    A file whose end is missing is read as far as it goes.
+    A file that is torn or damaged is read as far as it goes, which is noted.
     """
     from mcap.reader import NonSeekingReader, make_reader
 
-    topics: dict[str, Rows] = {}
+    damage: list[str] = []
     with path.open("rb") as file:
-        try:
-            _take_fixes(make_reader(file).iter_messages(), topics)
-        except Exception:
-            topics.clear()
+        topics = _fixes(_readable(make_reader(file, validate_crcs=True).iter_messages(), damage), notes)
+        if damage:
+            del notes[:], damage[1:]
             file.seek(0)
-            with contextlib.suppress(Exception):
-                _take_fixes(NonSeekingReader(file).iter_messages(log_time_order=False), topics)
+            reader = NonSeekingReader(file, validate_crcs=True)
+            topics = _fixes(_readable(reader.iter_messages(log_time_order=False), damage), notes)
             if not topics:
-                raise
+                raise InputError(f"{path}: cannot be read as .mcap ({damage[0]})")
+            notes.append(TORN if len(damage) > 1 else UNINDEXED)
     return max(topics.values(), key=len, default=[])
 
 
-def _take_fixes(messages: Iterator[Any], topics: dict[str, Rows]) -> None:
-    """Adds rows by topic."""
-    import json
+def _readable(messages: Iterator[Any], damage: list[str]) -> Iterator[Any]:
+    """Messages up to where a file is damaged; what its reader says of that goes into `damage`."""
+    try:
+        yield from messages
+    except ImportError:  # of what it is compressed with
+        raise
+    except Exception as error:  # whatever a library says of a damaged file
+        damage.append(" ".join(str(error).split())[:200] or type(error).__name__)
 
+
+def _fixes(messages: Iterator[Any], notes: list[str]) -> dict[str, Rows]:
+    """Rows by topic; how many messages hold no position goes into the notes."""
     from mcap_protobuf.decoder import DecoderFactory
 
-    factory = DecoderFactory()
+    factory, topics, broken = DecoderFactory(), dict[str, Rows](), 0
     for schema, channel, message in messages:
         if schema is None or schema.name != "foxglove.LocationFix":
             continue
-        decode = factory.decoder_for(channel.message_encoding, schema)
-        if decode is not None:
+        decode = factory.decoder_for(channel.message_encoding, schema) or _plain
+        try:
             fix = decode(message.data)
-            place = (fix.latitude, fix.longitude, fix.altitude)
-        else:
-            plain = json.loads(message.data)
-            place = (plain["latitude"], plain["longitude"], plain.get("altitude", 0.0))
-        row = (message.log_time / 1e9, *map(float, place))
+            row = (message.log_time / 1e9, *map(float, (fix.latitude, fix.longitude, fix.altitude)))
+        except Exception:  # whatever a library says of a damaged message
+            broken += 1
+            continue
         topics.setdefault(channel.topic, []).append(row)
+    if broken:
+        notes.append(f"{counted(broken, 'message')} of foxglove.LocationFix without a position passed over")
+    return topics
 
 
-def _csv(path: Path) -> Rows | LogTrack:
+def _plain(data: bytes) -> SimpleNamespace:
+    """A message in JSON."""
+    import json
+
+    return SimpleNamespace(**{"altitude": 0.0, **json.loads(data)})
+
+
+def _csv(path: Path, notes: list[str]) -> Rows | LogTrack:
     """A table with a header: time_s, a position, and altitude_m where there is one."""
     rows: Rows = []
     with path.open(encoding="utf-8-sig", newline="") as file:
@@ -286,7 +342,7 @@ def _csv(path: Path) -> Rows | LogTrack:
     return LogTrack(*np.array(rows, dtype=np.float64).reshape(-1, 4).T) if local else rows
 
 
-READERS: Final[dict[str, Callable[[Path], Rows | LogTrack]]] = {
+READERS: Final[dict[str, Callable[[Path, list[str]], Rows | LogTrack]]] = {
     ".ulg": _ulog,
     ".bin": _dataflash,
     ".igc": _igc,

@@ -253,6 +253,71 @@ def test_a_torn_mcap_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     found = read_log(tmp_path / "torn.mcap", PLANE)
     assert 4 <= len(found.time_s) < 39
     assert found.east_m[0] == pytest.approx(TRUTH.east_m[0], abs=1e-3)
+    assert found.notes == ("damaged, or torn: read as far as it goes",)
+    assert read_log(tmp_path / "a.mcap", PLANE).notes == ()
+
+
+def test_a_damaged_mcap_is_not_taken_for_whole(tmp_path: Path) -> None:
+    write_mcap(tmp_path / "a.mcap")
+    whole = (tmp_path / "a.mcap").read_bytes()
+    inside = whole.index(b'"longitude"', len(whole) // 2)
+    for name, data, most, note in (
+        ("digit", whole[:inside] + whole[inside:].replace(b"8.0", b"9.0", 1), 38, "damaged, or torn"),
+        ("key", whole[:inside] + b'"longitudo"' + whole[inside + 11 :], 38, "damaged, or torn"),
+        ("index", whole[:-28] + struct.pack("<Q", 3) + whole[-20:], 39, "its index is damaged"),
+    ):
+        (tmp_path / f"{name}.mcap").write_bytes(data)
+        found = read_log(tmp_path / f"{name}.mcap", PLANE)
+        assert 4 <= len(found.time_s) <= most, name
+        assert np.hypot(found.east_m, found.north_m).max() < 1000.0, name
+        assert [each.startswith(note) for each in found.notes] == [True], name
+
+
+def test_messages_without_a_position_are_counted(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    with (tmp_path / "a.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("foxglove.LocationFix", "jsonschema", b"{}")
+        topic = writer.register_channel("/gps", "json", schema)
+        for row, (latitude, longitude) in enumerate(degrees()):
+            at = {"latitude": latitude} if row in (3, 4) else {"latitude": latitude, "longitude": longitude}
+            writer.add_message(topic, 10**9 * row, json.dumps(at).encode(), 10**9 * row)
+        writer.finish()  # type: ignore[no-untyped-call]
+    found = read_log(tmp_path / "a.mcap", PLANE)
+    assert len(found.time_s) == 18
+    assert found.notes == ("2 messages of foxglove.LocationFix without a position passed over",)
+
+
+@pytest.mark.parametrize(
+    ("ending", "write", "row"),
+    [(".ulg", write_ulog, 3 + 2 + 28), (".bin", write_dataflash, 3 + 20), (".igc", write_igc, 37)],
+)
+def test_of_a_damaged_log_it_is_said_that_it_is(
+    ending: str, write: Callable[[Path], None], row: int, tmp_path: Path
+) -> None:
+    write(tmp_path / f"a{ending}")
+    assert read_log(tmp_path / f"a{ending}", PLANE).notes == ()
+    whole = (tmp_path / f"a{ending}").read_bytes()
+    garbage = b"B99zz\r\n" * (
+        100 if ending == ".bin" else 3
+    )  # as much as a page may be at the end of such a log
+    (tmp_path / f"damaged{ending}").write_bytes(whole[: -10 * row] + garbage + whole[-10 * row :])
+    found = read_log(tmp_path / f"damaged{ending}", PLANE)
+    assert len(found.time_s) >= 7
+    assert [note.endswith("passed over") for note in found.notes] == [True]
+    if ending == ".ulg":
+        (tmp_path / "torn.ulg").write_bytes(whole[:-9])
+        assert len(read_log(tmp_path / "torn.ulg", PLANE).notes) == 1
+
+
+def test_view_tells_what_of_a_log_is_not_there(tmp_path: Path, run: Path) -> None:
+    write_mcap(tmp_path / "a.mcap")
+    whole = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "torn.mcap").write_bytes(whole[: len(whole) // 3])
+    notes = write_log_recording(tmp_path / "torn.mcap", run, tmp_path / "torn.rrd")
+    assert notes == ("damaged, or torn: read as far as it goes",)
 
 
 def test_what_was_flown_in_a_gap_is_not_drawn(tmp_path: Path, run: Path) -> None:
