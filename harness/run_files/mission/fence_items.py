@@ -7,22 +7,12 @@ files that ground stations write may hold them together with the mission.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
 
+from harness.files.fence_commands import CIRCLES, CORNERS, HOME_CIRCLE, RALLY_POINT
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.run_files.fences import Fence, Fences
 from harness.run_files.mission.items import Item
-
-RETURN_POINT: Final = 5000
-CORNERS: Final = {5001: True, 5002: False}
-"""Corner of an area to stay inside of, and of one to stay out of; the first parameter counts the corners."""
-HOME_CIRCLE: Final = 5005
-CIRCLES: Final = {5003: True, 5004: False, HOME_CIRCLE: True}
-"""A circle to stay inside of, and one to stay out of, and one about home; the first parameter is the radius."""
-RALLY_POINT: Final = 5100
-APART: Final = frozenset((RETURN_POINT, *CORNERS, *CIRCLES, RALLY_POINT))
-"""Commands of items that are no part of the mission."""
 
 
 def fences_of(items: Sequence[Item], home: tuple[float, float] | None = None) -> Fences:

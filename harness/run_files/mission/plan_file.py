@@ -9,15 +9,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Final
 
+from harness.files.fence_commands import inside_all
 from harness.files.input_file import InputError
 from harness.run_files.fences import Fence, Fences
 from harness.run_files.mission import commands
 from harness.run_files.mission.fence_items import rally_note
 from harness.run_files.mission.items import Item, MissionAsRead
 from harness.run_files.read_values import finite, parsed_json, shown, whole
-
-ARDUPILOT: Final = 3
-"""MAV_AUTOPILOT of ArduPilot, which wants an aircraft inside of all inclusion fences; PX4 wants it inside of one."""
 
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
 """Complex items that are written as a place to descend at and a place to land."""
@@ -43,7 +41,7 @@ def read_plan(text: str, source: str) -> MissionAsRead:
     if not isinstance(mission, dict):
         raise InputError(f"{source}: mission.items: is missing; it is required")
     read = read_mission(mission, source, "mission.")
-    fences = _fences(plan.get("geoFence"), source, mission.get("firmwareType") == ARDUPILOT)
+    fences = _fences(plan.get("geoFence"), source, inside_all(mission.get("firmwareType")))
     return replace(read, fences=fences, notes=(*read.notes, *_passed_over(plan)))
 
 
@@ -169,7 +167,7 @@ def _landing(item: dict[str, Any], key: str, source: str, number: int, land: int
     yield Item(place, number + 2, land, frames[1], (0.0, 0.0, 0.0, 0.0, *landing))
 
 
-def _fences(geofence: Any, source: str, inside_all: bool) -> Fences:
+def _fences(geofence: Any, source: str, every: bool) -> Fences:
     """The geoFence of a plan: polygons and circles, in degrees."""
     if geofence is None:
         return Fences()
@@ -190,7 +188,7 @@ def _fences(geofence: Any, source: str, inside_all: bool) -> Fences:
             if not isinstance(each, dict) or not isinstance(each.get("inclusion"), bool):
                 raise InputError(f"{source}: {key}.inclusion: must be true or false")
             found.append(_polygon(each, source, key) if kind == "polygons" else _circle(each, source, key))
-    return Fences(tuple(found), inside_all)
+    return Fences(tuple(found), inside_all=every)
 
 
 def _polygon(each: dict[str, Any], source: str, key: str) -> Fence:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
+from harness.files.fence_commands import APART, RALLY_POINT
 from harness.files.input_file import InputError
 from harness.run_files.mission import commands, fence_items
 from harness.run_files.mission.items import Item, MissionAsRead
@@ -54,10 +55,10 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     items, notes = _numbered(items)
     home = items[0] if items[0].command == commands.WAYPOINT else None
     others = items[1:] if home is not None else items
-    flown = tuple(item for item in others if item.command not in fence_items.APART)
+    flown = tuple(item for item in others if item.command not in APART)
     if not flown and (instead := fence_items.nothing_but(others)):
         raise InputError(f"{source}: has no items to fly to, but {instead}")
-    rally = sum(item.command == fence_items.RALLY_POINT for item in others)
+    rally = sum(item.command == RALLY_POINT for item in others)
     return MissionAsRead(
         source,
         flown,

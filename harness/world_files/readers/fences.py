@@ -8,16 +8,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+from harness.files.fence_commands import CIRCLES, CORNERS, HOME_CIRCLE, RALLY_POINT, inside_all
 from harness.world_files.bounded import json_of, read_bytes, text_of
 from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError, counted
 from harness.world_files.readers import rings
 
-PX4: Final = 12
-"""`firmwareType` of PX4 in a plan."""
-FENCE_COMMANDS: Final = {5001: True, 5002: False, 5003: True, 5004: False}
-"""MAV_CMD_NAV_FENCE_*: vertex of an inclusion and exclusion polygon, inclusion and exclusion circle."""
-CIRCLES: Final = (5003, 5004)
-HOME_CIRCLE, RALLY_POINT = 5005, 5100
+WAYPOINT: Final = 16
+"""MAV_CMD of the first item of a waypoint file where that is home."""
+NOWHERE: Final = (0.0, 0.0)
+"""Where an item has no place."""
 
 
 def read_plan(path: Path, reading: Reading) -> Contents:
@@ -46,7 +45,7 @@ def read_plan(path: Path, reading: Reading) -> Contents:
             raise
         raise WorldFileError("has a geoFence whose polygons or circles are not whole") from error
     mission = content.get("mission")
-    any_of = isinstance(mission, dict) and mission.get("firmwareType") == PX4
+    any_of = isinstance(mission, dict) and not inside_all(mission.get("firmwareType"))
     rally = content.get("rallyPoints")
     points = rally.get("points") if isinstance(rally, dict) else None
     return _contents("plan_fence", found, any_of, len(points) if isinstance(points, list) else 0)
@@ -85,8 +84,8 @@ def _items(rows: list[list[str]]) -> list[tuple[Any, bool]]:
     """Fences among the items of a waypoint file: four numbers, the fourth the command, four parameters, the place."""
     found: list[tuple[Any, bool]] = []
     pending: list[rings.Place] = []
-    before = 0
-    for row in rows:
+    before, home = 0, None
+    for number, row in enumerate(rows):
         try:
             command, first = int(row[3]), float(row[4])
             place = rings.on_earth(float(row[9]), float(row[8]))
@@ -97,19 +96,21 @@ def _items(rows: list[list[str]]) -> list[tuple[Any, bool]]:
                 f"has a fence of {len(pending)} corners that should have more; it may be torn"
             )
         before = command
+        if number == 0 and command == WAYPOINT and place != NOWHERE:
+            home = place
         if command == HOME_CIRCLE:
-            raise WorldFileError(
-                "has a fence about home, whose place it does not say; give a circle with a place"
-            )
-        if command not in FENCE_COMMANDS:
-            continue
+            if home is None:
+                raise WorldFileError(
+                    "has a fence about home, whose place it does not say; give a circle with a place"
+                )
+            place = home
         if command in CIRCLES:
-            found.append((rings.circle(place, first), FENCE_COMMANDS[command]))
-            continue
-        pending.append(place)
-        if len(pending) >= first:
-            found.append((rings.ring(pending), FENCE_COMMANDS[command]))
-            pending = []
+            found.append((rings.circle(place, first), CIRCLES[command]))
+        elif command in CORNERS:
+            pending.append(place)
+            if len(pending) >= first:
+                found.append((rings.ring(pending), CORNERS[command]))
+                pending = []
     if pending:
         raise WorldFileError(f"has a fence of {len(pending)} corners that should have more; it may be torn")
     return found

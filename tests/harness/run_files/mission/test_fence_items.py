@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,31 @@ def test_a_fence_about_home(tmp_path: Path) -> None:
         read_path(path)
     with pytest.raises(WorldFileError, match="has a fence about home, whose place it does not say"):
         read_world(path, None, Reading())
+    path.write_text(wpl(*WAYPOINTS, (5005, 50.0, 0.0, 0.0)))
+    (part,) = read_world(path, None, Reading()).parts
+    assert part.keep_in
+    assert part.footprint.centroid.coords[0] == pytest.approx((8.0, 47.0), abs=1e-9)
+    assert part.footprint.bounds[3] == pytest.approx(47.0 + 50.0 / 111_170.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(("firmware", "every"), [(12, False), (3, True), (0, True), (None, True)])
+def test_check_and_world_agree_on_several_inclusion_fences(
+    firmware: int | None, every: bool, tmp_path: Path
+) -> None:
+    rings = [[[47.0, 8.0 + off], [47.1, 8.0 + off], [47.1, 8.1 + off]] for off in (0.0, 0.02)]
+    places = [
+        {"type": "SimpleItem", "command": 16, "frame": 0, "params": [0, 0, 0, 0, 47.05, lon, 500]}
+        for lon in (8.03, 8.04)
+    ]
+    plan = {
+        "fileType": "Plan",
+        "mission": {"items": places, **({} if firmware is None else {"firmwareType": firmware})},
+        "geoFence": {"polygons": [{"inclusion": True, "polygon": ring} for ring in rings]},
+    }
+    path = tmp_path / "m.plan"
+    path.write_text(json.dumps(plan))
+    assert read_path(path).fences.inside_all is every
+    assert len(read_world(path, None, Reading()).parts) == 1 + every
 
 
 def test_a_first_item_that_is_no_waypoint_is_no_home(tmp_path: Path) -> None:
