@@ -35,9 +35,7 @@ def read_igc(text: str, source: str) -> PathAsRead:
     flown = _in_flight(valid)
     if len(flown) < 2:
         raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
-    satellites = all(fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V" for fix in flown)
-    kind = "gps_alt" if satellites else "pressure_alt"
-    notes = [f"{'GNSS' if satellites else 'pressure'} altitudes of the logger taken as above the sea"]
+    known, kind, notes = _with_altitudes(flown)
     if broken:
         notes.append(f"{broken} B records that cannot be read passed over")
     if len(valid) > len(flown):
@@ -46,10 +44,29 @@ def read_igc(text: str, source: str) -> PathAsRead:
         notes.append(f"{len(fixes) - len(valid)} fixes without a position passed over")
     return PathAsRead(
         False,
-        tuple((float(fix["lat"]), float(fix["lon"])) for fix in flown),
-        tuple(float(fix[kind] or 0.0) for fix in flown),
+        tuple((float(fix["lat"]), float(fix["lon"])) for fix in known),
+        tuple(float(fix[kind] or 0.0) for fix in known if kind),
         notes=tuple(notes),
     )
+
+
+def _with_altitudes(flown: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], str, list[str]]:
+    """Fixes that have an altitude, the name of the one that they have, and what to say of it.
+
+    Where the logger has none, all fixes and no name.
+    """
+    by_satellites = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
+    if len(by_satellites) == len(flown):
+        return flown, "gps_alt", ["GNSS altitudes of the logger taken as above the sea"]
+    if any(fix["pressure_alt"] for fix in flown):
+        return flown, "pressure_alt", ["pressure altitudes of the logger taken as above the sea"]
+    if len(by_satellites) < 2:
+        return flown, "", ["its logger has no altitudes"]
+    notes = [
+        "GNSS altitudes of the logger taken as above the sea",
+        f"{len(flown) - len(by_satellites)} fixes without an altitude passed over: the logger has no barometer",
+    ]
+    return by_satellites, "gps_alt", notes
 
 
 def _fixes(text: str, source: str) -> tuple[list[dict[str, Any]], int]:

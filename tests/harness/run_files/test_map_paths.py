@@ -116,6 +116,21 @@ def test_a_recorded_flight_begins_and_ends_in_the_air(tmp_path: Path) -> None:
     assert read_path(path).altitudes_m.tolist() == [130.0, 135.0, 140.0]
 
 
+def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_path: Path) -> None:
+    path = tmp_path / "a.igc"
+    lost = [fix[:25] + "00000" + fix[30:] for fix in FLIGHT]  # no pressure altitude, as of a telephone
+    lost[2] = lost[2][:24] + "V0000000000"  # no three-dimensional fix
+    path.write_text(igc(*lost))
+    found = read_path(path)
+    assert found.altitudes_m.tolist() == [195.0, 205.0]
+    assert len(found.points_m) == 2
+    assert "1 fixes without an altitude passed over: the logger has no barometer" in found.notes
+    path.write_text(igc(*(fix[:24] + "V0000000000" for fix in FLIGHT)))
+    found = read_path(path)
+    assert (len(found.points_m), found.altitudes_m.tolist()) == (3, [])
+    assert "its logger has no altitudes" in found.notes
+
+
 @pytest.mark.parametrize(
     ("name", "text", "sentence"),
     [
