@@ -73,22 +73,16 @@ def _numbered(items: list[Item]) -> tuple[list[Item], tuple[str, ...]]:
     """Items with numbers that can be jumped to.
 
     Autopilots count the items of a file by their lines. The numbers that stand there are kept unless that matters:
-    where some are left out and there is a jump.
-
-    Raises:
-        InputError: that of home is there again.
+    where one comes twice, or some are left out and there is a jump.
     """
     numbers = [item.number for item in items]
-    again = next((item for item in items[1:] if item.number == numbers[0]), None)
-    if again is not None:
-        raise InputError(
-            f"{again.place}: item {numbers[0]} is there twice, first as home; numbers must differ"
-        )
+    twice = len(set(numbers)) < len(numbers)
     gaps = numbers != list(range(numbers[0], numbers[0] + len(numbers)))
-    if not gaps or len(set(numbers)) < len(numbers) or all(item.command != commands.JUMP for item in items):
+    if not twice and not (gaps and any(item.command == commands.JUMP for item in items)):
         return items, ()
     counted = [replace(item, number=number) for number, item in enumerate(items)]
-    return counted, ("some numbers of its items are left out: counted by lines from 0, as autopilots do",)
+    told = "come twice" if twice else "are left out"
+    return counted, (f"some numbers of its items {told}: counted by lines from 0, as autopilots do",)
 
 
 def _meant(lines: list[str]) -> str:

@@ -215,7 +215,6 @@ BROKEN = {
         wpl(*wpl_items(), line(4, 0, 3, 177, 1, 30000, 0, 0, 0, 0, 0, 1)),
         "jumps make it more than 20,000 legs",
     ),
-    "one number twice": ("a.waypoints", wpl(*wpl_items(), wpl_items()[0]), ": item 1 is there twice"),
     "nothing to fly": (
         "a.plan",
         plan(item(0, 0, command=183), item(0, 0, command=2000, doJumpId=2)),

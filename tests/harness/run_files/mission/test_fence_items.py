@@ -99,6 +99,12 @@ def test_items_are_counted_by_lines_where_their_numbers_leave_it_open() -> None:
     assert "counted by lines from 0, as autopilots do" in found.notes[0]
     without_jump = read_waypoints(gap.rpartition("\n")[0], "m")
     assert [item.number for item in without_jump.items] == [1, 9, 3]
+    for again in ("0", "1"):  # as ArduPilot's own missions of changes of the loiter radius have it
+        twice = read_waypoints("\n".join((head, *rows[:2], again + rows[2][1:], *rows[3:])), "m")
+        assert [item.number for item in twice.items] == [1, 2, 3, 4]
+        assert twice.notes == (
+            "some numbers of its items come twice: counted by lines from 0, as autopilots do",
+        )
 
 
 @pytest.mark.parametrize(
