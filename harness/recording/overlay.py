@@ -10,7 +10,6 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rerun as rr
 
 from harness.analysis.rows import escaped, number
@@ -150,13 +149,15 @@ def _send_events(rec: rr.RecordingStream, chunks: Sequence[rr.chunk.Chunk], plac
     """The events of one run, in its colour and after its name."""
     for chunk in chunks:
         if chunk.entity_path == f"/{look.EVENTS}":
-            columns = chunk.to_record_batch().to_pydict()
-            texts = next(cells for key, cells in columns.items() if key.endswith("text"))
-            times = [at.total_seconds() for at in columns[look.TIMELINE]]
-            levels = next(cells for key, cells in columns.items() if key.endswith("level"))
+            batch = chunk.to_record_batch()
+            columns = {name: batch[name] for name in batch.schema.names}
+            texts = next(cells.to_pylist() for key, cells in columns.items() if key.endswith("text"))
+            levels = next(cells.to_pylist() for key, cells in columns.items() if key.endswith("level"))
+            # As numbers: as Python objects, times in nanoseconds need pandas.
+            times_s = columns[look.TIMELINE].cast("int64").to_numpy() / 1e9
             rec.send_columns(
                 look.EVENTS,
-                [look.time_column(np.array(times))],
+                [look.time_column(times_s)],
                 rr.TextLog.columns(
                     text=[f"{name}, {text}" for (text,) in texts],
                     level=[level for (level,) in levels],

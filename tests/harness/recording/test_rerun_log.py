@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import sys
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -93,7 +93,11 @@ def scan(time_s: float) -> RangeScan:
 
 
 def record(
-    path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan], east_m: float = 0.0
+    path: Path,
+    make_track: Callable[..., Track],
+    make_plan: Callable[..., AcceptedPlan],
+    east_m: float = 0.0,
+    told: Sequence[str] = ("goal reached",),
 ) -> Flight:
     """100 s north, in blocks of 30 s, one scan every 0.5 s, a plan at 0 s and one at 50 s."""
     track = make_track(1001, east_m=east_m, clearance_m=np.where(np.arange(1001) < 200, np.inf, 150.0))
@@ -105,7 +109,8 @@ def record(
         for plan in (first, second):
             if plan.time_s == 0.5 * tick:
                 log.on_plan(plan, STATE)
-    log.on_event(99.9, "goal reached")
+    for text in told:
+        log.on_event(99.9, text)
     for start in range(0, 1001, 300):
         log.on_block(Track(**{name: column[start : start + 300] for name, column in vars(track).items()}))
     flight = Flight(track, (first, second), Outcome.REACHED, "in the goal's circle", (2.5, 2.5), 100.0, 0.1)
@@ -565,6 +570,35 @@ def test_overlay_keeps_every_track_and_one_world(
         assert "over: reached" in column(entities, f"/states/1-first/{lane}", "values")[-1]
     colours = [column(entities, f"/plan/runs/{number}/flown", "colors")[-1] for number in (0, 1)]
     assert colours[0] != colours[1]
+
+
+def test_runs_with_events_at_once_are_overlaid_without_pandas(
+    tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
+) -> None:
+    record(tmp_path / "a.rrd", make_track, make_plan, told=("goal reached", "first to arrive"))
+    (tmp_path / "pandas.py").write_text(
+        "raise ModuleNotFoundError('hidden: the first line of README brings none')"
+    )
+    script = f"""
+from pathlib import Path
+from harness.recording.overlay import write_overlay
+a, shown = Path({str(tmp_path / "a.rrd")!r}), Path({str(tmp_path / "b.rrd")!r})
+write_overlay([a, a], ["first", "second"], shown)
+"""
+    paths = os.pathsep.join([str(tmp_path), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    told = [str(text) for (text,) in column(read(tmp_path / "b.rrd"), "/events", "text")]
+    assert [text for text in told if text.endswith("first to arrive")] == [
+        "first, t = 100 s: first to arrive",
+        "second, t = 100 s: first to arrive",
+    ]
 
 
 @pytest.mark.parametrize(
