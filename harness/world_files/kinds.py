@@ -83,6 +83,8 @@ FAMILIES: Final = (
 )
 
 _XML_ROOT: Final = re.compile(rb"<([A-Za-z_][\w.-]*:)?([A-Za-z_][\w.-]*)[\s>/]")
+_OPEN_AIR: Final = re.compile(r"^(AC\s|AN\s(.*\n)+?(DP|DC|DA|DB|DY)\s)", re.IGNORECASE | re.MULTILINE)
+"""An airspace: a class, or a name and something of a shape."""
 _PLACES: Final = re.compile(r"\s*[-+]?\d+\.\d+[\s,]+[-+]?\d+\.\d+\s*$")
 
 
@@ -190,7 +192,7 @@ def _text(path: Path, first: bytes, ending: str) -> str | None:
         line.startswith("resolution:") for line in lines
     ):
         return "ros_map"
-    if any(line.upper().startswith(("AC ", "AC\t")) for line in lines):
+    if _OPEN_AIR.search("\n".join(lines)):
         return "openair"
     if len(lines) >= 2 and all(_PLACES.match(line) for line in lines[:20]):
         return "ardupilot_fence"

@@ -108,6 +108,8 @@ def limit_of(text: str, feet: bool = True, datum: Datum = Datum.SEA) -> Limit | 
     ground = _GROUND.search(word) is not None or (
         datum is Datum.GROUND and not re.search("MSL|STD|ALT", word)
     )
+    if ground and value < 0.0:  # as in SFC-2500, which says where a zone begins as well
+        return None
     return Limit(value * (1.0 if metres else FOOT_M), Datum.GROUND if ground else Datum.SEA)
 
 

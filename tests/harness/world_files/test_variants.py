@@ -277,6 +277,7 @@ SPACE = "AC R\nAN one\nAL {}\nAH {}\nDP 47:00:00 N 008:00:00 E\nDP 47:00:00 N 00
         ("UNL", NO_TOP),
         ("Ask on 122.8", NO_TOP),
         ("FL95/FL115", NO_TOP),
+        ("SFC-2500", NO_TOP),
     ],
 )
 def test_limits_of_openair(text: str, limit: Limit, tmp_path: Path) -> None:
@@ -294,6 +295,12 @@ def test_limits_of_openair(text: str, limit: Limit, tmp_path: Path) -> None:
         "47 26 36N, 7 03 42E",
         "47\N{DEGREE SIGN}26'36\"N , 007\N{DEGREE SIGN}03'42\"E",
         "47:26.6N 007:03.7E",
+        "N 47 26 36 E 007 03 42",
+        "N47:26:36 E007:03:42",
+        "472636N 0070342E",
+        "472636.00N 0070342.00E",
+        "N472636.00 E0070342.00",
+        "4726.6N 00703.7E",
     ],
 )
 def test_places_of_openair(place: str, tmp_path: Path) -> None:
@@ -302,6 +309,64 @@ def test_places_of_openair(place: str, tmp_path: Path) -> None:
     )
     (part,) = read_any(written(tmp_path / "a.txt", text)).parts
     assert part.footprint.bounds[:2] == pytest.approx((7.0 + 3.7 / 60, 47.0 + 26.6 / 60), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "bottom", "top", "notes"),
+    [
+        ("AL FL20\nAH FL65\n", Limit(2000 * FOOT_M), Limit(6500 * FOOT_M), []),
+        (
+            "AL GND\nAL FL80\n",
+            NO_BOTTOM,
+            NO_TOP,
+            ["lower limit is given more than once", "upper limit is missing"],
+        ),
+        (
+            "AL FL20\nAH FL50\nAH FL65\n",
+            Limit(2000 * FOOT_M),
+            Limit(6500 * FOOT_M),
+            ["upper limit is given more"],
+        ),
+        (
+            "AH FL50\nAH 900 ft AGL\n",
+            NO_BOTTOM,
+            NO_TOP,
+            ["lower limit is missing", "upper limit is given more"],
+        ),
+        ("", NO_BOTTOM, NO_TOP, ["lower limit is missing", "upper limit is missing"]),
+    ],
+)
+def test_limits_of_openair_that_are_missing_or_come_twice(
+    more: str, bottom: Limit, top: Limit, notes: list[str], tmp_path: Path
+) -> None:
+    found = read_any(written(tmp_path / "a.txt", SPACE.replace("AL {}\nAH {}\n", more)))
+    (part,) = found.parts
+    assert same(part.bottom, bottom)
+    assert same(part.top, top)
+    assert [note for note in found.notes if any(each in note for each in notes)] == list(
+        found.notes[: len(notes)]
+    )
+    assert len(found.notes) == len(notes) + 1
+
+
+def test_an_airspace_without_a_class_is_one_of_its_own(tmp_path: Path) -> None:
+    first = SPACE.format("GND", "FL65")
+    second = first.replace("AC R\n", "").replace("one", "two").replace("E\n", "W\n").replace("FL65", "FL95")
+    found = read_any(written(tmp_path / "a.txt", first + second))
+    assert [(part.name, round(part.top.height_m / FOOT_M)) for part in found.parts] == [
+        ("one", 6500),
+        ("two", 9500),
+    ]
+    assert found.parts[0].footprint.bounds[0] == pytest.approx(8.0)
+    assert found.parts[1].footprint.bounds[2] == pytest.approx(-8.0)
+    assert any("(1 R, 1 none)" in note for note in found.notes)
+    assert [part.name for part in read_any(written(tmp_path / "b.txt", second)).parts] == ["two"]
+    turned = "".join(
+        f"{b}\n{a}\n{c}" for a, b, c in (each.split("\n", 2) for each in (first, "AC Q\n" + second))
+    )
+    assert [part.name for part in read_any(written(tmp_path / "c.txt", turned)).parts] == ["one", "two"]
+    with pytest.raises(WorldFileError, match="line 5: has 75 minutes or seconds; must be at most 60"):
+        read_any(written(tmp_path / "d.txt", first.replace("47:00:00", "47:75:00", 1)))
 
 
 def test_openair_names_what_it_passes_over(tmp_path: Path) -> None:
