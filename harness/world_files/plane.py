@@ -143,16 +143,40 @@ def vertical_unit_m(name: str) -> float:
     Raises:
         WorldFileError: there is none of that name.
     """
+    return next((float(axis.unit_conversion_factor) for axis in _axes(name) if axis.direction == "up"), 1.0)
+
+
+def has_heights(name: str) -> bool:
+    """Whether a coordinate reference system says what heights are.
+
+    Raises:
+        WorldFileError: there is none of that name.
+    """
+    return any(axis.direction == "up" for axis in _axes(name))
+
+
+def unit_that_is_no_metre(name: str) -> str:
+    """The unit of the plane of a coordinate reference system, as PROJ names it; empty for metres and degrees.
+
+    Raises:
+        WorldFileError: there is none of that name.
+    """
+    if in_degrees(name):
+        return ""
+    axis = _axes(name)[0]
+    return "" if axis.unit_conversion_factor == 1.0 else str(axis.unit_name)
+
+
+def _axes(name: str) -> list[Any]:
     from pyproj import CRS
     from pyproj.exceptions import CRSError
 
     try:
-        axes = CRS.from_user_input(name).axis_info
+        return list(CRS.from_user_input(name).axis_info)
     except CRSError as error:
         raise WorldFileError(
             f"has the crs {name[:60]!r}, which is not known; give one as EPSG:32632"
         ) from error
-    return next((float(axis.unit_conversion_factor) for axis in axes if axis.direction == "up"), 1.0)
 
 
 def geodetic(crs: str, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

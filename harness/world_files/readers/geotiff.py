@@ -16,7 +16,7 @@ import numpy as np
 
 from harness.world_files.bounded import read_bytes
 from harness.world_files.parts import FOOT_M, Contents, FloatArray, Raster, Reading, WorldFileError
-from harness.world_files.plane import flat_crs, vertical_unit_m
+from harness.world_files.plane import flat_crs, has_heights, unit_that_is_no_metre, vertical_unit_m
 
 MAX_CELLS: Final = 60_000_000
 """Half a gigabyte of heights while they are read."""
@@ -24,6 +24,15 @@ PIXEL_SCALE, TIE_POINTS, TRANSFORMATION, GEO_KEYS, NODATA = 33550, 33922, 34264,
 GEOGRAPHIC_CRS, PROJECTED_CRS, RASTER_TYPE = 2048, 3072, 1025
 VERTICAL_CRS, VERTICAL_UNIT, METADATA = 4096, 4099, 42112
 USER_DEFINED: Final = 32767
+COMPRESSION, SUBFILE = 259, 254
+MASK: Final = 4
+"""Bit of SUBFILE: the image says which cells of the first one hold a value."""
+BIG_ENDIAN: Final = b"MM"
+VOIDS: Final = (-9999.0, -32767.0, -32768.0)
+"""What cells without a height hold in files that do not say so."""
+MOST_IMAGES: Final = 100
+LEAST_POINTS: Final = 3
+"""Ground control points that say where a grid lies."""
 FOOT, US_FOOT = 9002, 9003
 """EPSG numbers of units."""
 US_FOOT_M: Final = 1200.0 / 3937.0
@@ -73,7 +82,12 @@ def _with_pillow(path: Path, reading: Reading) -> Contents:
                 )
             if image.mode in ("P", "1"):
                 raise WorldFileError(f"has a palette; must have numbers, of heights; {MISSING}")
+            if data[:2] == BIG_ENDIAN and tags.get(COMPRESSION, 1) != 1 and image.mode != "L":
+                # Pillow 12 turns the bytes round which its decoder has turned already.
+                raise WorldFileError(f"is compressed and has its high bytes first; {MISSING}")
             values = np.asarray(image).astype(np.float64)
+            if _has_mask(image, path):
+                raise WorldFileError(f"has a mask that says which cells hold a height; {MISSING}")
     except WorldFileError:
         raise
     except Exception as error:  # Pillow raises many kinds for damaged files
@@ -88,8 +102,20 @@ def _with_pillow(path: Path, reading: Reading) -> Contents:
     keys = _geo_keys(tags.get(GEO_KEYS, ()))
     crs = reading.crs or _crs(keys)
     affine = _affine(tags, keys.get(RASTER_TYPE) == POINT)
-    values, notes = in_metres(values, _scaling(tags, keys))
+    scaling = _scaling(tags, keys)
+    values, notes = in_metres(values, scaling, crs)
     return Contents("geotiff", crs, terrain=Raster(plausible(values), affine), notes=notes)
+
+
+def _has_mask(image: Any, path: Path) -> bool:
+    """Whether one of the images of a file is a mask, or there is one beside it."""
+    if path.with_name(f"{path.name}.msk").is_file():
+        return True
+    for number in range(1, min(image.n_frames, MOST_IMAGES)):
+        image.seek(number)
+        if int(image.tag_v2.get(SUBFILE, 0)) & MASK:
+            return True
+    return False
 
 
 class Scaling(NamedTuple):
@@ -97,12 +123,23 @@ class Scaling(NamedTuple):
 
     factor: float = 1.0
     offset_m: float = 0.0
+    is_told: bool = True  # that these are the unit
 
 
-def in_metres(values: FloatArray, scaling: Scaling) -> tuple[FloatArray, tuple[str, ...]]:
-    """Heights in metres, and what to say of it."""
-    if scaling == Scaling():
-        return values, ()
+def in_metres(values: FloatArray, scaling: Scaling, crs: str) -> tuple[FloatArray, tuple[str, ...]]:
+    """Heights in metres, and what to say of it.
+
+    Args:
+        values: as the file has them; voids become NaN.
+        scaling: what the file says of them.
+        crs: of its horizontal coordinates.
+    """
+    values[np.isin(values, VOIDS)] = np.nan
+    if scaling[:2] == (1.0, 0.0):
+        plane_unit = "" if scaling.is_told else unit_that_is_no_metre(crs)
+        if not plane_unit:
+            return values, ()
+        return values, (f"its heights name no unit: taken as metres, although its plane is in {plane_unit}",)
     told = f"its heights are its numbers times {scaling.factor:.6g}"
     told += f" plus {scaling.offset_m:g} m" if scaling.offset_m else ""
     return scaling.factor * values + scaling.offset_m, (told + ", as it says",)
@@ -129,6 +166,7 @@ def _scaling(tags: dict[int, Any], keys: dict[int, int]) -> Scaling:
         for match in re.finditer(r"<Item[^>]*\brole=\"(\w+)\"[^>]*>([^<]*)<", str(tags.get(METADATA, "")))
     }
     scale, offset = (_number(items.get(name, none)) for name, none in (("scale", "1"), ("offset", "0")))
+    is_told = bool(items.get("unittype") or keys.get(VERTICAL_UNIT) or keys.get(VERTICAL_CRS))
     if items.get("unittype"):
         unit = unit_m(items["unittype"])
     else:
@@ -140,7 +178,7 @@ def _scaling(tags: dict[int, Any], keys: dict[int, int]) -> Scaling:
         or scale == 0.0
     ):
         raise WorldFileError("has a scale or an offset of its heights that is no number")
-    return Scaling(scale * unit, offset * unit)
+    return Scaling(scale * unit, offset * unit, is_told)
 
 
 def _vertical_unit_m(code: int) -> float:
@@ -225,14 +263,45 @@ def _with_rasterio(path: Path, reading: Reading) -> Contents | WorldFileError | 
                 )
             band = source.read(1, masked=True)
             values = np.ma.filled(band.astype(np.float64), np.nan)
-            crs = reading.crs or (source.crs.to_wkt() if source.crs else None)
+            system = source.crs or source.gcps[1]
+            crs = reading.crs or (system.to_wkt() if system else None)
             if crs is None:
                 return WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
+            affine = _placed(source)
             unit = unit_m(source.units[0]) if source.units[0] else vertical_unit_m(crs)
-            values, notes = in_metres(values, Scaling(source.scales[0] * unit, source.offsets[0] * unit))
-            terrain = Raster(plausible(values), tuple(source.transform)[:6])
+            is_told = bool(source.units[0]) or has_heights(crs)
+            scaling = Scaling(source.scales[0] * unit, source.offsets[0] * unit, is_told)
+            values, notes = in_metres(values, scaling, crs)
+            terrain = Raster(plausible(values), affine)
             return Contents("geotiff", crs, terrain=terrain, notes=notes)
     except WorldFileError as error:
         return error
     except (RasterioError, ValueError, OSError, MemoryError) as error:
         return WorldFileError(f"cannot be read as a raster ({' '.join(str(error).split())[:120]})")
+
+
+def _placed(source: Any) -> tuple[float, float, float, float, float, float]:
+    """Where a raster of rasterio lies, by its transformation, or by its ground control points.
+
+    Raises:
+        WorldFileError: by neither, or the points do not lie on a grid.
+    """
+    from rasterio.transform import from_gcps
+
+    if not source.transform.is_identity:
+        return tuple(source.transform)[:6]
+    points = source.gcps[0]
+    if len(points) < LEAST_POINTS:
+        raise WorldFileError(
+            "says not where it lies (no tie point, no transformation); get it with its place"
+        )
+    a, b, c, d, e, f = tuple(from_gcps(points))[:6]
+    off = [
+        math.hypot(a * each.col + b * each.row + c - each.x, d * each.col + e * each.row + f - each.y)
+        for each in points
+    ]
+    if not max(off) <= 0.5 * math.sqrt(abs(a * e - b * d)):
+        raise WorldFileError(
+            "has ground control points that do not lie on a grid; warp it, as with gdalwarp, and give the result"
+        )
+    return a, b, c, d, e, f

@@ -1,0 +1,125 @@
+"""GeoTIFFs as GDAL writes them, of every byte order and compression."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from harness.world_files.kinds import read
+from harness.world_files.parts import Contents, Raster, Reading, WorldFileError
+
+rasterio = pytest.importorskip("rasterio")
+pytestmark = pytest.mark.filterwarnings("ignore")  # of rasterio's own
+
+HEIGHTS = (500.0 + np.add.outer(np.arange(40.0), 3.0 * np.arange(50.0))).astype(np.float32)
+CELL_M, WEST_M, NORTH_M = 50.0, 450_000.0, 5_200_000.0
+
+
+def made(path: Path, heights: NDArray[Any] = HEIGHTS, crs: str | None = "EPSG:32632", **how: Any) -> Path:
+    """A GeoTIFF by GDAL."""
+    units, mask = how.pop("units", None), how.pop("mask", None)
+    if "gcps" not in how:
+        how.setdefault("transform", rasterio.transform.from_origin(WEST_M, NORTH_M, CELL_M, CELL_M))
+    rows, columns = heights.shape
+    size = {"height": rows, "width": columns, "count": 1, "dtype": heights.dtype.name}
+    with (
+        rasterio.Env(GDAL_TIFF_INTERNAL_MASK=how.pop("inside", True)),
+        rasterio.open(path, "w", driver="GTiff", crs=crs, **size, **how) as file,
+    ):
+        file.write(heights, 1)
+        if units:
+            file.units = [units]
+        if mask is not None:
+            file.write_mask(mask)
+    return path
+
+
+def contents(path: Path, **reading: Any) -> Contents:
+    return read(path, None, Reading(**reading))
+
+
+def terrain(path: Path, **reading: Any) -> Raster:
+    found = contents(path, **reading).terrain
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("order", ["BIG", "LITTLE"])
+@pytest.mark.parametrize("packed", [{}, {"compress": "lzw"}, {"compress": "deflate", "predictor": 2}])
+@pytest.mark.parametrize("kind", ["int16", "uint16", "int32", "float32", "float64"])
+@pytest.mark.parametrize("tiled", [False, True])
+def test_heights_whatever_the_order_of_their_bytes(
+    order: str, packed: dict[str, Any], kind: str, tiled: bool, tmp_path: Path
+) -> None:
+    how: dict[str, Any] = {"tiled": True, "blockxsize": 32, "blockysize": 32} if tiled else {}
+    path = made(tmp_path / "a.tif", HEIGHTS.astype(kind), ENDIANNESS=order, **packed, **how)
+    assert terrain(path).values.tolist() == HEIGHTS.tolist()
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_cells_that_a_mask_takes_out_have_no_height(inside: bool, tmp_path: Path) -> None:
+    mask = np.full(HEIGHTS.shape, 255, dtype=np.uint8)
+    mask[:7] = 0
+    found = terrain(made(tmp_path / "a.tif", mask=mask, inside=inside)).values
+    assert np.isnan(found[:7]).all()
+    assert found[7:].tolist() == HEIGHTS[7:].tolist()
+
+
+@pytest.mark.parametrize("void", [-9999.0, -32767.0, -32768.0])
+@pytest.mark.parametrize("units", [None, "ft"])
+def test_voids_that_are_not_declared(void: float, units: str | None, tmp_path: Path) -> None:
+    heights = HEIGHTS.copy()
+    heights[0] = void
+    found = terrain(made(tmp_path / "a.tif", heights, units=units)).values
+    assert np.isnan(found[0]).all()
+    assert np.isfinite(found[1:]).all()
+
+
+def points(bend_m: float) -> list[Any]:
+    """Ground control points in the corners and in the middle, which is off by so much."""
+    rows, columns = HEIGHTS.shape
+    return [
+        rasterio.control.GroundControlPoint(
+            row, column, WEST_M + CELL_M * column + off, NORTH_M - CELL_M * row
+        )
+        for row, column, off in (
+            (0, 0, 0.0), (0, columns, 0.0), (rows, 0, 0.0), (rows, columns, 0.0), (rows // 2, columns // 2, bend_m),
+        )
+    ]  # fmt: skip
+
+
+def test_ground_control_points_say_where_it_lies(tmp_path: Path) -> None:
+    found = contents(made(tmp_path / "a.tif", gcps=points(0.0)))
+    assert found.crs is not None
+    assert "UTM zone 32N" in found.crs
+    assert found.terrain is not None
+    assert found.terrain.affine == pytest.approx((CELL_M, 0.0, WEST_M, 0.0, -CELL_M, NORTH_M), abs=1e-6)
+    with pytest.raises(WorldFileError, match="ground control points that do not lie on a grid"):
+        contents(made(tmp_path / "b.tif", gcps=points(300.0)))
+
+
+def test_one_without_a_place_is_not_put_at_the_corner_of_its_system(tmp_path: Path) -> None:
+    nowhere = made(tmp_path / "a.tif", crs=None, transform=None)
+    with pytest.raises(WorldFileError, match="says not where it lies"):
+        contents(nowhere, crs="EPSG:32632")
+
+
+@pytest.mark.parametrize(
+    ("crs", "units", "noted"),
+    [
+        ("EPSG:2263", None, True),
+        ("EPSG:2263", "m", False),
+        ("EPSG:32632", None, False),
+        ("EPSG:2263+6360", None, False),
+    ],
+)
+def test_heights_without_a_unit_over_a_plane_in_feet_are_told(
+    crs: str, units: str | None, noted: bool, tmp_path: Path
+) -> None:
+    notes = contents(made(tmp_path / "a.tif", crs=crs, units=units)).notes
+    told = "its heights name no unit: taken as metres, although its plane is in US survey foot"
+    assert (told in notes) is noted
