@@ -14,6 +14,7 @@ from harness.world_files.readers import (
     city_json,
     ed269,
     fences,
+    gazebo,
     geo_json,
     geotiff,
     grids,
@@ -44,7 +45,7 @@ KINDS: Final[dict[str, Reader]] = {
     "ardupilot_fence": fences.read_ardupilot,
     "ros_map": occupancy.read_ros,
     "moving_ai": occupancy.read_moving_ai,
-    "gazebo_world": occupancy.read_gazebo,
+    "gazebo_world": gazebo.read,
     "vector": vector.read,
 }
 """Readers by the name of their kind."""

@@ -249,7 +249,7 @@ def _cell_that_fits(
 
 
 def _cell_m(contents: Sequence[Contents], specs: Sequence[FileSpec]) -> float:
-    from harness.world_files.readers.occupancy import BARN_CELL_M
+    from harness.world_files.readers.gazebo import BARN_CELL_M
 
     for each, spec in zip(contents, specs, strict=True):
         raster = each.occupied or each.terrain

@@ -1,26 +1,23 @@
-"""Occupancy maps: ROS map_server, MovingAI benchmark maps, worlds of the BARN navigation challenge."""
+"""Occupancy maps: ROS map_server, MovingAI benchmark maps."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
 from typing import Any, Final
-from xml.etree import ElementTree
 
 import numpy as np
 
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of, xml_events
+from harness.world_files.bounded import read_bytes, text_of
 from harness.world_files.parts import (
     BoolArray,
     Contents,
     FloatArray,
-    Part,
     Raster,
     Reading,
     WorldFileError,
-    counted,
 )
 from harness.world_files.readers.geotiff import check_cells
 
@@ -28,8 +25,6 @@ FREE: Final = frozenset(b".GS")
 """Ground, ground and shallow water of the MovingAI format (Sturtevant, Benchmarks for grid-based pathfinding, 2012)."""
 BLOCKED: Final = frozenset(b"@OTW")
 """Out of bounds, trees and deep water."""
-BARN_CELL_M: Final = 0.15
-"""Side of a cell of the BARN worlds: the diameter of their cylinders (Perille et al. 2020)."""
 MODES: Final = ("trinary", "scale", "raw")
 """Of ROS map_server: how a grey becomes occupied, free or unknown."""
 
@@ -185,77 +180,3 @@ def _turned(
         sin * b + cos * e,
         y0 + sin * c + cos * f,
     )
-
-
-def read_gazebo(path: Path, reading: Reading) -> Contents:
-    """Reads the upright cylinders and boxes of a Gazebo world, as those of the BARN challenge are.
-
-    `metres_per_cell` scales it: a cell is the diameter of a BARN cylinder, 0.15 m.
-
-    Raises:
-        WorldFileError: it is not whole XML, or has nothing solid.
-    """
-    scale = (reading.metres_per_cell or BARN_CELL_M) / BARN_CELL_M
-    parts: list[Part] = []
-    passed = included = 0
-    in_state = False  # where the models are listed again, as they were when the world was saved
-    for event, element in xml_events(read_bytes(path, MAX_TREE_BYTES), ends_only=False):
-        if element.tag == "state":
-            in_state = event == "start"
-        included += element.tag == "include" and event == "end" and not in_state
-        if element.tag != "model" or event == "start" or in_state:
-            continue
-        pose = _pose(element)
-        for link in element.iter("link"):
-            for collision in link.iter("collision"):
-                solid = _solid(collision, [pose, _pose(link), _pose(collision)], scale)
-                passed += solid is None and collision.find("geometry/plane") is None
-                parts += [Part(solid, name=str(element.get("name", ""))[:40])] if solid is not None else []
-        element.clear()
-    if not parts:
-        raise WorldFileError("has no upright cylinder or box; must be a Gazebo world with some")
-    notes = [f"{counted(passed, 'shape')} other than cylinders and boxes passed over"] if passed else []
-    if included:
-        notes.append(f"{counted(included, 'model')} of other files passed over")
-    if not reading.metres_per_cell:
-        notes.append("a cell is taken as 0.15 m (metres_per_cell)")
-    return Contents("gazebo_world", None, tuple(parts), notes=tuple(notes))
-
-
-Pose = tuple[float, float, float]
-"""x, y and turn about the vertical."""
-
-
-def _pose(element: ElementTree.Element) -> Pose:
-    text = element.findtext("pose") or ""
-    try:
-        numbers = [float(each) for each in text.split()] or [0.0] * 6
-    except ValueError as error:
-        raise WorldFileError(f"has the pose {text[:40]!r}; must be six numbers") from error
-    if len(numbers) != 6 or not all(map(math.isfinite, numbers)):
-        raise WorldFileError(f"has the pose {text[:40]!r}; must be six finite numbers")
-    return numbers[0], numbers[1], numbers[5]
-
-
-def _solid(collision: ElementTree.Element, poses: list[Pose], scale: float) -> Any:
-    """Footprint of a cylinder or box; None of anything else."""
-    import shapely
-    from shapely import affinity
-
-    radius, box = collision.findtext("geometry/cylinder/radius"), collision.findtext("geometry/box/size")
-    try:
-        if radius is not None:
-            # Circumscribed: no point of the disc is left out.
-            shape = shapely.Point(0, 0).buffer(float(radius) / math.cos(math.pi / 32), quad_segs=8)
-        elif box is not None:
-            width, depth = (0.5 * float(each) for each in box.split()[:2])
-            shape = shapely.box(-width, -depth, width, depth)
-        else:
-            return None
-    except ValueError as error:
-        raise WorldFileError("has a cylinder or box whose size is no number") from error
-    for x, y, yaw in reversed(poses):
-        if yaw:
-            shape = affinity.rotate(shape, yaw, origin=(0, 0), use_radians=True)
-        shape = affinity.translate(shape, x, y)
-    return affinity.scale(shape, scale, scale, origin=(0, 0)) if scale != 1.0 else shape
