@@ -10,6 +10,7 @@ import numpy as np
 
 from harness.flight.polylines import polylines
 from harness.flight.record import AcceptedPlan, FloatArray
+from harness.run_files.columns import lists, numbers, texts, truths
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -50,16 +51,16 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
 
     paths = [accepted.plan.path for accepted in plans]
     columns = {
-        "plan_index": pa.array([accepted.plan_index for accepted in plans], pa.int64()),
-        "time_s": pa.array([accepted.time_s for accepted in plans], pa.float64()),
-        "status": pa.array([accepted.plan.status.value for accepted in plans], pa.string()),
-        "compute_ms": pa.array([accepted.compute_ms for accepted in plans], pa.float64()),
-        "waypoints": _points_column([accepted.plan.waypoints_m for accepted in plans]),
-        "path": _points_column(polylines([accepted.segments for accepted in plans])),
-        "segments": _points_column([accepted.segments for accepted in plans], 6),
-        "loiter": pa.array([accepted.loiter for accepted in plans], pa.bool_()),
-        "length_m": pa.array([path.length_m for path in paths if path], pa.float64()),
-        "max_curvature_1pm": pa.array([path.max_curvature_1pm for path in paths if path], pa.float64()),
+        "plan_index": numbers([accepted.plan_index for accepted in plans], np.int64),
+        "time_s": numbers([accepted.time_s for accepted in plans]),
+        "status": texts([accepted.plan.status.value for accepted in plans]),
+        "compute_ms": numbers([accepted.compute_ms for accepted in plans]),
+        "waypoints": lists([accepted.plan.waypoints_m for accepted in plans], 2),
+        "path": lists(polylines([accepted.segments for accepted in plans]), 2),
+        "segments": lists([accepted.segments for accepted in plans], 6),
+        "loiter": truths([accepted.loiter for accepted in plans]),
+        "length_m": numbers([path.length_m for path in paths if path]),
+        "max_curvature_1pm": numbers([path.max_curvature_1pm for path in paths if path]),
     }
     return pa.table(columns)
 
@@ -73,13 +74,3 @@ def plan_rows(table: pa.Table) -> tuple[PlanRow, ...]:
         row["segments"] = np.array(row["segments"], dtype=np.float64).reshape(-1, 6)
         rows.append(PlanRow(**row))
     return tuple(rows)
-
-
-def _points_column(rows: Sequence[FloatArray], width: int = 2) -> pa.Array:
-    """A column of lists of rows: by default of [east_m, north_m]."""
-    import pyarrow as pa
-
-    flat = np.concatenate([np.zeros((0, width)), *rows]).ravel()
-    offsets = np.cumsum([0, *(len(each) for each in rows)])
-    values = pa.FixedSizeListArray.from_arrays(pa.array(flat), width)
-    return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), values)

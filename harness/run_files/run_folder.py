@@ -34,6 +34,7 @@ from harness.flight.record import (
     AcceptedPlan,
     Track,
 )
+from harness.run_files.columns import numbers
 from harness.run_files.plans_table import PlanRow, plan_rows, plans_table
 
 if TYPE_CHECKING:
@@ -197,7 +198,7 @@ def track_table(track: Track) -> pa.Table:
 
     columns = {name: TRACK_COLUMNS[name] for name in _fields_of(track)}
     return pa.table(
-        [getattr(track, name) for name in columns],
+        [numbers(getattr(track, name), column.dtype) for name, column in columns.items()],
         pa.schema(
             pa.field(name, pa.from_numpy_dtype(column.dtype), metadata={"description": column.doc})
             for name, column in columns.items()
