@@ -13,14 +13,22 @@ def parsed_json(text: str, source: str) -> Any:
     """What a JSON text holds; a fault of it names the file.
 
     Raises:
-        InputError: it is not JSON, or has a number that is not finite.
+        InputError: it is not JSON, has a key twice in one place, or a number that is not finite.
     """
 
     def refuse(name: str) -> NoReturn:
         raise InputError(f"{source}: has the number {name}; must be finite")
 
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            names = [name for name, _ in pairs]
+            again = next(name for name in names if names.count(name) > 1)
+            raise InputError(f"{source}: has the key {shown(again)!r} twice in one place; must have it once")
+        return found
+
     try:
-        return json.loads(text, parse_constant=refuse)
+        return json.loads(text, parse_constant=refuse, object_pairs_hook=once)
     except json.JSONDecodeError as error:
         raise InputError(f"{source}:{error.lineno}: is not JSON ({error.msg})") from error
     except RecursionError as error:

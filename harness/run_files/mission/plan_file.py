@@ -118,6 +118,11 @@ def _simple(item: dict[str, Any], key: str, source: str, number: int) -> Item:
         for i, value in enumerate(params)
     ]
     command, frame = (whole(item.get(name), f"{source}: {key}.{name}") for name in ("command", "frame"))
+    if (params[4] is None) != (params[5] is None) and command in commands.FLOWN:
+        missing = 4 if params[4] is None else 5
+        raise InputError(
+            f"{source}: {key}.params[{missing}]: is null; a place must have latitude and longitude"
+        )
     if params[6] is None and command in (commands.WAYPOINT, commands.SPLINE_WAYPOINT):
         raise InputError(f"{source}: {key}.params[6]: is null; a waypoint must have an altitude")
     jump_id = item.get("doJumpId")

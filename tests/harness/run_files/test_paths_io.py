@@ -215,6 +215,16 @@ BROKEN = {
         wpl(*wpl_items(), line(4, 0, 3, 177, 1, 30000, 0, 0, 0, 0, 0, 1)),
         "jumps make it more than 20,000 legs",
     ),
+    "a key twice": (
+        "a.plan",
+        plan(item(47.0, 8.0), item(47.1, 8.0)).replace('"items"', '"items": [], "items"'),
+        ": has the key 'items' twice in one place; must have it once",
+    ),
+    "half a place": (
+        "a.plan",
+        plan(item(47.0, 8.0), item(0.0, 8.0, params=[0, 0, 0, 0, None, 8.0, 100])),
+        ": mission.items[1].params[4]: is null; a place must have latitude and longitude",
+    ),
     "nothing to fly": (
         "a.plan",
         plan(item(0, 0, command=183), item(0, 0, command=2000, doJumpId=2)),
