@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import (
@@ -20,6 +20,9 @@ from harness.world_files.parts import (
 from harness.world_files.readers import limits, rings
 from harness.world_files.readers.geo_json import FREE, footprint_of, places_of, radius_of, zone_limit
 
+LISTS: Final = ("features", "UASZoneList")
+"""What the list of zones is called, where the file is not the list itself."""
+
 
 def read(path: Path, reading: Reading) -> Contents:
     """Reads all zones, whatever the time: applicability is not looked at.
@@ -28,9 +31,11 @@ def read(path: Path, reading: Reading) -> Contents:
         WorldFileError: it is not ED-269, or has no zone.
     """
     content = json_of(path)
-    zones = next(
-        (content[key] for key in ("features", "UASZoneList") if isinstance(content.get(key), list)), None
-    )
+    if isinstance(content, list):
+        content = {"features": content}
+    zones = None
+    if isinstance(content, dict):
+        zones = next((content[key] for key in LISTS if isinstance(content.get(key), list)), None)
     if zones is None:
         raise WorldFileError("has neither features nor UASZoneList; must be ED-269")
     notes: list[str] = []
@@ -76,6 +81,6 @@ def _part(volume: Any, name: str, notes: list[str]) -> Part:
     found: list[Limit | None] = []
     for word, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
         value = volume.get(f"{word}Limit")
-        reference = str(volume.get(f"{word}VerticalReference"))
-        found.append(none if value is None else zone_limit(value, reference, feet))
+        reference = str(volume.get(f"{word}VerticalReference") or "")
+        found.append(none if value is None else zone_limit(value, reference, feet, notes, name))
     return Part(footprint, *limits.band_of(found[0], found[1], notes, name), name=name)

@@ -29,6 +29,9 @@ from harness.world_files.plane import in_degrees
 from harness.world_files.readers import limits, rings
 
 DEEPEST: Final = 8
+ABOVE_GROUND: Final = ("AGL", "SFC", "GND")
+ABOVE_SEA: Final = ("AMSL", "MSL")
+ABOVE_ELLIPSOID: Final = ("WGS84", "HAE")
 FREE: Final = ("NO_RESTRICTION",)
 """Restrictions of a geozone that forbid nothing."""
 
@@ -75,11 +78,12 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
     """
     notes: list[str] = []
     parts: list[Part] = []
-    passed = free = 0
+    passed = free = timed = 0
     for tags, geometry, name in _features(_whole(path)):
         if str(tags.get("type", "")).upper() in FREE:
             free += 1
             continue
+        timed += bool(tags.get("limitedApplicability"))
         for one in _simple(geometry, 0):
             layer, extent = one.get("layer"), one.get("extent")
             if isinstance(extent, dict) and one.get("type") == "Point":
@@ -98,6 +102,8 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
         notes.append(f"{counted(passed, 'geometry')} without an area passed over")
     if free:
         notes.append(f"{counted(free, 'zone')} without restriction passed over")
+    if timed:
+        notes.append(f"{counted(timed, 'zone')} that apply at times only taken as always there")
     return Contents("ed318", WGS84, tuple(parts), notes=tuple(notes))
 
 
@@ -106,18 +112,23 @@ def _layer(layer: dict[str, Any], notes: list[str], name: str) -> tuple[Limit, L
     found: list[Limit | None] = []
     for word, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
         value = layer.get(word)
-        found.append(none if value is None else zone_limit(value, str(layer.get(f"{word}Reference")), feet))
+        reference = str(layer.get(f"{word}Reference") or "")
+        found.append(none if value is None else zone_limit(value, reference, feet, notes, name))
     return limits.band_of(found[0], found[1], notes, name)
 
 
-def zone_limit(value: Any, reference: str, feet: bool) -> Limit | None:
+def zone_limit(value: Any, reference: str, feet: bool, notes: list[str], name: str) -> Limit | None:
     """A limit of a geozone: a number, in its own unit, above ground (AGL) or above mean sea level (AMSL, WGS84)."""
     number = limits.metres_of(value)
     if number is None:
         return None
-    datum = Datum.GROUND if reference.upper() in ("AGL", "SFC", "GND") else Datum.SEA
+    datum = Datum.GROUND if reference.upper() in ABOVE_GROUND else Datum.SEA
     if datum is Datum.GROUND and number == 0.0:
         return NO_BOTTOM
+    if datum is Datum.SEA and reference.upper() not in ABOVE_SEA:
+        told = "are above the ellipsoid" if reference.upper() in ABOVE_ELLIPSOID else "name no reference"
+        note = f"{name or 'a zone'}: its limits {told}; taken as above mean sea level"
+        notes += [] if note in notes[-1:] else [note]
     return Limit(number * (FOOT_M if feet else 1.0), datum)
 
 

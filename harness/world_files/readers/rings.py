@@ -107,6 +107,9 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]], degrees: bool = F
 
     Returns:
         A valid shapely geometry for each part, None where it has no area.
+
+    Raises:
+        WorldFileError: one is of degrees, and has places that are none.
     """
     import shapely
 
@@ -120,6 +123,7 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]], degrees: bool = F
     if not polygons:
         return found
     if degrees:
+        _check_degrees([ring for _, kept in polygons for ring in kept])
         first = {part: float(kept[0][0][0]) for part, kept in reversed(polygons)}
         polygons = [
             (part, [short_ring(ring, first[part]) if _apart(ring, first[part]) else ring for ring in kept])
@@ -142,6 +146,16 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]], degrees: bool = F
             pieces = list(dict(zip(shapely.to_wkb(shapely.normalize(pieces)), pieces, strict=True)).values())
         found[part] = pieces[0] if len(pieces) == 1 else shapely.union_all(pieces)
     return found
+
+
+def _check_degrees(every: Sequence[FloatArray]) -> None:
+    """Raises WorldFileError if a ring of longitude and latitude has a place that is not on earth."""
+    for ring in every:
+        x, y = ring[np.abs(ring).argmax(axis=0), (0, 1)].tolist()
+        if abs(x) > TURN_DEG or abs(y) > 0.25 * TURN_DEG:
+            raise WorldFileError(
+                f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs, as EPSG:32632"
+            )
 
 
 def _apart(ring: FloatArray, about_deg: float) -> bool:

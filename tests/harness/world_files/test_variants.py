@@ -745,3 +745,57 @@ def test_models_of_other_files_in_a_gazebo_world_are_counted(tmp_path: Path) -> 
     )
     found = read_any(written(tmp_path / "a.world", text))
     assert "2 models of other files passed over" in found.notes
+
+
+def zone(name: str, **more: Any) -> dict[str, Any]:
+    """A zone of ED-269."""
+    ring = [[8.0, 47.0], [8.01, 47.0], [8.01, 47.01], [8.0, 47.0]]
+    limits = {"lowerLimit": 100, "upperLimit": 900, "uomDimensions": "M"}
+    references = {"lowerVerticalReference": "AMSL", "upperVerticalReference": "AMSL"}
+    shape = {"horizontalProjection": {"type": "Polygon", "coordinates": [ring]}}
+    return {
+        "identifier": name,
+        "restriction": "PROHIBITED",
+        "geometry": [{**limits, **references, **shape, **more}],
+    }
+
+
+def test_zones_of_ed269_as_a_list_and_what_their_limits_are_counted_from(tmp_path: Path) -> None:
+    zones = [
+        zone("A"),
+        zone("B", upperVerticalReference="WGS84", lowerVerticalReference="WGS84"),
+        zone("C", upperVerticalReference=None),
+    ]
+    found = read_any(written(tmp_path / "a.json", json.dumps(zones)))
+    assert [part.name for part in found.parts] == ["A", "B", "C"]
+    assert found.notes == (
+        "B: its limits are above the ellipsoid; taken as above mean sea level",
+        "C: its limits name no reference; taken as above mean sea level",
+    )
+
+
+def test_zones_of_ed318_that_apply_at_times_are_told(tmp_path: Path) -> None:
+    layer = {"lower": 0, "lowerReference": "AGL", "upper": 120, "upperReference": "AGL", "uom": "m"}
+    geometry = {
+        "type": "Point",
+        "coordinates": [8.0, 47.0],
+        "extent": {"subType": "Circle", "radius": 500},
+        "layer": layer,
+    }
+    times = {"limitedApplicability": [{"startDateTime": "2024-01-01T00:00:00Z"}]}
+    features = [{"type": "Feature", "geometry": geometry, "properties": tags} for tags in ({}, times)]
+    found = read_any(
+        written(tmp_path / "a.json", json.dumps({"type": "FeatureCollection", "features": features}))
+    )
+    assert found.kind == "ed318"
+    assert "1 zone that apply at times only taken as always there" in found.notes
+
+
+@pytest.mark.parametrize("place", [[2_600_000.0, 1_200_000.0], [8.0, 147.0], [-400.0, 47.0]])
+def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float], tmp_path: Path) -> None:
+    ring = [place, [place[0] + 0.5, place[1]], [place[0], place[1] + 0.5], place]
+    path = written(tmp_path / "a.geojson", json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    with pytest.raises(WorldFileError, match="for a longitude and a latitude; must be degrees, or give crs"):
+        read_any(path)
+    if place[0] > 1e6:
+        assert len(read_any(path, crs="EPSG:2056").parts) == 1
