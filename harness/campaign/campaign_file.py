@@ -17,7 +17,7 @@ from harness.scenario.generators.generators import WorldSpec
 from harness.scenario.resolving import model_or_folder
 from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
 from harness.scenario.shipped import shipped_scenarios
-from harness.scenario.validation import KeyFault, input_error, shown
+from harness.scenario.validation import NAME_PATTERN, KeyFault, input_error, shown
 
 SCHEMA: Final = "wayproof/campaign/1"
 MAX_RUNS: Final = 1_000_000
@@ -52,7 +52,7 @@ class Campaign(Section):
     """
 
     schema_: Literal["wayproof/campaign/1"] = key("Format and version.", alias="schema")
-    name: str = key("Names the folder.", pattern=r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$", max_length=100)
+    name: str = key("Names the folder.", pattern=NAME_PATTERN, max_length=100)
     seed: int = key("Root seed; every case's seed and draws derive from it.", unit="1", ge=0, le=2**53)
     scenarios: Annotated[tuple[str, ...], Strict(False)] = key(
         "What is flown: scenario files or folders of them, from the campaign file on, or names that `wayproof "
@@ -226,11 +226,21 @@ def load_campaign(path: Path) -> CampaignFile:
 
 def is_campaign(path: Path) -> bool:
     """Whether a file says that it is a campaign."""
+    return _schema_of(path).startswith("wayproof/campaign/")
+
+
+def is_scenario(path: Path) -> bool:
+    """Whether a file says that it is a scenario."""
+    return _schema_of(path).startswith("wayproof/scenario/")
+
+
+def _schema_of(path: Path) -> str:
+    """What a file says that it is; empty where it cannot be read or says nothing."""
     try:
         schema = strict_yaml.read(path).at(("schema",))
     except InputError:
-        return False
-    return schema is not None and str(schema.value).startswith("wayproof/campaign/")
+        return ""
+    return "" if schema is None else str(schema.value)
 
 
 def campaign_schema() -> dict[str, Any]:

@@ -144,7 +144,8 @@ def _report(error: Exception) -> int:
         text = " ".join(error.format_message().split()).replace(
             "Value error, ", ""
         )  # typer checks with pydantic
-        say(f"wayproof: {text} (see wayproof --help)", err=True)
+        whose = getattr(getattr(error, "ctx", None), "command_path", "wayproof")
+        say(f"wayproof: {text} (see {whose} --help)", err=True)
         return BAD_INPUT
     if isinstance(error, WriteError):
         say(f"wayproof: {error}", err=True)

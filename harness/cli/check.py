@@ -27,68 +27,75 @@ if TYPE_CHECKING:
 
 def check(
     path: Annotated[
-        Path, typer.Argument(metavar="PATH", help=".csv (x_m,y_m), .geojson, .plan or .waypoints.")
+        Path,
+        typer.Argument(
+            metavar="PATH",
+            help="A line (.csv, .geojson, .kml), a track (.gpx, .igc) or a mission (.plan, .waypoints).",
+        ),
     ],
-    aircraft: Annotated[str, typer.Option(metavar="NAME", help="What `wayproof list aircraft` prints.")],
+    aircraft: Annotated[
+        str, typer.Option(metavar="NAME", help="A name that `wayproof list aircraft` prints.")
+    ],
     guidance: GuidanceOption = None,
     airspeed_mps: Annotated[
         float | None, typer.Option(metavar="V", help="True airspeed. Default: the aircraft's cruise.")
     ] = None,
     altitude_m: Annotated[
-        float | None, typer.Option(metavar="H", help="Above the sea. Default: the file's, else 300.")
+        float | None,
+        typer.Option(metavar="H", help="Altitude above sea level. Default: the file's, else 300."),
     ] = None,
     wind: Annotated[
-        str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, and degrees it blows from.")
+        str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, degrees it blows from.")
     ] = None,
     turbulence: Annotated[
-        str | None, typer.Option(metavar="INTENSITY", help="light, moderate or severe; milspec:light.")
+        str | None, typer.Option(metavar="INTENSITY", help="light, moderate or severe; or milspec:light, ...")
     ] = None,
     scenario: Annotated[
         str | None,
         typer.Option(
-            metavar="WORLD", help="A scenario whose obstacles, bounds, air and altitude it is flown in."
+            metavar="WORLD", help="A scenario that gives obstacles, bounds, environment, seed, altitude."
         ),
     ] = None,
     clearance_m: Annotated[
-        float | None, typer.Option(metavar="C", help="Free room about the path. Default: one turn radius.")
+        float | None, typer.Option(metavar="C", help="Wanted clearance. Default: one turn radius.")
     ] = None,
     tolerance_m: Annotated[
         float | None,
-        typer.Option(metavar="T", help="How far off it may be. Default: a tenth of C in calm air."),
+        typer.Option(metavar="T", help="Largest distance from the path. Default: a tenth of C in calm air."),
     ] = None,
     corner_m: Annotated[
         float | None,
         typer.Option(
             metavar="R",
             min=0.0,
-            help="How far off corners may be passed. Default: T; at waypoints of a mission the acceptance radius of "
-            "the file, else C.",
+            help="Largest distance from corners. Default: T; at waypoints of a mission the acceptance radius in the "
+            "file, else C.",
         ),
     ] = None,
     polygons: Annotated[
         str | None,
         typer.Option(
             metavar="KIND",
-            help="What polygons beside a drawn path are: exclusion (default), inclusion or none.",
+            help="Fences that polygons beside a drawn path are: exclusion (default), inclusion, none.",
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Of the turbulence.")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of the turbulence.")] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; can be repeated."),
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Default: runs/check/NAME-AIRCRAFT, and digits for options."),
+        typer.Option(metavar="DIR", help="The run folder. Default: its own in runs/check."),
     ] = None,
     no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
     as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
 ) -> int:
-    """Flies a path and says whether it can be flown as given, and where and why not.
+    """Flies a given path and says whether it can be flown as given, and where and why not.
 
-    A drawn line is to be flown as drawn; a mission's corners may be cut. Obstacles (of WORLD, or --set obstacles=...),
-    fences and bounds that were named must not be touched or crossed.
+    A drawn line is to be flown as drawn; a mission's corners may be cut. Obstacles (of WORLD, or --set obstacles=...)
+    must not be touched, fences and given bounds not crossed.
 
     For example: wayproof check survey.plan --aircraft aerosonde --wind 8,270
 
@@ -96,7 +103,7 @@ def check(
 
     0 trackable, no contact, no fence or bound crossed
 
-    1 flown, but not so
+    1 flown, but not as given
 
     2 bad input or usage, nothing flown
     """

@@ -26,8 +26,8 @@ def envelope(
 ) -> int:
     """Flies an aircraft and prints what it can do: speeds, turns, roll-in, the tightest path that it tracks.
 
-    What has been measured is kept until the model or wayproof changes. In the table, planned is the radius that
-    planners are given: the tightest one and a margin.
+    The figures are kept until the model or wayproof changes. The planned radius in the table is the one that planners
+    get: the tightest radius tracked, and a margin.
 
     For example: wayproof envelope c172p --wind 8
     """

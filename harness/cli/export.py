@@ -16,21 +16,25 @@ def export(
     run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A run folder.")],
     form: Annotated[
         Literal["plan", "waypoints", "geojson", "kml", "gpx", "csv", "acmi", "mcap"],
-        typer.Option("--format", help="The format."),
+        typer.Option(
+            "--format", metavar="FORMAT", help="plan, waypoints, geojson, kml, gpx, csv, acmi or mcap."
+        ),
     ],
-    what: Annotated[Literal["flown", "planned"], typer.Option(help="The track, or the plans in effect.")] = (
-        "flown"
-    ),
+    what: Annotated[
+        Literal["flown", "planned"],
+        typer.Option(metavar="WHAT", help="flown: the track; planned: the plans in effect."),
+    ] = "flown",
     tolerance_m: Annotated[
         float,
-        typer.Option(metavar="T", min=0.0, help="Points nearer to the path, seen from above, are left out."),
+        typer.Option(
+            metavar="T", min=0.0, help="Leaves out points nearer than this to the path, seen from above."
+        ),
     ] = 0.25,
     ground_m: Annotated[
         float | None,
         typer.Option(
             metavar="G",
-            help="Altitude of the ground at both ends: a plan or a waypoints file then begins with a takeoff and ends "
-            "with a landing.",
+            help="Altitude of the ground at both ends; adds a takeoff and a landing to a plan or waypoints file.",
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: standard output.")] = None,

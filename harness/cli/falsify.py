@@ -44,36 +44,39 @@ def falsify(
     seed: SeedOption = None,
     settings: SettingsOption = None,
     until: Annotated[
-        Literal["failed", "untrackable"], typer.Option(help="Not reached, or a leg not tracked either.")
+        Literal["failed", "untrackable"],
+        typer.Option(
+            metavar="WHAT", help="failed: goal not reached; untrackable: that, or a leg not tracked."
+        ),
     ] = "failed",
     runs: Annotated[
-        int | None, typer.Option(metavar="N", min=2, help=f"Conditions at most. Default: {RUNS_A_KEY} a key.")
+        int | None,
+        typer.Option(metavar="N", min=2, help=f"Number of conditions. Default: {RUNS_A_KEY} a key."),
     ] = None,
     seeds: Annotated[
-        int, typer.Option(metavar="N", min=1, help="Flights a condition; it fails when one does.")
+        int, typer.Option(metavar="N", min=1, help="Flights of a condition, which fails if one fails.")
     ] = 1,
     tolerance: Annotated[
-        float, typer.Option(metavar="SHARE", help="Narrow down to this share of each range.")
+        float, typer.Option(metavar="SHARE", help="Precision, as a share of each range.")
     ] = 0.01,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Default: runs/SCENARIO/falsify-KEYS, and digits for --set."),
+        typer.Option(metavar="DIR", help="The folder. Default: its own in runs/SCENARIO."),
     ] = None,
     as_json: JsonOption = False,
 ) -> int:
-    """Look for the mildest condition that makes the run fail, and write the scenario that does.
+    """Searches for the mildest condition that makes a flight fail, and writes it as a scenario.
 
-    The answer is the mildest failure found: with one key no failing stretch wider than the widest untried gap,
-    which is printed, is missed; more --runs make that gap smaller.
+    The answer is the mildest failure found. With one key, milder failures can lie only in a gap between tried values;
+    the widest gap is printed, and more --runs make it smaller.
 
-    LO is the mild end; LO > HI where smaller is harder. Of several keys, a condition is as hard as the key that is
-    furthest from its mild end.
+    LO is the mild end; LO > HI if smaller is harder. With several keys, the key furthest from its mild end counts.
 
     For example: wayproof falsify aerosonde_forest --vary environment.wind.speed_mps=0:20
 
     Exit status:
 
-    0 searched, whether something failed or not; the last line says which
+    0 searched, with or without a failure; the last line says which
 
     2 bad input or usage, nothing written
     """

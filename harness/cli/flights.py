@@ -64,7 +64,7 @@ def fly(
     ] = None,
     run: Annotated[int | None, typer.Option(metavar="K", help="With --from: which run.")] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Default: runs/SCENARIO/PLANNER-AIRCRAFT-SEED.")
+        Path | None, typer.Option(metavar="DIR", help="The run folder. Default: its own in runs/SCENARIO.")
     ] = None,
     no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
     view: Annotated[bool, flag("--view", "Open the recording after the flight.")] = False,
@@ -77,7 +77,7 @@ def fly(
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
     as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
 ) -> int:
-    """One closed-loop flight, headless, into a run folder.
+    """Flies a scenario with a planner, and writes a run folder.
 
     For example: wayproof fly paper_circles --seed 3 --set planner.clearance_m=400
 
@@ -85,7 +85,7 @@ def fly(
 
     0 goal reached with no collision and inside the area
 
-    1 flown, but not so; or with --from not as the campaign flew it
+    1 flown, but goal not reached; or with --from not as the campaign flew it
 
     2 bad input or usage, nothing flown
 
@@ -177,7 +177,7 @@ def compare(
     no_recording: Annotated[bool, flag("--no-recording", "Write no recordings and no overlay.")] = False,
     as_json: Annotated[bool, flag("--json", "Print comparison.json, and nothing else.")] = False,
 ) -> int:
-    """Every planner (under every guidance law) on every scenario, side by side: table, figures, report, overlays.
+    """Flies every planner (under every guidance law) through every scenario: table, figures, report, overlays.
 
     For example: wayproof compare paper_circles --planners rolling_window,bug2
 
@@ -185,7 +185,7 @@ def compare(
 
     0 every planner reached every goal
 
-    1 one did not, or crashed
+    1 one did not, or the software failed in a flight
 
     2 bad input or usage, nothing flown
     """
@@ -236,21 +236,21 @@ def bench(
     scenario: Annotated[
         str,
         typer.Argument(
-            metavar="[SCENARIO]",
+            metavar="SCENARIO",
             help="A file or shipped name; or the word tracking, rates or worlds.",
             show_default=True,
         ),
     ] = "paper_circles",
     aircraft: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="With tracking and rates: what flies. Default: aerosonde."),
+        typer.Option(metavar="NAME", help="With tracking and rates: the aircraft. Default: aerosonde."),
     ] = None,
     seeds: Annotated[
         int | None,
         typer.Option(
             metavar="N",
             min=1,
-            help="With tracking: courses a case. Default: 20. With rates: courses. Default: 3.",
+            help="Number of courses: with tracking in each air, default 20; with rates default 3.",
         ),
     ] = None,
     guidance: Annotated[
@@ -258,15 +258,17 @@ def bench(
     ] = None,
     most: Annotated[
         int | None,
-        typer.Option(metavar="N", min=10, help="With worlds: no more obstacles. Default: 100000."),
+        typer.Option(metavar="N", min=10, help="With worlds: largest number of obstacles. Default: 100000."),
     ] = None,
     as_json: JsonOption = False,
 ) -> int:
-    """What the loop costs on this machine against bare JSBSim, block by block.
+    """Measures the time of the closed loop on this machine over that of bare JSBSim, block by block.
 
-    `bench tracking` measures how close an aircraft stays to random courses of 14 turns in calm air, wind and
-    turbulence, the worst of all courses of a case; its exit status is 1 if that is more than promised.
-    `bench rates` flies the same at several step rates: how far each is from the finest, and its time.
+    `bench tracking` measures the largest errors of an aircraft on random courses of 14 turns in calm air, wind and
+    turbulence; its exit status is 1 if one is above its limit.
+
+    `bench rates` flies courses at several step rates: distance from the track of the finest rate, and computing time.
+
     `bench worlds` measures the same flight in worlds of 10 to 100,000 obstacles at one density.
 
     For example: wayproof bench aerosonde_forest --json

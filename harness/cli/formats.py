@@ -17,7 +17,7 @@ def validate(
         list[str], typer.Argument(metavar="FILE...", help="Scenario or campaign files, or shipped names.")
     ],
 ) -> int:
-    """Checks scenario and campaign files without flying them; of a campaign, every run.
+    """Checks scenario and campaign files without flying them; in a campaign, every run.
 
     For example: wayproof validate my_world.yaml paper_circles
     """
@@ -57,7 +57,8 @@ def _found(file: str) -> tuple[str, tuple[str, ...]]:
 
 def schema(
     kind: Annotated[
-        Literal["scenario", "campaign"], typer.Argument(help="The file format.", show_default=True)
+        Literal["scenario", "campaign"],
+        typer.Argument(metavar="FORMAT", help="The file format.", show_default=True),
     ] = "scenario",
 ) -> int:
     """Prints the JSON Schema of a file format, for editors.

@@ -7,7 +7,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
@@ -16,24 +16,35 @@ from harness.cli.standard_output import say
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
 
+LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "campaigns")
 _AIRCRAFT_ROW: Final = "{:10} {:>7} {:>10} {:>6} {:>6} {:8} "
 _WIDTH: Final = 80
 _INTERRUPT_S: Final = 0.1
 """How often it is looked whether the process was asked to end."""
 
 
+def _listed(incomplete: str) -> list[str]:
+    """What can be listed, for the shell to complete."""
+    return [name for name in LISTED if name.startswith(incomplete)]
+
+
 def list_names(
     what: Annotated[
-        Literal["planners", "aircraft", "guidance", "scenarios", "campaigns"], typer.Argument(help="Of what.")
+        str,
+        typer.Argument(
+            metavar="WHAT", help=f"{', '.join(LISTED[:-1])} or {LISTED[-1]}.", autocompletion=_listed
+        ),
     ],
 ) -> int:
-    """Prints the names that a scenario or a command can use; of planners and guidance laws their own keys too.
+    """Prints the names that a scenario or a command can use; for planners and guidance laws also their keys.
 
-    Aircraft that have not been flown here before are flown for their figures, on all processors: all of the fleet
-    takes about a minute. The figures are kept.
+    `list aircraft` first measures, in flight, each aircraft that is new to this machine: about a minute for the fleet
+    on all processors. The figures are kept.
 
     For example: wayproof list planners
     """
+    if what not in LISTED:
+        raise typer.BadParameter(f"{what[:60]!r} is not one of {', '.join(LISTED)}", param_hint="WHAT")
     if what == "aircraft":
         _print_aircraft()
     elif what == "guidance":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from inspect import cleandoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -23,7 +25,11 @@ IN_THE_NAME: Final = ("name", "seed", "planner.kind", "aircraft.model")
 
 
 class Command(TyperCommand):
-    """A command whose help shows no type for what takes no value."""
+    """A command whose help shows no type for what takes no value, and paragraphs without the source's line breaks."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.help = re.sub(r"(?<!\n)\n(?!\n)", " ", cleandoc(self.help or ""))
 
     def get_params(self, ctx: Any) -> list[Any]:
         """Its parameters."""
@@ -89,7 +95,7 @@ PlannerOption = Annotated[
     str | None,
     typer.Option(
         metavar="KIND",
-        help="Replaces planner.kind; FILE.py:NAME or MODULE:NAME too.",
+        help="Replaces planner.kind; or FILE.py:NAME, MODULE:NAME.",
         autocompletion=planners,
     ),
 ]
@@ -99,7 +105,7 @@ AircraftOption = Annotated[
 GuidanceOption = Annotated[
     str | None,
     typer.Option(
-        metavar="KIND", help="Replaces guidance.kind; FILE.py:NAME or MODULE:NAME too.", autocompletion=laws
+        metavar="KIND", help="Replaces guidance.kind; or FILE.py:NAME, MODULE:NAME.", autocompletion=laws
     ),
 ]
 SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]

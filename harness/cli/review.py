@@ -17,11 +17,11 @@ def view(
         list[Path],
         typer.Argument(
             metavar="RUN_DIR...",
-            help="Run folders, several are overlaid, and flight logs of other tools after them (.ulg, .bin, .igc, "
-            ".mcap, .csv); or a campaign's folder, as a table of runs.",
+            help="Run folders (several are overlaid), then flight logs of other tools (.ulg, .bin, .igc, .mcap, "
+            ".csv); or a campaign's folder, as a table of runs.",
         ),
     ],
-    web: Annotated[bool, flag("--web", "In a browser, served on 127.0.0.1, instead of a window.")] = False,
+    web: Annotated[bool, flag("--web", "Show them in a browser, served on 127.0.0.1.")] = False,
 ) -> int:
     """Opens recordings in the rerun viewer.
 
@@ -51,7 +51,7 @@ def report(
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
-    The figures of a run are there as SVG and PNG too, its table as CSV and Markdown.
+    Beside report.html lie its figures as SVG and PNG, and its table as CSV and Markdown.
 
     For example: wayproof report runs/paper_circles/rolling_window-aerosonde-1
     """

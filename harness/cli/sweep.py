@@ -38,30 +38,31 @@ def sweep(
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="Of a Dask cluster that flies instead, as tls://HOST:8786; trusted with running code here.",
+            help="A Dask cluster that flies instead: tls://HOST:8786. It can run code on this machine.",
         ),
     ] = None,
     unencrypted: Annotated[
         bool,
-        flag("--unencrypted", "Let --scheduler lead beyond this machine without TLS, in a trusted network."),
+        flag("--unencrypted", "Allow a --scheduler beyond this machine without TLS, in a trusted network."),
     ] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="The campaign's folder. Default: runs/NAME.")
     ] = None,
-    resume: Annotated[bool, flag("--resume", "Fly only what is missing in DIR.")] = False,
-    dry_run: Annotated[bool, flag("--dry-run", "Print what would be flown; fly and write nothing.")] = False,
+    resume: Annotated[bool, flag("--resume", "Fly only the runs missing in DIR.")] = False,
+    dry_run: Annotated[bool, flag("--dry-run", "Print the runs; fly and write nothing.")] = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
     as_json: Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")] = False,
 ) -> int:
-    """A campaign: many flights on all processors or a cluster, one row each in results.parquet.
+    """Flies a campaign: many flights on all processors or a cluster, one row each in results.parquet.
 
     For example: wayproof sweep forest_planners --workers 4
 
     Exit status:
 
-    0 every run was flown to its end, wherever that was
+    0 every run was flown to its end, whatever its outcome
 
-    1 a run crashed: its row has the traceback; or the disk was full, the cluster gone: --resume goes on
+    1 the software failed in a run (its row has the traceback), or the disk was full or the cluster gone (--resume
+    goes on)
 
     2 bad input or usage, nothing flown
 
@@ -99,11 +100,17 @@ def sweep(
 
 def checked(path: Path) -> CampaignRuns:
     """The runs of a campaign file, every scenario of them made once."""
-    from harness.campaign.campaign_file import load_campaign
+    from harness.campaign.campaign_file import is_scenario, load_campaign
     from harness.campaign.runs import CampaignRuns
     from harness.cli.sweep_terminal import check_bar
+    from harness.files.strict_yaml import InputError
 
-    runs = CampaignRuns(load_campaign(path))
+    try:
+        runs = CampaignRuns(load_campaign(path))
+    except InputError as error:
+        if is_scenario(path):
+            raise InputError(f"{path}: this is a scenario: use `wayproof fly {path}`") from error
+        raise
     with check_bar(len(runs)) as report:
         runs.check(report)
     return runs

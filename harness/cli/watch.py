@@ -18,25 +18,23 @@ if TYPE_CHECKING:
     from harness.watching.watched_flight import Onlookers
 
 LiveOption = Annotated[
-    bool, flag("--live", "Open the viewer first; it follows the flight, at --speed or as fast as it goes.")
+    bool, flag("--live", "Show the flight in the viewer while it is flown, at --speed or as fast as it goes.")
 ]
-WebOption = Annotated[bool, flag("--web", "With --live: in a browser, served on 127.0.0.1.")]
+WebOption = Annotated[bool, flag("--web", "With --live: show it in a browser, served on 127.0.0.1.")]
 ViewerOption = Annotated[
     str | None,
-    typer.Option(metavar="HOST:PORT", help="With --live, of a rerun viewer that is running."),
+    typer.Option(metavar="HOST:PORT", help="With --live: use a rerun viewer that is running."),
 ]
 SpeedOption = Annotated[
     float | None,
-    typer.Option(metavar="X", help="Times real time, with --live or --mavlink (whose default is 1)."),
+    typer.Option(metavar="X", help="Speed over real time, with --live or --mavlink (default there: 1)."),
 ]
 MavlinkOption = Annotated[
     str | None,
-    typer.Option(
-        metavar="udp:HOST:PORT", help="Be a MAVLink vehicle for a ground station that listens there."
-    ),
+    typer.Option(metavar="udp:HOST:PORT", help="Show the flight to a ground station that listens there."),
 ]
 BeyondOption = Annotated[
-    bool, flag("--beyond-this-machine", "Let --viewer and --mavlink lead to another machine.")
+    bool, flag("--beyond-this-machine", "Allow --viewer and --mavlink on another machine.")
 ]
 
 

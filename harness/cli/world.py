@@ -32,24 +32,27 @@ def world(
     altitude_m: Annotated[
         float, typer.Option("--altitude-m", metavar="H", help="Flight altitude above mean sea level.")
     ],
-    out: Annotated[Path, typer.Option(metavar="SCENARIO.yaml", help="The scenario that is written.")],
+    out: Annotated[Path, typer.Option(metavar="SCENARIO.yaml", help="The scenario to write.")],
     aircraft: Annotated[
-        str, typer.Option(metavar="NAME", help="What flies.", autocompletion=aircraft_names)
+        str, typer.Option(metavar="NAME", help="The aircraft.", autocompletion=aircraft_names)
     ] = "aerosonde",
     start: Annotated[
         str | None,
         typer.Option(
-            metavar="A,B", help="Latitude,longitude; x,y in metres of a file without a place on earth."
+            metavar="A,B", help="Latitude,longitude; or x,y in metres for a file without a place on earth."
         ),
     ] = None,
-    goal: Annotated[str | None, typer.Option(metavar="A,B", help="The same.")] = None,
+    goal: Annotated[str | None, typer.Option(metavar="A,B", help="Likewise.")] = None,
     clearance_m: Annotated[
-        float | None, typer.Option("--clearance-m", metavar="C", help="planner.clearance_m.")
+        float | None,
+        typer.Option("--clearance-m", metavar="C", help="Wanted clearance: planner.clearance_m."),
     ] = None,
     vertical_clearance_m: Annotated[
         float,
         typer.Option(
-            "--vertical-clearance-m", metavar="V", help="What reaches so near to the altitude is an obstacle."
+            "--vertical-clearance-m",
+            metavar="V",
+            help="Whatever comes this near to the altitude is an obstacle.",
         ),
     ] = 10.0,
     metres_per_cell: Annotated[
@@ -63,12 +66,13 @@ def world(
         ),
     ] = None,
     crs: Annotated[
-        str | None, typer.Option(metavar="EPSG:N", help="Of files that name none, as EPSG:28992.")
+        str | None,
+        typer.Option(metavar="EPSG:N", help="Coordinate system of files that name none, such as EPSG:28992."),
     ] = None,
 ) -> int:
-    """Makes a scenario that can be flown from files of terrain, buildings, airspace, fences or occupancy.
+    """Makes a scenario from files of terrain, buildings, airspace, fences or an occupancy map.
 
-    Without --start and --goal they lie far apart in free space with room to turn.
+    Without --start and --goal it places them far apart, in free space with room to turn.
 
     For example: wayproof world davos.tif --altitude-m 2000 --out davos.yaml
     """

@@ -22,6 +22,7 @@ from harness.scenario.sections import (
     key,
 )
 from harness.scenario.simulation import Simulation
+from harness.scenario.validation import NAME_PATTERN
 
 
 class ScenarioKeys(Section):
@@ -33,7 +34,7 @@ class ScenarioKeys(Section):
     model_config = ConfigDict(title="Scenario")
 
     schema_: Literal["wayproof/scenario/1"] = key("Format and version.", alias="schema")
-    name: str = key("Names the run folder.", pattern=r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$", max_length=100)
+    name: str = key("Names the run folder.", pattern=NAME_PATTERN, max_length=100)
     seed: int = key("Root seed; every random stream derives from it.", unit="1", default=1, ge=0, le=2**53)
     area: Area = key("The area of operations.")
     obstacles: Annotated[tuple[Obstacle, ...], Strict(False), FailFast()] = key(

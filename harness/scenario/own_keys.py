@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, Protocol, TypeVar, get_type_hints
 
@@ -92,12 +93,19 @@ def resolved_config(section: str, spec: OwnKeys, kind: Kind, shared: Mapping[str
     try:
         return kind.config(**own).resolved(about)
     except ValueError as error:
-        blamed = [name for name in known if name in str(error)][:1]
-        raise KeyFault((section, *blamed), str(error)) from error
+        raise _blamed(section, known, str(error)) from error
     except KeyboardInterrupt:
         raise
     except BaseException as error:
         raise KeyFault((section, "kind"), f"cannot be configured: {sentence(error)}") from error
+
+
+def _blamed(section: str, known: Sequence[str], text: str) -> KeyFault:
+    """What a config says, as a fault of the key that it names: `sensor.range_m is ...`, or one of its own."""
+    other = re.match(r"(\w+)\.(\w+) (is .*)", text, re.DOTALL)
+    if other is not None:
+        return KeyFault((other[1], other[2]), other[3])
+    return KeyFault((section, *[name for name in known if name in text][:1]), text)
 
 
 def json_schema(common: dict[str, Any], kinds: Mapping[str, Kind]) -> dict[str, Any]:

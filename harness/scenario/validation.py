@@ -30,6 +30,10 @@ _WANTED: Final = {
     "dict_type": "a mapping `key: value`",
     "model_attributes_type": "a mapping `key: value`",
 }
+NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
+"""Of a name that a folder may be called after."""
+
+_PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}
 _BOUNDS: Final = {
     "greater_than": ("greater than", "gt"),
     "greater_than_equal": ("at least", "ge"),
@@ -82,7 +86,23 @@ def fault_error(found: KeyFaults, root: Node, source: str) -> InputError:
 
 def faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[Loc, str]]:
     """Key and sentence of every fault."""
-    return [_located(details, model) for details in error.errors(include_url=False)]
+    every = error.errors(include_url=False)
+    found = []
+    for details in every:
+        loc: Loc = details["loc"]
+        if details["type"] == "missing" and isinstance(loc[-1], int):
+            last = max(int(each["loc"][-1]) for each in every if _lacks_number(each, loc[:-1]))
+            given = str(list(details["input"]))
+            short = given if len(given) <= 80 else f"{given[:77]}..."
+            found.append((loc[:-1], f"is {short}; must have {last + 1} numbers"))
+        else:
+            found.append(_located(details, model))
+    return found
+
+
+def _lacks_number(details: ErrorDetails, loc: Loc) -> bool:
+    """Whether the list at `loc` is too short."""
+    return details["type"] == "missing" and details["loc"][:-1] == loc
 
 
 def in_lines(every: Sequence[str], source: str) -> InputError:
@@ -105,10 +125,6 @@ def _located(details: ErrorDetails, model: type[BaseModel]) -> tuple[Loc, str]:
     cause = details.get("ctx", {}).get("error")
     if isinstance(cause, KeyFault):
         return (*loc, *cause.loc), str(cause)
-    if details["type"] == "missing" and isinstance(loc[-1], int):
-        given = str(list(details["input"]))
-        short = given if len(given) <= 80 else f"{given[:77]}..."
-        return loc[:-1], f"is {short}; must have more numbers, see `wayproof schema`"
     known = _known_keys(model, loc[:-1]) if details["type"] == "extra_forbidden" else ()
     return loc, sentence(details, known)
 
@@ -148,7 +164,7 @@ def sentence(details: ErrorDetails, known: tuple[str, ...] = ()) -> str:
     if kind == "literal_error":
         return f"is {shown(value)}; must be {context['expected']}"
     if kind == "string_pattern_mismatch":
-        return f"is {shown(value)}; must match {context['pattern']}"
+        return f"is {shown(value)}; must {_PATTERNS.get(context['pattern'], 'match ' + context['pattern'])}"
     if kind == "too_long":
         return f"has {context['actual_length']} items; must have {context['max_length']}"
     if kind == "too_short":

@@ -71,7 +71,7 @@ class RollingWindowConfig:
             raise ValueError(
                 f"sensor.range_m is {mission.sensor_range_m:g}, too short for a turn radius of "
                 f"{mission.turn_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
-                f"no safe turn could be seen ahead: at least {math.ceil(least)} is needed"
+                f"must be at least {math.ceil(least)}, to see room for a safe turn ahead"
             )
         window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
         if window > mission.sensor_range_m:

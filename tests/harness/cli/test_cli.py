@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -22,6 +23,7 @@ from harness.scenario import scenario, shipped
 
 ROOT = Path(__file__).parents[3]
 CAMPAIGN = ROOT / "scenarios" / "campaigns" / "forest_planners.yaml"
+SCENARIO = ROOT / "scenarios" / "paper_circles.yaml"
 SLOW = {"jsbsim", "numba", "rerun", "shapely", "pyarrow", "pydantic", "matplotlib", "numpy", "scipy", "yaml"}
 COMMANDS = (
     "fly",
@@ -113,6 +115,24 @@ def test_help_of_a_command_has_an_example_that_is_one(
     assert "<bool>" not in shown
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_a_command_fills_80_columns_and_breaks_no_word(
+    command: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "…" not in shown
+    prose = [line.strip() for line in shown.partition("╭")[0].splitlines()]
+    early = [
+        line
+        for line, following in pairwise(prose)
+        if line and following and len(f"{line} {following.split()[0]}") <= 78
+    ]
+    assert early == []
+    assert re.findall(r"<[^>\n]*?(?:  |$)", shown, re.MULTILINE) == [], "a list of choices is cut"
+
+
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
@@ -120,6 +140,7 @@ def test_help_of_a_command_has_an_example_that_is_one(
         ("wayproof fly paper_b", {"paper_bug_trap"}),
         ("wayproof fly x --planner tangent", {"tangent_bug"}),
         ("wayproof fly x --aircraft aero", {"aerosonde"}),
+        ("wayproof list sc", {"scenarios"}),
     ],
 )
 def test_the_shell_completes_commands_and_names(words: str, offered: set[str], tmp_path: Path) -> None:
@@ -194,9 +215,16 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
         (["fly", "one", "two"], "two"),
         (
             ["schema", "campaigns"],
-            "Invalid value for 'kind': 'campaigns' is not one of 'scenario', 'campaign'.",
+            "Invalid value for 'FORMAT': 'campaigns' is not one of 'scenario', 'campaign'.",
         ),
-        (["list", "birds"], "birds"),
+        (["list", "birds"], "'birds' is not one of planners, aircraft, guidance, scenarios, campaigns"),
+        (["list"], "(see wayproof list --help)"),
+        (["flight"], "(see wayproof --help)"),
+        (["sweep", str(SCENARIO)], f"{SCENARIO}: this is a scenario: use `wayproof fly {SCENARIO}`"),
+        (
+            ["fly", "paper_circles", "--set", "sensor.range_m=100"],
+            "command line: sensor.range_m: is 100, too short for a turn radius of 110 m",
+        ),
         (["validate"], "FILE"),
         (["view"], "RUN_DIR"),
         (["view", "no-such-run"], "no-such-run"),

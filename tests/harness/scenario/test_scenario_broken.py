@@ -49,10 +49,10 @@ BROKEN = {
     "no bounds": ("  bounds_m: [0, 0, 20000, 10000]\n", "", "4: area.bounds_m", "is missing"),
     "no start": ("  start_m: [1000, 5000]\n", "", "11: mission.start_m", "is missing"),
     "no goal": ("  goal_m: [19000, 5000]\n", "", "11: mission.goal_m", "is missing"),
-    "name in capitals": ("name: good", "name: Good", "2: name", "must match"),
-    "name climbs out": ("name: good", "name: ..", "2: name", "must match"),
+    "name in capitals": ("name: good", "name: Good", "2: name", "must have only a-z, 0-9"),
+    "name climbs out": ("name: good", "name: ..", "2: name", "and not only dots"),
     "name is a number": ("name: good", "name: 7", "2: name", "must be text; put it in quotes"),
-    "name is a path": ("name: good", "name: a/b", "2: name", "must match"),
+    "name is a path": ("name: good", "name: a/b", "2: name", "must have only a-z, 0-9"),
     "negative seed": ("seed: 1", "seed: -1", "3: seed", "must be at least 0"),
     "fractional seed": ("seed: 1", "seed: 1.5", "3: seed", "must be a whole number"),
     "seed with a point": (
@@ -63,7 +63,13 @@ BROKEN = {
     ),
     "seed beyond floats": ("seed: 1", "seed: 1%s" % (20 * "0"), "3: seed", "of at most 9007199254740992"),
     "seed is true": ("seed: 1", "seed: true", "3: seed", "is true; must be a whole number"),
-    "three bounds": ("[0, 0, 20000, 10000]", "[0, 0, 20000]", "5: area.bounds_m", "must have more numbers"),
+    "three bounds": (
+        "[0, 0, 20000, 10000]",
+        "[0, 0, 20000]",
+        "5: area.bounds_m",
+        "is [0, 0, 20000]; must have 4 numbers",
+    ),
+    "two bounds": ("[0, 0, 20000, 10000]", "[0, 0]", "5: area.bounds_m", "is [0, 0]; must have 4 numbers"),
     "five bounds": ("20000, 10000]", "20000, 10000, 1]", "5: area.bounds_m", "has 5 items; must have 4"),
     "bounds turned round": (
         "[0, 0, 20000,",
