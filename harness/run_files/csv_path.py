@@ -27,7 +27,7 @@ COMMENT: Final = "#"
 MOST_NAMED: Final = 4
 
 
-class _Altitudes(NamedTuple):
+class AltitudeColumn(NamedTuple):
     """The column of the altitudes.
 
     Attributes:
@@ -41,6 +41,12 @@ class _Altitudes(NamedTuple):
     unit_m: float = 1.0
     above_ground: bool = False
     noted: bool = False
+
+    @property
+    def note(self) -> str:
+        """What is taken for granted; empty where its name says it."""
+        unit, above = "feet" if self.unit_m != 1.0 else "metres", "ground" if self.above_ground else "sea"
+        return f"{shown(self.name)}: taken as {unit} above the {above}" if self.noted else ""
 
 
 def read_csv(text: str, source: str) -> PathAsRead:
@@ -64,7 +70,7 @@ def read_csv(text: str, source: str) -> PathAsRead:
             f"{source}:{max(rows.line_num, 1) if header else 1}: has the columns "
             f"{shown(', '.join(header)) or 'none'}; must have x_m,y_m or latitude_deg,longitude_deg"
         )
-    height = _altitudes(header)
+    height = altitude_column(header)
     wanted = (*names, *((height.name,) if height else ()))
     columns = [header.index(name) for name in wanted]
     positions, altitudes = [], []
@@ -94,27 +100,24 @@ def _delimiter(line: str) -> str:
     return next((each for each in DELIMITERS if each in line), ",")
 
 
-def _altitudes(header: list[str]) -> _Altitudes | None:
+def altitude_column(header: list[str]) -> AltitudeColumn | None:
     """The column of the altitudes: ours, else the first whose name says so."""
     own = next((name for name in header if name in ALTITUDE_COLUMNS), None)
     if own is not None:
-        return _Altitudes(own)
+        return AltitudeColumn(own)
     for name in header:
         words = set(re.findall(r"[a-z]+", name))
         if words & ALTITUDE_WORDS and not words - ALTITUDE_WORDS - METRES - FEET:
             unit_m = FOOT_M if words & FEET else 1.0
             above_ground = bool(words & GROUND)
             told = bool(words & (METRES | FEET)) and bool(words & (SEA | GROUND))
-            return _Altitudes(name, unit_m, above_ground, not told)
+            return AltitudeColumn(name, unit_m, above_ground, not told)
     return None
 
 
-def _notes(header: list[str], wanted: tuple[str, ...], height: _Altitudes | None) -> tuple[str, ...]:
+def _notes(header: list[str], wanted: tuple[str, ...], height: AltitudeColumn | None) -> tuple[str, ...]:
     """What is taken for granted, and what is passed over."""
-    notes = []
-    if height is not None and height.noted:
-        unit, above = "feet" if height.unit_m != 1.0 else "metres", "ground" if height.above_ground else "sea"
-        notes.append(f"{shown(height.name)}: taken as {unit} above the {above}")
+    notes = [height.note] if height is not None and height.noted else []
     others = [shown(name) or "one without a name" for name in header if name not in wanted]
     if others:
         more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""

@@ -20,6 +20,7 @@ from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.flight.record import FloatArray
+from harness.run_files.csv_path import altitude_column
 
 NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 MAX_BYTES: Final = 1_000_000_000
@@ -322,20 +323,27 @@ def _csv(path: Path, notes: list[str]) -> Rows | LogTrack:
     with path.open(encoding="utf-8-sig", newline="") as file:
         table = csv.reader(file, skipinitialspace=True)
         names = [name.strip() for name in next(table, [])]
+        column = altitude_column([name.lower() for name in names])
         local = {"x_m", "y_m"} <= set(names)
         if "time_s" not in names or not (local or {"latitude_deg", "longitude_deg"} <= set(names)):
             raise InputError(
                 f"{path}:1: must have the columns time_s and x_m,y_m or latitude_deg,longitude_deg"
             )
         wanted = ["time_s", *(("x_m", "y_m") if local else ("latitude_deg", "longitude_deg"))]
-        height = names.index("altitude_m") if "altitude_m" in names else None
+        height = None if column is None else [name.lower() for name in names].index(column.name)
+        if column is None:
+            notes.append("has no altitudes: shown at 0 m")
+        elif column.above_ground:
+            notes.append(f"{names[height or 0]}: altitudes above the ground, shown as if above the sea")
+        elif column.noted:
+            notes.append(column.note)
         places = [names.index(name) for name in wanted]
         for row in filter(None, table):
             try:
-                up_m = float(row[height] or 0) if height is not None else 0.0
+                up_m = column.unit_m * float(row[height] or 0) if column and height is not None else 0.0
                 time_s, first, second = (float(row[place]) for place in places)
             except (IndexError, ValueError) as error:
-                wanted += ["altitude_m"] if height is not None else []
+                wanted += [names[height]] if height is not None else []
                 told = f"{', '.join(wanted[:-1])} or {wanted[-1]}"
                 raise InputError(f"{path}:{table.line_num}: has no number in {told}") from error
             rows.append((time_s, first, second, up_m))

@@ -312,6 +312,26 @@ def test_of_a_damaged_log_it_is_said_that_it_is(
         assert len(read_log(tmp_path / "torn.ulg", PLANE).notes) == 1
 
 
+@pytest.mark.parametrize(
+    ("column", "up_m", "notes"),
+    [
+        ("altitude_m", 500.0, ()),
+        ("alt", 500.0, ("alt: taken as metres above the sea",)),
+        ("Altitude(ft)", 152.4, ("altitude(ft): taken as feet above the sea",)),
+        ("agl_m", 500.0, ("agl_m: altitudes above the ground, shown as if above the sea",)),
+        ("what", 0.0, ("has no altitudes: shown at 0 m",)),
+    ],
+)
+def test_altitudes_of_a_table_by_other_names(
+    column: str, up_m: float, notes: tuple[str, ...], tmp_path: Path
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"time_s,latitude_deg,longitude_deg,{column}\n0,47,8,500\n1,47.0001,8,500\n")
+    found = read_log(path, PLANE)
+    assert found.up_m == pytest.approx([up_m] * 2)
+    assert found.notes == notes
+
+
 def test_view_tells_what_of_a_log_is_not_there(tmp_path: Path, run: Path) -> None:
     write_mcap(tmp_path / "a.mcap")
     whole = (tmp_path / "a.mcap").read_bytes()
