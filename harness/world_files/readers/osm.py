@@ -12,6 +12,7 @@ from harness.world_files.readers.osm_elements import (
     AREAS,
     FIRST_INLINE,
     MULTIPOLYGON,
+    POINTS,
     Collected,
     Elements,
     Line,
@@ -64,15 +65,15 @@ class _Document:
                 self.finish()
             deleted = attributes.get("visible") == "false" or attributes.get("action") == "delete"
             self._number, self._kind = _whole(tag, attributes, "id"), "" if deleted else tag
-            if tag == "node":
-                self._kind = ""
-                if not deleted:
-                    self.elements.node(self._number, *_place(attributes))
+            if tag == "node" and not deleted:
+                self.elements.node(self._number, *_place(attributes))
             self._tags, self._refs, self._members = {}, [], []
 
     def finish(self) -> None:
         """The last element ends."""
-        if self._kind == "way":
+        if self._kind == "node":
+            self.elements.point(self._tags)
+        elif self._kind == "way":
             self.elements.way(self._number, self._refs, self._tags)
         elif self._kind == "relation":
             self._finish_member()
@@ -144,6 +145,7 @@ def read_json(path: Path, reading: Reading) -> Contents:
             kind, tags = each.get("type"), {str(k): str(v) for k, v in (each.get("tags") or {}).items()}
             if kind == "node":
                 found.node(int(each["id"]), *_place(each))
+                found.point(tags)
             elif kind == "way":
                 found.way(int(each["id"]), refs_of(each), tags)
             elif kind == "relation":
@@ -187,6 +189,9 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
                 wanted[each.id] = tags, [(m.ref, m.role == "inner") for m in each.members if m.type == "w"]
         needed = {number for _, members in wanted.values() for number, _ in members}
         ways: dict[int, Line] = {}
+        points = osmium.filter.KeyFilter(*POINTS)
+        for each in osmium.FileProcessor(str(path), osmium.osm.NODE).with_filter(points):
+            found.point({tag.k: tag.v for tag in each.tags})
         entities = osmium.osm.NODE | osmium.osm.WAY
         for each in osmium.FileProcessor(str(path), entities).with_locations():
             if not each.is_way() or not (each.id in needed or any(name in each.tags for name in AREAS)):

@@ -41,6 +41,10 @@ TALL: Final = frozenset(
     )
 )
 """Of `man_made`, what stands up like a building; piers, pipelines and the like do not."""
+POINTS: Final = ("building", "man_made", "power")
+"""What tags of a node have that may be something tall; it has no outline."""
+ENTRANCE: Final = "entrance"
+"""Of `building`, a door."""
 MULTIPOLYGON: Final = "multipolygon"
 
 Line = list[tuple[float, float]]
@@ -58,6 +62,12 @@ class Collected:
         self._rings: list[tuple[Mapping[str, str], Line, str]] = []
         self.unknown = Counter[str]()
         self.broken = self.closed = 0
+        self._points: list[float] = []  # heights of what has no outline, 0 where none is known
+
+    def point(self, tags: Mapping[str, str]) -> None:
+        """A node with tags; what is tall and has no outline is counted."""
+        if is_tall(tags):
+            self._points.append(limits.metres_of(tags.get("height")) or 0.0)
 
     def way(self, tags: Mapping[str, str], line: Line, name: str) -> None:
         """A building that is one way; those that are whole rings are made all at once."""
@@ -104,6 +114,11 @@ class Collected:
             notes.append(f"{counted(self.closed, 'building')} cut open by the edge of the extract closed")
         if self.broken:
             notes.append(f"{counted(self.broken, 'building')} whose outline is not there passed over")
+        if self._points:
+            highest_m = max(self._points)
+            told = f", the highest {highest_m:g} m" if highest_m > 0.0 else ""
+            many = counted(len(self._points), "point")
+            notes.append(f"{many} for towers, masts or buildings without an outline passed over{told}")
         return Contents("osm", WGS84, tuple(self.parts), notes=tuple(notes))
 
 
@@ -120,6 +135,12 @@ class Elements:
         self._spans: dict[int, tuple[int, int]] = {}
         self._buildings: dict[int, dict[str, str]] = {}
         self._relations: dict[int, tuple[dict[str, str], list[Member]]] = {}
+        self._points: list[Mapping[str, str]] = []
+
+    def point(self, tags: Mapping[str, str]) -> None:
+        """Tags of a node."""
+        if is_tall(tags):
+            self._points.append(tags)
 
     def node(self, number: int, longitude: float, latitude: float) -> None:
         """A place."""
@@ -153,6 +174,8 @@ class Elements:
             span = slice(*self._spans[number])
             return list(map(tuple, places[span][known[span]].tolist()))
 
+        for tags in self._points:
+            found.point(tags)
         for number, tags in self._buildings.items():
             found.way(tags, line(number), f"way {number}")
         needed = {number for _, members in self._relations.values() for number, _ in members}
@@ -174,6 +197,13 @@ class Elements:
 def is_building(tags: Mapping[str, str]) -> bool:
     """Whether tags are those of a building, of a part of one, or of what stands up like one."""
     return any(tags.get(name, "no") != "no" for name in AREAS[:2]) or tags.get("man_made") in TALL
+
+
+def is_tall(tags: Mapping[str, str]) -> bool:
+    """Whether tags of a node are those of something that stands up: a building, a tower, a wind turbine."""
+    if tags.get("building") == ENTRANCE:
+        return False
+    return is_building(tags) or tags.get("power") == "tower" or tags.get("generator:source") == "wind"
 
 
 def _area(lines: Sequence[Line]) -> tuple[Any, bool]:

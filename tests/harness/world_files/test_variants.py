@@ -799,3 +799,44 @@ def test_coordinates_that_are_no_degrees_ask_for_their_system(place: list[float]
         read_any(path)
     if place[0] > 1e6:
         assert len(read_any(path, crs="EPSG:2056").parts) == 1
+
+
+POINTS = (
+    ({"man_made": "tower", "height": "150"}, True),
+    ({"power": "tower", "height": "60 m"}, True),
+    ({"power": "generator", "generator:source": "wind", "height": "590 ft"}, True),
+    ({"building": "yes"}, True),
+    ({"building": "entrance"}, False),
+    ({"natural": "tree", "height": "30"}, False),
+)
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_towers_that_are_points_are_counted(form: str, tmp_path: Path) -> None:
+    ring = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001)]
+    path = osm(tmp_path / "a.osm", [({"building": "yes", "height": "9"}, ring)])
+    tags = "".join(
+        f'<node id="{n}" lat="47" lon="8">{"".join(f"<tag k={k!r} v={v!r}/>" for k, v in t.items())}</node>'
+        for n, (t, _) in enumerate(POINTS, 1)
+    )
+    path.write_text(path.read_text().replace('<osm version="0.6">', f'<osm version="0.6">{tags}'))
+    if form == "json":
+        nodes = [
+            {"type": "node", "id": n, "lat": 47.0, "lon": 8.0, "tags": t}
+            for n, (t, _) in enumerate(POINTS, 1)
+        ]
+        corners = [
+            {"type": "node", "id": 90 + n, "lat": lat, "lon": lon} for n, (lon, lat) in enumerate(ring)
+        ]
+        way = {"type": "way", "id": 9, "nodes": [90, 91, 92, 90], "tags": {"building": "yes", "height": "9"}}
+        path = written(tmp_path / "a.json", json.dumps({"elements": [*nodes, *corners, way]}))
+    if form == "osm.pbf":
+        osmium = pytest.importorskip("osmium")
+        with osmium.SimpleWriter(str(tmp_path / "a.osm.pbf")) as writer:
+            for each in osmium.FileProcessor(str(path)):
+                writer.add(each)
+        path = tmp_path / "a.osm.pbf"
+    count = sum(tall for _, tall in POINTS)
+    assert read_any(path).notes == (
+        f"{count} points for towers, masts or buildings without an outline passed over, the highest 179.832 m",
+    )
