@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import BoolArray, Contents, FloatArray, Limit, Part, Reading, WorldFileError
-from harness.world_files.plane import flat_crs
+from harness.world_files.plane import flat_crs, has_heights, unit_that_is_no_metre, vertical_unit_m
 from harness.world_files.readers import limits, rings
 
 SOLID: Final = ("Building", "Bridge", "OtherConstruction")
@@ -27,6 +27,8 @@ DEEPEST: Final = 5
 """A ring's indices lie no deeper than this in `boundaries`."""
 AREAS: Final = ("Surface", "Solid")
 """Ends of the types of geometry that are taken; points and lines are not solid."""
+INSTANCE: Final = "GeometryInstance"
+"""A geometry that is a template of the file, put somewhere."""
 MOST_NAMED: Final = 4
 ROOFS: Final = ("b3_h_dak_max", "b3_h_nok", "h_dak_max")
 """Attributes of 3DBAG with the height of the roof above the datum, for buildings whose geometry is flat."""
@@ -68,6 +70,8 @@ def read(path: Path, reading: Reading) -> Contents:
     if crs is not None and _latitude_first(crs, places):
         places = places[:, [1, 0, 2]]
         notes.append("its latitudes are taken to come first")
+    if crs is not None:
+        places[:, 2] *= _height_unit_m(crs, notes)
     parts = _parts(objects, places, reading, notes)
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
@@ -98,11 +102,26 @@ def _objects(contents: Sequence[Any]) -> tuple[list[_Object], FloatArray, Counte
         for name, each in found.items():
             kind = str(each.get("type", "?")) if isinstance(each, dict) else "?"
             if kind.startswith(SOLID):
+                passed[INSTANCE] += sum(each["type"] == INSTANCE for each in _geometries(each))
                 objects.append(_Object(name, begin, end, _surfaces_of(each), _attributes(each)))
             else:
                 passed[kind] += 1
         begin = end
-    return objects, np.concatenate(vertices), passed
+    return objects, np.concatenate(vertices), +passed
+
+
+def _height_unit_m(crs: str, notes: list[str]) -> float:
+    """Length of the unit of heights in metres: that of the vertical system, else that of the plane."""
+    if has_heights(crs):
+        unit_m = vertical_unit_m(crs)
+        if unit_m != 1.0:
+            notes.append(f"its heights are its numbers times {unit_m:.6g}, as it says")
+        return unit_m
+    name = unit_that_is_no_metre(crs)
+    if not name:
+        return 1.0
+    notes.append(f"its heights name no unit: taken in {name}, as its plane")
+    return float(flat_crs(crs).axis_info[0].unit_conversion_factor)
 
 
 def _latitude_first(crs: str, places: FloatArray) -> bool:
@@ -138,13 +157,18 @@ def _attributes(thing: dict[str, Any]) -> dict[str, Any]:
     return attributes if isinstance(attributes, dict) else {}
 
 
-def _surfaces_of(thing: dict[str, Any]) -> list[Surface]:
-    """Surfaces of an object at its highest level of detail."""
-    shapes = [
+def _geometries(thing: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those of an object that say of what type they are."""
+    return [
         each
         for each in thing.get("geometry") or ()
-        if isinstance(each, dict) and "boundaries" in each and str(each.get("type")).endswith(AREAS)
+        if isinstance(each, dict) and isinstance(each.get("type"), str)
     ]
+
+
+def _surfaces_of(thing: dict[str, Any]) -> list[Surface]:
+    """Surfaces of an object at its highest level of detail."""
+    shapes = [each for each in _geometries(thing) if "boundaries" in each and each["type"].endswith(AREAS)]
     best = max((str(each.get("lod", "0")) for each in shapes), default="")
     return [
         surface

@@ -840,3 +840,37 @@ def test_towers_that_are_points_are_counted(form: str, tmp_path: Path) -> None:
     assert read_any(path).notes == (
         f"{count} points for towers, masts or buildings without an outline passed over, the highest 179.832 m",
     )
+
+
+FOOT_US_M = 1200 / 3937
+
+
+@pytest.mark.parametrize(
+    ("crs", "given", "unit_m", "note"),
+    [
+        ("EPSG::2263", None, FOOT_US_M, "its heights name no unit: taken in US survey foot, as its plane"),
+        ("EPSG::7415", None, 1.0, None),
+        ("EPSG::7415", "EPSG:2263+6360", FOOT_US_M, "its heights are its numbers times 0.304801, as it says"),
+        ("EPSG::7415", "EPSG:2263+5703", 1.0, None),
+    ],
+)
+def test_heights_of_a_city_are_in_the_unit_of_its_system(
+    crs: str, given: str | None, unit_m: float, note: str | None, tmp_path: Path
+) -> None:
+    vertices = [[x, y, z] for z in (10.0, 40.0) for x, y in ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0))]
+    shape = {"type": "MultiSurface", "lod": "1", "boundaries": [[[0, 1, 2, 3]], [[4, 5, 6, 7]]]}
+    instance = {
+        "type": "GeometryInstance",
+        "template": 0,
+        "boundaries": [0],
+        "transformationMatrix": [1] * 16,
+    }
+    objects = {
+        "a": {"type": "Building", "geometry": [shape]},
+        "b": {"type": "Building", "geometry": [instance]},
+    }
+    text = json.dumps(city(f"urn:ogc:def:crs:{crs}", objects, vertices))
+    found = read_any(written(tmp_path / "a.json", text), crs=given)
+    (part,) = found.parts
+    assert (part.bottom.height_m, part.top.height_m) == pytest.approx((10 * unit_m, 40 * unit_m))
+    assert found.notes == (*((note,) if note else ()), "passed over: 1 GeometryInstance")
