@@ -51,9 +51,10 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     console.print(f" {LEGEND}", style="dim", highlight=False, width=width)
     for duel in summary.duels:
         console.print(
-            f"{plain(duel.first)} against {plain(duel.second)}, {duel.pairs} pairs: reached "
-            f"{difference(duel.success)} points, only {plain(duel.first)} {duel.only_first}, only "
-            f"{plain(duel.second)} {duel.only_second}; length x {ratio(duel.length)} on {duel.both_reached}",
+            f"{plain(duel.first)} against {plain(duel.second)} in {counted(duel.pairs, 'pair')} of flights: goals "
+            f"reached {difference(duel.success)} points ({duel.only_first} by {plain(duel.first)} alone, "
+            f"{duel.only_second} by {plain(duel.second)} alone); length {ratio(duel.length)} times, where both "
+            f"reached ({duel.both_reached})",
             highlight=False,
             width=width,
         )

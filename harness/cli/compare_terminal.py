@@ -19,6 +19,10 @@ from harness.files.wording import printable
 from harness.scenario.scenario import Scenario
 
 WIDTH = 80
+LEGEND = (
+    "ratio: length over the optimum; clear: least clearance; κ·R: tightest planned turn, above 1 too tight; "
+    "tracks: all legs trackable; xt: cross-track error, m; p99: planner time"
+)
 NAME_WIDTH = 14
 """A longer name goes on in the next line."""
 
@@ -54,7 +58,7 @@ def comparison_bar(scenarios: Sequence[Scenario]) -> Iterator[Report | None]:
 
 
 def print_comparison(rows: Sequence[Row]) -> None:
-    """One table a scenario on standard output, and why those that crashed did.
+    """One table a scenario on standard output, what its headings mean, and why those that crashed did.
 
     Where one planner flew under several guidance laws, the rows are called after the laws, and the planner is in the
     title.
@@ -84,11 +88,10 @@ def print_comparison(rows: Sequence[Row]) -> None:
             table.add_row(plain("\n".join(_name_lines(row, by_law))), *cells)
         console.print(table, width=min(WIDTH, console.width))
         console.print()
-        for row in own:
-            if row.outcome == CRASHED:
-                console.print(
-                    f"{plain(row.label)} crashed: {plain(row.reason)}", highlight=False, soft_wrap=True
-                )
+    console.print(LEGEND, style="dim", highlight=False, width=min(WIDTH, console.width))
+    for row in rows:
+        if row.outcome == CRASHED:
+            console.print(f"{plain(row.label)} crashed: {plain(row.reason)}", highlight=False, soft_wrap=True)
 
 
 def _name_lines(row: Row, by_law: bool) -> list[str]:

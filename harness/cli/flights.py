@@ -227,7 +227,8 @@ def compare(
     else:
         print_comparison(comparison.rows)
         say(f"report: {out / 'report.html'}")
-        for overlay in sorted(out.glob(f"*/{OVERLAY}"))[:1]:
+        overlays = [out / each.name / OVERLAY for each in loaded]
+        for overlay in [each for each in overlays if each.is_file()][:1]:
             say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
     return 0 if comparison.all_reached else FAILED
 

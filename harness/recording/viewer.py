@@ -39,9 +39,9 @@ SETTLE_S = 1.5
 ALONE = ".rrd"
 LOG = "viewer.log"
 NO_SCREEN = (
-    "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); `wayproof view --web` "
-    f"serves it to a browser, or copy the run's {RECORDING} to a machine with a screen and open it there: "
-    f"rerun {RECORDING}"
+    "there is no screen to open the viewer on (neither DISPLAY nor WAYLAND_DISPLAY is set); `wayproof view --web`, or "
+    f"`wayproof fly --live --web`, shows it in a browser; or copy the run's {RECORDING} to a machine with a screen and "
+    f"open it there: rerun {RECORDING}"
 )
 NO_DRIVER = (
     "the headless viewer did not start: it needs a Vulkan driver "

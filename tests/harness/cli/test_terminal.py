@@ -57,6 +57,7 @@ def test_the_table_of_a_flight_fits_80_columns_and_says_what_happened(
     assert "no: 3 of 4 legs, wind drift (2 legs), bank limit" in shown
     assert "rms 0.04 / p95 0.09 / max 0.18 m" in shown
     assert "rms - / p95 - / max - m" in shown
+    assert re.search(r"\n replans +41 *\n planner time +p99 \S+ / max \S+ ms a search *\n wall time ", shown)
     assert "\x1b" not in shown
 
 

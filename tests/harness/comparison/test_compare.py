@@ -287,6 +287,17 @@ def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
     assert "an obstacle moves" in (place / "workers-1" / "report.html").read_text()
 
 
+def test_the_overlay_of_an_earlier_comparison_is_not_offered(
+    place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--planners", "corner", "--kinematic", "--out", str(tmp_path)]
+    assert main(["compare", str(place / "ring.yaml"), *options]) == 0
+    assert f"view: wayproof view {tmp_path}/ring/overlay.rrd" in capsys.readouterr().out.splitlines()
+    assert main(["compare", str(place / "drift.yaml"), *options, "--no-recording"]) == 0
+    assert "view: " not in capsys.readouterr().out
+    assert (tmp_path / "ring" / "overlay.rrd").is_file()
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
@@ -397,6 +408,7 @@ def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) 
     for text in ("planner_failed", "123.5", "12.3456", "-1234", "123.46", "no", "1234", "123.4", "crashed"):
         assert any(text in line.split() for line in lines), text
     assert lines[-1] == "b crashed: [bold] it died"
+    assert "all legs trackable" in " ".join(lines[-4:-1])
 
 
 @pytest.mark.parametrize(
