@@ -34,7 +34,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     _add_contacts(metrics, rows)
     tolerance = f"{legs[0]['threshold_m']:.3g} m" if legs else "none"
     rows["off the path given"] = f"p95 {_metres(off['p95'])} / max {_metres(off['max'])}, allowed {tolerance}"
-    if any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"]):
+    if legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"]):
         rows["off the path given"] += ", at corners as below"
     rows["cross-track error"] = (
         f"rms {_metres(cross['rms'])} / p95 {_metres(cross['p95'])} / max {_metres(cross['max'])}"

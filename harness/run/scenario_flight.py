@@ -105,12 +105,16 @@ def guidance_law(scenario: Scenario) -> GuidanceLaw:
 
 
 def start_conditions(scenario: Scenario) -> StartConditions:
-    """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary."""
+    """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary.
+
+    A given path may begin outside the area; then the flight does, too.
+    """
     xmin, ymin, xmax, ymax = scenario.area.bounds_m
     east, north = scenario.mission.start_m
-    inside_m = min(INSIDE_M, 0.5 * (xmax - xmin), 0.5 * (ymax - ymin))
-    east = min(max(east, xmin + inside_m), xmax - inside_m)
-    north = min(max(north, ymin + inside_m), ymax - inside_m)
+    if xmin <= east <= xmax and ymin <= north <= ymax:
+        inside_m = min(INSIDE_M, 0.5 * (xmax - xmin), 0.5 * (ymax - ymin))
+        east = min(max(east, xmin + inside_m), xmax - inside_m)
+        north = min(max(north, ymin + inside_m), ymax - inside_m)
     course = math.radians(_given(scenario.mission.course_deg))
     return StartConditions(
         east, north, scenario.mission.altitude_m, course, _given(scenario.aircraft.airspeed_mps)

@@ -219,6 +219,20 @@ def test_a_world_is_a_scenario_whose_start_may_lie_anywhere(
     assert (status, metrics["contacts"][0]["start_s"]) == (1, 0.0)
 
 
+@pytest.mark.parametrize("off_m", [20.0, 3000.0])
+def test_a_path_may_begin_outside_the_area(
+    off_m: float, straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bounds = f"area.bounds_m=[-400, {off_m}, 400, 5000]"
+    status, metrics = flown(straight, tmp_path / "run", "--set", bounds, capsys=capsys)
+    (left,) = metrics["breaches"]
+    assert (status, metrics["outcome"]) == (1, "reached")
+    assert (left["start_s"], left["time_s"] < 1.0) == (0.0, True)
+    assert left["depth_m"] == pytest.approx(off_m, abs=0.1)
+    assert metrics["check"]["verdict"] == f"no: leaves area.bounds_m at 0 s, by {off_m:.3g} m"
+    assert metrics["deviation_from_given_m"]["max"] < 1.0
+
+
 def mission(*fences: dict[str, Any], acceptance_m: float = 0.0, firmware: int = 12) -> str:
     places = [(47.0, 8.0), (47.012, 8.0), (47.012, 8.016)]
     items = [
