@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, Strict, ValidationError, model_vali
 from harness.campaign.sampling import Distribution, Sampler
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError, Loc, Node, fault_line, node_of
+from harness.scenario.files_resolved import file_beside
 from harness.scenario.generators.generators import WorldSpec
 from harness.scenario.resolving import model_or_folder
 from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
@@ -206,7 +207,7 @@ def load_campaign(path: Path) -> CampaignFile:
         InputError: a file cannot be read or is not a campaign; a line of its text names file, line and key.
     """
     source, root = str(path), strict_yaml.read(path)
-    root = _with_folders(root, path.parent)
+    root = _with_folders(_with_world_files(root, path.parent), path.parent)
     campaign = _validated(root, source)
     if not campaign.scenarios:
         line = root.line_of(("worlds",))
@@ -216,7 +217,8 @@ def load_campaign(path: Path) -> CampaignFile:
     for index, entry in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)
         for file in _files(entry, path.parent, partial(_fault, source, root, loc)):
-            found = _with_folder(_mapping(file), ("aircraft", "model"), file.parent)
+            found = _with_world_files(_mapping(file), file.parent)
+            found = _with_folder(found, ("aircraft", "model"), file.parent)
             base = Base(file.name, str(file), found)
             if base.name in bases:
                 raise _fault(source, root, loc, f"is a second scenario called {base.name}; rename one")
@@ -303,3 +305,23 @@ def _with_folder(root: Node, loc: Loc, folder: Path) -> Node:
     if node is None or not isinstance(node.value, str):
         return root
     return strict_yaml.replaced(root, loc, Node(model_or_folder(node.value, folder), node.line))
+
+
+def _with_world_files(node: Node, folder: Path, keys: str = "") -> Node:
+    """Keys with every `file.path` of an obstacle that lies beside their file given from the root of the file system on.
+
+    Args:
+        node: the keys of a scenario or a campaign, or a part of them.
+        folder: of their file.
+        keys: the key path of `node`.
+    """
+    value = node.value
+    if isinstance(value, str) and ".file.path." in f"{keys}.":
+        beside = file_beside(value, folder)
+        return node if beside is None else Node(str(beside.absolute()), node.line)
+    if isinstance(value, tuple):
+        return Node(tuple(_with_world_files(each, folder, keys) for each in value), node.line)
+    if isinstance(value, dict) and not {"circle", "polygon"} & value.keys():
+        inner = {key: _with_world_files(each, folder, f"{keys}.{key}") for key, each in value.items()}
+        return Node(inner, node.line)
+    return node

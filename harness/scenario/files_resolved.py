@@ -80,13 +80,16 @@ def _path(text: str, folder: Path | None) -> Path:
     package, colon, inner = text.partition(":")
     if colon and package.isidentifier() and (spec := importlib.util.find_spec(package)) is not None:
         return Path((spec.submodule_search_locations or [""])[0]) / inner
-    if folder is not None:
-        try:
-            if (beside := folder / Path(text).expanduser()).exists():
-                return beside
-        except (OSError, RuntimeError):  # too long, or the home of nobody
-            return Path(text)
-    return Path(text)
+    return (file_beside(text, folder) if folder is not None else None) or Path(text)
+
+
+def file_beside(text: str, folder: Path) -> Path | None:
+    """The file that lies so from a folder; None where there is none."""
+    try:
+        beside = folder / Path(text).expanduser()
+        return beside if beside.exists() else None
+    except (OSError, RuntimeError):  # too long, or the home of nobody
+        return None
 
 
 def _joined(obstacles: Sequence[Obstacle], found: Expanded, ground: GroundSpec | None) -> Resolved:

@@ -314,6 +314,32 @@ def test_a_plain_form_that_is_none_is_bad_input(place: Path, changed: dict[str, 
             CampaignRuns(CampaignFile.from_plain(each, "results")).check()
 
 
+def test_world_files_are_sought_beside_the_file_that_names_them(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tests.harness.world_files.making import feature, geojson
+
+    (place / "worlds").mkdir()
+    for name, west in (("one", 8.005), ("two", 8.025)):
+        ring = [[west + x, 47.02 + y] for x, y in ((0, 0), (0.001, 0), (0.001, 0.001), (0, 0.001), (0, 0))]
+        geojson(place / "worlds" / f"{name}.geojson", feature({"building": "yes", "height": 400}, ring))
+    text = SCENARIO.format(name="town").replace(
+        "  - circle", "  - file: {path: one.geojson, ground_m: 0}\n  - circle"
+    )
+    (place / "worlds" / "town.yaml").write_text(text)
+    monkeypatch.chdir(place.parent)
+    campaign = "schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [worlds/town.yaml]\n"
+    other = 'grid: {"obstacles[0].file.path": [worlds/two.geojson]}\n'
+    for text, east_m in ((campaign, 380.2), (campaign + other, 1900.9)):
+        runs = runs_of(place, text)
+        scenario = runs.scenario(0)
+        polygon = scenario.obstacles[0].polygon
+        assert polygon is not None
+        assert min(east for east, _ in polygon.vertices_m) == pytest.approx(east_m, abs=0.5)
+        again = CampaignRuns(CampaignFile.from_plain(runs.file.plain(), "results"))
+        assert again.scenario(0) == scenario
+
+
 def test_an_aircraft_folder_is_sought_beside_the_file_that_names_it(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
