@@ -90,7 +90,7 @@ def load_scenario(path: str | Path, overrides: Sequence[tuple[str, str]] = ()) -
     """
     path = scenario_path(str(path))
     root = strict_yaml.read(path)
-    return validated(overridden(root, overrides), str(path), path.parent)
+    return validated(overridden(root, overrides), str(path), path.absolute().parent)
 
 
 def parse_scenario(

@@ -512,6 +512,23 @@ def test_a_scenario_with_other_keys_is_derived_anew_and_the_first_one_stays() ->
     assert other.with_({"planner.clearance_m": 40, "seed": 1, "sensor": first.sensor}) == first
 
 
+def test_a_scenario_can_be_changed_from_any_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.harness.world_files.making import feature, geojson
+
+    (tmp_path / "town").mkdir()
+    geojson(tmp_path / "town" / "houses.geojson", feature({"building": "yes", "height": 400}))
+    (tmp_path / "town" / "s.yaml").write_text(
+        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [-3000, -3000, 3000, 3000]},"
+        " obstacles: [{file: {path: houses.geojson, ground_m: 0}}],"
+        " mission: {start_m: [-2000, -2000], goal_m: [2000, -2000]}}"
+    )
+    monkeypatch.chdir(tmp_path)
+    scenario = load_scenario("town/s.yaml")
+    monkeypatch.chdir("/")
+    assert scenario.with_({"seed": 2}).obstacles == scenario.obstacles
+    assert len(scenario.obstacles) == 1
+
+
 def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
     bare = parse_scenario(
         "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [0, 0, 9000, 9000]},"
