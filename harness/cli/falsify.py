@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
@@ -144,7 +145,7 @@ def _search(
         return 0
     print_table(f"{found.scenario}: {found.planner}, {found.aircraft}", breaking_rows(found))
     if found.found is not None:
-        say(f"again: wayproof fly {folder / FALSIFIED}")
+        say(f"again: {shlex.join(['wayproof', 'fly', str(folder / FALSIFIED)])}")
     say(last_line(found))
     return 0
 

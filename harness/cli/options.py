@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Sequence
 from inspect import cleandoc
 from pathlib import Path
@@ -126,7 +127,8 @@ def load(scenario: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
         return load_scenario(scenario_path(scenario), overrides)
     except InputError as error:
         if _is_campaign(scenario):
-            raise InputError(f"{scenario}: this is a campaign: use `wayproof sweep {scenario}`") from error
+            use = shlex.join(["wayproof", "sweep", scenario])
+            raise InputError(f"{scenario}: this is a campaign: use `{use}`") from error
         raise
 
 

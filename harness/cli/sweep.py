@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -109,7 +110,8 @@ def checked(path: Path) -> CampaignRuns:
         runs = CampaignRuns(load_campaign(path))
     except InputError as error:
         if is_scenario(path):
-            raise InputError(f"{path}: this is a scenario: use `wayproof fly {path}`") from error
+            use = shlex.join(["wayproof", "fly", str(path)])
+            raise InputError(f"{path}: this is a scenario: use `{use}`") from error
         raise
     with check_bar(len(runs)) as report:
         runs.check(report)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -275,4 +276,5 @@ def _print(found: Site, out: Path) -> None:
     }
     for number, note in enumerate(_notes(found), 1):
         rows[f"note {number}"] = plain(note)
-    print_table(plain(f"{out}: fly it with `wayproof fly {out}`"), rows)
+    command = shlex.join(["wayproof", "fly", str(out)])
+    print_table(plain(f"{out}: fly it with `{command}`"), rows)

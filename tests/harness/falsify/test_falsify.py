@@ -215,6 +215,15 @@ def test_a_key_inside_a_list_can_be_varied(to_break: Path) -> None:
     assert circle.radius_m == 300.0
 
 
+def test_the_command_that_fails_again_can_be_copied(
+    to_break: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = to_break.parent / "my folder"
+    given = [str(to_break), "--vary", "mission.time_limit_s=90:30", "--runs", "2", "--out", str(folder)]
+    assert main(["falsify", *given]) == 0
+    assert f"again: wayproof fly '{folder}/falsified.yaml'" in capsys.readouterr().out.replace("\n", "")
+
+
 def test_the_command_leaves_a_scenario_that_fails_again_with_the_same_digest(
     to_break: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

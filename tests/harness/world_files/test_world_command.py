@@ -64,6 +64,14 @@ def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     assert again["min_altitude_above_ground_m"] == figures["min_altitude_above_ground_m"]
 
 
+def test_the_command_that_flies_it_can_be_copied(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run_world(Path("my hill.yaml"), str(hill(tmp_path)), "--altitude-m", "1250") == 0
+    assert "my hill.yaml: fly it with `wayproof fly 'my hill.yaml'`" in capsys.readouterr().out
+
+
 def test_an_expanded_scenario_is_read_back_as_it_was(tmp_path: Path) -> None:
     out = tmp_path / "hill.yaml"
     assert run_world(out, str(hill(tmp_path)), "--altitude-m", "1250") == 0
