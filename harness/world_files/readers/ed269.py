@@ -47,8 +47,10 @@ def read(path: Path, reading: Reading) -> Contents:
         if zone.get("restriction") in FREE:
             free += 1
             continue
+        times = zone.get("applicability") or ()
         timed += any(
-            isinstance(a, dict) and a.get("permanent") == "NO" for a in zone.get("applicability") or ()
+            isinstance(each, dict) and (each.get("permanent") == "NO" or "schedule" in each)
+            for each in ((times,) if isinstance(times, dict) else times)
         )
         name = str(zone.get("identifier") or zone.get("name") or "")[:40]
         parts += [_part(each, name, notes) for each in zone["geometry"]]

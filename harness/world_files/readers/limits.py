@@ -114,15 +114,19 @@ def limit_of(text: str, feet: bool = True, datum: Datum = Datum.SEA) -> Limit | 
 
 
 def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: str) -> tuple[Limit, Limit]:
-    """Bottom and top: what is not known is no limit, and limits that are the wrong way round are turned."""
+    """Bottom and top: what is not known is no limit, and limits that are the wrong way round are turned.
+
+    Files write an upper limit of 0 where there is none; a zone of no height would forbid nothing.
+    """
     if lower is None or upper is None:
         which = (
             "lower limit is" if upper is not None else "upper limit is" if lower is not None else "limits are"
         )
         notes.append(f"{name or 'a part'}: its {which} not known; taken as without")
     bottom, top = lower or NO_BOTTOM, upper or NO_TOP
-    if top == NO_BOTTOM:  # an upper limit of the surface: the zone has no height
-        top = Limit(0.0, Datum.GROUND)
+    if top == NO_BOTTOM or (top.height_m == 0.0 and bottom.height_m in (0.0, -math.inf)):
+        notes.append(f"{name or 'a part'}: its upper limit is 0, or the surface; taken as without")
+        top = NO_TOP
     if bottom == NO_TOP or (bottom.datum is top.datum and bottom.height_m > top.height_m):
         notes.append(
             f"{name or 'a part'}: its lower limit lies above the upper one; taken the other way round"

@@ -774,6 +774,21 @@ def test_zones_of_ed269_as_a_list_and_what_their_limits_are_counted_from(tmp_pat
     )
 
 
+@pytest.mark.parametrize("reference", ["AGL", "AMSL"])
+def test_a_zone_whose_upper_limit_is_0_is_not_lost(reference: str, tmp_path: Path) -> None:
+    references = {"lowerVerticalReference": reference, "upperVerticalReference": reference}
+    zones = [zone("A", lowerLimit=0, upperLimit=0, **references)]
+    zones[0]["applicability"] = {"schedule": [{"day": "MON"}]}
+    found = read_any(written(tmp_path / "a.json", json.dumps({"features": zones})))
+    assert [part.top for part in found.parts] == [NO_TOP]
+    assert found.notes == (
+        "A: its upper limit is 0, or the surface; taken as without",
+        "1 zone that apply at times only taken as always there",
+    )
+    (part,) = read_any(written(tmp_path / "a.txt", SPACE.format("GND", "GND"))).parts
+    assert part.top == NO_TOP
+
+
 def test_zones_of_ed318_that_apply_at_times_are_told(tmp_path: Path) -> None:
     layer = {"lower": 0, "lowerReference": "AGL", "upper": 120, "upperReference": "AGL", "uom": "m"}
     geometry = {
