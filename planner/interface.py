@@ -22,10 +22,10 @@ ComplexArray = NDArray[np.complex128]
 
 
 OFF_PATH = 4.0
-"""So many times the tracking error off a path the aircraft has left it."""
+"""The aircraft has left a path when it is this many times the tracking error away from it."""
 
 NOT_UNIT = 1e-6
-"""A tangent is no unit vector where its length is off by more."""
+"""A tangent is a unit vector if its length differs from 1 by less than this."""
 
 
 def _frozen(array: FloatArray) -> FloatArray:
@@ -44,9 +44,9 @@ class PlanStatus(Enum):
     NO_BETTER = "no_better"
     """A search found nothing better than the path being flown, which still serves."""
     NO_PATH = "no_path"
-    """None was found this time; the path being flown goes on."""
+    """A search found no path; the path being flown goes on."""
     UNREACHABLE = "unreachable"
-    """No way can exist in what has been seen: the goal is proved unreachable."""
+    """The edges seen so far leave no way: the goal is proved unreachable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +54,9 @@ class MovingEdges:
     """The seen edge of one obstacle that moves.
 
     Attributes:
-        time_s: when it was there.
-        points_m: (k, 2) edge points in order from one end of what is seen to the other; at least one.
-        velocity_mps: east and north; (0, 0) where it has just appeared and is not known yet.
+        time_s: simulated time at which the obstacle was at these points.
+        points_m: (k, 2) edge points, in order from one end of the seen edge to the other; at least one.
+        velocity_mps: east and north; (0, 0) if the obstacle has just appeared and its velocity is not known yet.
     """
 
     time_s: float
@@ -68,7 +68,7 @@ class MovingEdges:
 
 
 class MapView(Protocol):
-    """What the sensor has shown so far: obstacle edges and free space. All that a planner may know."""
+    """The map so far, from the scans: obstacle edges and free space. All that a planner may know of the world."""
 
     @property
     def spacing_m(self) -> float:
@@ -87,12 +87,12 @@ class MapView(Protocol):
 
     @property
     def moving(self) -> tuple[MovingEdges, ...]:
-        """What is known to move; its edges are not among the others."""
+        """Obstacles known to move; their edge points are not among those of `edges_since`."""
         ...
 
     @property
     def last_contradiction_s(self) -> float:
-        """When something last stood, or seemed to stand, in space that had been seen to be free; -inf: never."""
+        """Simulated time of the latest edge in space that had been seen to be free; -inf: there was none."""
         ...
 
     def edges_since(self, revision: int) -> FloatArray:
@@ -116,10 +116,10 @@ class Mission:
         turn_radius_m: smallest radius a path may have.
         speed_mps: airspeed.
         roll_in_s: time from wings level to 90 % of 30 degrees, or of the bank limit if that is less.
-        tracking_error_m: how far off the path the aircraft may be.
+        tracking_error_m: largest expected distance of the aircraft from its path.
         sensor_range_m: radius of the sensing range (the paper's r).
-        compute_latency_s: a plan takes effect this much after it was asked for.
-        sensor_latency_s: a scan is known this much after it was taken.
+        compute_latency_s: a plan takes effect this long after the request.
+        sensor_latency_s: a scan is known this long after it was taken.
         wind_mps: the strongest steady wind to expect.
     """
 
@@ -138,7 +138,7 @@ class Mission:
 
     @property
     def off_path_m(self) -> float:
-        """Further off the path in effect than this, a new one begins at the aircraft itself."""
+        """If the aircraft is further than this from the path in effect, a new path begins at the aircraft itself."""
         return max(1.0, OFF_PATH * self.tracking_error_m)
 
     @property
@@ -213,9 +213,9 @@ class PlanRequest(NamedTuple):
         time_s: simulated time.
         position_m: (east, north) of the aircraft.
         direction: unit vector of its ground velocity.
-        seen: what is known of the world.
+        seen: the map so far.
         flown: the plan in effect, None before the first.
-        arc_length_m: how far along `flown.path` the aircraft is.
+        arc_length_m: distance of the aircraft along `flown.path`, from its start.
         scanned: a scan has come in since the last request.
     """
 
@@ -230,14 +230,14 @@ class PlanRequest(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlanPicture:
-    """What a person needs to see how a plan came about; never read by the loop.
+    """A drawing of how a plan was found, for the recording; the loop never reads it.
 
     Attributes:
         guide_m: (2, 2) guide vector, from the aircraft to the point it aims at.
         window_m: radius of the planning window (the paper's r1).
         sectors: (k, 4) free sectors at the aircraft: unit vectors of the right and the left edge.
         candidates: polylines (m, 2) that were compared, the chosen one first.
-        met_m: (j, 2) edges of what moves, where they are expected to be met.
+        met_m: (j, 2) edge points of moving obstacles, at the places where the plan expects to meet them.
     """
 
     guide_m: FloatArray
@@ -261,8 +261,8 @@ class Plan:
         reason: one sentence for the event log.
         waypoints_m: (k, 2) fixed-altitude waypoints, anything that numpy makes such an array of; empty unless FOUND.
         path: the curve through them; None unless FOUND.
-        picture: makes a picture of how it came about, where the planner can tell: asked for only where somebody looks.
-        wants_more_time: more is looked for: the planner wants to be asked again before the next scan.
+        picture: makes a drawing of how the plan was found, or None; called once for each path that is accepted.
+        wants_more_time: the search goes on: the planner wants to be asked again before the next scan.
 
     Raises:
         ValueError: the path has a tangent that is no unit vector: nothing could be flown or judged by it.
@@ -291,18 +291,18 @@ class Planner(Protocol):
     """A local planner for one flight. It is asked after every scan, in order of time.
 
     Between scans it is asked at every step of guidance for as long as its last answer has `wants_more_time`.
-    What it is handed is read-only; what it prints goes to standard error.
+    Its inputs are read-only; its output goes to standard error.
     """
 
     def plan(self, request: PlanRequest) -> Plan:
         """Answers one request. Must not use clocks or randomness of its own: same requests, same plans.
 
-        A path that is FOUND begins at `request.position_m`, and each segment where the one before ends. What is
-        asked of an answer, with every figure, is in `planner.plan_checks`: one that does not pass, or whatever is
-        raised here, ends the flight as `planner_failed` with a sentence that says why.
+        A path that is FOUND begins at `request.position_m`, and each segment at the end of the one before.
+        `planner.plan_checks` has every rule for an answer, with its figures. An answer that breaks one, or an
+        exception, ends the flight as `planner_failed` with a sentence that says why.
         """
         ...
 
 
 class NoWayToBegin(RuntimeError):
-    """There is no plan, and there will be none: what is known leaves no room for one, or nothing is seen."""
+    """No plan can be found: the space seen to be free leaves no room for one, or nothing is seen."""

@@ -1,4 +1,4 @@
-"""What a guidance law is: a route in, then state in and roll command out, update by update."""
+"""The interface of a guidance law: it takes a route, then at every update a state, and gives a roll command."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class GuidanceLimits:
         bank_limit_rad: largest roll command.
         roll_rate_radps: fastest change of the roll command.
         roll_lag_s: time constant of roll behind its command; the command leads by it.
-        roll_delay_s: what further delay there is (actuators, the roll mode).
+        roll_delay_s: further delay of roll (actuators, the roll mode).
         bandwidth_radps: natural frequency omega of the cross-track correction, about a third of 1 / roll_lag_s.
     """
 
@@ -37,11 +37,11 @@ class GuidanceLimits:
 
     @property
     def slowest_roll_s(self) -> float:
-        """Time constant of first order that roll is never slower than, s.
+        """Time constant of the slowest first-order roll, s.
 
-        A roll of first order begins a step to the bank limit at that limit over its time constant. An aircraft whose
-        roll rate is limited below that is as slow as one with the longer time constant, and a law that counts on less
-        swings from limit to limit.
+        A first-order roll to the bank limit begins at the rate bank limit / time constant. An aircraft with a lower
+        roll rate limit rolls like one with a longer time constant; a law that assumes a shorter one swings from limit
+        to limit.
         """
         return max(self.roll_lag_s + self.roll_delay_s, self.bank_limit_rad / self.roll_rate_radps)
 
@@ -58,9 +58,9 @@ class GuidanceOutput(NamedTuple):
     bank_saturated: bool
     """The bank limit cut the command."""
     past_end: bool
-    """The route is flown out; straight on along its last tangent."""
+    """The aircraft is past the end of the route and goes straight on along its last tangent."""
     airspeed_mps: float = math.nan
-    """True airspeed that the law asks for; NaN: the one that the mission holds."""
+    """True airspeed that the law asks for; NaN: that of the mission."""
 
     def airspeed_or(self, held_mps: float) -> float:
         """The airspeed to be commanded (m/s): what the law asks for, else what the mission holds."""
@@ -70,11 +70,11 @@ class GuidanceOutput(NamedTuple):
 class GuidanceLaw(Protocol):
     """Follows a route, asked `UPDATE_RATE_HZ` times a second. One object serves one flight.
 
-    The state it is given is what the aircraft believes of itself, not necessarily what is true.
+    It gets the believed state, which differs from the true state by the navigation errors.
     """
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
-        """Takes a new route; the roll command goes on from where it is.
+        """Takes a new route; the roll command goes on from its present value.
 
         Args:
             route: what to fly.
@@ -100,7 +100,7 @@ class GuidanceLaw(Protocol):
 class VerticalLaw(Protocol):
     """Says at which altitude and airspeed the aircraft flies, asked `UPDATE_RATE_HZ` times a second.
 
-    One object serves one flight. The state it is given is what the aircraft believes of itself.
+    One object serves one flight. It gets the believed state.
     """
 
     def command(self, state: AircraftState, arc_length_m: float) -> tuple[float, float]:
@@ -108,6 +108,6 @@ class VerticalLaw(Protocol):
 
         Args:
             state: the aircraft now.
-            arc_length_m: where on the route it is; NaN before the first route.
+            arc_length_m: distance of the aircraft along the route; NaN before the first route.
         """
         ...

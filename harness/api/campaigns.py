@@ -1,4 +1,4 @@
-"""Many flights from Python: `compare`, `sweep`, and reading back what a campaign flew."""
+"""Many flights from Python: `compare`, `sweep`, and reading a campaign's folder."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def compare(
     kinematic: bool = False,
     workers: int | None = None,
 ) -> ComparisonResult:
-    """Flies every planner (under every guidance law) on every scenario, side by side: tables, figures, a report.
+    """Flies every planner (under every guidance law) through every scenario: tables, figures, a report.
 
     Args:
         scenarios: one or more: scenarios, files, or names of those that come with wayproof.
@@ -104,9 +104,10 @@ def sweep(
         campaign: its file, or the name of one that comes with wayproof.
         out: its folder; default: `runs/NAME`.
         workers: flights at a time; default: one a processor.
-        scheduler: address of a Dask cluster that flies instead, as `tcp://HOST:8786`.
-        resume: fly only what is missing in the folder.
-        progress: called with the answer of every run that is over.
+        scheduler: address of a Dask cluster that flies instead, such as `tls://HOST:8786`. It can run code on this
+            machine.
+        resume: fly only the runs missing in the folder.
+        progress: called with the answer of every run that has ended.
 
     Raises:
         InputError: the campaign or the folder cannot be used; nothing was flown.
@@ -137,7 +138,7 @@ def sweep(
 
 
 def load_campaign(folder: str | Path) -> CampaignResult:
-    """Reads back what a campaign flew, complete or not.
+    """Reads the folder of a campaign, complete or not.
 
     Args:
         folder: where `sweep` wrote; not the campaign's file, which `sweep` flies.

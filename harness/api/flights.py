@@ -33,18 +33,18 @@ def fly(
 
     Args:
         scenario: a scenario, its file, or the name of one that comes with wayproof.
-        planner: what plans in place of the scenario's planner: a kind that `wayproof list planners` prints,
+        planner: replaces the scenario's planner: a kind that `wayproof list planners` prints,
             `FILE.py:NAME` or `MODULE:NAME`, a class or function that takes the mission or nothing and makes the
             planner, or an object with the method `plan(request)`. None: as the scenario says.
-        guidance: what steers in place of the scenario's guidance law: a kind that `wayproof list guidance` prints, a
+        guidance: replaces the scenario's guidance law: a kind that `wayproof list guidance` prints, a
             `GuidanceKind`, a class or function that takes the `GuidanceLimits` or nothing and makes the law, or an
             object with the methods `follow(route, arc_length_m)` and `update(state)`. None: as the scenario says.
-        out: the run folder, made or written anew; None: none is kept.
+        out: the run folder to write, in place of an earlier run there; None: no folder.
         recording: whether to record the flight for rerun (`run.show()`).
-        progress: called every few simulated seconds with simulated time (s), distance to go (m) and a word.
+        progress: called every few simulated seconds with simulated time (s), distance to go (m) and the state.
 
     Returns:
-        What was flown, whatever its outcome.
+        The result of the flight, whatever its outcome.
 
     Raises:
         InputError: the scenario, planner or folder cannot be used; nothing was flown.
@@ -71,7 +71,7 @@ def load_run(folder: str | Path) -> FlightResult:
     """Reads a run folder back.
 
     Raises:
-        InputError: it is none, or its run is incomplete or damaged.
+        InputError: the folder holds no run, or an incomplete or damaged one.
     """
     from harness.run_files import run_folder
 

@@ -1,7 +1,7 @@
-"""The content of `metrics.json` with names and types: what `run.metrics` is.
+"""The type of `run.metrics`: the content of `metrics.json` with names and types.
 
-A figure that does not exist is None. A key that a newer version wrote, and that has no field here, is an attribute all
-the same, as JSON has it.
+A figure that does not exist is None. A key of a newer version, which has no field here, is an attribute with the value
+that JSON has.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, PrivateAttr
 
 
 class Figures(BaseModel):
-    """A mapping of `metrics.json`: frozen, and with every key that is there."""
+    """A mapping of `metrics.json`: frozen, with every key in it."""
 
     model_config = ConfigDict(frozen=True, extra="allow", protected_namespaces=())
 
@@ -55,7 +55,7 @@ class Percentiles(Figures):
 
 
 class Delays(Figures):
-    """How late plans took effect, s.
+    """Time from the latest scan that a plan could use until the plan took effect, s.
 
     Attributes:
         p50: median.
@@ -69,11 +69,11 @@ class Delays(Figures):
 
 
 class LostReturns(Figures):
-    """Which share of the beams that met something returned nothing, 0 to 1.
+    """Share of the beams that met something and returned nothing, 0 to 1.
 
     Attributes:
-        share: of all scans.
-        max: of the worst scan.
+        share: in all scans.
+        max: in the worst scan.
     """
 
     share: float | None = None
@@ -117,20 +117,20 @@ class PlannedAndFlown(Figures):
 
 
 class LegVerdict(Figures):
-    """Whether one leg was tracked; `harness.analysis.trackability.Leg` says how it is told.
+    """Whether one leg was tracked; `harness.analysis.trackability.Leg` has the definitions.
 
     Attributes:
         start_s: simulated time of its first row.
         end_s: simulated time of its last row.
         max_cross_track_m: largest absolute cross-track error.
-        threshold_m: what it may be.
+        threshold_m: limit of the cross-track error.
         max_altitude_error_m: largest absolute altitude error.
         max_airspeed_error_mps: largest absolute error of the airspeed, averaged; None where it is not judged.
         max_load_factor: largest load factor, averaged.
         corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
-        waypoint: number of the mission's waypoint that the leg leads to; None where it is no mission's.
+        waypoint: number of the point of a given path that the leg leads to; None if it leads to none.
         max_deviation_m: largest distance from the path as given; None where a planner made the path.
-        trackable: whether it stayed within all that it may be.
+        trackable: whether the leg stayed within all limits.
         cause: why not; None where trackable.
     """
 
@@ -149,12 +149,12 @@ class LegVerdict(Figures):
 
 
 class Timing(Figures):
-    """What the flight took.
+    """Simulated and wall-clock time of a flight.
 
     Attributes:
         sim_s: simulated time.
         wall_s: wall-clock time.
-        realtime_factor: the first over the second.
+        realtime_factor: simulated over wall-clock time.
     """
 
     sim_s: float
@@ -168,10 +168,10 @@ class CheckVerdict(Figures):
     Attributes:
         ok: tracked, nothing touched, no fence or bound crossed.
         verdict: the answer as a sentence.
-        drawn: the line itself was to be flown; else a mission, whose corners may be cut.
+        drawn: true for a line, which is to be flown as drawn; false for a mission, whose corners may be cut.
         points: number of points given.
         given: how smooth the path as given is.
-        corners: that had to be cut, as JSON has them.
+        corners: corners that had to be cut, as in `metrics.json`.
     """
 
     ok: bool
@@ -196,8 +196,8 @@ class Metrics(Figures):
         clearance_violation_s: time below the wanted clearance.
         cross_track_m: distance from the plan being flown.
         navigation_error_m: distance from the true position to the believed one; None where navigation is perfect.
-        navigation_jump_m: the most that this changes from one row of the track to the next; likewise.
-        navigation_margin_m: what the planner kept from obstacles beyond the clearance for it; likewise.
+        navigation_jump_m: largest change of this error from one row of the track to the next; likewise.
+        navigation_margin_m: distance that the planner kept beyond the clearance because of this error; likewise.
         altitude_error_m: distance from the mission's altitude.
         smoothness: of the path as planned and as flown.
         bank_saturation_fraction: share of the rows in which the bank was at its limit.
@@ -205,17 +205,17 @@ class Metrics(Figures):
         trackable: whether every leg was tracked.
         trackability: verdict and cause, leg by leg.
         replans: plans accepted after the first.
-        plan_delay_s: from the latest scan that a plan could know of until it took effect.
-        lost_returns: what the sensor lost of what its beams met.
-        compute_ms: planner's times.
+        plan_delay_s: from the latest scan that a plan could use until the plan took effect.
+        lost_returns: share of the returns that the sensor lost.
+        compute_ms: times of the planner's searches.
         timing: simulated and wall-clock time.
         digest: SHA-256 of the track.
-        error: traceback of what the planner raised; None where it did not.
+        error: traceback of the planner's exception; None if there was none.
         deviation_from_given_m: of a checked path: distance of the track from the path as given.
         contact: of a checked path: whether an obstacle was touched.
-        contacts: of a checked path: which, as JSON has it.
-        breaches: of a checked path: fences and bounds that were crossed, as JSON has it.
-        check: of a checked path: the verdict; None of any other run.
+        contacts: of a checked path: each contact, as in `metrics.json`.
+        breaches: of a checked path: fences and bounds that were crossed, as in `metrics.json`.
+        check: of a checked path: the verdict; None for other runs.
     """
 
     outcome: str

@@ -32,7 +32,7 @@ def check(
     out: str | Path | None = None,
     recording: bool = False,
 ) -> FlightResult:
-    """Flies a path with the real aircraft and says whether it can be flown as given.
+    """Flies a given path with the simulated aircraft and says whether it can be flown as given.
 
         run = wayproof.check("survey.plan", aircraft="aerosonde", wind=(8, 270))
         run.metrics.check.ok, run.metrics.check.verdict
@@ -41,14 +41,14 @@ def check(
         path: a file that `wayproof check` takes, or points (n, 2): east and north in metres; a third column is the
             altitude.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        scenario: whose obstacles, bounds, air and altitude the path is flown in; None: nothing is there.
+        scenario: gives obstacles, bounds, environment, seed and altitude; None: an empty world in calm air.
         airspeed_mps: true airspeed; None: the aircraft's cruising speed.
         altitude_m: above mean sea level; None: the path's, else the scenario's, else 300 m.
         wind: speed (m/s) and the direction it blows from (degrees); None: the scenario's, else calm.
-        corner_m: how far off corners may be passed; None: the cross-track threshold for a drawn path; for a mission
-            the acceptance radius of the file, else the clearance.
+        corner_m: largest distance from corners; None: for a drawn path the cross-track limit, for a mission the
+            acceptance radius in the file, else the clearance.
         settings: further keys of a scenario, by key path; values as YAML.
-        out: the run folder; None: none is kept.
+        out: the run folder to write; None: no folder.
         recording: whether to record the flight for rerun.
 
     Raises:

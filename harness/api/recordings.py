@@ -1,4 +1,4 @@
-"""A recording as a path, and as a table of what was recorded."""
+"""A recording as a path, and as a table of its data."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ class Recording(_PATH):  # type: ignore[misc]
         *,
         filled: bool = False,
     ) -> pa.Table:
-        """What was recorded of some entities, a row for each time of a timeline.
+        """The recorded data of some entities, a row for each time of a timeline.
 
             run.recording.dataframe("/series/clearance/**").to_pandas()
 
         Args:
-            contents: paths of entities as rerun writes them: `/series/**`, `-/series/bank/**` for what is left out.
+            contents: paths of entities as rerun writes them: `/series/**`; `-/series/bank/**` leaves some out.
             index: the timeline.
-            filled: a row has the last value of whatever has none at its time.
+            filled: an empty cell gets the last value before it.
 
         Returns:
-            `recording`, its identity; `sim_time_s`; a column for each entity's number, or list of whatever it is.
+            Columns `recording`, its identity; `sim_time_s`; one for each entity: its number, or a list of values.
 
         Raises:
             InputError: nothing was recorded there, or the extra `wayproof[catalog]` is not installed.

@@ -1,4 +1,4 @@
-"""What a flight, a comparison and a campaign give back: typed figures, tables, and a look for notebooks."""
+"""The results of a flight, a comparison and a campaign: typed figures, tables, and a look for notebooks."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FlightResult:
-    """One flight that is over.
+    """A flight that has ended: its figures, track and plans.
 
     Attributes:
-        scenario: what was flown, every default filled in.
+        scenario: the scenario as flown, every default filled in.
         metrics: its figures, as in `metrics.json`.
-        track: the flown track, a row per log tick, with the columns of `track.parquet`.
+        track: the flown track, ten rows a second, with the columns of `track.parquet`.
         plans: the accepted plans, a row each, with the columns of `plans.parquet`.
-        folder: its run folder; None where none was kept.
+        folder: its run folder; None if none was written.
         manifest: versions, platform, command and start time; empty without a run folder.
     """
 
@@ -45,7 +45,7 @@ class FlightResult:
 
     @classmethod
     def of(cls, scenario: Scenario, flight: Flight) -> FlightResult:
-        """Of a flight of which no run folder is kept."""
+        """The result of a flight without a run folder."""
         from harness.analysis.metrics import metrics
         from harness.run.scenario_flight import flight_limits
         from harness.run_files.plans_table import plans_table
@@ -71,7 +71,7 @@ class FlightResult:
 
     @property
     def recording(self) -> Recording | None:
-        """The rerun recording, a path that can be asked for what was recorded; None where none was made."""
+        """The rerun recording: a path, with its data in `dataframe()`; None if none was made."""
         from harness.run_files.run_folder import RECORDING
 
         path = Recording(self.folder / RECORDING) if self.folder else None
@@ -85,7 +85,7 @@ class FlightResult:
             height_px: of the widget.
 
         Raises:
-            InputError: there is no recording, or what is needed to show it is missing.
+            InputError: there is no recording, no screen, or a package that the viewer needs is missing.
         """
         if self.recording is None:
             raise InputError("wayproof: the run has no recording to show; fly it with recording=True")
@@ -111,7 +111,7 @@ class FlightResult:
 
     @property
     def pilot(self) -> str:
-        """The planner's kind; of a checked path what stands for it."""
+        """The planner's kind; for a checked path the word that stands for it."""
         from harness.run_files.given_path import GIVEN
 
         return GIVEN if self.metrics.check is not None else self.scenario.planner.kind
@@ -148,7 +148,7 @@ class ComparisonResult:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CampaignResult:
-    """A campaign that was flown, or as much of it as has been.
+    """A campaign, or the part of it that has been flown.
 
     Attributes:
         folder: the campaign's folder.
@@ -185,13 +185,13 @@ class CampaignResult:
         filled: bool = False,
         runs: Sequence[int] | None = None,
     ) -> pa.Table:
-        """What the recordings hold of some entities, run below run; as `Recording.dataframe` of one.
+        """The recorded data of some entities of all runs, run below run, as `Recording.dataframe` has them of one.
 
         Args:
             contents: paths of entities as rerun writes them.
             index: the timeline.
-            filled: a row has the last value of whatever has none at its time.
-            runs: numbers of runs; default: all that were kept.
+            filled: an empty cell gets the last value before it.
+            runs: numbers of runs; default: all with a recording.
 
         Raises:
             InputError: one of the runs has no recording, or the extra `wayproof[catalog]` is not installed.
@@ -205,7 +205,7 @@ class CampaignResult:
 
     @property
     def outcomes(self) -> dict[str, int]:
-        """How many runs ended how, the most frequent first."""
+        """Number of runs with each outcome, the most frequent first."""
         return dict(self.summary.outcomes)
 
     def __repr__(self) -> str:

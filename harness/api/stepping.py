@@ -30,7 +30,7 @@ class SteppedFlight(SteppedLoop):
         self.scenario = scenario
 
     def reset(self) -> Status:
-        """Begins a new flight, whatever has become of the one before; it is at its start.
+        """Begins a new flight, whether or not the one before has ended, and returns its status at the start.
 
         Raises:
             InputError: the aircraft cannot be loaded or trimmed.
@@ -40,7 +40,7 @@ class SteppedFlight(SteppedLoop):
             return super().reset()
 
     def result(self) -> FlightResult:
-        """What was flown, as `fly` gives it.
+        """The result of the flight, as `fly` gives it.
 
         Raises:
             RuntimeError: no flight has begun, or it is not over.
@@ -67,15 +67,16 @@ def make(
             status = flight.step()
         run = flight.result()  # as wayproof.fly gives it, with the same digest
 
-    A caller that decides itself gives objects of its own and changes them between two steps: a planner is asked after
-    every scan, a law of guidance at every step. `step(roll_command_rad=...)` steers for one step in place of the law.
+    To decide itself, a caller gives its own planner or law as an object and changes the object between two steps: a
+    planner is asked after every scan, a guidance law at every step. `step(roll_command_rad=...)` steers for one step
+    in place of the law.
 
     Args:
         scenario: a scenario, its file, or the name of one that comes with wayproof.
         planner: as `fly` takes it. An object serves every flight; a class makes one for each.
         guidance: as `fly` takes it; likewise.
-        observers: look on at every flight, with the methods of `harness.flight.observer.Observer`: each scan, plan and
-            event, and the track in blocks.
+        observers: objects with the methods of `harness.flight.observer.Observer`, told of each scan, plan and event of
+            every flight, and of the track in blocks.
 
     Returns:
         The flight, not yet begun: `reset()` begins it.

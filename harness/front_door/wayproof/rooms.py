@@ -25,8 +25,8 @@ def own_packages() -> Any:
             what = "does not find it" if found is None else f"finds another one first, {found}"
             raise ImportError(
                 f"wayproof needs its own package {room!r}, and Python {what}: rename that folder or file, or move the "
-                "script that is run (or start Python) into another folder; a checkout of wayproof is its own after "
-                "`pip install -e`",
+                "script that is run (or start Python) into another folder; if it is another checkout of wayproof, run "
+                "`pip install -e .` in it first",
                 name=room,
             )
     return import_module("harness")
