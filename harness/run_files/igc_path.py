@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from typing import Any, Final
 
 from harness.files.input_file import InputError
@@ -15,6 +16,7 @@ FLYING_MPS: Final = 12.0
 MOST_BROKEN: Final = 0.05
 """A file of which a larger share of fixes cannot be read is refused."""
 
+DATE: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
 EARTH_M: Final = 6_371_000.0
 
 
@@ -75,6 +77,8 @@ def _fixes(text: str, source: str) -> tuple[list[dict[str, Any]], int]:
 
     if not text.lstrip("\ufeff").startswith("A"):
         raise InputError(f"{source}:1: must begin with an A record, the logger's number; is no IGC file")
+    if not DATE.search(text):
+        raise InputError(f"{source}: has no date (an HFDTE record); must have one before the first fix")
     # A reader that goes on after a broken line; of each it keeps the error.
     try:
         read = Reader(skip_duplicates=True).read(io.StringIO(text))

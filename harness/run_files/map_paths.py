@@ -21,6 +21,8 @@ MAX_ELEMENTS: Final = 4_000_000
 DECLARED: Final = ("<!DOCTYPE", "<!ENTITY")
 """A file that declares entities is refused: none of these formats needs them."""
 
+BOUNDARIES: Final = ("outerBoundaryIs", "innerBoundaryIs")
+LINKED: Final = ("NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay")
 COMMA: Final = re.compile(r"\s*,\s*")
 ABSOLUTE, RELATIVE = "absolute", "relativeToGround"
 """Values of KML's altitudeMode; with any other the altitude means nothing."""
@@ -49,8 +51,11 @@ def read_kml(text: str, source: str) -> PathAsRead:
                 lines.append((name, element))
             elif kind == "Polygon":
                 fences.append(_polygon(element, name, source))
-            elif kind in ("Point", "Model", "MultiTrack") and kind != "MultiTrack":
+            elif kind in ("Point", "Model", "LinearRing"):
                 others[kind] += 1
+            elif kind in BOUNDARIES:  # which hold the ring of a polygon
+                others["LinearRing"] -= sum(1 for _ in _all(element, "LinearRing"))
+    others.update(kind for element in root.iter() if (kind := _name(element)) in LINKED)
     if len(lines) != 1:
         told = f" ({', '.join(name for name, _ in lines[:4])})" if lines else ""
         raise InputError(f"{source}: has {len(lines)} lines{told}; must have exactly one, the path")
@@ -58,7 +63,7 @@ def read_kml(text: str, source: str) -> PathAsRead:
     points = _kml_points(line, name, source)
     mode = _text(line, "altitudeMode")
     flat = mode not in (ABSOLUTE, RELATIVE)
-    notes = [f"{counted(count, kind)} beside the path passed over" for kind, count in others.items()]
+    notes = [f"{counted(count, kind)} beside the path passed over" for kind, count in (+others).items()]
     if flat and any(altitude for *_, altitude in points):
         notes.append("altitudes passed over: their altitudeMode is clampToGround")
     return _path(points, source, name, Fences(tuple(fences)), tuple(notes), flat, mode == RELATIVE)
@@ -168,7 +173,7 @@ def _point(row: list[str], where: str) -> Point:
 
 def _polygon(element: ElementTree.Element, name: str, source: str) -> Fence:
     rings = []
-    for boundary in ("outerBoundaryIs", "innerBoundaryIs"):
+    for boundary in BOUNDARIES:
         for each in _all(element, boundary):
             rows = _coordinates(each)
             where = f"{source}: {name}: corner"

@@ -79,6 +79,23 @@ def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> Non
     assert given.notes == ("altitudes passed over: their altitudeMode is clampToGround",)
 
 
+def test_what_else_is_in_a_kml_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.kml"
+    ring = "<LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47</coordinates></LinearRing>"
+    more = (
+        f"<Placemark><name>r</name>{ring}</Placemark>"
+        f"<Placemark><name>p</name><Polygon><outerBoundaryIs>{ring}</outerBoundaryIs></Polygon></Placemark>"
+        "<NetworkLink/><GroundOverlay/><GroundOverlay/>"
+    )
+    path.write_text(kml(more=more))
+    found = read_path(path)
+    assert {"1 LinearRing beside the path passed over", "1 NetworkLink beside the path passed over"} <= {
+        *found.notes
+    }
+    assert "2 GroundOverlays beside the path passed over" in found.notes
+    assert "p" in [fence.name for fence in found.fences.every]
+
+
 def test_a_track_of_kml(tmp_path: Path) -> None:
     path = tmp_path / "a.kml"
     path.write_text(kml().replace("<Placemark><name>way</name>", "<!--").replace("</Placemark>", "-->", 1))
@@ -148,6 +165,7 @@ def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_pa
         ("a.gpx", gpx(f"<trk><trkseg>{point('trkpt', 47, '')}{point('trkpt', 48)}</trkseg></trk>"), "at 1 of 2 points"),
         ("a.igc", "B1200005049413N00611520EA0013000195\n", ":1: must begin with an A record"),
         ("a.igc", igc(), ": has 0 fixes, none of them in flight"),
+        ("a.igc", "AXXX001\n" + FLIGHT[0] + "\n", ": has no date (an HFDTE record); must have one"),
         ("a.igc", igc(*FLIGHT[:2]), ": has 2 fixes, none of them in flight"),
         ("a.igc", igc(*FLIGHT, "B12x"), ": has 1 B records that cannot be read, of 6; must be at most 5%"),
     ],
