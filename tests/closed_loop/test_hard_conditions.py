@@ -1,15 +1,18 @@
 """Hard conditions, each alone and all together, in public worlds: 30 % wind, moderate turbulence, the real aircraft.
 
 Besides the sensor's flaws: obstacles that appear ahead, and obstacles that come to the straight line to the goal
-when the aircraft does. `python -m tests.closed_loop.test_hard_conditions` flies whole families and prints
-the table of planner/MEASURED.md.
+when the aircraft does. `python -m tests.closed_loop.test_hard_conditions [MOST [FAMILY...]]` flies MOST worlds of each
+family, has each flight judged by the independent referee, and prints the table of planner/MEASURED.md.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import shutil
 import sys
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +21,11 @@ import pytest
 
 from harness.flight.closed_loop import fly
 from harness.flight.record import Flight, Outcome
-from harness.run.scenario_flight import make_loop
+from harness.run.scenario_flight import fly_to_folder, make_loop
 from harness.scenario.scenario import Scenario, scenario_of
+from tests.closed_loop.worlds_table import SHARED, referee_faults
 
-WORLDS = Path(__file__).parents[3] / "shared" / "worlds"
+WORLDS = SHARED / "worlds"
 FAMILIES = ("circles_mid", "paper_like", "faster_forest", "barn")
 SPEED_MPS, TURN_M = 25.0, 230.0
 WIND_MPS = 0.3 * SPEED_MPS
@@ -159,20 +163,36 @@ def test_a_way_without_room_to_turn_that_is_hard_to_see_is_found_in_the_end() ->
     assert flight.outcome is Outcome.REACHED, flight.reason
 
 
-def _row(condition: str, most: int) -> str:
-    cells = [condition]
-    for family in FAMILIES:
-        flights = [flown(path, condition) for path in worlds(family, most)]
-        reached = sum(flight.outcome is Outcome.REACHED for flight, _ in flights)
-        hit = sum(flight.outcome is Outcome.COLLISION for flight, _ in flights)
-        least = min(
-            float(flight.track.clearance_m.min()) / (scenario.planner.clearance_m or math.nan)
-            for flight, scenario in flights
-        )
-        cells.append(f"{reached}/{len(flights)}, {hit}, {least:.2f}")
-    return "| " + " | ".join(cells) + " |"
+def _cell(family: str, condition: str, most: int, folder: Path) -> tuple[str, list[str]]:
+    """A cell of the table: goals reached, collisions, least clearance over the wanted one; and the referee's faults."""
+    ends, shares, faults = [], [], []
+    for path in worlds(family, most):
+        scenario = hard(json.loads(path.read_text()), CONDITIONS[condition])
+        run = folder / f"{path.stem}-{len(condition)}"
+        metrics = fly_to_folder(scenario, run, recording=False)
+        ends.append(metrics["outcome"])
+        shares.append(metrics["min_clearance_m"] / (scenario.planner.clearance_m or math.nan))
+        faults += [f"{path.stem}, {condition}: {fault}" for fault in referee_faults(run)]
+        shutil.rmtree(run)
+    counts = f"{ends.count('reached')}/{len(ends)}, {ends.count('collision')}"
+    return f"{counts}, {min(shares):.2f}", faults
+
+
+def main(most: int, families: Sequence[str]) -> int:
+    """Prints the table, a row as soon as it is flown, then what the referee found wrong."""
+    wrong: list[str] = []
+    print(f"| condition | {' | '.join(families)} |")
+    with tempfile.TemporaryDirectory() as folder:
+        for condition in CONDITIONS:
+            cells = [condition]
+            for family in families:
+                cell, faults = _cell(family, condition, most, Path(folder))
+                cells.append(cell)
+                wrong += faults
+            print("| " + " | ".join(cells) + " |", flush=True)
+    print("\n".join(wrong) or "no fault")
+    return 1 if wrong else 0
 
 
 if __name__ == "__main__":
-    for name in CONDITIONS:
-        print(_row(name, int(sys.argv[1]) if len(sys.argv) > 1 else 10_000), flush=True)
+    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000, sys.argv[2:] or FAMILIES))

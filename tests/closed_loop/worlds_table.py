@@ -50,11 +50,7 @@ def judged(world: Path, folder: Path) -> dict[str, Any]:
     convert = [sys.executable, str(SHARED / "tools" / "world_to_scenario.py"), str(world)]
     scenario.write_text(subprocess.run(convert, capture_output=True, text=True, check=True).stdout)
     metrics = fly_to_folder(load_scenario(scenario), run, recording=False)
-    judge = [sys.executable, str(SHARED / "tools" / "referee.py"), str(run)]
-    verdict = subprocess.run(judge, capture_output=True, text=True)
-    faults = (
-        [] if verdict.returncode == 0 else [f"{verdict.stdout.strip()[-300:]}{verdict.stderr.strip()[-300:]}"]
-    )
+    faults = referee_faults(run)
     if metrics["outcome"] != ENDS.get(facts["expect"], metrics["outcome"]):
         faults.append(f"ended as {metrics['outcome']}, expected {facts['expect']}")
     if metrics["clearance_violation_s"] > 0:
@@ -67,6 +63,15 @@ def judged(world: Path, folder: Path) -> dict[str, Any]:
         "p99_ms": metrics["compute_ms"]["p99"],
         "faults": [f"{world.stem}: {fault}" for fault in faults],
     }
+
+
+def referee_faults(run: Path) -> list[str]:
+    """What the independent referee, which knows the true obstacles, finds wrong with a run folder."""
+    judge = [sys.executable, str(SHARED / "tools" / "referee.py"), str(run)]
+    verdict = subprocess.run(judge, capture_output=True, text=True)
+    if verdict.returncode == 0:
+        return []
+    return [f"{verdict.stdout.strip()[-300:]}{verdict.stderr.strip()[-300:]}"]
 
 
 def worlds(folders: tuple[str, ...], most: int) -> list[Path]:
