@@ -102,7 +102,7 @@ def read_ros(path: Path, reading: Reading) -> Contents:
 
 def _image(path: Path) -> tuple[FloatArray, BoolArray]:
     """Grey from 0 to 255, of colours their mean as map_server has it, and where the image is opaque."""
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
     try:
         data = read_bytes(path)
@@ -124,6 +124,8 @@ def _image(path: Path) -> tuple[FloatArray, BoolArray]:
                 opaque = np.asarray(image.convert("RGBA").getchannel("A")) == 255
     except WorldFileError:
         raise
+    except UnidentifiedImageError as error:
+        raise WorldFileError(f"names the image {path.name}, which is no PGM, PNG, BMP or JPEG") from error
     except Exception as error:  # Pillow raises many kinds for damaged files
         raise WorldFileError(
             f"names the image {path.name}, which cannot be read ({str(error)[:80]})"
