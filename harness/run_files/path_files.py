@@ -39,8 +39,8 @@ Place = tuple[float, float]
 MAX_BYTES: Final = 64_000_000
 MAX_SPAN_M: Final = 500e3
 JSON_ENDINGS: Final = (".json", ".txt", ".mission")
-PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"')
-"""What stands in every plan of QGroundControl, whatever the name of its file."""
+PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"|"groundStation"\s*:\s*"MissionPlanner"')
+"""What stands in every plan of QGroundControl, or mission of Mission Planner in JSON, whatever the name of its file."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Missions in .mission files of QGroundControl before its plans: JSON, of versions 1 and 2.
+"""Missions in .mission files: of QGroundControl before its plans, JSON of versions 1 and 2, and of Mission Planner.
 
 Version 2 is the `mission` of a plan on its own. Version 1 has the parameters of an item one by one, surveys in a list
 of their own, and an item for home.
@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from harness.files.input_file import InputError
 from harness.run_files.mission.items import MissionAsRead
-from harness.run_files.mission.plan_file import read_mission
+from harness.run_files.mission.plan_file import read_mission, read_plan
 from harness.run_files.mission.wpl_file import WPL, read_waypoints
 from harness.run_files.read_values import parsed_json
 
@@ -32,6 +32,8 @@ def read_old_mission(text: str, source: str) -> MissionAsRead:
     if text.lstrip().startswith("<"):
         raise InputError(f"{source}: is XML, as INAV's missions are; save it as .plan or .waypoints")
     whole = parsed_json(text, source)
+    if isinstance(whole, dict) and isinstance(whole.get("mission"), dict):  # Mission Planner's, as plans are
+        return read_plan(text, source)
     listed = whole.get("items") if isinstance(whole, dict) else None
     if not isinstance(listed, list):
         raise InputError(f"{source}: items: is missing; a .mission of QGroundControl must have it")

@@ -1,4 +1,4 @@
-"""Missions in .plan files of QGroundControl, with their fences.
+"""Missions in .plan files of QGroundControl, with their fences, and in the JSON that Mission Planner writes.
 
 The format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html
 """
@@ -35,9 +35,10 @@ def read_plan(text: str, source: str) -> MissionAsRead:
         InputError: it is none.
     """
     plan = parsed_json(text, source)
-    if not isinstance(plan, dict) or plan.get("fileType") != "Plan":
+    mission = plan.get("mission") if isinstance(plan, dict) else None
+    kind = plan.get("fileType") if isinstance(plan, dict) else ""
+    if kind != "Plan" and not (kind is None and isinstance(mission, dict)):  # Mission Planner leaves it open
         raise InputError(f'{source}: is not a plan of QGroundControl; must have "fileType": "Plan"')
-    mission = plan.get("mission")
     if not isinstance(mission, dict):
         raise InputError(f"{source}: mission.items: is missing; it is required")
     read = read_mission(mission, source, "mission.")
@@ -86,7 +87,7 @@ def _items(item: Any, key: str, source: str, number: int, notes: list[str]) -> I
     """The simple items that an item of a plan stands for; what it is without any goes into the notes."""
     if not isinstance(item, dict):
         raise InputError(f"{source}: {key}: must be a mission item")
-    if item.get("type") == "SimpleItem":
+    if item.get("type") == "SimpleItem" or (item.get("type") is None and item.get("command") is not None):
         yield _simple(item, key, source, number)
         return
     kind = shown(str(item.get("complexItemType") or item.get("type") or "without a type"))

@@ -100,6 +100,33 @@ def test_other_ways_to_write_a_table(text: str, tmp_path: Path) -> None:
         read_path(path)
 
 
+@pytest.mark.parametrize("ending", ["mission", "plan", "json", "txt"])
+def test_missions_in_the_json_of_mission_planner(ending: str, tmp_path: Path) -> None:
+    """Its items say not what they are, and are all of number 0."""
+    rest: dict[str, Any] = {
+        "type": None,
+        "doJumpId": 0,
+        "TransectStyleComplexItem": None,
+        "complexItemType": None,
+        "version": None,
+    }
+    items = [
+        item(*place, command=command, **rest) for place, command in zip(POINTS, (22, 16, 16), strict=True)
+    ]
+    jump = {**item(0.0, 0.0, **rest), "command": 177, "params": [2, 1, 0, 0, 0, 0, 0]}
+    content = {
+        "fileType": None, "geoFence": None, "groundStation": "MissionPlanner", "rallyPoints": None, "version": 1,
+        "mission": {"items": [*items, jump], "plannedHomePosition": [47.0, 8.0, 400.0], "firmwareType": 0},
+    }  # fmt: skip
+    path = tmp_path / f"a.{ending}"
+    path.write_text(json.dumps(content, indent=2))
+    given = read_path(path)
+    assert given.mission is not None
+    assert [step.item for step in given.mission.program.steps] == [1, 2, 3, 2, 3]
+    assert [altitude_m(step, 400.0, 0.0, 0.0) for step in given.mission.program.steps] == [520.0] * 5
+    assert given.notes == ("a doJumpId is there twice: items are counted from 1 instead",)
+
+
 def test_of_many_other_columns_four_are_named(tmp_path: Path) -> None:
     path = tmp_path / "path.csv"
     path.write_text("x_m,y_m,a,b,,d,e,f\n0,0,1,1,1,1,1,1\n9,9,1,1,1,1,1,1\n")
