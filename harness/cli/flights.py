@@ -23,7 +23,6 @@ from harness.cli.options import (
     flag,
     law_kind,
     load,
-    planner_kind,
     print_json,
     setting,
     straight_m,
@@ -190,11 +189,9 @@ def compare(
     2 bad input or usage, nothing flown
     """
     named = [kind.strip() for kind in planners.split(",")]
-    kinds = [planner_kind(kind) for kind in named]
     laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
-    loaded = [
-        load(scenario, chosen(kind, guidance=law)) for scenario in scenarios for kind in kinds for law in laws
-    ]
+    replaced = [chosen(kind, guidance=law) for kind in named for law in laws]
+    loaded = [load(scenario, each) for scenario in scenarios for each in replaced]
 
     from aircraft.airframes import AircraftError
     from harness.cli.compare_terminal import comparison_bar, print_comparison

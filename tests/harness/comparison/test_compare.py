@@ -334,6 +334,18 @@ def test_a_scenario_with_the_name_of_a_file_of_ours_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+def test_a_planner_in_a_file_may_lie_in_another_folder(
+    place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine").mkdir()
+    own = PLUGIN.partition("class Dies")[0].replace("self, config, mission", "self, mission")
+    (tmp_path / "mine" / "own.py").write_text(own)
+    monkeypatch.chdir(tmp_path)
+    given = [str(place / "ring.yaml"), "--planners", "rolling_window,mine/own.py:Corner", "--no-recording"]
+    assert main(["compare", *given, "--kinematic", "--out", "out"]) == 0
+    assert [row["planner"] for row in rows_of(tmp_path / "out")] == ["rolling_window", "own.py:Corner"]
+
+
 def test_a_folder_with_other_things_is_refused_and_left_alone(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
