@@ -178,8 +178,6 @@ MUTILATED: dict[str, str] = {
     "a jump to nowhere": row(2, 206, 25) + "->" + row(2, 177, 99, 3),
     "a jump in a circle": row(2, 206, 25) + "->" + row(2, 177, 2, -1),
     "no end of jumps": row(2, 206, 25) + "->" + row(2, 177, 1, 1e6),
-    "a number twice": "\n3\t->\n1\t",
-    "home twice": "\n1\t->\n0\t",
     "a command beyond MAVLink": "\t16\t0.0\t->\t1e300\t0.0\t",
     "a negative command": "\t16\t0.0\t->\t-1\t0.0\t",
     "a frame of nowhere": "\n3\t0\t3->\n3\t0\t8",
