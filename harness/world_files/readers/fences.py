@@ -5,6 +5,7 @@ What is not inside an inclusion fence is solid. PX4 asks to be inside one of sev
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,6 +16,8 @@ from harness.world_files.readers import rings
 
 WAYPOINT: Final = 16
 """MAV_CMD of the first item of a waypoint file where that is home."""
+POLYGON: Final = ".poly"
+"""Ending of the polygons that Mission Planner saves: as a fence, without a return point."""
 NOWHERE: Final = (0.0, 0.0)
 """Where an item has no place."""
 
@@ -77,6 +80,9 @@ def read_ardupilot(path: Path, reading: Reading) -> Contents:
         raise WorldFileError("has a line that is not two numbers; must be an ArduPilot fence")
     if len(places) < 4:
         raise WorldFileError(f"has {len(places)} lines; must be a return point and at least three corners")
+    if path.suffix.lower() == POLYGON or (places[0] == places[-1] != places[1]):
+        closed = _contents("ardupilot_fence", [(rings.ring(places), True)], any_of=False)
+        return replace(closed, notes=(*closed.notes, "has no return point: its first place is a corner"))
     return _contents("ardupilot_fence", [(rings.ring(places[1:]), True)], any_of=False)
 
 

@@ -398,6 +398,28 @@ def test_a_fence_among_waypoints_with_circles_and_a_torn_one(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(
+    ("name", "lines", "corner", "noted"),
+    [
+        ("a.txt", ["47.5 8.5", "47.0 8.0", "47.0 9.0", "48.0 9.0", "47.0 8.0"], False, False),
+        (
+            "a.fen",
+            ["#saved by Mission Planner", "47.5 8.5", "47.0 8.0", "47.0 9.0", "48.0 9.0", "47.0 8.0"],
+            False,
+            False,
+        ),
+        ("a.txt", ["48.5 8.5", "47.0 8.0", "47.0 9.0", "48.0 9.0", "48.5 8.5"], True, True),
+        ("a.poly", ["#saved by Mission Planner", "48.5 8.5", "47.0 8.0", "47.0 9.0", "48.0 9.0"], True, True),
+    ],
+)
+def test_a_fence_without_a_return_point_keeps_its_first_corner(
+    name: str, lines: list[str], corner: bool, noted: bool, tmp_path: Path
+) -> None:
+    found = read_any(written(tmp_path / name, "\n".join(lines) + "\n"))
+    assert found.parts[0].footprint.bounds[3] == (48.5 if corner else 48.0)
+    assert ("has no return point: its first place is a corner" in found.notes) is noted
+
+
+@pytest.mark.parametrize(
     ("mode", "negate", "wanted"),
     [
         ("trinary", 0, [1.0, math.nan, 0.0, 0.0]),
