@@ -168,7 +168,7 @@ def _cell(family: str, condition: str, most: int, folder: Path) -> tuple[str, li
     ends, shares, faults = [], [], []
     for path in worlds(family, most):
         scenario = hard(json.loads(path.read_text()), CONDITIONS[condition])
-        run = folder / f"{path.stem}-{len(condition)}"
+        run = folder / path.stem
         metrics = fly_to_folder(scenario, run, recording=False)
         ends.append(metrics["outcome"])
         shares.append(metrics["min_clearance_m"] / (scenario.planner.clearance_m or math.nan))
