@@ -11,7 +11,7 @@ from typing import Final
 from harness.files.fence_commands import APART, RALLY_POINT
 from harness.files.input_file import InputError
 from harness.run_files.mission import commands, fence_items
-from harness.run_files.mission.items import Item, MissionAsRead
+from harness.run_files.mission.items import FRAMES, SEA, Item, MissionAsRead
 from harness.run_files.read_values import finite, whole
 
 WPL: Final = "QGC WPL"
@@ -55,6 +55,9 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     items, notes = _numbered(items)
     home = items[0] if items[0].command == commands.WAYPOINT else None
     others = items[1:] if home is not None else items
+    if home is not None and FRAMES.get(home.frame, SEA) != SEA and home.params[6] != 0.0:
+        altitude = f"its altitude, {home.params[6]:g} m, is taken as above the sea"
+        notes += (f"its first item is home, as autopilots have it, though of frame {home.frame}: {altitude}",)
     flown = tuple(item for item in others if item.command not in APART)
     if not flown and (instead := fence_items.nothing_but(others)):
         raise InputError(f"{source}: has no items to fly to, but {instead}")

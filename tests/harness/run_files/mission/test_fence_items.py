@@ -20,7 +20,7 @@ PLACES = [(47.0, 8.0), (47.02, 8.0)]
 def wpl(*items: tuple[int, float, float, float]) -> str:
     """A plain-text mission of items: command, first parameter, latitude, longitude."""
     rows = [
-        f"{number}\t0\t3\t{command}\t{first}\t0\t0\t0\t{latitude}\t{longitude}\t100\t1"
+        f"{number}\t0\t{3 if number else 0}\t{command}\t{first}\t0\t0\t0\t{latitude}\t{longitude}\t100\t1"
         for number, (command, first, latitude, longitude) in enumerate(((16, 0, 47.0, 8.0), *items))
     ]
     return "\n".join(("QGC WPL 110", *rows)) + "\n"
@@ -76,6 +76,15 @@ def test_check_and_world_agree_on_several_inclusion_fences(
     path.write_text(json.dumps(plan))
     assert read_path(path).fences.inside_all is every
     assert len(read_world(path, None, Reading()).parts) == 1 + every
+
+
+def test_a_home_whose_altitude_is_not_above_the_sea_is_told() -> None:
+    text = wpl(*WAYPOINTS)
+    assert read_waypoints(text, "m").notes == ()
+    for frame, noted in ((0, False), (2, False), (3, True), (10, True)):
+        notes = read_waypoints(text.replace("0\t0\t0\t16", f"0\t0\t{frame}\t16", 1), "m").notes
+        told = f"though of frame {frame}: its altitude, 100 m, is taken as above the sea"
+        assert any(note.endswith(told) for note in notes) is noted
 
 
 def test_a_first_item_that_is_no_waypoint_is_no_home(tmp_path: Path) -> None:
