@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from harness.flight.record import FloatArray, Track
+from harness.flight.record import FloatArray, IntArray, Track
 from harness.recording import blueprint as look
 
 if TYPE_CHECKING:
@@ -24,6 +24,23 @@ def thin_curves(block: Track) -> dict[str, FloatArray]:
         "bank/commanded": block.roll_command_deg,
         "bank/flown": block.roll_deg,
     }
+
+
+def thin_rows(entity: str, curve: FloatArray, every: int) -> IntArray:
+    """The rows of a curve (n,) that a thin recording keeps: every so many, the extreme ones between, and the last.
+
+    Without the extreme ones a plot would show less than the figures say: a peak is shorter than the rows are apart.
+
+    Args:
+        entity: as `thin_curves` has it; of the clearance the least value matters, else the farthest from 0.
+        curve: its values; NaN where there is none.
+        every: rows from one that is kept to the next.
+    """
+    size = np.nan_to_num(-curve if entity == "clearance/flown" else np.abs(curve), nan=-np.inf)
+    groups = np.full((-(-len(size) // every), every), -np.inf)
+    groups.flat[: len(size)] = size
+    regular = np.arange(len(groups)) * every
+    return np.unique(np.concatenate((regular, regular + groups.argmax(axis=1), [len(size) - 1])))
 
 
 def curves(block: Track, altitude_m: FloatArray) -> dict[str, FloatArray]:

@@ -34,7 +34,7 @@ from harness.recording.scene import (
     log_trail_style,
     quaternions,
 )
-from harness.recording.series import send_curves, send_levels, thin_curves
+from harness.recording.series import send_curves, send_levels, thin_curves, thin_rows
 from harness.recording.solids import strips_2d, strips_3d
 from harness.recording.states import Nearness, send_events
 from harness.run_files.exports.exported_path import planned_points
@@ -119,8 +119,9 @@ class ThinLog:
             ),
         ):
             self._rec.send_columns(entity, times, rr.Transform3D.columns(translation=place, quaternion=turn))
-        kept = {name: curve[rows] for name, curve in thin_curves(block).items()}
-        send_curves(self._rec, kept, block.time_s[rows])
+        for name, curve in thin_curves(block).items():
+            kept = thin_rows(name, curve, ROWS)
+            send_curves(self._rec, {name: curve[kept]}, block.time_s[kept])
         send_levels(self._rec, self._scene, block.time_s)
 
     def end(self) -> None:
@@ -136,7 +137,8 @@ class ThinLog:
         """Draws the whole track and the events, writes the summary and the typed properties, and ends the file."""
         self._send_plans()
         if self._whole:
-            track = lines_2d([np.concatenate(self._whole)], look.TRACK, 1.5, 15)
+            whole = np.concatenate(self._whole)
+            track = lines_2d([whole], look.TRACK, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
         send_events(self._rec, [(*event, look.TOLD) for event in self._events])
         log_summary(self._rec, replace(self._scene, scenario_yaml=""), metrics)

@@ -6,6 +6,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,6 +118,34 @@ def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
         "/summary",
         "/events",
     } <= rows.keys()
+
+
+def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(
+    tmp_path: Path, make_track: MakeTrack, make_plan: MakePlan
+) -> None:
+    """Peaks of a tenth of a second, between the rows that are kept of the track."""
+    cross_track_m, clearance_m, bank_deg = np.zeros(1001), np.full(1001, 250.0), np.zeros(1001)
+    cross_track_m[[0, 1]] = np.nan
+    cross_track_m[507], clearance_m[613], bank_deg[999] = -2.5, 37.5, -45.0
+    track = make_track(1001, cross_track_m=cross_track_m, clearance_m=clearance_m, roll_deg=bank_deg)
+    record(tmp_path, 0, replace(flight(make_track, make_plan, Outcome.REACHED, 250.0), track=track))
+    assert curve(tmp_path, "cross_track/flown")[50.7] == -2.5
+    assert curve(tmp_path, "clearance/flown")[61.3] == 37.5
+    assert curve(tmp_path, "bank/flown")[99.9] == -45.0
+    assert len(curve(tmp_path, "clearance/flown")) == 1001 // 20 + 1 + 1
+
+
+def curve(campaign: Path, entity: str) -> dict[float, float]:
+    """Values by time, s, of a curve of a campaign's first recording."""
+    values: dict[float, float] = {}
+    for chunk in rr.chunk.RrdReader(str(recordings_of(campaign)[0])).stream():
+        if str(chunk.entity_path) == f"/series/{entity}":
+            rows = chunk.to_record_batch().to_pydict()
+            times, scalars = rows.get("sim_time"), rows.get("Scalars:scalars")
+            if times and scalars:
+                pairs = zip(times, scalars, strict=True)
+                values |= {round(time.total_seconds(), 3): value[0] for time, value in pairs}
+    return values
 
 
 def test_severity_orders_outcomes_then_clearance(make_track: MakeTrack, make_plan: MakePlan) -> None:
