@@ -167,7 +167,7 @@ def campaign_of(results: Path) -> dict[str, Any]:
     import pyarrow.parquet as pq
 
     if not results.exists():
-        raise InputError(f"{results}: there is no such file")
+        raise InputError(f"{results}: no such file")
     try:
         schema = pq.read_schema(results)
         found = json.loads((schema.metadata or {})[b"wayproof"])

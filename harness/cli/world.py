@@ -261,6 +261,7 @@ def _write(out: Path, text: str) -> None:
 
 def _print(found: Site, out: Path) -> None:
     from harness.cli.terminal import plain, print_table
+    from harness.files.wording import counted
 
     xmin, ymin, xmax, ymax = found.bounds_m
     solid = [each for source in found.expanded.sources for each in source.polygons]
@@ -270,7 +271,7 @@ def _print(found: Site, out: Path) -> None:
         "origin": "none: the files name no place on earth"
         if found.place is None
         else f"{found.place.latitude_deg:.5f}, {found.place.longitude_deg:.5f}",
-        "obstacles": f"{len(solid):,} polygons, {min(inside, 1.0):.0%} of the area",
+        "obstacles": f"{counted(len(solid), 'polygon')}, {min(inside, 1.0):.0%} of the area",
         "start to goal": f"{math.dist(found.start_m, found.goal_m) / 1e3:.4g} km",
         "ground": "from terrain" if found.expanded.ground is not None else "not known",
     }

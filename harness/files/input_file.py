@@ -42,6 +42,8 @@ def read_text(path: Path, max_bytes: int, what: str, utf_16: bool = False) -> st
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
+        if isinstance(error, FileNotFoundError):
+            raise InputError(f"{path}: no such file; give the path of a file") from error
         reason = error.strerror if isinstance(error, OSError) else error
         raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
     if len(data) > max_bytes:

@@ -15,7 +15,7 @@ halves of characters, which no encoding has."""
 
 def counted(number: int, noun: str) -> str:
     """A number and what it counts, as `1 run` or `2 runs`."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def tallied(every: Sequence[str], noun: str) -> str:

@@ -74,7 +74,7 @@ def open_viewer(
     for each in run_dirs:
         ending = each.suffix.lower()
         if ending in (*READERS, ALONE) and not each.exists():
-            raise InputError(f"{each}: there is no such file")
+            raise InputError(f"{each}: no such file")
         if ending == ALONE and len(run_dirs) > 1:
             raise InputError(f"{each}: a recording is opened alone; run folders are overlaid")
         if not each.is_file():

@@ -111,7 +111,7 @@ def read_log(path: Path, plane: LocalPlane) -> LogTrack:
     if reader is None:
         raise InputError(f"{path}: is no flight log that can be shown; must end in {', '.join(READERS)}")
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
+        raise InputError(f"{path}: no such file")
     size, most = path.stat().st_size, MAX_TEXT_BYTES if reader in (_csv, _igc) else MAX_BYTES
     if size > most:
         raise InputError(f"{path}: has {size / 1e6:.0f} MB; at most {most / 1e6:g} MB are read")

@@ -226,6 +226,7 @@ def load_run(path: Path) -> Run:
     """
     manifest = read_index(path / MANIFEST, SCHEMA)
     if manifest is None:
+        _there(path)
         raise RunFolderError(f"{path} is not a run folder: it has no {MANIFEST} of a run")
     if manifest.get("complete") is not True:
         raise RunFolderError(f"the run in {path} is incomplete: it was stopped before its end; fly it again")
@@ -272,6 +273,12 @@ def damaged(path: Path, error: BaseException) -> RunFolderError:
     return RunFolderError(f"the run in {path} is damaged: {reason}; fly it again")
 
 
+def _there(path: Path) -> None:
+    """Raises RunFolderError if there is nothing."""
+    if not path.exists():
+        raise RunFolderError(f"{path}: no such folder; give a run folder")
+
+
 def recording_of(path: Path) -> Path:
     """The recording in a run folder, whose run may be incomplete.
 
@@ -280,6 +287,7 @@ def recording_of(path: Path) -> Path:
     """
     recording = path / RECORDING
     if not recording.is_file():
+        _there(path)
         raise RunFolderError(f"{path} has no {RECORDING}: not a run folder, or flown with --no-recording")
     try:
         _check(recording, read_index(path / MANIFEST, SCHEMA) or {})

@@ -231,7 +231,7 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
         (["--from", "r.parquet"], "--from and --run go together"),
         (["paper_circles", "--from", "r.parquet", "--run", "1"], "either a SCENARIO or --from"),
         (["--from", "run/track.parquet", "--run", "1"], "is not the results.parquet of a campaign"),
-        (["--from", "nowhere", "--run", "1"], "nowhere: there is no such file"),
+        (["--from", "nowhere", "--run", "1"], "nowhere: no such file"),
         (["--from", "times", "--run", "1"], "is not the results.parquet of a campaign"),
     ):
         assert main(["fly", *arguments]) == 2

@@ -228,7 +228,7 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
         (["validate"], "FILE"),
         (["view"], "RUN_DIR"),
         (["view", "no-such-run"], "no-such-run"),
-        (["report", "no-such-run"], "no-such-run is not a run folder"),
+        (["report", "no-such-run"], "no-such-run: no such folder; give a run folder"),
         (["bench", "nowhere.yaml"], "nowhere.yaml: no such file"),
         (["fly", "forest_planners"], "this is a campaign: use `wayproof sweep forest_planners`"),
         (["fly", str(CAMPAIGN)], f"this is a campaign: use `wayproof sweep {CAMPAIGN}`"),

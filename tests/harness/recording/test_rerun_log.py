@@ -647,7 +647,7 @@ def test_a_comparison_is_viewed_as_its_overlay(
     assert runs_in(list(read(recording[0]))) == [""]
     with pytest.raises(InputError, match="a recording is opened alone; run folders are overlaid"):
         open_viewer([recording[0].parent, overlay], web=True)
-    with pytest.raises(InputError, match="there is no such file"):
+    with pytest.raises(InputError, match="no such file"):
         open_viewer([tmp_path / "none.rrd"], web=True)
     shutil.copytree(overlay.parent, tmp_path / "turned")
     with pytest.raises(RunFolderError, match=r"compares several scenarios; name one of .*overlay\.rrd, "):

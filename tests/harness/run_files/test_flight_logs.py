@@ -138,7 +138,7 @@ def test_a_log_that_is_not_there_is_told_as_one(tmp_path: Path, capsys: pytest.C
     run.mkdir()
     (run / "flight.rrd").write_bytes(b"")
     assert main(["view", str(run), str(tmp_path / "none.csv"), "--web"]) == 2
-    assert capsys.readouterr().err == f"{tmp_path / 'none.csv'}: there is no such file\n"
+    assert capsys.readouterr().err == f"{tmp_path / 'none.csv'}: no such file\n"
 
 
 def test_cross_track_is_positive_right_of_what_was_flown_of_the_plans() -> None:

@@ -14,7 +14,7 @@ from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.files.errors import RunFolderError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track, digest
-from harness.run_files.run_folder import METRICS, PLANS, TRACK, RunFolder, load_run
+from harness.run_files.run_folder import METRICS, PLANS, TRACK, RunFolder, load_run, recording_of
 
 REPOSITORY = Path(__file__).parents[3]
 REFEREE = REPOSITORY.parent / "shared" / "tools" / "referee.py"
@@ -219,8 +219,16 @@ def test_missing_and_damaged_runs_are_told_apart(
     tmp_path: Path, make_track: Callable[..., Track], straight_plan: AcceptedPlan
 ) -> None:
     with pytest.raises(RunFolderError, match="is not a run folder"):
-        load_run(tmp_path / "nowhere")
+        load_run(tmp_path)
     write_run(tmp_path, fly_straight(make_track, straight_plan))
     (tmp_path / TRACK).write_bytes(b"PAR1")
     with pytest.raises(RunFolderError, match="is damaged"):
         load_run(tmp_path)
+
+
+@pytest.mark.parametrize("read", [load_run, recording_of])
+def test_a_folder_that_is_not_there_is_said_to_be_missing(
+    tmp_path: Path, read: Callable[[Path], object]
+) -> None:
+    with pytest.raises(RunFolderError, match="gone: no such folder; give a run folder"):
+        read(tmp_path / "gone")
