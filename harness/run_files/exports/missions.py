@@ -16,6 +16,7 @@ import numpy as np
 
 from aircraft.frames import LocalPlane
 from harness.run_files.exports.exported_path import ExportedPath, geodetic
+from harness.scenario.obstacles import Polygon
 from harness.scenario.scenario import Scenario
 
 NAV_WAYPOINT: Final = 16
@@ -35,6 +36,9 @@ ABSOLUTE: Final = 2
 PX4, FIXED_WING = 12, 1
 DIGITS: Final = 9
 """Decimal places of degrees: a tenth of a millimetre."""
+
+SLIVER_M2: Final = 1e-6
+"""What is left of a polygon beside a cut and is smaller than this is rounding."""
 
 CLIMB_SLOPE: Final = math.tan(math.radians(8.0))
 """Slope of the climb after takeoff; small fixed-wing aircraft climb at 8 to 15 degrees."""
@@ -164,7 +168,7 @@ def _plan_item(item: MissionItem, number: int) -> dict[str, Any]:
 def fences(scenario: Scenario, plane: LocalPlane) -> dict[str, Any]:
     """A plan's geoFence: the area to stay in, and what stands in it for ever to stay out of.
 
-    A polygon's holes are filled: a fence of QGroundControl has none.
+    A fence of QGroundControl has no holes: a polygon with holes is several fences.
     """
     xmin, ymin, xmax, ymax = scenario.area.bounds_m
     corners = [(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax)]
@@ -176,9 +180,33 @@ def fences(scenario: Scenario, plane: LocalPlane) -> dict[str, Any]:
             circle = {"center": centre, "radius": obstacle.circle.radius_m}
             circles.append({"circle": circle, "inclusion": False, "version": 1})
         if obstacle.fixed and obstacle.polygon is not None:
-            ring = _ring(obstacle.polygon.vertices_m, plane)
-            polygons.append({"inclusion": False, "polygon": ring, "version": 1})
+            polygons += [
+                {"inclusion": False, "polygon": _ring(part, plane), "version": 1}
+                for part in _without_holes(obstacle.polygon)
+            ]
     return {"circles": circles, "polygons": polygons, "version": 2}
+
+
+def _without_holes(polygon: Polygon) -> list[Sequence[Sequence[float]]]:
+    """Rings, not closed, that together are a polygon without its holes: it is cut north to south through each."""
+    if not polygon.holes_m:
+        return [polygon.vertices_m]
+    import shapely
+
+    whole = [shapely.Polygon(polygon.vertices_m, polygon.holes_m)]
+    rings: list[Sequence[Sequence[float]]] = []
+    while whole:
+        shape = whole.pop()
+        if not shape.interiors:
+            rings.append(list(shape.exterior.coords)[:-1])
+            continue
+        xmin, ymin, xmax, ymax = shape.bounds
+        middles = sorted(0.5 * (hole.bounds[0] + hole.bounds[2]) for hole in shape.interiors)
+        cut = middles[len(middles) // 2]
+        for side in (shapely.box(xmin, ymin, cut, ymax), shapely.box(cut, ymin, xmax, ymax)):
+            parts = shapely.get_parts(shapely.intersection(shape, side))
+            whole += [part for part in parts if part.area > SLIVER_M2]
+    return rings
 
 
 def _ring(points_m: Sequence[Sequence[float]], plane: LocalPlane) -> list[list[float]]:

@@ -119,8 +119,8 @@ def _messages(run: Run) -> Iterator[tuple[str, float, Any]]:
             ]
             _line(world, rim, scenario.mission.altitude_m)
         if obstacle.fixed and obstacle.polygon is not None:
-            ring = obstacle.polygon.vertices_m
-            _line(world, [*ring, ring[0]], scenario.mission.altitude_m)
+            for ring in (obstacle.polygon.vertices_m, *(obstacle.polygon.holes_m or ())):
+                _line(world, [*ring, ring[0]], scenario.mission.altitude_m)
     yield "/world", 0.0, world
     for plan in run.plans:
         scene = _scene("plan", 1.0)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -28,7 +31,9 @@ from scipy.spatial.transform import Rotation
 from harness.cli.app import main
 from harness.flight.record import FloatArray
 from harness.run_files.exports.export import FORMATS
-from harness.run_files.exports.exported_path import planned_points
+from harness.run_files.exports.exported_path import plane_of, planned_points
+from harness.run_files.exports.missions import fences
+from harness.run_files.exports.recordings import mcap_bytes
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.scenario import parse_scenario
 from harness.scenario.sections import Origin
@@ -290,6 +295,17 @@ def test_mcap_is_read_by_mcap_and_by_rerun(export: Export, run: Run, tmp_path: P
     assert (tmp_path / "a.rrd").stat().st_size > 10_000
 
 
+def test_mcap_draws_the_holes_of_a_polygon(run: Run) -> None:
+    hole = [[81500, 61200], [81800, 61200], [81800, 61800]]
+    polygon = f"{{vertices_m: [[81000, 61000], [82000, 61000], [82000, 62000]], holes_m: [{hole}]}}"
+    text = re.sub(r"obstacles:\n(?:[- ].*\n)*", f"obstacles: [{{polygon: {polygon}}}]\n", run.scenario_yaml)
+    written = io.BytesIO(mcap_bytes(replace(run, scenario_yaml=text)))
+    reader = make_reader(written, decoder_factories=[DecoderFactory()])
+    ((*_, world),) = reader.iter_decoded_messages(topics=["/world"])
+    corners = [[[point.x, point.y] for point in line.points] for line in world.entities[0].lines]
+    assert corners[1:] == [[[81000, 61000], [82000, 61000], [82000, 62000], [81000, 61000]], [*hole, hole[0]]]
+
+
 def test_a_plan_with_a_ground_takes_off_and_lands(export: Export, run: Run) -> None:
     loader = mavwp.MAVWPLoader()
     loader.load(export("waypoints", "flown", "--ground-m", "120"))
@@ -318,6 +334,27 @@ def test_fences_of_a_plan_are_the_area_and_what_stands_in_it(export: Export, run
     assert circle["circle"]["radius"] == 400.0
     (centre,) = in_plane(run, *([value] for value in circle["circle"]["center"]))
     assert centre == pytest.approx([83500.0, 63600.0], abs=0.01)
+
+
+def test_fences_of_a_polygon_with_holes_leave_the_holes_free() -> None:
+    shell = [[500, 500], [5500, 500], [5500, 5500], [500, 5500]]
+    holes = [
+        [[700, 700], [3800, 700], [3800, 5300], [700, 5300]],
+        [[4000, 700], [5300, 800], [5300, 2500]],
+        [[4100, 3000], [5000, 3000], [4500, 5000]],
+    ]
+    scenario = parse_scenario(
+        "{schema: wayproof/scenario/1, name: a, area: {bounds_m: [0, 0, 6000, 6000]},"
+        f" obstacles: [{{polygon: {{vertices_m: {shell}, holes_m: {holes}}}}}],"
+        " mission: {start_m: [2000, 3000], goal_m: [3000, 1500]}}"
+    )
+    _, *fenced = fences(scenario, plane_of(scenario))["polygons"]
+    there = Transformer.from_crs("EPSG:4326", "+proj=aeqd +lat_0=47 +lon_0=8 +ellps=WGS84")
+    parts = [shapely.Polygon([there.transform(*place) for place in each["polygon"]]) for each in fenced]
+    assert [each["inclusion"] for each in fenced] == [False] * len(fenced)
+    solid = shapely.Polygon(shell, holes)
+    assert shapely.symmetric_difference(shapely.union_all(parts), solid).area < 2e-4 * solid.area
+    assert sum(part.area for part in parts) == pytest.approx(solid.area, rel=1e-4)
 
 
 def test_planned_path_goes_on_where_one_plan_takes_over_from_another(run: Run) -> None:
