@@ -166,7 +166,12 @@ def loaded_file(path: Path, kind: str | None, reading: Reading) -> Contents:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
-    return _loaded(path.absolute(), kind, reading, (stamp.st_size, stamp.st_mtime_ns))
+    return _loaded(_plainly(path), kind, reading, (stamp.st_size, stamp.st_mtime_ns))
+
+
+def _plainly(path: Path) -> Path:
+    """The same file by the same path, however its folder is written; of a link the name is kept."""
+    return path.parent.resolve() / path.name
 
 
 @lru_cache(maxsize=4)
@@ -294,7 +299,7 @@ def _cut(
     else:
         notes.append(f"nothing of it is solid in the area between {band.low_m:g} and {band.high_m:g} m")
     heights = _heights(final, solids, None if contents.terrain is None else band.low_m)
-    digest = _digest(spec.path.absolute(), (stamp.st_size, stamp.st_mtime_ns))
+    digest = _digest(_plainly(spec.path), (stamp.st_size, stamp.st_mtime_ns))
     return Source(spec, contents.kind, digest, tuple(final), tuple(heights), tuple(notes))
 
 

@@ -262,7 +262,9 @@ def _with_rasterio(path: Path, reading: Reading) -> Contents | WorldFileError | 
                     f"has {source.count} bands or a palette, an image; must have one band, of heights"
                 )
             band = source.read(1, masked=True)
-            values = np.ma.filled(band.astype(np.float64), np.nan)
+            values = band.data.astype(np.float64)
+            values[np.ma.getmaskarray(band)] = np.nan
+            del band
             system = source.crs or source.gcps[1]
             crs = reading.crs or (system.to_wkt() if system else None)
             if crs is None:

@@ -911,3 +911,13 @@ def test_heights_of_a_city_are_in_the_unit_of_its_system(
     (part,) = found.parts
     assert (part.bottom.height_m, part.top.height_m) == pytest.approx((10 * unit_m, 40 * unit_m))
     assert found.notes == (*((note,) if note else ()), "passed over: 1 GeometryInstance")
+
+
+def test_a_file_is_read_once_however_its_folder_is_written(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    path = geojson(tmp_path / "a.geojson", feature({}))
+    again = tmp_path / "out" / ".." / "a.geojson"
+    assert loaded_file(again, None, Reading()) is loaded_file(path, None, Reading())
+    link = tmp_path / "N47E008.geojson"
+    link.symlink_to(path)
+    assert loaded_file(link, None, Reading()) is not loaded_file(path, None, Reading())
