@@ -78,6 +78,7 @@ def run_html(
     legs: Sequence[Mapping[str, Any]],
     checked: Mapping[str, Any] | None,
     *,
+    moments: Mapping[str, float],
     aircraft: str,
     scenario_yaml: str,
     command: str,
@@ -91,6 +92,7 @@ def run_html(
         chapter: with one row, and the figures of the path and of its profiles.
         legs: `trackability` of `metrics.json`.
         checked: `metrics.json` of a path that was given; None where a planner made the path.
+        moments: when figures came about, by `Figure.short` (`harness.analysis.moments`).
         aircraft: its name.
         scenario_yaml: the scenario as flown.
         command: the command line that flew it.
@@ -106,6 +108,7 @@ def run_html(
         legs=legs,
         lost=[leg for leg in legs if not leg["trackable"]],
         checked=checked,
+        moments=moments,
         aircraft=aircraft,
         scenario_yaml=scenario_yaml,
         command=command,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
+from harness.analysis.moments import moments
 from harness.analysis.rows import escaped, to_csv, to_markdown
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
@@ -49,6 +50,9 @@ def _written(run: Run, folder: Path) -> Path:
         run_chapter(scenario, flight, optimum),
         run.metrics["trackability"],
         run.metrics if "check" in run.metrics else None,
+        moments=moments(
+            run.track, scenario.planner.clearance_m or 0.0, run.metrics["bank_saturation_fraction"] > 0.0
+        ),
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
         command=command,
