@@ -94,7 +94,8 @@ class Extreme:
         value: the figure: the largest of all runs, of clearance the least.
         following: the same of the run that comes next; None where only one run has the figure.
         median: of all runs that have one.
-        apart: whether the figure is far from that of every other run: by the factor `APART`.
+        apart: whether the figure is far from that of every other run, by the factor `APART`, or it alone came nearer
+            to an obstacle than was wanted.
     """
 
     figure: str
@@ -123,8 +124,9 @@ def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
     if least is not None:
         following = None if least.following is None else -least.following
         least = replace(least, value=-least.value, following=following, median=-least.median)
+        least = replace(least, apart=following is not None and least.value < 1.0 <= following)
     found = (least, *(_extreme(runs, label, values) for label, values in figures.items()))
-    marked = [replace(each, apart=_is_apart(each)) for each in found if each is not None]
+    marked = [replace(each, apart=each.apart or _is_apart(each)) for each in found if each is not None]
     return tuple(sorted(marked, key=lambda each: not each.apart))
 
 

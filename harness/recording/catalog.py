@@ -46,7 +46,7 @@ COLUMNS: Final = {
     "bank_saturation_percent": "bank at limit, %",
     "plan_delay_max_s": "plan delay max, s",
     "navigation_jump_m": "navigation jump, m",
-    "lost_returns_max_percent": "returns lost, %",
+    "lost_returns_max_percent": "returns lost, worst scan, %",
     "trackable": "trackable",
     "causes": "causes",
     "wind_mps": "wind, m/s",
