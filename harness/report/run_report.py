@@ -44,7 +44,7 @@ def _written(run: Run, folder: Path) -> Path:
     if not isinstance(line, str):
         raise TypeError(f"command: must be text; got {type(line).__name__}")
     _, *arguments = shlex.split(line)
-    command = shlex.join(["wayproof", *arguments])
+    command = shlex.join(["wayproof", *_found_again(arguments, folder)])
     versions = {name: version for name, version in manifest["versions"].items() if version}
     text = run_html(
         run_chapter(scenario, flight, optimum),
@@ -67,3 +67,13 @@ def _written(run: Run, folder: Path) -> Path:
     page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
     replace_text(page, text)
     return page
+
+
+def _found_again(arguments: list[str], folder: Path) -> list[str]:
+    """The arguments of a command, with the table that a run came from where it lies now: campaigns are moved."""
+    found = list(arguments)
+    for place in [place for place, each in enumerate(arguments[:-1], 1) if each == "--from"]:
+        before, now = Path(arguments[place]), folder.resolve().parent.parent / Path(arguments[place]).name
+        if not before.exists() and now.is_file():
+            found[place] = str(now)
+    return found
