@@ -80,8 +80,10 @@ def changed(given: Given, keys: Mapping[str, Any]) -> Node:
         keys: values by key path; None takes a key away.
 
     Raises:
-        InputError: one is not a key path, or leads nowhere.
+        InputError: it is no mapping, or one is not a key path, or leads nowhere.
     """
+    if not isinstance(keys, Mapping) or not all(isinstance(name, str) for name in keys):
+        raise InputError('with_: must be given a mapping of key paths, such as {"planner.clearance_m": 60}')
     plain = {name.removesuffix("_"): _plain(value) for name, value in given.sections.items()}
     root = node_of(plain, IN_PYTHON)
     for name, value in keys.items():

@@ -554,9 +554,11 @@ def test_defaults_of_a_changed_scenario_follow_the_changed_keys() -> None:
         ({"a..b": 1}, "with_: 'a..b' is not a key path"),
         ({"name.inner": 1}, "with_: name.inner: no such key"),
         ({"seed": math.nan}, "with_: seed: "),
+        ({1: 2}, "with_: must be given a mapping of key paths"),
+        ([("seed", 2)], "with_: must be given a mapping of key paths"),
     ],
 )
-def test_a_wrong_key_of_a_changed_scenario_is_told(keys: dict[str, Any], said: str) -> None:
+def test_a_wrong_key_of_a_changed_scenario_is_told(keys: Any, said: str) -> None:
     with pytest.raises(InputError, match=f"^{re.escape(said)}"):
         load_scenario("aerosonde_forest").with_(keys)
 
