@@ -75,6 +75,7 @@ def figures(scene: Scene, metrics: Mapping[str, Any]) -> dict[str, str]:
         else f"no: {', '.join(dict.fromkeys(causes)) or 'no plan'}",
         "cross-track p95, max": f"{_text(cross['p95'], 2)} m, {_text(cross['max'], 2)} m",
         **_navigation(metrics),
+        **_late_and_lost(metrics),
         "altitude p95, max": f"{_text(altitude['p95'], 2)} m, {_text(altitude['max'], 2)} m",
         "bank at its limit": f"{100 * metrics['bank_saturation_fraction']:.1f} % of the time",
         "flown": f"{_text(metrics['flown_length_m'], 0)} m in {_text(metrics['flight_time_s'], 0)} s",
@@ -96,6 +97,17 @@ def _navigation(metrics: Mapping[str, Any]) -> dict[str, str]:
         "navigation error p95, max": f"{_text(error['p95'], 2)} m, {_text(error['max'], 2)} m",
         "planned for it": margin,
     }
+
+
+def _late_and_lost(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """How late plans took effect and what the sensor lost, where there was either."""
+    delay_s, lost = metrics["plan_delay_s"]["max"], metrics["lost_returns"]
+    found = {}
+    if delay_s:
+        found["plan delay max"] = f"{delay_s:.1f} s"
+    if lost["share"]:
+        found["returns lost, worst scan"] = f"{100 * lost['share']:.1f} %, {100 * lost['max']:.1f} %"
+    return found
 
 
 def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:

@@ -437,6 +437,23 @@ def test_the_summary_of_a_given_path_leads_with_the_verdict(recording: tuple[Pat
     assert "as given" not in summary(SCENE, metrics(recording[1], LIMITS))
 
 
+def test_the_summary_says_how_late_plans_were_and_what_the_sensor_lost(
+    recording: tuple[Path, Flight],
+) -> None:
+    figures = metrics(recording[1], LIMITS) | {
+        "plan_delay_s": {"p50": 0.2, "p99": 2.9, "max": 3.0},
+        "lost_returns": {"share": 0.348, "max": 0.446},
+    }
+    page = summary(SCENE, figures)
+    assert "| plan delay max | 3.0 s |" in page
+    assert "| returns lost, worst scan | 34.8 %, 44.6 % |" in page
+    figures |= {
+        "plan_delay_s": dict.fromkeys(("p50", "p99", "max")),
+        "lost_returns": {"share": None, "max": None},
+    }
+    assert not any(name in summary(SCENE, figures) for name in ("plan delay", "returns lost"))
+
+
 def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     (centre,) = column(entities, "/world/true_obstacles/circles", "centers")[0]
