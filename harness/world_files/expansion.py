@@ -12,11 +12,12 @@ from typing import Any, Final
 import numpy as np
 
 from harness.files.input_file import open_regular
+from harness.files.wording import counted
 from harness.world_files import kinds
 from harness.world_files.bounded import uncollected
 from harness.world_files.growing import simplified
 from harness.world_files.height_field import HeightField
-from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError, counted
+from harness.world_files.parts import Contents, FloatArray, Raster, Reading, WorldFileError
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.slicing import Box, HeightBand, KnownGround, Solid, sliced_cells, sliced_parts
 from harness.world_files.terrain import height_field

@@ -141,8 +141,3 @@ class Reading:
     metres_per_cell: float | None = None
     crs: str | None = None
     default_height_m: float = 2 * LEVEL_M
-
-
-def counted(number: int, what: str) -> str:
-    """`1 part`, `2 parts`."""
-    return f"{number:,} {what}{'' if number == 1 else 's'}"

@@ -12,18 +12,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from harness.files.wording import counted
 from harness.world_files.cells import outlines
 from harness.world_files.height_field import HeightField
-from harness.world_files.parts import (
-    BoolArray,
-    Datum,
-    FloatArray,
-    Limit,
-    Part,
-    Raster,
-    WorldFileError,
-    counted,
-)
+from harness.world_files.parts import BoolArray, Datum, FloatArray, Limit, Part, Raster, WorldFileError
 from harness.world_files.plane import Mapping
 
 LONGEST_EDGE_CELLS: Final = 64

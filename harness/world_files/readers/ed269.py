@@ -5,18 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+from harness.files.wording import counted
 from harness.world_files.bounded import json_of
-from harness.world_files.parts import (
-    NO_BOTTOM,
-    NO_TOP,
-    WGS84,
-    Contents,
-    Limit,
-    Part,
-    Reading,
-    WorldFileError,
-    counted,
-)
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading, WorldFileError
 from harness.world_files.readers import limits, rings
 from harness.world_files.readers.geo_json import FREE, footprint_of, places_of, radius_of, zone_limit
 

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from harness.files.fence_commands import CIRCLES, CORNERS, HOME_CIRCLE, RALLY_POINT, inside_all
+from harness.files.wording import counted
 from harness.world_files.bounded import json_of, read_bytes, text_of
-from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError, counted
+from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
 from harness.world_files.readers import rings
 
 WAYPOINT: Final = 16

@@ -13,8 +13,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, xml_events
-from harness.world_files.parts import Contents, FloatArray, Part, Reading, WorldFileError, counted
+from harness.world_files.parts import Contents, FloatArray, Part, Reading, WorldFileError
 
 BARN_CELL_M: Final = 0.15
 """Side of a cell of the BARN worlds: the diameter of their cylinders (Perille et al. 2020)."""

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import (
     FOOT_M,
@@ -23,7 +24,6 @@ from harness.world_files.parts import (
     Part,
     Reading,
     WorldFileError,
-    counted,
 )
 from harness.world_files.plane import in_degrees
 from harness.world_files.readers import limits, rings

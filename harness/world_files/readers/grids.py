@@ -46,6 +46,9 @@ def read_ascii(path: Path, reading: Reading) -> Contents:
         raise WorldFileError(
             f"has no {' and '.join(missing) or 'positive cellsize'}; must be an ESRI ASCII grid"
         )
+    for name in ("ncols", "nrows"):
+        if not keys[name].is_integer():
+            raise WorldFileError(f"has {name} {keys[name]:g}; must be a whole number")
     columns, rows = int(keys["ncols"]), int(keys["nrows"])
     check_cells(rows, columns)
     try:

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, unzipped, xml_events
 from harness.world_files.parts import (
     NO_BOTTOM,
@@ -26,7 +27,6 @@ from harness.world_files.parts import (
     Part,
     Reading,
     WorldFileError,
-    counted,
 )
 from harness.world_files.readers import limits, rings
 

@@ -12,18 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, text_of
-from harness.world_files.parts import (
-    NO_BOTTOM,
-    NO_TOP,
-    WGS84,
-    Contents,
-    Limit,
-    Part,
-    Reading,
-    WorldFileError,
-    counted,
-)
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading, WorldFileError
 from harness.world_files.readers import limits, rings
 from harness.world_files.readers.rings import NAUTICAL_MILE_M, Place
 

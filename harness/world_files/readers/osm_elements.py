@@ -14,16 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.world_files.parts import (
-    WGS84,
-    BoolArray,
-    Contents,
-    FloatArray,
-    Part,
-    Reading,
-    WorldFileError,
-    counted,
-)
+from harness.files.wording import counted
+from harness.world_files.parts import WGS84, BoolArray, Contents, FloatArray, Part, Reading, WorldFileError
 from harness.world_files.readers import limits, rings
 
 AREAS: Final = ("building", "building:part", "man_made")

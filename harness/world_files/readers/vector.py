@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.files.wording import counted
 from harness.world_files.bounded import MAX_BYTES
-from harness.world_files.parts import Contents, Part, Reading, WorldFileError, counted
+from harness.world_files.parts import Contents, Part, Reading, WorldFileError
 from harness.world_files.plane import in_degrees
 from harness.world_files.readers import limits, rings
 

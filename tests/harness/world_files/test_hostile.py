@@ -100,6 +100,14 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
         "must have at most 60,000,000",
     ),
     "a grid without size": (text("a.asc", "ncols 2\nnrows 2\n1 2 3 4\n"), "positive cellsize"),
+    "a grid of columns and a half": (
+        text("a.asc", "ncols 2.5\nnrows 2\ncellsize 9\n1 2 3 4\n"),
+        "has ncols 2.5; must be a whole number",
+    ),
+    "a grid without end": (
+        text("a.asc", "ncols inf\nnrows 2\ncellsize 9\n1 2 3 4\n"),
+        "has ncols inf; must be a whole number",
+    ),
     "a grid of nothing": (text("a.asc", GRID + "-9999 " * 4), "has no cell with a height"),
     "a pickle": (
         lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([{}], dtype=object))),
