@@ -15,7 +15,7 @@ from harness.cli.options import (
     chosen,
     flag,
     print_json,
-    setting,
+    settings_of,
     tell_interrupted,
     told_apart,
 )
@@ -121,10 +121,11 @@ def check(
         "environment": _given(wind=_wind(wind), turbulence=_turbulence(turbulence)),
     }
     overrides = chosen(seed=seed, guidance=guidance)
+    replaced = settings_of(settings, [*overrides, *chosen(aircraft=aircraft)])
     check = asked(
         given,
         sections,
-        [*overrides, *map(setting, settings or [])],
+        [*overrides, *replaced],
         world=world,
         altitude_m=altitude_m,
         corner_m=corner_m,
@@ -145,7 +146,7 @@ def check(
         "polygons": polygons,
     }
     differs = [(name, str(value)) for name, value in {**numbers, **words}.items() if value is not None]
-    apart = told_apart([*differs, *map(setting, settings or ())], named=())
+    apart = told_apart([*differs, *replaced], named=())
     folder = out or Path("runs") / "check" / f"{check.scenario.name}-{Path(aircraft).name}{apart}"
     flown = _fly(check, folder, recording=not no_recording, silent=quiet)
     if as_json:

@@ -21,7 +21,7 @@ from harness.cli.options import (
     chosen,
     load,
     print_json,
-    setting,
+    settings_of,
     told_apart,
 )
 from harness.cli.standard_output import say
@@ -84,7 +84,8 @@ def falsify(
     if not 0.0 < tolerance < 1.0:
         raise typer.BadParameter(f"is {tolerance:g}; must be between 0 and 1", param_hint="--tolerance")
     ranges = [range_of(text) for text in vary]
-    fixed = [*chosen(planner, aircraft, seed), *map(setting, settings or ())]
+    options = chosen(planner, aircraft, seed)
+    fixed = [*options, *settings_of(settings, options)]
     return _search(
         scenario, fixed, ranges, until, runs or RUNS_A_KEY * len(ranges), seeds, tolerance, out, as_json
     )

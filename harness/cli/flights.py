@@ -24,7 +24,7 @@ from harness.cli.options import (
     law_kind,
     load,
     print_json,
-    setting,
+    settings_of,
     straight_m,
     tell_interrupted,
     told_apart,
@@ -94,7 +94,8 @@ def fly(
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
     watch = Watch(live, web, viewer, speed, mavlink, beyond_this_machine)
     watch.check()
-    replaced = [*chosen(guidance=guidance), *map(setting, settings or ())]
+    options = chosen(planner, aircraft, seed, guidance)
+    replaced = [*chosen(guidance=guidance), *settings_of(settings, options)]
     given = [*chosen(planner, aircraft, seed), *replaced]
     loaded, digest = _asked(scenario, results, run, given)
     if results is not None:

@@ -187,12 +187,33 @@ def _kind(text: str, part: LoopPart, option: str) -> str:
         raise typer.BadParameter(str(error), param_hint=option) from error
 
 
-def setting(text: str) -> tuple[str, str]:
+def _setting(text: str) -> tuple[str, str]:
     """KEY.PATH=VALUE as its two parts."""
     name, equals, value = text.partition("=")
     if not equals:
         raise typer.BadParameter(f"{text[:60]!r} is not KEY.PATH=VALUE", param_hint="--set")
     return name.strip(), value
+
+
+def settings_of(texts: Sequence[str] | None, options: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """What --set replaces, beside what other options do.
+
+    Args:
+        texts: KEY.PATH=VALUE, each.
+        options: key paths and values of the other options.
+
+    Raises:
+        typer.BadParameter: one is no such text, or its key is given by another option with another value.
+    """
+    found = [_setting(text) for text in texts or ()]
+    for name, value in found:
+        for key, other in options:
+            if f"{key}.".startswith(f"{name}.") and value.strip() not in (other, other.strip('"')):
+                raise typer.BadParameter(
+                    f"{name}={value[:60]} beside an option that gives {key} as {other}; leave one of them out",
+                    param_hint="--set",
+                )
+    return found
 
 
 def straight_m(scenario: Scenario) -> float:

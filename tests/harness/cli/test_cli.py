@@ -210,6 +210,14 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
         (["fly", "paper_circles", "--aircraft", "T38"], "T38 cannot hold 25 m/s"),
         (["fly", "paper_circles", "--set", "seed"], "'seed' is not KEY.PATH=VALUE"),
         (["fly", "paper_circles", "--set", "sensor.rnge_m=3"], "did you mean range_m?"),
+        (
+            ["fly", "paper_circles", "--seed", "5", "--set", "seed=4"],
+            "seed=4 beside an option that gives seed as 5; leave one of them out",
+        ),
+        (
+            ["falsify", "paper_circles", "--vary", "seed=1:2", "--planner", "bug2", "--set", "planner={}"],
+            'planner={} beside an option that gives planner.kind as "bug2"',
+        ),
         (["fly", "paper_circles", "--view", "--no-recording"], "nothing to view with --no-recording"),
         (["fly", "paper_circle"], "no such file; give a scenario file or one of aerosonde_forest"),
         (["fly", "one", "two"], "two"),
