@@ -22,7 +22,7 @@ def test_every_aircraft_reaches_the_goal_at_the_clearance(name: str, law: str) -
 def test_a_range_that_is_too_short_is_refused_with_the_one_that_is_needed() -> None:
     flight = flown("T38", "preview", wind_share=0.0, seed=1, range_radii=2.5)
     assert (flight.outcome, flight.good) == ("refused", False)
-    assert re.search(r"no safe turn could be seen ahead: at least \d+ is needed", flight.reason)
+    assert re.search(r"must be at least \d+, to see room for a safe turn ahead", flight.reason)
 
 
 def test_worlds_are_the_same_in_turn_radii() -> None:

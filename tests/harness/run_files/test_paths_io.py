@@ -369,10 +369,12 @@ def test_a_number_near_the_largest_is_too_far(tmp_path: Path) -> None:
         read_path(path)
 
 
-@pytest.mark.parametrize("name", ["missing.csv", "folder.csv"])
-def test_says_what_cannot_be_read(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "sentence"), [("missing.csv", "no such file; give"), ("folder.csv", "cannot be read")]
+)
+def test_says_what_cannot_be_read(name: str, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match=sentence):
         read_path(tmp_path / name)
 
 
