@@ -68,7 +68,9 @@ def run_claims(folder: Path) -> bool:
     try:
         load_run(folder)
     except RunFolderError as error:
-        return not ("incomplete" in str(error) or "not a run folder" in str(error))
+        return not any(
+            word in str(error) for word in ("is incomplete", "is not a run folder", "no such folder")
+        )
     return True
 
 
