@@ -57,7 +57,7 @@ def test_planners_and_guidance_are_listed_with_their_keys_and_defaults(
     for what, kinds in every.items():
         assert main(["list", what]) == 0
         lines = capsys.readouterr().out.splitlines()
-        assert [line.partition(":")[0] for line in lines if line[0] != " "] == list(kinds)
+        assert [line.partition(": ")[0] for line in lines if line[0] != " "] == list(kinds)
         told = [line.split()[0] for line in lines if line.startswith("  ") and " = " in line]
         assert told[0] == fields(next(iter(kinds.values())).config)[0].name
         assert len(told) == sum(len(fields(kind.config)) for kind in kinds.values())
