@@ -310,6 +310,8 @@ def _with_folder(root: Node, loc: Loc, folder: Path) -> Node:
 def _with_world_files(node: Node, folder: Path, keys: str = "") -> Node:
     """Keys with every `file.path` of an obstacle that lies beside their file given from the root of the file system on.
 
+    Circles and polygons are passed over: there may be thousands of them, and they have no file.
+
     Args:
         node: the keys of a scenario or a campaign, or a part of them.
         folder: of their file.

@@ -173,7 +173,7 @@ def unzipped(data: bytes, suffixes: tuple[str, ...], most: int) -> tuple[str, by
     """Name and bytes of the first file with one of these suffixes in a ZIP archive.
 
     Raises:
-        WorldFileError: there is none, it is damaged, or it unpacks to more than `most` bytes.
+        WorldFileError: there is none, it is damaged or encrypted, or it unpacks to more than `most` bytes.
     """
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
@@ -186,6 +186,9 @@ def unzipped(data: bytes, suffixes: tuple[str, ...], most: int) -> tuple[str, by
                             f"unpacks to more than {most // 10**6} MB; must be one {' or '.join(suffixes)} file"
                         )
                     return Path(info.filename).name, inner
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError) as error:
+    except RuntimeError as error:  # it wants a password, or is of a method that zipfile does not know
+        why = " ".join(str(error).split())[:120]
+        raise WorldFileError(f"is a ZIP archive that cannot be unpacked ({why}); unpack it first") from error
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError) as error:
         raise WorldFileError("is a damaged ZIP archive; get it again") from error
     raise WorldFileError(f"is a ZIP archive without a {' or '.join(suffixes)} file")

@@ -46,6 +46,18 @@ def _zip_bomb(folder: Path) -> Path:
     return path
 
 
+def _locked_zip(folder: Path) -> Path:
+    """An archive that says of its file that it needs a password."""
+    path = folder / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("N46E009.hgt", bytes(100))
+    content = bytearray(path.read_bytes())
+    for mark, flags in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(mark) + flags] |= 1
+    path.write_bytes(content)
+    return path
+
+
 def _torn_tiff(folder: Path) -> Path:
     path = geotiff(folder / "a.tif", np.ones((200, 200)), (0.0, 0.0), 10.0, 32632)
     path.write_bytes(path.read_bytes()[:5000])
@@ -86,6 +98,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     ),
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
     "a torn ZIP": (data("a.zip", b"PK\x03\x04" + bytes(30)), "is a damaged ZIP archive"),
+    "a ZIP with a password": (_locked_zip, "password required for extraction.; unpack it first"),
     "a ZIP of something": (
         lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
         "is a ZIP archive with 'readme.txt'",
