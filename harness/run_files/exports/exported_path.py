@@ -41,6 +41,7 @@ class ExportedPath:
         longitude_deg: (n,).
         altitude_m: (n,) above mean sea level.
         points_m: (n, 2) east, north in the local plane.
+        plane: the local plane.
         time_s: (n,) simulated time at which the aircraft was there, or followed the plan there.
         started: date and time of `time_s` 0.
         attributes: columns of the track by name, (n,) each; empty for a planned path.
@@ -55,6 +56,7 @@ class ExportedPath:
     longitude_deg: FloatArray
     altitude_m: FloatArray
     points_m: FloatArray
+    plane: LocalPlane
     time_s: FloatArray
     started: datetime
     attributes: dict[str, FloatArray]
@@ -95,7 +97,8 @@ def path_of(run: Run, what: str, tolerance_m: float) -> ExportedPath:
         rows = np.arange(len(track))
     kept = _simplified(places, tolerance_m)
     places, rows = places[kept], rows[kept]
-    degrees = geodetic(plane_of(scenario), places[:, :2])
+    plane = plane_of(scenario)
+    degrees = geodetic(plane, places[:, :2])
     curvature = max((plan.max_curvature_1pm for plan in run.plans), default=0.0)
     return ExportedPath(
         name=scenario.name,
@@ -104,6 +107,7 @@ def path_of(run: Run, what: str, tolerance_m: float) -> ExportedPath:
         longitude_deg=degrees[:, 1],
         altitude_m=places[:, 2],
         points_m=places[:, :2],
+        plane=plane,
         time_s=track.time_s[rows],
         started=datetime.fromisoformat(str(run.manifest["started_utc"])),
         attributes={}

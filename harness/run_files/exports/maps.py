@@ -7,6 +7,7 @@ import math
 from typing import Any, Final
 from xml.etree import ElementTree
 
+from harness.run_files.exports.antimeridian import pieces
 from harness.run_files.exports.exported_path import ExportedPath
 
 LINE_COLOURS: Final = {"flown": "ff40b3ff", "planned": "ffffc440"}
@@ -35,31 +36,40 @@ def dates(path: ExportedPath) -> list[str]:
 
 
 def geojson_text(path: ExportedPath) -> str:
-    """A feature after RFC 7946, its altitudes above mean sea level.
+    """A feature after RFC 7946, its altitudes above mean sea level: a LineString, several where it crosses 180 degrees.
 
-    Figures of single points are lists in `coordinateProperties`, `times` among them, as Mapbox's togeojson has it.
+    Figures of single points are lists in `coordinateProperties`, `times` among them, as Mapbox's togeojson has it: of
+    several LineStrings a list each.
     """
-    attributes = {
-        name: [_number(value) for value in column.tolist()] for name, column in path.attributes.items()
-    }
+    parts = pieces(path)
+    lines = [[[longitude, latitude, up] for latitude, longitude, up in places(part)] for part in parts]
+    figures = [_figures(part) for part in parts]
+    whole = len(parts) == 1
     feature = {
         "type": "Feature",
         "properties": {
             "name": path.name,
             "what": path.what,
             "airspeed_mps": path.airspeed_mps,
-            "coordinateProperties": {
-                "times": dates(path),
-                "time_s": [round(time, 3) for time in path.time_s.tolist()],
-                **attributes,
-            },
+            "coordinateProperties": figures[0]
+            if whole
+            else {name: [each[name] for each in figures] for name in figures[0]},
         },
         "geometry": {
-            "type": "LineString",
-            "coordinates": [[longitude, latitude, up] for latitude, longitude, up in places(path)],
+            "type": "LineString" if whole else "MultiLineString",
+            "coordinates": lines[0] if whole else lines,
         },
     }
     return json.dumps({"type": "FeatureCollection", "features": [feature]}) + "\n"
+
+
+def _figures(path: ExportedPath) -> dict[str, list[Any]]:
+    """A list for each figure, a value a point."""
+    return {
+        "times": dates(path),
+        "time_s": [round(time, 3) for time in path.time_s.tolist()],
+        **{name: [_number(value) for value in column.tolist()] for name, column in path.attributes.items()},
+    }
 
 
 def _number(value: float) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import json
 import math
 import re
@@ -28,12 +29,14 @@ from pymavlink import mavwp
 from pyproj import CRS, Geod, Transformer
 from scipy.spatial.transform import Rotation
 
+from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.flight.record import FloatArray
 from harness.run_files.exports.export import FORMATS
 from harness.run_files.exports.exported_path import plane_of, planned_points
 from harness.run_files.exports.missions import fences
 from harness.run_files.exports.recordings import mcap_bytes
+from harness.run_files.path_files import PathAsGiven, read_path
 from harness.run_files.run_folder import Run, load_run
 from harness.scenario.scenario import parse_scenario
 from harness.scenario.sections import Origin
@@ -498,3 +501,79 @@ def test_a_file_that_cannot_be_written_is_named(
     out = tmp_path / "nowhere" / "a.kml"
     assert main(["export", str(run.folder), "--format", "kml", "--out", str(out)]) == 2
     assert str(out) in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def crossing(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A flight from 1.5 km west of 180 degrees to 1.5 km east of it, round an obstacle that lies on it."""
+    folder = tmp_path_factory.mktemp("crossing")
+    (folder / "w.yaml").write_text(
+        "schema: wayproof/scenario/1\nname: taveuni\n"
+        "area: {bounds_m: [-2500, -2000, 2500, 2000], origin: {latitude_deg: -16.8, longitude_deg: 180.0}}\n"
+        "obstacles: [{circle: {center_m: [0, 100], radius_m: 500}}]\n"
+        "mission: {start_m: [-1500, 0], goal_m: [1500, 0]}\n"
+    )
+    assert (
+        main(["fly", str(folder / "w.yaml"), "--out", str(folder / "run"), "--no-recording", "--quiet"]) == 0
+    )
+    return load_run(folder / "run")
+
+
+@pytest.mark.parametrize("what", ["flown", "planned"])
+def test_geojson_is_cut_at_180_degrees(what: str, crossing: Run, tmp_path: Path) -> None:
+    """RFC 7946, section 3.1.9. No part crosses, the parts meet there, and `check` flies them as one path."""
+    out = tmp_path / "path.geojson"
+    assert (
+        main(["export", str(crossing.folder), "--format", "geojson", "--what", what, "--out", str(out)]) == 0
+    )
+    (feature,) = geojson.loads(out.read_text()).features
+    assert feature.is_valid
+    parts = shapely.geometry.shape(feature.geometry).geoms
+    assert [part.bounds[0] > 0.0 for part in parts] == [True, False]
+    for part in parts:
+        assert part.bounds[2] - part.bounds[0] < 0.03
+    (west, east) = feature.geometry.coordinates
+    assert (west[-1][0], east[0][0]) == (180.0, -180.0)
+    assert west[-1][1:] == east[0][1:]
+    longitude, latitude, _ = zip(*west, *east, strict=True)
+    assert_same_line(in_plane(crossing, list(latitude), list(longitude)), line_of(crossing, what))
+    for name, figures in feature.properties["coordinateProperties"].items():
+        assert [len(each) for each in figures] == [len(west), len(east)], name
+        assert figures[0][-1] == figures[1][0], name
+    times = list(itertools.chain(*feature.properties["coordinateProperties"]["time_s"]))
+    assert times == sorted(times)
+    read = read_path(out)
+    assert len(read.points_m) == len(longitude) - 1
+    assert_same_line(
+        in_plane(
+            crossing,
+            *np.transpose([plane_of_path(read).geodetic(*p) for p in read.points_m.tolist()]).tolist(),
+        ),
+        line_of(crossing, what),
+    )
+
+
+@pytest.mark.parametrize("form", ["kml", "gpx", "csv", "plan", "waypoints"])
+def test_longitudes_are_within_half_a_turn(form: str, crossing: Run, tmp_path: Path) -> None:
+    out = tmp_path / f"path.{form}"
+    assert main(["export", str(crossing.folder), "--format", form, "--out", str(out)]) == 0
+    read = read_path(out)
+    assert_same_line(
+        in_plane(
+            crossing,
+            *np.transpose([plane_of_path(read).geodetic(*p) for p in read.points_m.tolist()]).tolist(),
+        )
+        if read.origin_deg is not None
+        else read.points_m,
+        line_of(crossing, "flown"),
+    )
+    numbers = re.findall(r"-?1[78]\d\.\d{6,}", out.read_text())
+    assert len(numbers) > 10
+    assert {float(number) > 0.0 for number in numbers} == {True, False}
+    assert max(abs(float(number)) for number in numbers) <= 180.0
+
+
+def plane_of_path(path: PathAsGiven) -> LocalPlane:
+    """The plane of a path in degrees."""
+    assert path.origin_deg is not None
+    return LocalPlane(*path.origin_deg)
