@@ -125,7 +125,7 @@ class ClosedLoop:
         self._measured_index = -1
         self._law_error: str | None = None
         self._scans_on_their_way: deque[RangeScan] = deque()
-        self._jumps = 0
+        self._jumps, self._had_fix = 0, True
         scan_rate_hz = loop.scan_rate_hz if loop.sensor else 0.0
         timetable = intervals(loop.model.step_rate_hz, scan_rate_hz)
         self._intervals, self._first_steps = itertools.cycle(timetable), timetable[0][0].steps
@@ -178,13 +178,23 @@ class ClosedLoop:
         """What the aircraft believes it to be."""
         if self._loop.navigator.jumps != self._jumps:
             self._jump()
+        if self._had_fix and not self._loop.navigator.has_fix:
+            self._lose_fix()
+
+    def _lose_fix(self) -> None:
+        """Tells observers; that a fix is back is told as the jump that comes with it."""
+        self._had_fix = False
+        at_start = self.true.time_s == 0.0
+        told = f"no fix {'at the start' if at_start else 'any more'}: the believed position drifts"
+        for observer in self._observers:
+            observer.on_event(self.true.time_s, told if at_start else Caution(told))
 
     def _jump(self) -> None:
         """Forgets the map and scans on their way, all entered from elsewhere, after the believed position has jumped.
 
         The planner is asked with the next scan, and checks its plan against what that shows.
         """
-        self._jumps = self._loop.navigator.jumps
+        self._jumps, self._had_fix = self._loop.navigator.jumps, True
         self._scans_on_their_way.clear()
         self._loop.seen.start_over(self.true.time_s)
         for observer in self._observers:

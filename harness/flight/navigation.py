@@ -94,6 +94,11 @@ class Navigator:
         self._outage = -1
         self._fix_error, self._drift = np.zeros(2), np.zeros(2)
 
+    @property
+    def has_fix(self) -> bool:
+        """Whether there is a fix, as of the last call of `believed`."""
+        return self._outage < 0
+
     def believed(self, state: AircraftState) -> AircraftState:
         """What the aircraft believes where this is its true state.
 

@@ -15,6 +15,11 @@ class StateEstimator(Protocol):
     """Tells what the aircraft believes of its state. One object serves one flight."""
 
     @property
+    def has_fix(self) -> bool:
+        """Whether the position is that of a fix; without one it is reckoned, and drifts."""
+        ...
+
+    @property
     def jumps(self) -> int:
         """How often the believed position has jumped, which the aircraft notices: a fix came back after an outage."""
         ...
@@ -34,7 +39,7 @@ class StateEstimator(Protocol):
 class PerfectEstimator:
     """The aircraft knows its state exactly. Implements `StateEstimator`."""
 
-    jumps = 0
+    has_fix, jumps = True, 0
 
     def believed(self, state: AircraftState) -> AircraftState:
         """The state itself."""

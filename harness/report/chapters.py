@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from harness.analysis.planned import PlannedRows, planned_rows
 from harness.analysis.rows import Row, number, row_of
 from harness.files.errors import RunFolderError
+from harness.files.wording import counted
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
 from harness.scenario.performance import performance_of
@@ -21,6 +22,9 @@ from harness.world.world import World
 if TYPE_CHECKING:
     from harness.report.figures import DrawnRun, FigureScene
     from harness.report.page import Chapter, Picture
+
+MOST_OUTAGES: Final = 4
+"""Outages of navigation that are named in a report."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +107,8 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
             )
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
     rows = [each.row for each in entries]
-    return Chapter(scene.name, _facts(scene, optimum), rows, pictures, optimum.reason)
+    facts = _facts(scene, optimum) | without_fix(scenario, scenario.mission.time_limit_s)
+    return Chapter(scene.name, facts, rows, pictures, optimum.reason)
 
 
 def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) -> Chapter:
@@ -130,10 +135,30 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         _picture(folder / "path", path, caption),
         _picture(folder / "profiles", strips, PROFILES),
     ]
-    return Chapter(scene.name, _facts(scene, optimum), [flight.row], pictures, optimum.reason)
+    facts = _facts(scene, optimum) | without_fix(scenario, metrics["flight_time_s"])
+    return Chapter(scene.name, facts, [flight.row], pictures, optimum.reason)
 
 
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."
+
+
+def without_fix(scenario: Scenario, until_s: float) -> dict[str, str]:
+    """When there was no fix of the position, as a fact; nothing where there always was one.
+
+    Args:
+        scenario: what was flown.
+        until_s: when the flight ended, or would have to.
+    """
+    met = [
+        (begin_s, min(end_s, until_s))
+        for begin_s, end_s in scenario.navigation.outages_s
+        if begin_s < until_s
+    ]
+    if not met:
+        return {}
+    told = [f"{begin_s:.0f} to {end_s:.0f} s" for begin_s, end_s in met[:MOST_OUTAGES]]
+    more = f" and {counted(len(met) - MOST_OUTAGES, 'time')} more" if len(met) > MOST_OUTAGES else ""
+    return {"without a fix": ", ".join(told) + more}
 
 
 def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from aircraft.interface import AircraftState, Route
 from harness.analysis.metrics import metrics
 from harness.cli.terminal import flight_rows
 from harness.flight.closed_loop import Loop, fly
+from harness.flight.observer import Caution
 from harness.flight.record import BELIEVED_FIELDS, TRACK_FIELDS, Flight, Outcome, digest
 from harness.flight.state_estimator import PerfectEstimator
 from harness.mapping.sensed_map import SensedMap
@@ -22,6 +24,7 @@ from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run, tables
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, parse_scenario
+from harness.watching.onlooker import Onlooker
 from planner.interface import Plan, PlanRequest
 from tests.closed_loop.conftest import SmallWorld
 from tests.point_mass import PointMass
@@ -124,13 +127,61 @@ def test_the_plan_keeps_the_margin_from_the_border_of_the_area(scenario: Scenari
 class Jumping:
     """Believes to be 80 m to the east, until a fix comes at 30 s."""
 
-    jumps = 0
+    has_fix, jumps = True, 0
 
     def believed(self, state: AircraftState) -> AircraftState:
         if state.time_s >= 30.0:
             self.jumps = 1
             return state
         return state._replace(east_m=state.east_m + 80.0)
+
+
+class Told(Onlooker):
+    """Notes the events that tell of fixes."""
+
+    def __init__(self) -> None:
+        self.of_fixes: list[tuple[float, str, bool]] = []
+
+    def on_event(self, time_s: float, text: str) -> None:
+        if "fix" in text:
+            self.of_fixes.append((round(time_s, 3), text.partition(":")[0], isinstance(text, Caution)))
+
+
+@pytest.mark.parametrize(
+    ("navigation", "told"),
+    [
+        ({"kind": "gnss"}, []),
+        (
+            {"kind": "gnss", "outages_s": [[40.0, 60.0], [70.0, 80.0], [90.0, 1e4]]},
+            [
+                (40.0, "no fix any more", True),
+                (60.0, "a fix again", True),
+                (70.0, "no fix any more", True),
+                (80.0, "a fix again", True),
+                (90.0, "no fix any more", True),
+            ],
+        ),
+        # From one outage into the next between two looks at the state: the fix in between is told of too.
+        (
+            {"kind": "gnss", "outages_s": [[40.0, 60.01], [60.02, 70.0]]},
+            [
+                (40.0, "no fix any more", True),
+                (60.1, "a fix again", True),
+                (60.1, "no fix any more", True),
+                (70.0, "a fix again", True),
+            ],
+        ),
+        ({"kind": "dead_reckoning"}, [(0.0, "no fix at the start", False)]),
+    ],
+)
+def test_events_say_when_a_fix_is_lost_and_when_it_is_back(
+    navigation: dict[str, Any], told: list[tuple[float, str, bool]], small_world: SmallWorld
+) -> None:
+    scenario = small_world(TREE, navigation=navigation)
+    events = Told()
+    seen = fly(make_loop(scenario, PointMass), [events])
+    assert events.of_fixes == told
+    assert digest(seen.track) == digest(flown(scenario).track)
 
 
 class Watched:

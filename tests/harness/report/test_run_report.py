@@ -14,6 +14,7 @@ import pytest
 
 from harness.cli.app import main
 from harness.run_files.run_folder import REPORT_FILES, load_run
+from harness.scenario.scenario import dump_scenario, parse_scenario
 from tests.page import shown
 
 SCENARIO = """
@@ -48,6 +49,27 @@ def test_report_is_written_into_the_run_folder(run: Path) -> None:
     assert (row["outcome"], row["digest"]) == ("reached", metrics["digest"])
     assert float(row["flown_length_m"]) == metrics["flown_length_m"]
     assert "| outcome | reached |" in (run / "report.md").read_text()
+
+
+def test_it_says_when_there_was_no_fix(run: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "run"
+    shutil.copytree(run, copy)
+    scenario, perfect = copy / "scenario.yaml", parse_scenario((run / "scenario.yaml").read_text())
+    assert "without a fix" not in (run / "report.html").read_text()
+    for outages, told in (
+        ([[20, 50], [100.4, 9e3]], f"20 to 50 s, 100 to {load_run(run).metrics['flight_time_s']:.0f} s"),
+        ([[9e3, 9.1e3]], None),
+        (
+            [[t, t + 1] for t in range(0, 60, 10)],
+            "0 to 1 s, 10 to 11 s, 20 to 21 s, 30 to 31 s and 2 times more",
+        ),
+    ):
+        scenario.write_text(
+            dump_scenario(perfect.with_({"navigation": {"kind": "gnss", "outages_s": outages}}))
+        )
+        assert main(["report", str(copy)]) == 0
+        page = (copy / "report.html").read_text()
+        assert (f"<li>without a fix {told}</li>" in page) if told else "without a fix" not in page
 
 
 def test_a_near_miss_is_said_before_the_figures(run: Path, tmp_path: Path) -> None:
