@@ -11,14 +11,12 @@ from harness.world_files.parts import Contents, Reading, WorldFileError
 from harness.world_files.readers.osm_elements import (
     AREAS,
     FIRST_INLINE,
-    MULTIPOLYGON,
     POINTS,
     Collected,
     Elements,
-    Line,
-    Member,
     is_building,
 )
+from harness.world_files.readers.osm_relations import BUILDING, Line, Member, Relations
 
 MAX_BYTES: Final = 400_000_000
 MOST_NUMBER: Final = 1 << 62
@@ -58,8 +56,10 @@ class _Document:
             self._tags[attributes.get("k", "")] = attributes.get("v", "")
         elif tag == "member":
             self._finish_member()
-            if attributes.get("type") == "way":
-                self._members.append((_whole(tag, attributes, "ref"), attributes.get("role") == "inner"))
+            kind = attributes.get("type")
+            if kind in ("way", "relation"):
+                number = _whole(tag, attributes, "ref")
+                self._members.append(Member(number, attributes.get("role", ""), kind == "way"))
         elif tag in ("node", "way", "relation"):
             if self._kind:
                 self.finish()
@@ -83,7 +83,7 @@ class _Document:
     def _finish_member(self) -> None:
         """Overpass's `out geom` gives the line of a way as a member of a relation."""
         if self._members and self._refs:
-            self.elements.way(self._members[-1][0], self._refs, {})
+            self.elements.way(self._members[-1].number, self._refs, {})
         self._refs = []
 
     def _place_of_way(self, attributes: dict[str, str]) -> None:
@@ -149,12 +149,14 @@ def read_json(path: Path, reading: Reading) -> Contents:
             elif kind == "way":
                 found.way(int(each["id"]), refs_of(each), tags)
             elif kind == "relation":
-                members = [m for m in each.get("members") or () if m.get("type") == "way"]
+                members = [m for m in each.get("members") or () if m.get("type") in ("way", "relation")]
                 for member in members:
                     if member.get("geometry"):
                         found.way(int(member["ref"]), refs_of(member), {})
                 found.relation(
-                    int(each["id"]), [(int(m["ref"]), m.get("role") == "inner") for m in members], tags
+                    int(each["id"]),
+                    [Member(int(m["ref"]), str(m.get("role") or ""), m["type"] == "way") for m in members],
+                    tags,
                 )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         if isinstance(error, WorldFileError):
@@ -180,15 +182,11 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
             f"is larger than {MAX_BYTES // 10**6} MB; cut the area of interest out of it first"
         )
     found = Collected(reading)
-    buildings = osmium.filter.KeyFilter(*AREAS)
     try:
-        wanted: dict[int, tuple[dict[str, str], list[Member]]] = {}
-        for each in osmium.FileProcessor(str(path), osmium.osm.RELATION).with_filter(buildings):
-            tags = {tag.k: tag.v for tag in each.tags}
-            if is_building(tags) and tags.get("type", MULTIPOLYGON) == MULTIPOLYGON:
-                wanted[each.id] = tags, [(m.ref, m.role == "inner") for m in each.members if m.type == "w"]
-        needed = {number for _, members in wanted.values() for number, _ in members}
+        relations = _pbf_relations(path)
+        needed, taken = relations.ways(), set[int]()
         ways: dict[int, Line] = {}
+        tags_of: dict[int, Mapping[str, str]] = {}
         points = osmium.filter.KeyFilter(*POINTS)
         for each in osmium.FileProcessor(str(path), osmium.osm.NODE).with_filter(points):
             found.point({tag.k: tag.v for tag in each.tags})
@@ -197,14 +195,35 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
             if not each.is_way() or not (each.id in needed or any(name in each.tags for name in AREAS)):
                 continue
             line = [(node.lon, node.lat) for node in each.nodes if node.location.valid()]
+            tags = {tag.k: tag.v for tag in each.tags}
             if each.id in needed:
-                ways[each.id] = line
-            if is_building(tags := {tag.k: tag.v for tag in each.tags}):
+                ways[each.id], tags_of[each.id] = line, tags
+            if is_building(tags):
+                taken.add(each.id)
                 found.way(tags, line, f"way {each.id}")
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
         raise WorldFileError(
             f"cannot be read as PBF ({' '.join(str(error).split())[:80]}); it may be torn"
         ) from error
-    for number, (tags, members) in wanted.items():
-        found.relation(tags, members, ways, f"relation {number}")
+    found.areas(relations.areas(taken, tags_of), ways, relations.others)
     return found.contents()
+
+
+def _pbf_relations(path: Path) -> Relations:
+    """The relations that buildings need, by three passes: most of a file's relations are none of them."""
+    import osmium
+
+    relations = Relations()
+
+    def keep(selection: Any) -> None:
+        for each in osmium.FileProcessor(str(path), osmium.osm.RELATION).with_filter(selection):
+            tags = {tag.k: tag.v for tag in each.tags}
+            members = [Member(m.ref, m.role, m.type == "w") for m in each.members if m.type in ("w", "r")]
+            relations.add(each.id, members, tags, is_building(tags))
+
+    keep(osmium.filter.KeyFilter(*AREAS))
+    # Those of the first pass that are of this type come again, and replace themselves.
+    keep(osmium.filter.TagFilter(("type", BUILDING)))
+    if missing := relations.outlines_missing():
+        keep(osmium.filter.IdFilter(missing))
+    return relations

@@ -17,6 +17,7 @@ import numpy as np
 from harness.files.wording import counted
 from harness.world_files.parts import WGS84, BoolArray, Contents, FloatArray, Part, Reading, WorldFileError
 from harness.world_files.readers import limits, rings
+from harness.world_files.readers.osm_relations import Area, Line, Member, Relations
 
 AREAS: Final = ("building", "building:part", "man_made")
 TALL: Final = frozenset(
@@ -37,12 +38,6 @@ POINTS: Final = ("building", "man_made", "power")
 """What tags of a node have that may be something tall; it has no outline."""
 ENTRANCE: Final = "entrance"
 """Of `building`, a door."""
-MULTIPOLYGON: Final = "multipolygon"
-
-Line = list[tuple[float, float]]
-"""Longitude and latitude of the nodes of a way that are known."""
-Member = tuple[int, bool]
-"""Number of a way, and whether it is an inner ring."""
 
 
 class Collected:
@@ -54,6 +49,7 @@ class Collected:
         self._rings: list[tuple[Mapping[str, str], Line, str]] = []
         self.unknown = Counter[str]()
         self.broken = self.closed = 0
+        self._others: Mapping[str, int] = {}
         self._points: list[float] = []  # heights of what has no outline, 0 where none is known
 
     def point(self, tags: Mapping[str, str]) -> None:
@@ -68,12 +64,12 @@ class Collected:
         else:
             self._add(tags, [line], [], name)
 
-    def relation(
-        self, tags: Mapping[str, str], members: Iterable[Member], ways: Mapping[int, Line], name: str
-    ) -> None:
-        """A building of several ways, as far as they are in the file."""
-        there = [(ways[number], inner) for number, inner in members if number in ways]
-        self._add(tags, [w for w, inner in there if not inner], [w for w, inner in there if inner], name)
+    def areas(self, areas: Iterable[Area], ways: Mapping[int, Line], others: Mapping[str, int]) -> None:
+        """Buildings of several ways, as far as they are in the file; other relations are counted by their type."""
+        for tags, outer, inner, name in areas:
+            solid, hollow = ([ways[each] for each in numbers if each in ways] for numbers in (outer, inner))
+            self._add(tags, solid, hollow, name)
+        self._others = others
 
     def _add(self, tags: Mapping[str, str], outer: Sequence[Line], inner: Sequence[Line], name: str) -> None:
         import shapely
@@ -106,6 +102,10 @@ class Collected:
             notes.append(f"{counted(self.closed, 'building')} cut open by the edge of the extract closed")
         if self.broken:
             notes.append(f"{counted(self.broken, 'building')} whose outline is not there passed over")
+        if self._others:
+            types = ", ".join(sorted(self._others))
+            many = counted(sum(self._others.values()), "relation")
+            notes.append(f"{many} of buildings that is no area passed over (type {types})")
         if self._points:
             highest_m = max(self._points)
             told = f", the highest {highest_m:g} m" if highest_m > 0.0 else ""
@@ -126,7 +126,8 @@ class Elements:
         self._refs = array("q")
         self._spans: dict[int, tuple[int, int]] = {}
         self._buildings: dict[int, dict[str, str]] = {}
-        self._relations: dict[int, tuple[dict[str, str], list[Member]]] = {}
+        self._heights: dict[int, dict[str, str]] = {}
+        self._relations = Relations()
         self._points: list[Mapping[str, str]] = []
 
     def point(self, tags: Mapping[str, str]) -> None:
@@ -147,11 +148,12 @@ class Elements:
             self._refs.extend(refs)
         if is_building(tags):
             self._buildings[number] = tags
+        elif any("height" in name or "level" in name for name in tags):
+            self._heights[number] = tags
 
     def relation(self, number: int, members: list[Member], tags: dict[str, str]) -> None:
-        """A relation, kept if it is a building's area."""
-        if is_building(tags) and tags.get("type", MULTIPOLYGON) == MULTIPOLYGON:
-            self._relations[number] = tags, members
+        """A relation; those that are no building's are passed over."""
+        self._relations.add(number, members, tags, is_building(tags))
 
     def contents(self, reading: Reading) -> Contents:
         """The buildings.
@@ -170,10 +172,9 @@ class Elements:
             found.point(tags)
         for number, tags in self._buildings.items():
             found.way(tags, line(number), f"way {number}")
-        needed = {number for _, members in self._relations.values() for number, _ in members}
-        ways = {number: line(number) for number in needed & self._spans.keys()}
-        for number, (tags, members) in self._relations.items():
-            found.relation(tags, members, ways, f"relation {number}")
+        ways = {number: line(number) for number in self._relations.ways() & self._spans.keys()}
+        areas = self._relations.areas(self._buildings, self._heights)
+        found.areas(areas, ways, self._relations.others)
         return found.contents()
 
     def _places(self) -> tuple[FloatArray, BoolArray]:

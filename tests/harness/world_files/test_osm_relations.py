@@ -1,0 +1,133 @@
+"""Relations of OpenStreetMap that are buildings, in all three forms of its files."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from harness.world_files.kinds import read
+from harness.world_files.parts import Contents, Reading
+
+
+def read_any(path: Path) -> Contents:
+    return read(path, None, Reading())
+
+
+def osm_building(folder: Path, form: str, members: str, ways: dict[int, str], relation_tags: str) -> Path:
+    """Squares of 0.001 degrees in a row, one a way, and a relation of `type=building` over them."""
+    body, number = "", 100
+    lines = ""
+    for way, (identity, tags) in enumerate(ways.items()):
+        refs = [number + k for k in (0, 1, 2, 3, 0)]
+        for k, (x, y) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
+            body += (
+                f'<node id="{number + k}" version="1" lon="{8 + (2 * way + x) / 1e3}" lat="{47 + y / 1e3}"/>'
+            )
+        nds = "".join(f'<nd ref="{ref}"/>' for ref in refs)
+        lines += f'<way id="{identity}" version="1">{nds}{tags}</way>'
+        number += 4
+    path = folder / "a.osm"
+    path.write_text(
+        f'<osm version="0.6">{body}{lines}<relation id="9" version="1">{members}{relation_tags}</relation></osm>'
+    )
+    return as_form(path, form)
+
+
+def as_form(path: Path, form: str) -> Path:
+    """An OpenStreetMap XML file in another form."""
+    other = path.with_name(f"{path.stem}.{form}")
+    if form == "osm.pbf":
+        osmium = pytest.importorskip("osmium")
+        with osmium.SimpleWriter(str(other), overwrite=True) as writer:
+            for each in osmium.FileProcessor(str(path)):
+                writer.add(each)
+    if form == "json":
+        other.write_text(json.dumps({"elements": overpass_of(path)}))
+    return other
+
+
+def overpass_of(path: Path) -> list[dict[str, Any]]:
+    """The elements of an OpenStreetMap XML file as Overpass has them in JSON."""
+    elements: list[dict[str, Any]] = []
+    for each in ElementTree.parse(path).getroot():
+        found: dict[str, Any] = {"type": each.tag, "id": int(each.attrib["id"])}
+        found["tags"] = {tag.attrib["k"]: tag.attrib["v"] for tag in each.iter("tag")}
+        if each.tag == "node":
+            found |= {"lat": float(each.attrib["lat"]), "lon": float(each.attrib["lon"])}
+        elif each.tag == "way":
+            found["nodes"] = [int(nd.attrib["ref"]) for nd in each.iter("nd")]
+        else:
+            found["members"] = [
+                {"type": m.attrib["type"], "ref": int(m.attrib["ref"]), "role": m.attrib["role"]}
+                for m in each.iter("member")
+            ]
+        elements.append(found)
+    return elements
+
+
+TYPE_BUILDING = '<tag k="type" v="building"/>'
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_outlines_and_parts_without_tags_are_those_of_their_building(form: str, tmp_path: Path) -> None:
+    """https://wiki.openstreetmap.org/wiki/Relation:building; ways 1 and 3 have no building's tags."""
+    members = "".join(
+        f'<member type="{kind}" ref="{ref}" role="{role}"/>'
+        for kind, ref, role in (
+            ("way", 1, "outline"),
+            ("way", 2, "part"),
+            ("way", 3, "part"),
+            ("way", 4, "outline"),
+            ("node", 100, "entrance"),
+        )
+    )
+    ways = {
+        1: '<tag k="name" v="hall"/>',
+        2: '<tag k="building:part" v="yes"/><tag k="height" v="30"/>',
+        3: '<tag k="building:levels" v="9"/>',
+    }
+    path = osm_building(tmp_path, form, members, ways, f'{TYPE_BUILDING}<tag k="building:levels" v="4"/>')
+    found = read_any(path)
+    tops = {round((part.footprint.centroid.x - 8) * 1e3 - 0.5) / 2: part.top.height_m for part in found.parts}
+    assert tops == {0: 12.0, 1: 30.0, 2: 27.0}
+    assert [part.footprint.area for part in found.parts] == pytest.approx([1e-6] * 3)
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_an_outline_that_is_a_building_itself_is_taken_once(form: str, tmp_path: Path) -> None:
+    ways = {1: '<tag k="building" v="yes"/><tag k="height" v="20"/>'}
+    member = '<member type="way" ref="1" role="outline"/>'
+    path = osm_building(tmp_path, form, member, ways, f'{TYPE_BUILDING}<tag k="height" v="99"/>')
+    assert [part.top.height_m for part in read_any(path).parts] == [20.0]
+    path = osm_building(tmp_path, form, member, {1: ""}, f'{TYPE_BUILDING}<tag k="height" v="99"/>')
+    assert [part.top.height_m for part in read_any(path).parts] == [99.0]
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_an_outline_that_is_a_multipolygon_without_tags_has_its_courtyard(form: str, tmp_path: Path) -> None:
+    path = osm_building(
+        tmp_path, "osm", '<member type="relation" ref="10" role="outline"/>', {1: "", 2: ""}, TYPE_BUILDING
+    )
+    inside = "".join(
+        f'<member type="way" ref="{ref}" role="{role}"/>' for ref, role in ((1, "outer"), (2, "inner"))
+    )
+    other = f'<relation id="10" version="1">{inside}<tag k="type" v="multipolygon"/></relation>'
+    site = '<relation id="11" version="1"><tag k="type" v="site"/><tag k="building" v="yes"/></relation>'
+    text = path.read_text().replace("</osm>", f"{other}{site}</osm>")
+    # The second way is moved into the first.
+    for k, (x, y) in enumerate(((0.2, 0.2), (0.8, 0.2), (0.8, 0.8), (0.2, 0.8))):
+        text = re.sub(
+            rf'(<node id="{104 + k}" version="1") [^/]*/',
+            rf'\1 lon="{8 + x / 1e3}" lat="{47 + y / 1e3}"/',
+            text,
+        )
+    path.write_text(text)
+    found = read_any(as_form(path, form))
+    (part,) = found.parts
+    assert part.footprint.area == pytest.approx(0.64e-6, rel=1e-5)
+    assert "1 relation of buildings that is no area passed over (type site)" in found.notes
