@@ -125,7 +125,7 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
     """
     lanes = sum(each.startswith(f"/{STATES}/") for each in entities)
     if not lanes and len(runs) == 1:
-        return thin_blueprint(frame, lean=False)
+        return thin_blueprint(frame)
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
     without = [name for _, names in PLOTS for name in names if name not in drawn]
     on_earth = any(each.startswith(f"/{MAP}/") for each in entities)
@@ -154,22 +154,19 @@ def _events_view() -> rrb.TextLogView:
     )
 
 
-def thin_blueprint(frame: Frame, lean: bool = True) -> Layout:
+def thin_blueprint(frame: Frame) -> Layout:
     """The layout of a thin recording: plan view and 3-D flight, events and summary, three time series.
 
     Args:
         frame: what to frame the views on.
-        lean: it lies in the file, where every component of a layout takes 1.5 kB, most of that in the table of
-            contents: there are few. Else events have one column, and the bank a plot high enough for numbers.
     """
-    events = rrb.TextLogView(origin=EVENTS, name="Events") if lean else _events_view()
-    shares = None if lean else [share for share, _ in PLOTS]
+    shares = [share for share, _ in PLOTS]
     about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
     return Layout(
         rrb.Horizontal(
             rrb.Vertical(
                 rrb.Horizontal(plan_view(frame), flight_view(frame)),
-                rrb.Horizontal(events, about),
+                rrb.Horizontal(_events_view(), about),
                 row_shares=[12, 5],
             ),
             rrb.Vertical(*series_views(frame, ("",), THIN_SERIES, background=False), row_shares=shares),

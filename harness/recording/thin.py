@@ -137,8 +137,12 @@ class ThinLog:
         """Draws the whole track and the events, writes the summary and the typed properties, and ends the file."""
         self._send_plans()
         if self._whole:
-            track = lines_2d([np.concatenate(self._whole)], look.TRACK, 1.5, 15)
+            whole = np.concatenate(self._whole)
+            track = lines_2d([whole], look.TRACK, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
+            # No width, for every component takes 1.5 kB of the file: the viewer's own will do.
+            line = rr.LineStrips3D(strips_3d([whole]), colors=[look.TRACK])
+            self._rec.log(f"{look.WORLD}/{look.WHOLE}", line, static=True)
         send_events(self._rec, [(*event, look.TOLD) for event in self._events])
         log_summary(self._rec, replace(self._scene, scenario_yaml=""), metrics)
         if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):

@@ -92,7 +92,7 @@ def test_a_thin_recording_is_small_and_has_typed_properties(
 ) -> None:
     given = record(tmp_path, 7, flight(make_track, make_plan, Outcome.TIMEOUT, 90.0))
     (path,) = recordings_of(tmp_path)
-    assert path.stat().st_size < 240_000
+    assert path.stat().st_size < 250_000
     assert properties_of(path) == pytest.approx(given)
     kinds = {name: type(value) for name, value in properties_of(path).items()}
     assert kinds["outcome"] is str
@@ -108,6 +108,11 @@ def test_a_thin_recording_shows_the_whole_track(campaign: Path) -> None:
     for chunk in rr.chunk.RrdReader(str(recordings_of(campaign)[0])).stream():
         rows[str(chunk.entity_path)] = rows.get(str(chunk.entity_path), 0) + chunk.to_record_batch().num_rows
     assert rows["/world/aircraft"] == 1001 // 20 + 1
+    (line,) = strips(recordings_of(campaign)[0], "/world/whole_track")
+    (flat,) = strips(recordings_of(campaign)[0], "/plan/whole_track")
+    assert len(line) == 1001 // 20 + 1
+    assert line[[0, -1]].tolist() == [[0.0, 0.0, 300.0], [0.0, 2500.0, 300.0]]
+    np.testing.assert_array_equal(line[:, :2], flat)
     assert {
         "/plan/chosen",
         "/plan/waypoints",
@@ -133,6 +138,17 @@ def test_the_plots_of_a_thin_recording_have_the_peaks_that_its_figures_name(
     assert curve(tmp_path, "clearance/flown")[61.3] == 37.5
     assert curve(tmp_path, "bank/flown")[99.9] == -45.0
     assert len(curve(tmp_path, "clearance/flown")) == 1001 // 20 + 1 + 1
+
+
+def strips(recording: Path, entity: str) -> list[np.ndarray]:
+    """The line strips of an entity."""
+    for chunk in rr.chunk.RrdReader(str(recording)).stream():
+        if str(chunk.entity_path) == entity:
+            rows = chunk.to_record_batch().to_pydict()
+            return [
+                np.array(each) for name, (found,) in rows.items() if name.endswith("strips") for each in found
+            ]
+    return []
 
 
 def curve(campaign: Path, entity: str) -> dict[float, float]:
@@ -199,16 +215,15 @@ def test_a_run_of_the_table_opens_in_our_layout(campaign: Path) -> None:
         assert served.dataset.default_segment_table_blueprint() is not None
 
 
-def test_only_the_layout_inside_a_thin_file_is_lean() -> None:
-    """The table's own takes no room of a file: its events are one column, its bank is numbered."""
+def test_a_thin_file_has_the_layout_of_the_table() -> None:
+    """Its events are one column, its bank has the height for numbers."""
     frame = Frame((0.0, 0.0, 100.0, 100.0), 300.0, 40.0)
-    lean, roomy = thin_blueprint(frame), layout_of(frame, {"/series/bank/flown"})
-    layouts: tuple[tuple[Any, bool, list[int] | None], ...] = ((lean, False, None), (roomy, True, [4, 4, 5]))
-    for layout, one_column, shares in layouts:
+    layouts: tuple[Any, ...] = (thin_blueprint(frame), layout_of(frame, {"/series/bank/flown"}))
+    for layout in layouts:
         left, plots = layout.root_container.contents
         events = left.contents[1].contents[0]
-        assert ("TextLogColumns" in events.properties) == one_column
-        assert plots.row_shares == shares
+        assert "TextLogColumns" in events.properties
+        assert plots.row_shares == [4, 4, 5]
         layout.let_go()
 
 
