@@ -19,7 +19,7 @@ from harness.report.page import Picture, rendered
 
 PAGE = "summary.html"
 PLAIN = "summary.json"
-SCHEMA = "wayproof/campaign-summary/2"
+SCHEMA = "wayproof/campaign-summary/3"
 
 
 def write_summary(summary: Summary, folder: Path) -> Path:

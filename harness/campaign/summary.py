@@ -167,6 +167,7 @@ class Summary:
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
         extremes: the run that stands out by each of some figures.
         untracked: runs that were not tracked, by why, the most frequent first.
+        named: the runs that `extremes` and `untracked` name and `worst` does not have, by number.
         duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
     """
@@ -181,6 +182,7 @@ class Summary:
     worst: tuple[WorstRun, ...]
     extremes: tuple[Extreme, ...]
     untracked: tuple[Untracked, ...]
+    named: tuple[WorstRun, ...]
     duels: tuple[Duel, ...]
     planned: int | None = None
 
@@ -209,6 +211,11 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
     chosen = [list(each) for each in (by if by is not None else _default_choice(keys, runs))]
     singles = dict.fromkeys(itertools.chain(*chosen))
     drawn = drawn_keys(results)
+    worst, standing_out, untracked = (
+        _worst(runs, folder, keys),
+        extremes(results, runs),
+        _untracked(results, runs),
+    )
     return Summary(
         name=folder.resolve().name,
         varied=tuple(keys),
@@ -217,9 +224,10 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         tables=tuple(table(runs, each, drawn) for each in chosen),
         curves=tuple(table(runs, [key, "planner"], drawn) for key in singles if key != "planner"),
         lengths=_lengths(runs),
-        worst=_worst(runs, folder, keys),
-        extremes=extremes(results, runs),
-        untracked=_untracked(results, runs),
+        worst=worst,
+        extremes=standing_out,
+        untracked=untracked,
+        named=_named(runs, folder, keys, standing_out, untracked, {each.run for each in worst}),
         duels=duels(runs),
         planned=planned_runs(results),
     )
@@ -323,7 +331,7 @@ def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...
 
     Where nothing failed, the few that came closest.
     """
-    ratio = runs.min_clearance_m / np.where(runs.wanted_clearance_m > 0.0, runs.wanted_clearance_m, np.nan)
+    ratio = _clearance_ratio(runs)
     near = ratio if np.isfinite(ratio).any() else runs.min_clearance_m
     severity = {outcome: place for place, outcome in enumerate((*SEVERITY, "reached"))}
     outcomes = runs.names["outcome"]
@@ -337,11 +345,33 @@ def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...
     )
     failed = int((~runs.reached).sum())
     shown = order[: min(failed, WORST)] if failed else order[:CLOSEST]
-    return tuple(_worst_run(runs, row, float(ratio[row]), folder, keys) for row in shown)
+    return tuple(_worst_run(runs, row, folder, keys) for row in shown)
 
 
-def _worst_run(runs: Runs, row: int, ratio: float, folder: Path, keys: Sequence[str]) -> WorstRun:
-    number, names = int(runs.run[row]), runs.names
+def _named(
+    runs: Runs,
+    folder: Path,
+    keys: Sequence[str],
+    standing_out: Sequence[Extreme],
+    untracked: Sequence[Untracked],
+    known: Collection[int],
+) -> tuple[WorstRun, ...]:
+    """The runs that are named by their number, but for those already known."""
+    numbers = {each.run for each in standing_out}.union(*(each.runs for each in untracked)) - {*known}
+    rows = [row for row, number in enumerate(runs.run.tolist()) if number in numbers]
+    return tuple(_worst_run(runs, row, folder, keys) for row in rows)
+
+
+def _clearance_ratio(runs: Runs) -> FloatArray:
+    """Least clearance over the wanted one; NaN where one of them is not known."""
+    ratio: FloatArray = runs.min_clearance_m / np.where(
+        runs.wanted_clearance_m > 0.0, runs.wanted_clearance_m, np.nan
+    )
+    return ratio
+
+
+def _worst_run(runs: Runs, row: int, folder: Path, keys: Sequence[str]) -> WorstRun:
+    number, names, ratio = int(runs.run[row]), runs.names, float(_clearance_ratio(runs)[row])
     kept, clearance = Path("runs") / str(number), float(runs.min_clearance_m[row])
     recording = (folder / kept / RECORDING).is_file()
     return WorstRun(

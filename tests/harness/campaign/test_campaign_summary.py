@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -528,10 +529,24 @@ def test_runs_that_stand_out_are_named(tmp_path: Path) -> None:
     assert near.run == 3
     assert (near.value, near.following) == pytest.approx((49.9 / 50.0, 1.2))
     assert [(each.causes, each.count, each.runs) for each in summary.untracked] == [("bank limit", 1, (3,))]
+    assert [(run.run, run.command) for run in summary.named] == [
+        (2, f"wayproof fly --from {folder}/results.parquet --run 2")
+    ]
     page = write_summary(summary, folder).read_text()
     assert "Runs that stand out" in page
+    assert_links_lead_somewhere(page)
+    assert page.count('<a href="#run-2">2</a>') == 1
+    assert page.count('<a href="#run-3">3</a>') == 2
     assert "49.9 m; <strong class='bad'>below</strong> the wanted 50 m" in page
     assert "60 m; wanted 50 m" in page
+
+
+def assert_links_lead_somewhere(page: str) -> None:
+    """Each run that is linked to has one place on the page, with the command that flies it again."""
+    for number in set(re.findall(r'<a href="#run-(\d+)">', page)):
+        assert page.count(f'<li id="run-{number}">') == 1
+        (place,) = re.findall(rf'<li id="run-{number}">(.*?)</li>', page, re.DOTALL)
+        assert f"--run {number}</code>" in place
 
 
 ODD = {
@@ -559,7 +574,10 @@ def test_each_oddity_of_a_campaign_stands_out_on_its_page_though_runs_failed(tmp
     assert all(each.apart for each in summary.extremes)
     page = write_summary(summary, folder).read_text()
     for run, (figure, _) in ODD.items():
-        assert f'<tr class="apart"><th scope="row">{figure}</th><td>{run}</td>' in page
+        assert (
+            f'<tr class="apart"><th scope="row">{figure}</th><td><a href="#run-{run}">{run}</a></td>' in page
+        )
+    assert_links_lead_somewhere(page)
 
 
 def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
@@ -576,8 +594,11 @@ def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
     ]
     page = write_summary(summary, folder).read_text()
     assert "Not every leg was tracked in 19 of 20 runs:" in page
-    assert "<li>navigation error: 18 runs (1, 2, 3, 4, 5, \N{HORIZONTAL ELLIPSIS})</li>" in page
-    assert "<li>navigation error; bank limit: 1 run (13)</li>" in page
+    said = re.sub(r'<a href="#run-(\d+)">\1</a>', r"\1", page)
+    assert "<li>navigation error: 18 runs (1, 2, 3, 4, 5, \N{HORIZONTAL ELLIPSIS})</li>" in said
+    assert "<li>navigation error; bank limit: 1 run (13)</li>" in said
+    assert_links_lead_somewhere(page)
+    assert len(re.findall('<a href="#run-', page)) == 6 + len(summary.extremes)
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:
