@@ -57,9 +57,18 @@ def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise WorldFileError(f"cannot be read ({reason}); give the path of a file") from error
-    if len(data) > most:
-        raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it first")
+    _check_bytes(len(data), most)
     return data
+
+
+def check_size(path: Path, most: int = MAX_BYTES) -> None:
+    """Raises WorldFileError if a file is too large."""
+    _check_bytes(path.stat().st_size, most)
+
+
+def _check_bytes(size: int, most: int) -> None:
+    if size > most:
+        raise WorldFileError(f"is larger than {most // 10**6} MB; cut the area of interest out of it first")
 
 
 def head(path: Path, size: int = 65_536) -> bytes:

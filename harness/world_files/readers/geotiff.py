@@ -8,18 +8,23 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from io import BytesIO
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from harness.world_files.bounded import read_bytes
+from harness.files.input_file import open_regular
+from harness.world_files.bounded import check_size, head
 from harness.world_files.parts import FOOT_M, Contents, FloatArray, Raster, Reading, WorldFileError
 from harness.world_files.plane import flat_crs, has_heights, unit_that_is_no_metre, vertical_unit_m
 
 MAX_CELLS: Final = 60_000_000
 """Half a gigabyte of heights while they are read."""
+STRIP_CELLS: Final = 2_000_000
+"""As many at a time."""
+CACHE_MB: Final = 64
+"""Of GDAL, which keeps a twentieth of the machine's memory else."""
 PIXEL_SCALE, TIE_POINTS, TRANSFORMATION, GEO_KEYS, NODATA = 33550, 33922, 34264, 34735, 42113
 GEOGRAPHIC_CRS, PROJECTED_CRS, RASTER_TYPE = 2048, 3072, 1025
 VERTICAL_CRS, VERTICAL_UNIT, METADATA = 4096, 4099, 42112
@@ -59,20 +64,23 @@ def read(path: Path, reading: Reading) -> Contents:
     try:
         return _with_pillow(path, reading)
     except WorldFileError as error:
-        found = _with_rasterio(path, reading)
-        if found is None:
-            raise
-        if isinstance(found, WorldFileError):
-            raise found from error
-        return found
+        fault = WorldFileError(str(error))  # the first holds on to what was read
+    found = _with_rasterio(path, reading)
+    if found is None:
+        raise fault
+    if isinstance(found, WorldFileError):
+        raise found from fault
+    return found
 
 
 def _with_pillow(path: Path, reading: Reading) -> Contents:
     from PIL import Image
 
-    data = read_bytes(path)
+    first = head(path, len(BIG_ENDIAN))
+    check_size(path)
     try:
-        with Image.open(BytesIO(data), formats=["TIFF"]) as image:
+        # Not from bytes in memory: they would take as much room as the heights.
+        with open_regular(path) as file, Image.open(file, formats=["TIFF"]) as image:
             columns, rows = image.size
             check_cells(rows, columns)
             tags: dict[int, Any] = dict(image.tag_v2)  # type: ignore[attr-defined]
@@ -82,10 +90,10 @@ def _with_pillow(path: Path, reading: Reading) -> Contents:
                 )
             if image.mode in ("P", "1"):
                 raise WorldFileError(f"has a palette; must have numbers, of heights; {MISSING}")
-            if data[:2] == BIG_ENDIAN and tags.get(COMPRESSION, 1) != 1 and image.mode != "L":
+            if first == BIG_ENDIAN and tags.get(COMPRESSION, 1) != 1 and image.mode != "L":
                 # Pillow 12 turns the bytes round which its decoder has turned already.
                 raise WorldFileError(f"is compressed and has its high bytes first; {MISSING}")
-            values = np.asarray(image).astype(np.float64)
+            values = _numbers(image)
             if _has_mask(image, path):
                 raise WorldFileError(f"has a mask that says which cells hold a height; {MISSING}")
     except WorldFileError:
@@ -94,17 +102,35 @@ def _with_pillow(path: Path, reading: Reading) -> Contents:
         raise WorldFileError(
             f"cannot be read as a TIFF ({str(error)[:80] or type(error).__name__}); {MISSING}"
         ) from error
-    if values.shape != (rows, columns):
-        raise WorldFileError(f"is a TIFF of mode {image.mode}, not of heights; {MISSING}")
     nodata = _number(tags.get(NODATA))
-    if nodata is not None:
-        values[values == nodata] = np.nan
+    for strip in strips(values) if nodata is not None else ():
+        values[strip][values[strip] == nodata] = np.nan
     keys = _geo_keys(tags.get(GEO_KEYS, ()))
     crs = reading.crs or _crs(keys)
     affine = _affine(tags, keys.get(RASTER_TYPE) == POINT)
     scaling = _scaling(tags, keys)
     values, notes = in_metres(values, scaling, crs)
     return Contents("geotiff", crs, terrain=Raster(plausible(values), affine), notes=notes)
+
+
+def _numbers(image: Any) -> FloatArray:
+    """(rows, columns) numbers of an image of one band, by strips: Pillow's own way takes thrice the room."""
+    columns, rows = image.size
+    values = np.empty((rows, columns))
+    for strip in strips(values):
+        part = np.asarray(image.crop((0, strip.start, columns, strip.stop)))
+        if part.shape != values[strip].shape:
+            raise WorldFileError(f"is a TIFF of mode {image.mode}, not of heights; {MISSING}")
+        values[strip] = part
+    return values
+
+
+def strips(values: FloatArray) -> Iterator[slice]:
+    """Rows of a raster, a few million cells at a time: what is worked out for them takes little room."""
+    rows, columns = values.shape
+    step = max(STRIP_CELLS // max(columns, 1), 1)
+    for start in range(0, rows, step):
+        yield slice(start, min(start + step, rows))
 
 
 def _has_mask(image: Any, path: Path) -> bool:
@@ -130,11 +156,12 @@ def in_metres(values: FloatArray, scaling: Scaling, crs: str) -> tuple[FloatArra
     """Heights in metres, and what to say of it.
 
     Args:
-        values: as the file has them; voids become NaN.
+        values: as the file has them; changed in place, voids become NaN.
         scaling: what the file says of them.
         crs: of its horizontal coordinates.
     """
-    values[np.isin(values, VOIDS)] = np.nan
+    for strip in strips(values):
+        values[strip][np.isin(values[strip], VOIDS)] = np.nan
     if scaling[:2] == (1.0, 0.0):
         plane_unit = "" if scaling.is_told else unit_that_is_no_metre(crs)
         if not plane_unit:
@@ -142,7 +169,9 @@ def in_metres(values: FloatArray, scaling: Scaling, crs: str) -> tuple[FloatArra
         return values, (f"its heights name no unit: taken as metres, although its plane is in {plane_unit}",)
     told = f"its heights are its numbers times {scaling.factor:.6g}"
     told += f" plus {scaling.offset_m:g} m" if scaling.offset_m else ""
-    return scaling.factor * values + scaling.offset_m, (told + ", as it says",)
+    values *= scaling.factor
+    values += scaling.offset_m
+    return values, (told + ", as it says",)
 
 
 def unit_m(name: str) -> float:
@@ -194,10 +223,14 @@ def check_cells(rows: int, columns: int) -> None:
         )
 
 
-def plausible(values: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Heights with those that are no height on earth made NaN."""
-    values[~((values > -12_000.0) & (values < 9_000.0))] = np.nan
-    if not np.isfinite(values).any():
+def plausible(values: FloatArray) -> FloatArray:
+    """Heights with those that are no height on earth made NaN, in place."""
+    any_known = False
+    for strip in strips(values):
+        known = (values[strip] > -12_000.0) & (values[strip] < 9_000.0)
+        values[strip][~known] = np.nan
+        any_known |= bool(known.any())
+    if not any_known:
         raise WorldFileError("has no cell with a height between -12000 and 9000 m; must be terrain")
     return values
 
@@ -251,20 +284,27 @@ def _with_rasterio(path: Path, reading: Reading) -> Contents | WorldFileError | 
         import rasterio
         from rasterio.enums import ColorInterp
         from rasterio.errors import RasterioError
+        from rasterio.windows import Window
     except ImportError:
         return None
     try:
-        with warnings.catch_warnings(action="ignore"), rasterio.open(path) as source:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            rasterio.Env(GDAL_CACHEMAX=CACHE_MB),
+            rasterio.open(path) as source,
+        ):
             check_cells(source.height, source.width)
             others = [each for each in source.colorinterp[1:] if each is not ColorInterp.alpha]
             if others or source.colorinterp[0] is ColorInterp.palette:
                 return WorldFileError(
                     f"has {source.count} bands or a palette, an image; must have one band, of heights"
                 )
-            band = source.read(1, masked=True)
-            values = band.data.astype(np.float64)
-            values[np.ma.getmaskarray(band)] = np.nan
-            del band
+            values = np.empty((source.height, source.width))
+            for strip in strips(values):
+                window = Window(0, strip.start, source.width, strip.stop - strip.start)
+                band = source.read(1, window=window, masked=True)
+                values[strip] = band.data
+                values[strip][np.ma.getmaskarray(band)] = np.nan
             system = source.crs or source.gcps[1]
             crs = reading.crs or (system.to_wkt() if system else None)
             if crs is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import math
 import re
@@ -12,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from harness.world_files.bounded import read_bytes, text_of, unzipped
+from harness.world_files.bounded import UTF_16, read_bytes, text_of, unzipped
 from harness.world_files.parts import WGS84, Contents, FloatArray, Raster, Reading, WorldFileError
 from harness.world_files.plane import flat_crs
 from harness.world_files.readers.geotiff import check_cells, plausible
@@ -22,7 +23,11 @@ SIDES: Final = {2 * n * n: n for n in (1201, 3601)}
 VOID: Final = -32768
 _TILE: Final = re.compile(r"([NS])(\d{2})_?([EW])(\d{3})", re.IGNORECASE)
 _HEADER: Final = re.compile(r"\s*([A-Za-z_]+)\s+(\S+)[ \t]*\r?\n")
+_SPACE: Final = re.compile(rb"\s")
 MAX_MEMBER_BYTES: Final = 500_000_000
+MAX_HEADER_BYTES: Final = 100_000
+PIECE_BYTES: Final = 16_000_000
+"""Of the text of a grid, made into numbers at a time."""
 
 
 def read_ascii(path: Path, reading: Reading) -> Contents:
@@ -31,7 +36,8 @@ def read_ascii(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is not whole.
     """
-    text = text_of(read_bytes(path))
+    data = read_bytes(path).removeprefix(codecs.BOM_UTF8)
+    text = text_of(data if data.startswith(UTF_16) else data[:MAX_HEADER_BYTES])
     keys: dict[str, float] = {}
     place = 0
     while match := _HEADER.match(text, place):
@@ -51,14 +57,9 @@ def read_ascii(path: Path, reading: Reading) -> Contents:
             raise WorldFileError(f"has {name} {keys[name]:g}; must be a whole number")
     columns, rows = int(keys["ncols"]), int(keys["nrows"])
     check_cells(rows, columns)
-    try:
-        values = np.fromstring(text[place:], dtype=np.float64, sep=" ")
-    except ValueError as error:
-        raise WorldFileError("has something that is no number among its heights") from error
-    if len(values) != rows * columns:
-        raise WorldFileError(
-            f"has {len(values):,} heights; nrows times ncols are {rows * columns:,}: it may be torn"
-        )
+    if data.startswith(UTF_16):
+        data, place = text[place:].encode(), 0
+    values = _heights(data, len(text[:place].encode()), rows * columns)
     values[values == keys.get("nodata_value", -9999.0)] = np.nan
     west = keys.get("xllcorner", keys.get("xllcenter", 0.0) - (dx / 2 if "xllcenter" in keys else 0.0))
     south = keys.get("yllcorner", keys.get("yllcenter", 0.0) - (dy / 2 if "yllcenter" in keys else 0.0))
@@ -73,6 +74,30 @@ def read_ascii(path: Path, reading: Reading) -> Contents:
         () if crs else ("names no place on earth: its metres are taken as they are (crs, metres_per_cell)",)
     )
     return Contents("ascii_grid", crs, terrain=raster, notes=notes)
+
+
+def _heights(data: bytes, begin: int, count: int) -> FloatArray:
+    """(count,) numbers in a text from one of its bytes on, read in pieces.
+
+    Raises:
+        WorldFileError: there are more or fewer, or something else.
+    """
+    values, found = np.empty(count), 0
+    while begin < len(data):
+        space = _SPACE.search(data, begin + PIECE_BYTES)
+        end = space.start() if space else len(data)
+        piece = data[begin:end].strip()
+        begin = end
+        try:
+            numbers = np.fromstring(piece, dtype=np.float64, sep=" ") if piece else np.zeros(0)
+        except ValueError as error:
+            raise WorldFileError("has something that is no number among its heights") from error
+        if found + len(numbers) <= count:
+            values[found : found + len(numbers)] = numbers
+        found += len(numbers)
+    if found != count:
+        raise WorldFileError(f"has {found:,} heights; nrows times ncols are {count:,}: it may be torn")
+    return values
 
 
 def _beside(path: Path) -> str | None:

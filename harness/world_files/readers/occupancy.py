@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,7 +20,7 @@ from harness.world_files.parts import (
     Reading,
     WorldFileError,
 )
-from harness.world_files.readers.geotiff import check_cells
+from harness.world_files.readers.geotiff import check_cells, strips
 
 FREE: Final = frozenset(b".GS")
 """Ground, ground and shallow water of the MovingAI format (Sturtevant, Benchmarks for grid-based pathfinding, 2012)."""
@@ -74,8 +75,6 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     mode = str(keys.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise WorldFileError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
-    image_path = path.parent / str(keys.get("image", ""))
-    grey, opaque = _image(image_path)
     size = _positive(keys, "resolution")
     origin = keys.get("origin", (0.0, 0.0, 0.0))
     if not (isinstance(origin, tuple) and len(origin) >= 2 and all(_is_number(each) for each in origin)):
@@ -83,14 +82,20 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     occupied_from, free_to = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
     if not (_is_number(occupied_from) and _is_number(free_to)):
         raise WorldFileError("has thresholds that are no numbers")
-    known = opaque
-    if mode == "raw":
-        chance, known = grey / 100.0, known & (grey <= 100.0)
-    else:
-        chance = grey / 255.0 if keys.get("negate", 0) else (255.0 - grey) / 255.0
-    occupied, free = known & (chance > occupied_from), known & (chance < free_to)
-    solid = occupied.astype(np.float64)
-    solid[~occupied & ~free] = np.nan
+    negate = bool(keys.get("negate", 0))
+
+    def solid_of(grey: FloatArray, opaque: BoolArray) -> FloatArray:
+        known = opaque
+        if mode == "raw":
+            chance, known = grey / 100.0, known & (grey <= 100.0)
+        else:
+            chance = grey / 255.0 if negate else (255.0 - grey) / 255.0
+        occupied, free = known & (chance > occupied_from), known & (chance < free_to)
+        cells: FloatArray = occupied.astype(np.float64)
+        cells[~occupied & ~free] = np.nan
+        return cells
+
+    solid = _image(path.parent / str(keys.get("image", "")), solid_of)
     scale = (reading.metres_per_cell or size) / size
     rows = solid.shape[0]
     affine = _from_corner(origin[0] * scale, origin[1] * scale, size * scale, rows)
@@ -100,8 +105,13 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     return Contents("ros_map", None, occupied=Raster(solid, affine))
 
 
-def _image(path: Path) -> tuple[FloatArray, BoolArray]:
-    """Grey from 0 to 255, of colours their mean as map_server has it, and where the image is opaque."""
+def _image(path: Path, solid_of: Callable[[FloatArray, BoolArray], FloatArray]) -> FloatArray:
+    """(rows, columns) cells of an image, by strips.
+
+    Args:
+        path: of the image.
+        solid_of: cells from their grey (0 to 255, of colours the mean as map_server has it) and where they are opaque.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -112,16 +122,12 @@ def _image(path: Path) -> tuple[FloatArray, BoolArray]:
         ) from error
     try:
         with Image.open(_stream(data), formats=["PPM", "PNG", "BMP", "JPEG"]) as image:
-            check_cells(image.height, image.width)
-            if image.mode in ("I", "I;16", "F"):
-                grey = np.asarray(image, dtype=np.float64) / 257.0
-            elif image.mode in ("L", "1"):
-                grey = np.asarray(image.convert("L"), dtype=np.float64)
-            else:
-                grey = np.asarray(image.convert("RGB"), dtype=np.float64).mean(axis=2)
-            opaque = np.ones(grey.shape, dtype=np.bool_)
-            if "A" in image.convert("RGBA" if "transparency" in image.info else image.mode).getbands():
-                opaque = np.asarray(image.convert("RGBA").getchannel("A")) == 255
+            columns, rows = image.size
+            check_cells(rows, columns)
+            solid = np.empty((rows, columns))
+            for strip in strips(solid):
+                solid[strip] = solid_of(*_greys(image.crop((0, strip.start, columns, strip.stop))))
+            return solid
     except WorldFileError:
         raise
     except UnidentifiedImageError as error:
@@ -130,6 +136,19 @@ def _image(path: Path) -> tuple[FloatArray, BoolArray]:
         raise WorldFileError(
             f"names the image {path.name}, which cannot be read ({str(error)[:80]})"
         ) from error
+
+
+def _greys(image: Any) -> tuple[FloatArray, BoolArray]:
+    """Grey from 0 to 255 of an image, and where it is opaque."""
+    if image.mode in ("I", "I;16", "F"):
+        grey = np.asarray(image, dtype=np.float64) / 257.0
+    elif image.mode in ("L", "1"):
+        grey = np.asarray(image.convert("L"), dtype=np.float64)
+    else:
+        grey = np.asarray(image.convert("RGB"), dtype=np.float64).mean(axis=2)
+    opaque = np.ones(grey.shape, dtype=np.bool_)
+    if "A" in image.convert("RGBA" if "transparency" in image.info else image.mode).getbands():
+        opaque = np.asarray(image.convert("RGBA").getchannel("A")) == 255
     return grey, opaque
 
 
