@@ -11,8 +11,8 @@ from typing import Any
 
 from harness.files.wording import printable
 
-CRASHED = "crashed"
-"""Outcome of a flight that did not come to an end; the other outcomes are those of `metrics.json`."""
+ERROR = "error"
+"""Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
 
 DASH = "\N{EN DASH}"
 
@@ -24,7 +24,7 @@ class Row:
     Attributes:
         scenario: its name.
         planner: its kind.
-        outcome: as in `metrics.json`, or `crashed`.
+        outcome: as in `metrics.json`, or `error`.
         reason: the same as a sentence.
         flown_length_m: length of the flown track.
         optimum_m: the clairvoyant shortest path for a point that keeps the clearance.
@@ -191,7 +191,12 @@ class Figure:
 
 
 FIGURES = (
-    Figure("outcome", "outcome", lambda row: row.outcome),
+    Figure(
+        "outcome",
+        "outcome",
+        lambda row: row.outcome,
+        hint="how the flight ended; error: the software failed before the end, which says nothing of the aircraft",
+    ),
     Figure("flown length, km", "km", lambda row: number(row.flown_length_m, 1e-3)),
     Figure(
         "ratio to the clairvoyant optimum",

@@ -13,6 +13,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from harness.analysis.rows import ERROR as ERROR  # the same word for the same thing
 from harness.analysis.smoothness import Smoothness
 from harness.files.strict_yaml import InputError
 
@@ -26,9 +27,6 @@ RUNS: Final = "runs"
 RESULTS: Final = "results.parquet"
 TIMINGS: Final = "timings.parquet"
 SCHEMA: Final = "wayproof/results/1"
-ERROR: Final = "error"
-"""Outcome of a run that did not come to an end; the other outcomes are those of `metrics.json`."""
-
 RUN: Final = {
     "run": "int",
     "case": "int",

@@ -1,7 +1,7 @@
 """The answers of a campaign: what its runs say by two varied keys, which ran worst, which planner did better.
 
 Pure functions of the tables in a campaign's folder. A share has Wilson's 95 % interval (Wilson 1927). A run
-that crashed counts as one that did not reach its goal; so does a goal that the planner proved unreachable.
+whose software failed counts as one that did not reach its goal; so does a goal that the planner proved unreachable.
 """
 
 from __future__ import annotations

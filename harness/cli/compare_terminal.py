@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
-from harness.analysis.rows import CRASHED, DASH, FIGURES, ON_TERMINAL, Row
+from harness.analysis.rows import DASH, ERROR, FIGURES, ON_TERMINAL, Row
 from harness.cli.terminal import plain
 from harness.comparison.flights import Progress as Report
 from harness.files.wording import printable
@@ -58,7 +58,7 @@ def comparison_bar(scenarios: Sequence[Scenario]) -> Iterator[Report | None]:
 
 
 def print_comparison(rows: Sequence[Row]) -> None:
-    """One table a scenario on standard output, what its headings mean, and why those that crashed did.
+    """One table a scenario on standard output, what its headings mean, and the errors of the software.
 
     Where one planner flew under several guidance laws, the rows are called after the laws, and the planner is in the
     title.
@@ -90,8 +90,8 @@ def print_comparison(rows: Sequence[Row]) -> None:
         console.print()
     console.print(LEGEND, style="dim", highlight=False, width=min(WIDTH, console.width))
     for row in rows:
-        if row.outcome == CRASHED:
-            console.print(f"{plain(row.label)} crashed: {plain(row.reason)}", highlight=False, soft_wrap=True)
+        if row.outcome == ERROR:
+            console.print(f"{plain(row.label)}, error: {plain(row.reason)}", highlight=False, soft_wrap=True)
 
 
 def _name_lines(row: Row, by_law: bool) -> list[str]:

@@ -16,7 +16,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.analysis.rows import CRASHED, Row, to_csv, to_markdown
+from harness.analysis.rows import ERROR, Row, to_csv, to_markdown
 from harness.comparison.flights import ComparedAnswer, ComparedFlight, Progress, fly_all
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
@@ -208,7 +208,7 @@ def _entry(
 ) -> ReportedFlight:
     name, planner = job.scenario.name, job.scenario.planner.kind
     if answer.crash:
-        row = Row(name, planner, CRASHED, answer.crash, optimum_m=optima[name].length_m, guidance=law)
+        row = Row(name, planner, ERROR, answer.crash, optimum_m=optima[name].length_m, guidance=law)
         return ReportedFlight(row)
     return entry(job.scenario, load_run(job.folder), optima[name], job.kinematic, law)
 

@@ -33,8 +33,8 @@ class ReportedFlight:
 
     Attributes:
         row: its figures.
-        run: what was flown; None if it crashed.
-        planned: the plans row by row of the track; None if it crashed.
+        run: what was flown; None if the software failed.
+        planned: the plans row by row of the track; None if the software failed.
     """
 
     row: Row

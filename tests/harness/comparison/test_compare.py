@@ -153,10 +153,10 @@ def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path)
     assert json.loads((flown / "comparison.json").read_text())["complete"] is True
 
 
-def test_a_crash_is_a_row_and_the_others_fly_on(flown: Path) -> None:
+def test_an_error_is_a_row_and_the_others_fly_on(flown: Path) -> None:
     rows = rows_of(flown)
     assert [row["planner"] for row in rows] == ["rolling_window", "corner", "dies", "raises"]
-    assert [row["outcome"] for row in rows] == ["reached", "reached", "crashed", "crashed"]
+    assert [row["outcome"] for row in rows] == ["reached", "reached", "error", "error"]
     assert rows[2]["reason"] == "its process ended with exit status 7 before the flight did"
     told = "ValueError: <script>alert(1)</script> | *not* to be run"
     assert rows[3]["reason"] == f"the planner raises cannot be made: {told}"
@@ -256,9 +256,7 @@ def test_the_report_says_how_to_repeat_it(
     monkeypatch.setattr("sys.argv", ["/somewhere/bin/wayproof", *arguments])
     assert main(arguments) == 1
     assert f"wayproof compare {place / 'ring.yaml'} --planners raises" in (out / "report.html").read_text()
-    assert (
-        "raises crashed: the planner raises cannot be made: ValueError: <script>" in capsys.readouterr().out
-    )
+    assert "raises, error: the planner raises cannot be made: ValueError: <script>" in capsys.readouterr().out
     assert files(out / "ring") == set()
 
 
@@ -414,12 +412,12 @@ def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) 
         optimum_m=1e5, ratio=12.3456, min_clearance_m=-1234.5, tightest_turn=123.456, trackable=False,
         cross_track_max_m=1234.5, planner_p99_ms=123.4,
     )  # fmt: skip
-    print_comparison([worst, Row("a-scenario", "b", "crashed", "[bold] it died")])
+    print_comparison([worst, Row("a-scenario", "b", "error", "[bold] it died")])
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
-    for text in ("planner_failed", "123.5", "12.3456", "-1234", "123.46", "no", "1234", "123.4", "crashed"):
+    for text in ("planner_failed", "123.5", "12.3456", "-1234", "123.46", "no", "1234", "123.4", "error"):
         assert any(text in line.split() for line in lines), text
-    assert lines[-1] == "b crashed: [bold] it died"
+    assert lines[-1] == "b, error: [bold] it died"
     assert "all legs trackable" in " ".join(lines[-4:-1])
 
 
@@ -459,7 +457,7 @@ def test_the_terminal_table_never_breaks_a_word_of_a_name(
 
 
 def test_markdown_is_a_table_whatever_the_names_are() -> None:
-    text = to_markdown([Row("s", "a", "reached", "a | b <i>", ratio=1.5), Row("s", "b", "crashed", "c")])
+    text = to_markdown([Row("s", "a", "reached", "a | b <i>", ratio=1.5), Row("s", "b", "error", "c")])
     table = [line for line in text.splitlines() if line.startswith("| ")]
     assert {line.count("|") for line in table} == {4}
     assert "| ratio to the clairvoyant optimum | 1.5000 | \N{EN DASH} |" in table
@@ -478,9 +476,9 @@ def test_under_several_guidance_laws_a_row_is_called_after_both() -> None:
 
 
 def test_csv_of_a_crash_has_empty_cells() -> None:
-    head, line = to_csv([Row("s", "p", "crashed", "a, b")]).splitlines()
+    head, line = to_csv([Row("s", "p", "error", "a, b")]).splitlines()
     assert head.startswith("scenario,planner,outcome,reason,flown_length_m,")
-    assert line == 's,p,crashed,"a, b"' + "," * (head.count(",") - 3)
+    assert line == 's,p,error,"a, b"' + "," * (head.count(",") - 3)
 
 
 @pytest.mark.parametrize(
