@@ -28,7 +28,8 @@ from harness.run_files.mission.flying import GivenMission
 from harness.run_files.mission.items import HOME, MissionAsRead
 from harness.run_files.mission.old_mission import read_old_mission
 from harness.run_files.mission.plan_file import read_plan
-from harness.run_files.mission.program import Program, program
+from harness.run_files.mission.program import program
+from harness.run_files.mission.steps import Program
 from harness.run_files.mission.wpl_file import WPL, read_waypoints
 from harness.run_files.path_as_read import PathAsRead
 from harness.scenario.sections import ALTITUDES_M

@@ -17,15 +17,20 @@ LAND: Final = 21
 TAKEOFF: Final = 22
 CONTINUE_AND_CHANGE_ALTITUDE: Final = 30
 LOITER_TO_ALTITUDE: Final = 31
+ARC_WAYPOINT: Final = 36
 SPLINE_WAYPOINT: Final = 82
 VTOL_TAKEOFF: Final = 84
 VTOL_LAND: Final = 85
+CONDITION_DELAY: Final = 112
+CONDITION_DISTANCE: Final = 114
 JUMP: Final = 177
 CHANGE_SPEED: Final = 178
 LAND_START: Final = 189
 TAG: Final = 600
 JUMP_TO_TAG: Final = 601
+SCRIPT: Final = 42702
 
+CONDITIONS: Final = (CONDITION_DELAY, CONDITION_DISTANCE)
 LOITERS: Final = (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE)
 TAKEOFFS: Final = {
     TAKEOFF: "the roll is not flown: the flight begins at the altitude of the takeoff",
@@ -34,6 +39,7 @@ TAKEOFFS: Final = {
 LANDINGS: Final = (LAND, VTOL_LAND)
 FLOWN: Final = (
     WAYPOINT,
+    ARC_WAYPOINT,
     SPLINE_WAYPOINT,
     *LOITERS,
     RETURN_TO_LAUNCH,
@@ -61,17 +67,23 @@ NAMES: Final = {
     LAND_START: "landing start",
     TAG: "jump tag",
     JUMP_TO_TAG: "jump to tag",
+    23: "land at a local place",
+    24: "take off from a local place",
+    25: "follow",
     32: "follow",
-    36: "arc waypoint",
+    33: "follow and reposition",
+    34: "orbit",
+    35: "figure of eight",
+    ARC_WAYPOINT: "arc waypoint",
     80: "region of interest",
     81: "path planning",
     83: "altitude wait",
     92: "guided enable",
     93: "delay",
     94: "place payload",
-    112: "condition delay",
+    CONDITION_DELAY: "condition delay",
     113: "condition change altitude",
-    114: "condition distance",
+    CONDITION_DISTANCE: "condition distance",
     115: "condition yaw",
     176: "set mode",
     179: "set home",
@@ -92,6 +104,8 @@ NAMES: Final = {
     195: "region of interest at a place",
     196: "region of interest at the next waypoint",
     197: "no region of interest",
+    198: "region of interest at a vehicle",
+    200: "control video",
     201: "region of interest",
     202: "configure camera",
     203: "control camera",
@@ -106,7 +120,8 @@ NAMES: Final = {
     214: "camera trigger interval",
     215: "set resume repeat distance",
     216: "sprayer",
-    219: "change loiter radius",
+    217: "send script message",
+    218: "auxiliary function",
     220: "mount quaternion",
     222: "guided limits",
     223: "engine control",
@@ -130,8 +145,10 @@ NAMES: Final = {
     2500: "take video",
     2501: "stop taking video",
     3000: "VTOL transition",
+    4501: "condition gate",
     42600: "winch",
-    42702: "send script message",
+    SCRIPT: "script",
+    42703: "hold attitude",
 }
 """What each is called for people."""
 
@@ -150,6 +167,8 @@ WITHOUT_EFFECT: Final = frozenset(
             195,
             196,
             197,
+            198,
+            200,
             201,
             202,
             203,
@@ -179,12 +198,15 @@ WITHOUT_EFFECT: Final = frozenset(
             2501,
             3000,
             42600,
-            42702,
         ),
         *(LAND_START, TAG, JUMP, JUMP_TO_TAG),
     )
 )
 """Cameras, servos, marks and the like: the path of an aeroplane is the same without them."""
+
+
+WHY_NOT: Final = {SCRIPT: "a script of the aircraft flies it"}
+"""Of what is not flown, where there is more to say than that it cannot be."""
 
 
 def name_of(command: int) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from aircraft.guidance.altitude import VerticalProfile
 from harness.run_files.given_path import FloatArray, FlyBy
-from harness.run_files.mission.program import Program
+from harness.run_files.mission.steps import Program
 
 Ground = Callable[[FloatArray, FloatArray], FloatArray]
 """East and north -> height of the ground above mean sea level, NaN where it is not known."""

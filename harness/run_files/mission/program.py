@@ -13,12 +13,20 @@ from typing import Final
 
 from harness.files.input_file import InputError
 from harness.run_files.mission import commands
-from harness.run_files.mission.items import GROUND, HOME, LOCAL, Item, MissionAsRead
+from harness.run_files.mission.items import HOME, LOCAL, Item, MissionAsRead
+from harness.run_files.mission.steps import (
+    FLOWN,
+    NOT_FLOWN,
+    NOT_REACHED,
+    PASSED_OVER,
+    Loiter,
+    MissionStep,
+    Program,
+    Told,
+)
 
 MOST_STEPS: Final = 20_000
 """A mission whose jumps make it longer is refused."""
-
-FLOWN, PASSED_OVER, NOT_FLOWN, NOT_REACHED = "flown", "passed over", "not flown", "not reached"
 
 MOST_TURNS: Final = 1000
 MOST_LOITER_S: Final = 86_400.0
@@ -28,95 +36,14 @@ MOST_HEIGHT_M: Final = 50_000.0
 DEGREE_M: Final = 111_200.0
 """Length of a degree of latitude."""
 
+WHOLE_TURN_DEG: Final = 360.0
+"""Of this and more an arc between two places has none."""
+
 SIDE_ALONE_M: Final = 1.0
 """A radius of 1 m or less says which way round, and no more: ArduPlane hands back 1 or -1 where it has none."""
 
 AIRSPEED, GROUND_SPEED = 0, 1
 """Kinds of speed of a change of speed, its first parameter."""
-
-
-@dataclass(frozen=True)
-class Loiter:
-    """Circles to be flown.
-
-    Attributes:
-        radius_m: of the circle; 0: the autopilot's own.
-        clockwise: which way round.
-        turns: how many times round; or
-        time_s: how long; or neither: until the altitude is reached.
-    """
-
-    radius_m: float
-    clockwise: bool
-    turns: float | None = None
-    time_s: float | None = None
-
-
-@dataclass(frozen=True)
-class MissionStep:
-    """One thing that is flown.
-
-    Attributes:
-        item: the number of its item.
-        name: what the item is called.
-        position: latitude and longitude, or east and north; None: where the step before ends.
-        height_m: altitude; None: that of the step before.
-        above: what it is above: `sea`, `home` or `ground`.
-        acceptance_m: how far off it may be passed; 0 where the file does not say.
-        airspeed_mps: commanded from the begin of this step on; None: as before.
-        loiter: circles about the position.
-        landing: the flight ends on the way down to it.
-        straight: goes straight on until the altitude is reached.
-    """
-
-    item: int
-    name: str
-    position: tuple[float, float] | None
-    height_m: float | None
-    above: str
-    acceptance_m: float = 0.0
-    airspeed_mps: float | None = None
-    loiter: Loiter | None = None
-    landing: bool = False
-    straight: bool = False
-
-
-@dataclass(frozen=True)
-class Told:
-    """What became of an item.
-
-    Attributes:
-        item: its number.
-        name: what it is called.
-        what: `flown`, `passed over`, `not flown` or `not reached`.
-        why: a few words, or none.
-    """
-
-    item: int
-    name: str
-    what: str
-    why: str = ""
-
-
-@dataclass(frozen=True)
-class Program:
-    """What a mission makes an aeroplane fly.
-
-    Attributes:
-        local: positions are east and north in metres; else latitude and longitude in degrees.
-        steps: in order.
-        items: what became of every item, in the order of the file.
-        acts_on_ground: an altitude above ground is among them.
-    """
-
-    local: bool
-    steps: tuple[MissionStep, ...]
-    items: tuple[Told, ...]
-
-    @property
-    def above_ground(self) -> tuple[int, ...]:
-        """Numbers of the items with an altitude above ground."""
-        return tuple(dict.fromkeys(step.item for step in self.steps if step.above == GROUND))
 
 
 def program(mission: MissionAsRead) -> Program:
@@ -226,10 +153,22 @@ class _Run:
             self._change_speed(item)
         elif item.command in commands.WITHOUT_EFFECT:
             self._tell(item, PASSED_OVER, "no effect on the path")
+        elif item.command in commands.CONDITIONS:
+            self._condition(item)
         elif item.command in commands.FLOWN:
             self._fly(item)
         else:
-            self._tell(item, NOT_FLOWN, "an aeroplane here cannot")
+            self._tell(item, NOT_FLOWN, commands.WHY_NOT.get(item.command, "an aeroplane here cannot"))
+
+    def _condition(self, item: Item) -> None:
+        """ArduPlane flies on and holds back what follows up to the next leg: only a change of speed is of the path."""
+        for after in self.mission.items[self.index[item.number] + 1 :]:
+            if after.command in commands.FLOWN:
+                break
+            if after.command == commands.CHANGE_SPEED:
+                self._tell(item, NOT_FLOWN, f"the change of speed, item {after.number}, is not held back")
+                return
+        self._tell(item, PASSED_OVER, "holds back no leg")
 
     def _change_speed(self, item: Item) -> None:
         kind, speed = int(item.params[0]), item.params[1]
@@ -246,6 +185,7 @@ class _Run:
         fly: dict[int, Callable[[Item], MissionStep | None]] = {
             commands.RETURN_TO_LAUNCH: self._home,
             commands.CONTINUE_AND_CHANGE_ALTITUDE: self._straight,
+            commands.ARC_WAYPOINT: self._arc,
             **dict.fromkeys(commands.LOITERS, self._loiter),
             **dict.fromkeys(commands.LANDINGS, self._land),
             **dict.fromkeys(commands.TAKEOFFS, self._takeoff),
@@ -298,6 +238,20 @@ class _Run:
             why = "as a plain waypoint"
         self._tell(item, FLOWN, why)
         return self._step(item, acceptance_m=max(item.params[1], 0.0))
+
+    def _arc(self, item: Item) -> MissionStep | None:
+        angle = item.params[0]
+        if item.position is None:
+            self._tell(item, NOT_FLOWN, "has no position")
+            return None
+        if not self.steps or not 0.0 < abs(angle) < WHOLE_TURN_DEG:
+            why = f"its angle is {angle:g} degrees" if self.steps else "nothing is before it"
+            self._tell(item, FLOWN, f"as a plain waypoint: {why}")
+            return self._step(item)
+        self._tell(
+            item, FLOWN, f"{abs(angle):g} degrees {'clockwise' if angle > 0.0 else 'counter-clockwise'}"
+        )
+        return self._step(item, arc_deg=angle)
 
     def _takeoff(self, item: Item) -> MissionStep | None:
         if self.steps and self.steps[-1].landing:

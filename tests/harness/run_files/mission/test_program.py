@@ -9,8 +9,9 @@ import pytest
 from harness.files.input_file import InputError
 from harness.run_files.fences import Fences
 from harness.run_files.mission.items import Item, MissionAsRead
-from harness.run_files.mission.program import Program, Told, program
+from harness.run_files.mission.program import program
 from harness.run_files.mission.route import altitude_m
+from harness.run_files.mission.steps import Program, Told
 
 HOME = (47.0, 8.0)
 
@@ -89,7 +90,7 @@ def test_what_has_no_effect_is_passed_over_and_what_cannot_be_flown_is_named() -
     done = run(at(1), item(2, 183, 7, 1430), item(3, 206, 25), item(4, 112, 10), item(5, 31999), at(6))
     assert flown(done) == [1, 6]
     assert [what for what, _ in told(done).values()] == [
-        "flown", "passed over", "passed over", "not flown", "not flown", "flown"
+        "flown", "passed over", "passed over", "passed over", "not flown", "flown"
     ]  # fmt: skip
     assert done.items[4] == Told(5, "command 31999", "not flown", "an aeroplane here cannot")
 
@@ -142,3 +143,30 @@ def test_a_vertical_takeoff_far_from_home_is_at_home() -> None:
     assert done.steps[0].position == HOME
     assert told(done)[1][1].endswith("at home: the place it names is far from there")
     assert run(at(1, 84), at(2)).steps[0].position == (47.01, 8.0)
+
+
+def test_a_script_may_fly_anywhere() -> None:
+    """MAV_CMD_NAV_SCRIPT_TIME: what it does is not in the mission."""
+    done = run(at(1), item(2, 42702, 1, 10), at(3))
+    assert told(done)[2] == ("not flown", "a script of the aircraft flies it")
+
+
+@pytest.mark.parametrize("condition", [112, 114])
+def test_a_condition_holds_back_no_leg_but_a_change_of_speed(condition: int) -> None:
+    done = run(at(1), item(2, condition, 10), item(3, 206, 25), at(4), item(5, 178, 0, 22), at(6))
+    assert (flown(done), told(done)[2]) == ([1, 4, 6], ("passed over", "holds back no leg"))
+    done = run(at(1), item(2, condition, 10), item(3, 178, 0, 22), at(4))
+    assert told(done)[2] == ("not flown", "the change of speed, item 3, is not held back")
+    assert [step.airspeed_mps for step in done.steps] == [None, 22.0]
+
+
+def test_arcs_have_an_angle_and_something_before_them() -> None:
+    done = run(at(1, 36, first=90), at(2, 36, first=-90), item(3, 36, 90), at(4, 36, first=360), at(5, 36))
+    assert [(step.item, step.arc_deg) for step in done.steps] == [(1, 0.0), (2, -90.0), (4, 0.0), (5, 0.0)]
+    assert told(done) == {
+        1: ("flown", "as a plain waypoint: nothing is before it"),
+        2: ("flown", "90 degrees counter-clockwise"),
+        3: ("not flown", "has no position"),
+        4: ("flown", "as a plain waypoint: its angle is 360 degrees"),
+        5: ("flown", "as a plain waypoint: its angle is 0 degrees"),
+    }

@@ -12,8 +12,8 @@ from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray
 from harness.run_files.mission.circle import end_of
 from harness.run_files.mission.flying import Flying, GivenMission, Ground, MissionRoute
-from harness.run_files.mission.program import Loiter, MissionStep, Program
 from harness.run_files.mission.route import LANDING_HEIGHT_M, mission_route
+from harness.run_files.mission.steps import Loiter, MissionStep, Program
 
 TURN_M = 100.0
 
@@ -163,3 +163,46 @@ def test_a_circle_inside_another_or_about_it_is_joined_by_a_turn(wide_m: float) 
             first, second = Loiter(150.0, side, turns=1.2), Loiter(wide_m, other, turns=1.0)
             made = route((step(1), 0j), (step(2, loiter=first), 1000j), (step(3, loiter=second), center))
             assert abs(complex(*made.way.given_m[-1, :2]) - center) == pytest.approx(wide_m, abs=0.1)
+
+
+@pytest.mark.parametrize("angle_deg", [90.0, -90.0, 180.0, -270.0, 350.0])
+def test_an_arc_between_waypoints_is_that_of_a_circle(angle_deg: float) -> None:
+    """It begins and ends where it should, keeps its distance from one place, and climbs all along."""
+    chord = 2.0 * 600.0 * math.sin(math.radians(abs(angle_deg)) / 2.0)
+    begin, end = 1000j, 1000j + chord
+    made = route(
+        (step(1), -1000 + 1000j),
+        (step(2, 100.0), begin),
+        (step(3, 200.0, arc_deg=angle_deg), end),
+        (step(4), end + 900),
+    )
+    marks = dict(made.marks)
+    inside = made.way.given_m[(made.way.given_m[:, 2] >= marks[2]) & (made.way.given_m[:, 2] <= marks[3])]
+    # The centre is on the right of the chord, which leads east, of a short clockwise arc, on the left of a long one.
+    side = -1 if (angle_deg > 0) == (abs(angle_deg) < 180) else 1
+    center = (begin + end) / 2 + side * 1j * abs(600.0 * math.cos(math.radians(angle_deg / 2)))
+    away = np.abs(inside[:, 0] + 1j * inside[:, 1] - center)
+    assert np.abs(away - 600.0).max() < 600.0 * 1e-3
+    assert marks[3] - marks[2] == pytest.approx(600.0 * math.radians(abs(angle_deg)), abs=25.0)
+    at = np.linspace(marks[2], marks[3], 9)
+    assert made.profile.altitudes(at) == pytest.approx(np.linspace(500.0, 600.0, 9), abs=3.0)
+    # Halfway, it is on the side that the sign says.
+    halfway = complex(*inside[len(inside) // 2, :2])
+    wanted = center + (begin - center) * complex(math.cos(a := math.radians(-angle_deg / 2)), math.sin(a))
+    assert abs(halfway - wanted) < 60.0
+
+
+def test_an_arc_above_ground_follows_the_ground() -> None:
+    ground = lambda east, north: 100.0 + 0.1 * east  # noqa: E731
+    made = route(
+        (step(1, 50.0, "ground"), -1000 + 0j),
+        (step(2, 50.0, "ground"), 0j),
+        (step(3, 80.0, "ground", arc_deg=180.0), 1200 + 0j),
+        (step(4, 80.0, "ground"), 2500 + 0j),
+        ground=ground,
+    )
+    marks = dict(made.marks)
+    middle = (marks[2] + marks[3]) / 2
+    assert made.profile.altitudes(np.array([marks[2], middle, marks[3]])) == pytest.approx(
+        [150, 225, 300], abs=4.0
+    )
