@@ -127,6 +127,7 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
     from harness.campaign.table import recordings_of, worst_first
     from harness.files.errors import RunFolderError
     from harness.recording.catalog import AT_ONCE, open_table
+    from harness.recording.properties import severity_told
     from harness.recording.viewer import ViewerError
 
     try:
@@ -139,6 +140,7 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
         )
         added = f", the worst {AT_ONCE} first; {shows}"
         say(f"{len(recordings)} recordings{added if many else ''}", err=True)
+        say(f"sorted by {severity_told()}", err=True)
         open_table(
             folder.resolve().name,
             recordings,

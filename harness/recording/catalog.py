@@ -40,7 +40,7 @@ NEEDS_CATALOG: Final = (
 )
 COLUMNS: Final = {
     "outcome": "outcome",
-    "clearance_ratio": "clearance / wanted",
+    "clearance_ratio": "clearance/wanted",
     "min_clearance_m": "min clearance, m",
     "cross_track_max_m": "cross-track max, m",
     "bank_saturation_percent": "bank at limit, %",
@@ -58,7 +58,9 @@ COLUMNS: Final = {
     "seed": "seed",
     "severity": "severity",
 }
-"""Figures of a run that the table shows, in this order, and how they are headed."""
+"""Figures of a run that the table shows, in this order, and how they are headed.
+
+A browser cuts a heading that is longer than the name of its figure by more than a letter."""
 FIRST: Final = 2
 """So many of them come before the varied keys: there may be more keys than fit a window."""
 

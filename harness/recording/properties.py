@@ -28,6 +28,7 @@ SEVERITY: Final = {
 }
 """How bad an outcome is; a run that reached the goal has 1 where it was not trackable or came nearer to an obstacle
 than was wanted, and else 0."""
+FAIR: Final = {"reached, but not tracked or too near": 1.0, "reached": 0.0}
 
 Value = str | float | int | bool
 
@@ -83,6 +84,12 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
 def _rounded(value: Value) -> Value:
     """A figure as a table shows it: six significant digits."""
     return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def severity_told() -> str:
+    """What the figure `severity` says, for people who see it in a table."""
+    outcomes = ", ".join(f"{value:.0f} {name.replace('_', ' ')}" for name, value in (SEVERITY | FAIR).items())
+    return f"severity: the outcome before the point ({outcomes}), behind it more the less clearance there was"
 
 
 def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> float:

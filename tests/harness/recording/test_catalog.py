@@ -18,6 +18,7 @@ from PIL import Image, ImageChops
 from harness.analysis.metrics import metrics
 from harness.api.results import CampaignResult
 from harness.campaign.table import recordings_of, worst_first
+from harness.cli.app import main
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
@@ -185,6 +186,24 @@ def test_severity_orders_outcomes_then_clearance(make_track: MakeTrack, make_pla
     figures = [severity_of(*each) for each in worst_first]
     assert figures == sorted(figures, reverse=True)
     assert len(set(figures)) == len(figures)
+
+
+def test_severity_is_explained_where_the_table_is_opened(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(catalogs, "open_table", lambda *given: None)
+    (campaign / "campaign.json").write_text("{}")
+    assert main(["view", str(campaign)]) == 0
+    said = capsys.readouterr().err
+    assert "sorted by severity: the outcome before the point (7 collision, 6 lost control, " in said
+    assert (
+        "2 unreachable, 1 reached, but not tracked or too near, 0 reached), behind it more the less" in said
+    )
+
+
+def test_headings_are_no_longer_than_a_browser_shows() -> None:
+    """It makes a column as wide as the name of the figure, not as its heading: `clearance / want...`."""
+    assert [name for name, heading in catalogs.COLUMNS.items() if len(heading) > len(name) + 1] == []
 
 
 def test_who_came_too_near_is_no_better_than_who_was_not_tracked() -> None:
