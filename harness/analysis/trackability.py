@@ -46,7 +46,8 @@ class Leg:
             "lost control": the flight ended so, before any other.
 
             Of the cross-track error, the first that applies, as `harness.analysis.causes` tells them:
-            "navigation error": what the aircraft believed of the error stayed within the limit (of the altitude too);
+            "navigation error": where the error was largest, the aircraft believed to be within the limit (of the
+            altitude too);
             "planner too late": the aircraft was off the plan already when it took effect;
             "sensor horizon": a radius below V^2 / (g tan bank limit), near an obstacle that the sensor shows too late
             for any other;
@@ -174,7 +175,7 @@ def _judge(
     cause = None
     if lost_control:
         cause = "lost control"
-    elif off.max() > threshold and _believed_within(leg.believed_cross_track_m, 0.0, threshold):
+    elif off.max() > threshold and _believed_within(leg.believed_cross_track_m, 0.0, threshold, off.argmax()):
         cause = NAVIGATION_ERROR
     elif off.max() > threshold:
         cause = cross_track_cause(track, first + int(off.argmax()), plans, limits)
@@ -184,7 +185,7 @@ def _judge(
         begins, rows_of_mean = int(slow.argmax()), len(leg) - len(slow) + 1
         cause = speed_cause(leg.part(begins, begins + rows_of_mean))
     elif high.max() > limits.max_altitude_error_m and _believed_within(
-        leg.believed_up_m, wanted_m, limits.max_altitude_error_m
+        leg.believed_up_m, wanted_m, limits.max_altitude_error_m, high.argmax()
     ):
         cause = NAVIGATION_ERROR
     elif high.max() > limits.max_altitude_error_m:
@@ -205,13 +206,14 @@ def _judge(
     )
 
 
-def _believed_within(believed: FloatArray | None, wanted: FloatArray | float, most: float) -> bool:
-    """Whether what the aircraft believed was never too far from what was wanted; not where that is not known."""
-    if believed is None:
-        return False
-    off = np.abs(believed - wanted)
-    known = off[np.isfinite(off)]
-    return bool(len(known)) and float(known.max()) <= most
+def _believed_within(
+    believed: FloatArray | None, wanted: FloatArray | float, most: float, row: np.intp
+) -> bool:
+    """Whether the aircraft believed to be near enough at a row, that of the largest true error; not where unknown.
+
+    At other rows it may have been off: it flies to where its first fix says that it should be.
+    """
+    return believed is not None and bool(np.abs(believed - wanted)[row] <= most)
 
 
 def _judged_as_given(leg: Leg, given: AsGiven, rows: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Leg:

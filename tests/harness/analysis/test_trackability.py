@@ -233,3 +233,30 @@ def test_lost_control_is_on_the_last_leg(
     judged = legs(track, plans, LIMITS, lost_control=True)
     assert [leg.cause for leg in judged] == [None, "lost control"]
     assert [leg.trackable for leg in judged] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("believed_m", "cause"),
+    [
+        (
+            np.linspace(-14.0, 0.0, 201),
+            "navigation error",
+        ),  # it flies to where its first fix says that it should be
+        (np.full(201, 14.0), "tracking error"),
+        (np.linspace(0.0, 14.0, 201), "tracking error"),
+        (np.full(201, np.nan), "tracking error"),
+    ],
+)
+def test_a_navigation_error_is_told_where_the_true_error_is_largest(
+    believed_m: FloatArray, cause: str, make_track: Callable[..., Track], straight_plan: AcceptedPlan
+) -> None:
+    """A true error that grows to 14 m in altitude, or beside the plan, while the aircraft believes to be there."""
+    off_m = np.linspace(0.0, 14.0, 201)
+    limits = replace(LIMITS, max_altitude_error_m=10.0)
+    believed = {"believed_east_m": 0.0, "believed_north_m": 0.0, "believed_course_deg": 0.0}
+    for columns in (
+        {"up_m": 300.0 + off_m, "believed_up_m": 300.0 + believed_m, "believed_cross_track_m": 0.0},
+        {"cross_track_m": off_m, "believed_up_m": 300.0, "believed_cross_track_m": believed_m},
+    ):
+        (leg,) = legs(make_track(201, **believed, **columns), [straight_plan], limits)
+        assert leg.cause == cause
