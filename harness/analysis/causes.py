@@ -8,7 +8,7 @@ feasible, and guidance asked for all the bank there is nonetheless.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +38,23 @@ ROUNDING = 1.001
 
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
+
+
+def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: float | None) -> bool:
+    """Whether a flight was not tracked for navigation errors alone that are within what was planned for them.
+
+    Such a flight is as the scenario means it to be. Nearly all flights with a receiver of the usual kind are so, and
+    hide those in which something went wrong.
+
+    Args:
+        causes: of all legs that were not trackable.
+        error_m: largest distance from the true position to the believed one; None where navigation is perfect.
+        margin_m: what the planner kept beyond the clearance for it; likewise.
+    """
+    if error_m is None or margin_m is None:
+        return False
+    return set(causes) == {NAVIGATION_ERROR} and error_m <= margin_m
+
 
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 

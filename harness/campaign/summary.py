@@ -22,8 +22,10 @@ from harness.campaign.paired import CONFIDENCE, Duel, duels
 from harness.campaign.points import Extreme, extremes
 from harness.campaign.results import ERROR, RESULTS, fly_again
 from harness.campaign.table import (
+    HOW_BAD,
     NAMED,
     Runs,
+    allowed_for,
     are_crossed,
     drawn_keys,
     load_tables,
@@ -143,11 +145,13 @@ class Untracked:
 
     Attributes:
         causes: of all their legs; empty where nothing was flown of a plan.
+        allowed_for: these are navigation errors alone, within what was planned for them.
         count: how many runs.
         runs: numbers of the first of them.
     """
 
     causes: str
+    allowed_for: bool
     count: int
     runs: tuple[int, ...]
 
@@ -166,7 +170,7 @@ class Summary:
         lengths: of each planner, flown length over the optimum at evenly spaced shares of the goals reached.
         worst: failures, collisions first; where nothing failed, the runs that came closest to an obstacle.
         extremes: the run that stands out by each of some figures.
-        untracked: runs that were not tracked, by why, the most frequent first.
+        untracked: runs that were not tracked, by why, the most frequent first, but those `allowed_for` last.
         named: the runs that `extremes` and `untracked` name and `worst` does not have, by number.
         duels: planners on the same cases.
         planned: how many runs the campaign has, flown or not; None where the results do not say so.
@@ -315,14 +319,14 @@ def _lengths(runs: Runs) -> dict[str, tuple[float, ...]]:
 
 
 def _untracked(results: pa.Table, runs: Runs) -> tuple[Untracked, ...]:
-    column_of = "trackability.causes"
-    causes = results[column_of].to_pylist() if column_of in results.column_names else [None] * len(runs)
-    alike: dict[str, list[int]] = {}
-    for row in np.flatnonzero(runs.trackable == 0.0).tolist():
-        alike.setdefault(causes[row] or "", []).append(int(runs.run[row]))
+    rows = results.select([name for name in HOW_BAD if name in results.column_names]).to_pylist()
+    alike: dict[tuple[str, bool], list[int]] = {}
+    for place in np.flatnonzero(runs.trackable == 0.0).tolist():
+        why = rows[place].get("trackability.causes") or ""
+        alike.setdefault((why, allowed_for(rows[place])), []).append(int(runs.run[place]))
     return tuple(
-        Untracked(why, len(numbers), tuple(numbers[:FIRST]))
-        for why, numbers in sorted(alike.items(), key=lambda each: -len(each[1]))
+        Untracked(why, allowed, len(numbers), tuple(numbers[:FIRST]))
+        for (why, allowed), numbers in sorted(alike.items(), key=lambda each: (each[0][1], -len(each[1])))
     )
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.analysis.causes import is_allowed_for
 from harness.campaign.results import RESULTS, RUNS, TIMINGS
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
@@ -251,16 +252,38 @@ def worst_first(folder: Path, recordings: Sequence[Path]) -> list[Path]:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = ["run", "outcome", "trackable", "min_clearance_m", "wanted_clearance_m"]
     try:
-        rows = pq.read_table(folder / RESULTS, columns=columns).to_pylist()
+        names = set(pq.read_schema(folder / RESULTS).names)
+        rows = pq.read_table(
+            folder / RESULTS, columns=[name for name in HOW_BAD if name in names]
+        ).to_pylist()
     except (OSError, pa.ArrowException):
         return [*recordings]
     bad = {row["run"]: _how_bad(row) for row in rows}
     return sorted(recordings, key=lambda path: -bad.get(int(path.parent.name), -1.0))
 
 
+HOW_BAD: Final = (
+    "run",
+    "outcome",
+    "trackable",
+    "min_clearance_m",
+    "wanted_clearance_m",
+    "trackability.causes",
+    "navigation_error_m.max",
+    "navigation_margin_m",
+)
+"""Columns of the results that say how badly a run went."""
+
+
 def _how_bad(row: Mapping[str, Any]) -> float:
     least_m, wanted_m = row["min_clearance_m"], row["wanted_clearance_m"]
     ratio = least_m / wanted_m if least_m is not None and wanted_m else None
-    return severity(str(row["outcome"]), bool(row["trackable"]), ratio)
+    fair = bool(row["trackable"]) or allowed_for(row)
+    return severity(str(row["outcome"]), fair, ratio)
+
+
+def allowed_for(row: Mapping[str, Any]) -> bool:
+    """Whether a row of the results was not tracked for nothing but navigation errors that were planned for."""
+    causes = (row.get("trackability.causes") or "").split("; ")
+    return is_allowed_for(causes, row.get("navigation_error_m.max"), row.get("navigation_margin_m"))

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+from harness.analysis.causes import is_allowed_for
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -42,16 +44,19 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
 
     Returns:
         `severity` grows with how badly the run went: the outcome before the point, and for equal outcomes more the
-        less clearance there was. A figure that a run does not have (clearance in an empty world) is left out.
+        less clearance there was; navigation errors that were planned for are no fault. A figure that a run does not
+        have (clearance in an empty world) is left out.
     """
     clearance_m = metrics.get("min_clearance_m")
     ratio = None if clearance_m is None else clearance_m / (scenario.planner.clearance_m or math.inf)
     causes = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
+    off_m = metrics.get("navigation_error_m", {}).get("max")
+    allowed = is_allowed_for(causes, off_m, metrics.get("navigation_margin_m"))
     lost = metrics["lost_returns"]["max"]
     wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
     found: dict[str, Value | None] = {
         "outcome": metrics["outcome"],
-        "severity": severity(metrics["outcome"], bool(metrics["trackable"]), ratio),
+        "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
         "trackable": bool(metrics["trackable"]),
         "causes": ", ".join(causes) or None,
         "min_clearance_m": clearance_m,
@@ -60,7 +65,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "cross_track_p95_m": metrics["cross_track_m"]["p95"],
         "cross_track_max_m": metrics["cross_track_m"]["max"],
         "altitude_error_p95_m": metrics["altitude_error_m"]["p95"],
-        "navigation_error_max_m": metrics.get("navigation_error_m", {}).get("max"),
+        "navigation_error_max_m": off_m,
         "navigation_jump_m": metrics.get("navigation_jump_m"),
         "plan_delay_max_s": metrics["plan_delay_s"]["max"],
         "lost_returns_max_percent": None if lost is None else 100.0 * lost,
@@ -97,7 +102,7 @@ def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> fl
 
     Args:
         outcome: a value of `harness.flight.record.Outcome`.
-        trackable: whether all legs were tracked.
+        trackable: whether all legs were tracked, navigation errors that are planned for aside.
         clearance_ratio: least clearance over the wanted one; None where there was nothing to keep clear of.
     """
     fair = trackable and (clearance_ratio is None or clearance_ratio >= 1.0)

@@ -24,6 +24,7 @@ from harness.campaign.paired import mean_estimate
 from harness.campaign.questions import QUESTIONS, percent
 from harness.campaign.report import PAGE, PLAIN, write_summary
 from harness.campaign.summary import CURVE_POINTS, Cell, Summary, summarise, wilson
+from harness.campaign.table import worst_first
 from harness.cli.app import main
 from harness.cli.campaign_terminal import print_summary
 from harness.files.strict_yaml import InputError
@@ -40,6 +41,7 @@ SCHEMA = pa.schema(
     + [("optimum_m", pa.float64()), ("length_ratio", pa.float64()), ("wanted_clearance_m", pa.float64())]
     + [("max_load_factor", pa.float64()), ("trackability.causes", pa.string())]
     + [("bank_saturation_fraction", pa.float64()), ("plan_delay_s.max", pa.float64())]
+    + [("navigation_error_m.max", pa.float64()), ("navigation_margin_m", pa.float64())]
     + [("navigation_jump_m", pa.float64()), ("lost_returns.max", pa.float64())]
 )
 WIND = "environment.wind.speed_mps"
@@ -592,6 +594,7 @@ def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
         ("navigation error", 18, (1, 2, 3, 4, 5)),
         ("navigation error; bank limit", 1, (13,)),
     ]
+    assert not any(each.allowed_for for each in summary.untracked), "it is not known what was planned for it"
     page = write_summary(summary, folder).read_text()
     assert "Not every leg was tracked in 19 of 20 runs:" in page
     said = re.sub(r'<a href="#run-(\d+)">\1</a>', r"\1", page)
@@ -599,6 +602,27 @@ def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
     assert "<li>navigation error; bank limit: 1 run (13)</li>" in said
     assert_links_lead_somewhere(page)
     assert len(re.findall('<a href="#run-', page)) == 6 + len(summary.extremes)
+
+
+def test_navigation_errors_that_were_planned_for_come_last_and_say_so(tmp_path: Path) -> None:
+    """A receiver errs as the scenario says that it does: what is odd is another cause, or a larger error."""
+    untracked = {"trackable": False, "trackability.causes": "navigation error", "navigation_margin_m": 17.2}
+    rows = [row(run, **untracked, **{"navigation_error_m.max": 9.0 + 0.1 * run}) for run in range(20)]
+    rows[4] |= {"navigation_error_m.max": 42.5}
+    rows[13] |= {"trackability.causes": "navigation error; planner too late"}
+    folder = campaign(tmp_path / "c", rows)
+    summary = summarise(folder)
+    assert [(each.allowed_for, each.count, each.runs[:2]) for each in summary.untracked] == [
+        (False, 1, (4,)),
+        (False, 1, (13,)),
+        (True, 18, (0, 1)),
+    ]
+    page = write_summary(summary, folder).read_text()
+    usual = page.index("navigation error, of position no more than <abbr")
+    assert page.index("<li>navigation error: 1 run") < page.index("planner too late: 1 run") < usual
+    recordings = [folder / "runs" / str(run) / "flight.rrd" for run in (0, 4, 13, 19)]
+    first = [int(path.parent.name) for path in worst_first(folder, recordings)][:2]
+    assert sorted(first) == [4, 13], "they come first in the table of recordings too"
 
 
 def test_a_key_drawn_at_random_is_always_grouped() -> None:
