@@ -146,12 +146,25 @@ class Frame:
         altitude_m: altitude to be held, above mean sea level.
         clearance_m: wanted distance from every obstacle edge.
         bank_limit_deg: largest bank command of the guidance; None where several flights are shown.
+        latitude_deg: of the plane's origin, for the map; None where it was not given.
     """
 
     bounds_m: tuple[float, float, float, float]
     altitude_m: float
     clearance_m: float
     bank_limit_deg: float | None = None
+    latitude_deg: float | None = None
+
+    @property
+    def kept(self) -> dict[str, Any]:
+        """What a recording keeps of it."""
+        values = {
+            "bounds_m": self.bounds_m,
+            "altitude_m": self.altitude_m,
+            "clearance_m": self.clearance_m,
+            "latitude_deg": self.latitude_deg,
+        }
+        return {name: value for name, value in values.items() if value is not None}
 
     @property
     def span_m(self) -> float:
@@ -217,7 +230,8 @@ class Scene:
     def frame(self) -> Frame:
         """What the views are framed on."""
         limit_deg = round(math.degrees(self.limits.bank_limit_rad), 1)
-        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg)
+        latitude_deg = None if self.origin_deg is None else self.origin_deg[0]
+        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg, latitude_deg)
 
     @property
     def obstacle_top_m(self) -> float:

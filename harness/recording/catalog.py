@@ -210,15 +210,17 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
 def common_frame(runs: pa.Table) -> Frame:
     """What all recordings of a table are framed on; those that were not closed have nothing."""
     given = {
-        name: [each for each in runs[f"property:{FRAME}:{name}"].to_pylist() if each]
-        for name in ("bounds_m", "altitude_m", "clearance_m")
+        name: [each for each in runs[column].to_pylist() if each]
+        for name in ("bounds_m", "altitude_m", "clearance_m", "latitude_deg")
+        if (column := f"property:{FRAME}:{name}") in runs.column_names
     }
     (xmin, ymin), (xmax, ymax) = (
         map(extreme, zip(*(each[first : first + 2] for each in given["bounds_m"]), strict=True))
         for extreme, first in ((min, 0), (max, 2))
     )
     altitude_m, clearance_m = (max(each[0] for each in given[name]) for name in ("altitude_m", "clearance_m"))
-    return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m)
+    latitude_deg = next((each[0] for each in given.get("latitude_deg", ())), None)
+    return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m, latitude_deg=latitude_deg)
 
 
 def open_table(

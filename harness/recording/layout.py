@@ -77,7 +77,7 @@ def blueprint(
     """
     plan: rrb.Container | rrb.View = plan_view(frame, runs)
     if on_earth:
-        plan = rrb.Tabs(plan, rrb.MapView(origin=MAP, name="Map"), active_tab=0)
+        plan = rrb.Tabs(plan, rrb.MapView(origin=MAP, name="Map", zoom=map_zoom(frame)), active_tab=0)
     events = _events_view()
     about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
     colours = rrb.TextDocumentView(origin=COLOURS, name="Colours")
@@ -132,6 +132,11 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
     return blueprint(frame, runs, without, on_earth, lanes=lanes)
 
 
+MAP_PIXELS: Final = (400, 290)
+"""Width and height of the map's view in a window of 1280 x 768, less a margin."""
+LEVEL_0_PIXEL_M: Final = 156_543.0
+ZOOMS: Final = (1.0, 19.0)
+
 PLOTS: Final = (
     (4, ("cross_track", "altitude_error", NAVIGATION, "speed", THROTTLE)),
     (4, ("clearance", "search", PLAN_DELAY, RETURNS)),
@@ -178,6 +183,20 @@ def thin_blueprint(frame: Frame) -> Layout:
         auto_layout=False,
         auto_views=False,
     )
+
+
+def map_zoom(frame: Frame) -> float | None:
+    """Zoom of the map at which the area just fits into its view; None where the latitude is not known.
+
+    The viewer's own is so near that next to nothing of an area is seen. Levels are those of OpenStreetMap: a pixel is
+    156,543 m wide on the equator at level 0, and half of that at each level on.
+    """
+    if frame.latitude_deg is None:
+        return None
+    xmin, ymin, xmax, ymax = frame.bounds_m
+    pixel_m = max((xmax - xmin) / MAP_PIXELS[0], (ymax - ymin) / MAP_PIXELS[1])
+    zoom = math.log2(LEVEL_0_PIXEL_M * math.cos(math.radians(frame.latitude_deg)) / pixel_m)
+    return min(max(zoom, ZOOMS[0]), ZOOMS[1])
 
 
 def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:

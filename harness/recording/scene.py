@@ -49,7 +49,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
     frame = scene.frame
     rec.send_property(
         look.FRAME,
-        rr.AnyValues(bounds_m=frame.bounds_m, altitude_m=frame.altitude_m, clearance_m=frame.clearance_m),
+        rr.AnyValues(**frame.kept),
     )
     rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)

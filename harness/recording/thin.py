@@ -205,7 +205,7 @@ def write_log_recording(log: Path, run_dir: Path, out: Path) -> tuple[str, ...]:
         rec.send_recording_name(log.name)
         rec.send_property(
             look.FRAME,
-            rr.AnyValues(bounds_m=frame.bounds_m, altitude_m=frame.altitude_m, clearance_m=frame.clearance_m),
+            rr.AnyValues(**frame.kept),
         )
         log_shapes(rec, frame)
         _send_track(rec, track, run, frame.altitude_m)
