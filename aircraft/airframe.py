@@ -43,6 +43,7 @@ FIGURES = (
     "roll_lag_s",
     "roll_delay_s",
     "guidance_bandwidth_radps",
+    "turn_rate_share",
 )
 """Attributes of `Airframe` that an entry may replace."""
 
@@ -66,6 +67,7 @@ class Airframe:
         roll_lag_s: time constant of roll behind its command.
         roll_delay_s: further delay of roll behind its command.
         guidance_bandwidth_radps: natural frequency of the cross-track correction.
+        turn_rate_share: turn rate in a steady turn over that of a coordinated one, g tan(bank) / V.
         level_banks: (true airspeed m/s, bank deg) pairs, airspeed rising: the steepest bank up to the limit at
             which speed and altitude are kept.
         weave_error_m: largest cross-track error on a weave of lines and arcs as planned, at cruise in calm air.
@@ -86,6 +88,7 @@ class Airframe:
     roll_lag_s: float
     roll_delay_s: float
     guidance_bandwidth_radps: float
+    turn_rate_share: float
     level_banks: tuple[tuple[float, float], ...]
     weave_error_m: float
     gains: Gains
@@ -101,6 +104,7 @@ class Airframe:
             roll_lag_s=self.roll_lag_s,
             roll_delay_s=self.roll_delay_s,
             bandwidth_radps=self.guidance_bandwidth_radps,
+            turn_rate_share=self.turn_rate_share,
         )
 
     def level_bank_deg(self, airspeed_mps: float) -> float:

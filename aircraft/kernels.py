@@ -32,6 +32,7 @@ PREVIEW_GAINS = np.dtype(
         ("roll_step_rad", np.float64),  # largest change of the roll reference from one update to the next
         ("roll_lag_updates", np.float64),  # time constant of roll, in update intervals
         ("delay_s", np.float64),  # from a command to when roll begins to follow it
+        ("turn_rate_share", np.float64),  # turn rate of the aircraft over that of a coordinated turn
         ("blend_s", np.float64),  # a step of curvature is averaged over this time
     ]
 )
@@ -141,7 +142,8 @@ def preview_update(
         across = damped * speed / max(along_mps, 0.3 * speed)
         curvature = _mean_curvature(rows, row, arc_length + speed * has.delay_s, speed * has.blend_s)
         acceleration = across - curvature * (speed * speed)
-        wanted = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead_mps / speed, 0.2)))
+        lift = GRAVITY_MPS2 * has.turn_rate_share
+        wanted = math.atan(acceleration / (lift * max(ahead_mps / speed, 0.2)))
     allowed = _within(has.bank_limit_rad, wanted)
     step = _within(has.roll_step_rad, allowed - kept.roll_reference_rad)
     roll = kept.roll_reference_rad + step

@@ -66,6 +66,11 @@ WELL_TRACKED_S = 0.01
 PACES = (1.0, 0.7, 0.5, 0.35)
 LEG_S = 10.0
 TURN_S = 20.0
+TURN_SHARE_TOLERANCE = 0.03
+"""A steady turn whose rate is this close to that of a coordinated one counts as one: feedback makes up for the rest."""
+LEAST_TURN_SHARE = 0.5
+"""An aircraft that turns at less than this share of a coordinated turn's rate is not flown by its bank."""
+
 BANK_STEP_DEG = 1.0
 ROLL_IN_DEG = 30.0
 KEPT_SPEED_SHARE = 0.03
@@ -126,6 +131,12 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
             frame = _provisional(entry, files, cruise, at, placed)
             if reason := not_held(frame, cruise, REVERSALS):
                 continue
+            if "turn_rate_share" not in entry.figures:
+                share = turn_rate_share(frame, cruise)
+                if not LEAST_TURN_SHARE <= share <= 2.0 - LEAST_TURN_SHARE:
+                    reason = f"it turns at {share:.2g} of the rate of a coordinated turn"
+                    continue
+                frame = replace(frame, turn_rate_share=share)
             error_m = weaving_error_m(frame, cruise)
             if error_m < least_m:
                 best, least_m = replace(frame, weave_error_m=error_m), error_m
@@ -179,6 +190,7 @@ def _provisional(
         "roll_lag_s": round(1.0 / placed.roll, 3),
         "roll_delay_s": round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2),
         "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),
+        "turn_rate_share": 1.0,
         **entry.figures,
     }
     return Airframe(
@@ -304,6 +316,27 @@ def departure(state: AircraftState, bank_deg: float, speed: float) -> str | None
     if abs(state.up_m - REFERENCE_ALTITUDE_M) > KEPT_ALTITUDE_M:
         return f"altitude off by {state.up_m - REFERENCE_ALTITUDE_M:.1f} m"
     return None
+
+
+def turn_rate_share(frame: Airframe, speed: float) -> float:
+    """Turn rate in a steady turn at 30 degrees, or at the bank limit if that is less, over that of a coordinated turn.
+
+    The mean of a left and a right turn, to 0.01; 1 within `TURN_SHARE_TOLERANCE` of it. A side force makes it less: the
+    F-16's yaw damper has no washout, holds the nose back in a turn and so makes it slip.
+    """
+    shares = []
+    for bank_deg in (min(ROLL_IN_DEG, frame.bank_limit_deg), -min(ROLL_IN_DEG, frame.bank_limit_deg)):
+        model = in_flight(frame, speed)
+        model.command(math.radians(bank_deg), REFERENCE_ALTITUDE_M, speed)
+        model.advance(round(TURN_S * model.step_rate_hz))
+        before = model.state()
+        model.advance(model.step_rate_hz)
+        after = model.state()
+        turned_rad = math.remainder(after.course_rad - before.course_rad, math.tau)
+        coordinated_radps = GRAVITY_MPS2 * math.tan(after.roll_rad) / after.groundspeed_mps
+        shares.append(turned_rad / (after.time_s - before.time_s) / coordinated_radps)
+    share = round(sum(shares) / len(shares), 2)
+    return 1.0 if abs(share - 1.0) <= TURN_SHARE_TOLERANCE else share
 
 
 def roll_in_s(frame: Airframe, speed: float) -> float:

@@ -25,6 +25,8 @@ class GuidanceLimits:
         roll_lag_s: time constant of roll behind its command; the command leads by it.
         roll_delay_s: further delay of roll (actuators, the roll mode).
         bandwidth_radps: natural frequency omega of the cross-track correction, about a third of 1 / roll_lag_s.
+        turn_rate_share: turn rate in a steady turn over that of a coordinated one, g tan(bank) / V. It is less than 1
+            where a side force acts outwards, as on an aircraft that slips in turns.
     """
 
     airspeed_mps: float
@@ -34,6 +36,7 @@ class GuidanceLimits:
     roll_lag_s: float
     roll_delay_s: float
     bandwidth_radps: float
+    turn_rate_share: float = 1.0
 
     @property
     def slowest_roll_s(self) -> float:

@@ -1,16 +1,16 @@
 """The law `preview`: path curvature seen ahead of the roll lag, and a second-order correction of the cross-track error.
 
-    a = kappa Vg^2 - 2 zeta omega e_dot - omega^2 e,    phi = atan(a / (g cos(chi - psi)))
+    a = kappa Vg^2 - 2 zeta omega e_dot - omega^2 e,    phi = atan(a / (s g cos(chi - psi)))
 
 with a, e positive to the right of the path (the curvature kappa is therefore taken positive to the right here), chi the
-course and psi the heading. Curvature is that where the aircraft will be when it has rolled, averaged over the time that
-rolling into a turn takes, so that line and arc join without a bump. Clothoids in their place gained too little for what
-they would ask of every planner: on the 14-turn courses of `harness.bench.tracking`, three seeds, calm, 20 updates a
-second, p95/max were .049/.091 m with this and .074/.085 m with clothoids as long as the roll-in for the Aerosonde,
-.101/.182 and .063/.119 m for c172p, .101/.644 and .110/.417 m for T38. The roll command leads by the time constant of
-the roll loop, so that roll itself follows the law. Wind enters through the ground velocity alone, except where it is
-stronger than the aircraft: then the wind is estimated as ground velocity less air velocity, and
-`aircraft.kernels.air_direction` says where to head.
+course, psi the heading and s the share of its coordinated turn rate that the aircraft reaches. Curvature is that where
+the aircraft will be when it has rolled, averaged over the time that rolling into a turn takes, so that line and arc
+join without a bump. Clothoids in their place gained too little for what they would ask of every planner: on the 14-turn
+courses of `harness.bench.tracking`, three seeds, calm, 20 updates a second, p95/max were .049/.091 m with this and
+.074/.085 m with clothoids as long as the roll-in for the Aerosonde, .101/.182 and .063/.119 m for c172p, .101/.644 and
+.110/.417 m for T38. The roll command leads by the time constant of the roll loop, so that roll itself follows the law.
+Wind enters through the ground velocity alone, except where it is stronger than the aircraft: then the wind is estimated
+as ground velocity less air velocity, and `aircraft.kernels.air_direction` says where to head.
 
 Sources: R. W. Beard and T. W. McLain, "Small Unmanned Aircraft", chapter 9 (coordinated turn in wind), and PX4's npfg
 for the same use of ground and air velocity. The arithmetic is in `aircraft.kernels.preview_update`.
@@ -67,6 +67,7 @@ class PreviewLaw:
         self._gains["damping"] = config.damping
         self._gains["bank_limit_rad"] = limits.bank_limit_rad
         self._gains["roll_step_rad"] = limits.roll_rate_radps / UPDATE_RATE_HZ
+        self._gains["turn_rate_share"] = limits.turn_rate_share
         self._gains["roll_lag_updates"] = limits.roll_lag_s * UPDATE_RATE_HZ
         # The held command acts on average half an update late.
         self._gains["delay_s"] = limits.roll_delay_s + 0.5 * update_s

@@ -145,6 +145,20 @@ def test_curvature_preview_is_what_keeps_a_joint_smooth() -> None:
     assert worst(blind) > 3 * worst(LIMITS)
 
 
+def test_a_turn_rate_short_of_a_coordinated_turn_is_made_up_for_by_bank() -> None:
+    full, short = (preview(replace(LIMITS, turn_rate_share=share)) for share in (1.0, 0.9))
+    route = joined([(1 / 150.0, 1500.0)])
+    tangents = []
+    for law in (full, short):
+        law.follow(route)
+        state = PointMass(northwards()).state()
+        for _ in range(UPDATE_RATE_HZ * 3):
+            output = law.update(state)
+        tangents.append(math.tan(output.roll_command_rad))
+    assert tangents[0] == pytest.approx(0.9 * tangents[1])
+    assert tangents[0] != 0.0
+
+
 @given(
     st.floats(-3000.0, 3000.0),
     st.floats(0.0, math.tau),

@@ -18,7 +18,7 @@ from aircraft.autopilot import gains
 from aircraft.interface import AircraftState
 from aircraft.jsbsim_loading import linearised, mass_kg, trimmed
 from aircraft.model_files import model_files
-from aircraft.survey import departure, in_flight, not_held, survey, weaving_error_m
+from aircraft.survey import departure, in_flight, not_held, survey, turn_rate_share, weaving_error_m
 from tests.longer import longer
 
 AEROSONDE = Path(aircraft.__path__[0], "aerosonde")
@@ -34,6 +34,30 @@ def test_the_aerosonde_is_what_its_book_says() -> None:
     assert frame.roll_in_s == pytest.approx(0.63, abs=0.02)
     assert (frame.roll_lag_s, frame.roll_delay_s) == (0.25, 0.03)
     assert frame.level_bank_deg(25.0) == frame.bank_limit_deg == 45.0
+
+
+def test_an_aircraft_that_slips_in_turns_banks_for_it() -> None:
+    """The F-16's yaw damper makes it slip by a degree, and the side force takes a tenth of its turn rate."""
+    frame = airframe("f16")
+    assert 0.85 < frame.turn_rate_share < 0.95
+    assert frame.guidance_limits().turn_rate_share == frame.turn_rate_share
+    assert frame.weave_error_m < 4.0
+    blind = replace(frame, turn_rate_share=1.0)
+    assert weaving_error_m(blind, frame.cruise_mps) > 1.3 * frame.weave_error_m
+
+
+def test_a_turn_within_the_tolerance_counts_as_coordinated() -> None:
+    frame = airframe("aerosonde")
+    assert frame.turn_rate_share == 1.0 == turn_rate_share(frame, frame.cruise_mps)
+
+
+def test_an_aircraft_that_hardly_turns_when_it_banks_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(aircraft.survey, "turn_rate_share", lambda frame, speed: 0.4)
+    files = model_files("aerosonde")
+    with pytest.raises(
+        AircraftError, match=r"cannot be held at 25 m/s: it turns at 0\.4 of the rate of a coordinated"
+    ):
+        survey(AirframeEntry(files.name, "", 25.0), files)
 
 
 def test_a_speed_at_the_edge_is_held_and_one_beyond_is_not() -> None:
