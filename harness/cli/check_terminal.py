@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from harness.cli.terminal import plain
+from harness.cli.terminal import legible, plain, spread
 from harness.files.wording import counted
 
 MOST_ITEMS = 12
@@ -33,14 +33,11 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     }
     _add_contacts(metrics, rows)
     tolerance = f"{legs[0]['threshold_m']:.3g} m" if legs else "none"
-    rows["off the path given"] = f"p95 {_metres(off['p95'])} / max {_metres(off['max'])}, allowed {tolerance}"
+    rows["off the path given"] = f"{spread(off, ('p95', 'max'))} m, allowed {tolerance}"
     if legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"]):
         rows["off the path given"] += ", at corners as below"
-    rows["cross-track error"] = (
-        f"rms {_metres(cross['rms'])} / p95 {_metres(cross['p95'])} / max {_metres(cross['max'])}"
-    )
-    high = metrics["altitude_error_m"]
-    rows["altitude error"] = f"p95 {_metres(high['p95'])} / max {_metres(high['max'])}"
+    rows["cross-track error"] = f"{spread(cross)} m"
+    rows["altitude error"] = f"{spread(metrics['altitude_error_m'])} m"
     if "height_above_ground_m" in metrics:
         height = metrics["height_above_ground_m"]
         rows["above ground"] = (
@@ -138,7 +135,7 @@ def _rounded(corner: dict[str, Any]) -> str:
 
 
 def _metres(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g} m"
+    return "-" if value is None else f"{legible(value)} m"
 
 
 def _radius(curvature_1pm: float) -> str:

@@ -99,26 +99,26 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     compute, timing = metrics["compute_ms"], metrics["timing"]
     return {
         "outcome": f"[{style}]{metrics['outcome']}[/]: {plain(metrics['reason'])}",
-        "length flown": f"{_number(metrics['flown_length_m'])} m, "
-        f"planned {_number(metrics['planned_length_m'])} m",
-        "flight time": f"{_number(metrics['flight_time_s'])} s",
-        "least clearance": f"{_number(metrics['min_clearance_m'])} m, "
-        f"below the wanted one for {_number(metrics['clearance_violation_s'])} s",
+        "length flown": f"{legible(metrics['flown_length_m'])} m, "
+        f"planned {legible(metrics['planned_length_m'])} m",
+        "flight time": f"{legible(metrics['flight_time_s'])} s",
+        "least clearance": f"{legible(metrics['min_clearance_m'])} m, "
+        f"below the wanted one for {legible(metrics['clearance_violation_s'])} s",
         **_over_ground(metrics),
-        "cross-track error": f"{_spread(metrics['cross_track_m'])} m",
+        "cross-track error": f"{spread(metrics['cross_track_m'])} m",
         **_navigated(metrics),
-        "altitude error": f"{_spread(metrics['altitude_error_m'])} m",
+        "altitude error": f"{spread(metrics['altitude_error_m'])} m",
         "trackable": _tracked(metrics),
         "replans": str(metrics["replans"]),
-        "planner time": f"p99 {_number(compute['p99'])} / max {_number(compute['max'])} ms a search",
-        "wall time": f"{_number(timing['wall_s'])} s, {_number(timing['realtime_factor'])} x real time",
+        "planner time": f"p99 {legible(compute['p99'])} / max {legible(compute['max'])} ms a search",
+        "wall time": f"{legible(timing['wall_s'])} s, {legible(timing['realtime_factor'])} x real time",
     }
 
 
 def _over_ground(metrics: Mapping[str, Any]) -> dict[str, str]:
     """A row on the height above ground, where that is known."""
     least_m = metrics.get("min_altitude_above_ground_m")
-    return {} if least_m is None else {"above ground": f"at least {_number(least_m)} m"}
+    return {} if least_m is None else {"above ground": f"at least {legible(least_m)} m"}
 
 
 def _navigated(metrics: Mapping[str, Any]) -> dict[str, str]:
@@ -126,8 +126,8 @@ def _navigated(metrics: Mapping[str, Any]) -> dict[str, str]:
     error = metrics.get("navigation_error_m")
     if error is None:
         return {}
-    margin = f"{_number(metrics['navigation_margin_m'])} m planned for it beyond the clearance"
-    return {"navigation error": f"{_spread(error)} m; {margin}"}
+    margin = f"{legible(metrics['navigation_margin_m'])} m planned for it beyond the clearance"
+    return {"navigation error": f"{spread(error)} m; {margin}"}
 
 
 def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
@@ -194,7 +194,7 @@ _PATH_COLUMNS = {
 
 
 def _rows(entries: Sequence[Mapping[str, float | None]], columns: Mapping[str, str]) -> list[Sequence[str]]:
-    return [tuple(_number(entry[name]) for name in columns) for entry in entries]
+    return [tuple(legible(entry[name]) for name in columns) for entry in entries]
 
 
 def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
@@ -248,12 +248,13 @@ def plain(text: str) -> str:
     return escape(printable(text))
 
 
-def _number(value: float | None) -> str:
+def legible(value: float | None) -> str:
     """A number as a person reads it; a dash where there is none."""
     if value is None or value != value:
         return "-"
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def _spread(values: Mapping[str, float | None]) -> str:
-    return " / ".join(f"{name} {_number(values[name])}" for name in ("rms", "p95", "max"))
+def spread(values: Mapping[str, float | None], names: Sequence[str] = ("rms", "p95", "max")) -> str:
+    """Figures of one error, each after its name; their unit, once, comes after them."""
+    return " / ".join(f"{name} {legible(values[name])}" for name in names)

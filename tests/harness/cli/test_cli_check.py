@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from harness.cli.app import main
+from harness.cli.check_terminal import verdict_rows
+from harness.cli.terminal import flight_rows
 from harness.files.input_file import InputError
 from harness.run.path_check import check
 from harness.run_files.run_folder import load_run
@@ -331,3 +333,16 @@ def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
     assert not check(np.array([(0.0, 0.0), (0.0, 1000.0), (60.0, 1000.0), (60.0, 0.0)])).ok
     with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):
         check([1.0, 2.0])  # type: ignore[list-item]
+
+
+def test_errors_have_their_unit_where_those_of_a_flight_have_it(
+    straight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Once, behind the last figure; and no power of ten in a length."""
+    _, metrics = flown(straight, tmp_path / "run", capsys=capsys)
+    of_a_flight = flight_rows(metrics)
+    rows = verdict_rows(metrics | {"deviation_from_given_m": {"p95": 987.4, "max": 1234.5}})
+    for row in ("cross-track error", "altitude error"):
+        assert rows[row] == of_a_flight[row]
+        assert rows[row].count(" m") == 1 + rows[row].count(" max")
+    assert rows["off the path given"].startswith("p95 987 / max 1,234 m, allowed ")
