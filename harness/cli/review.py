@@ -37,7 +37,24 @@ def view(
         )
     if campaign is not None:
         return 0 if open_campaign(campaign, web) else FAILED
+    for each in runs:
+        _refuse_if_not_kept(each)
     return 0 if open_viewer(runs, web) else FAILED
+
+
+def _refuse_if_not_kept(run: Path) -> None:
+    """Raises InputError where a run of a campaign is meant of which no folder was kept."""
+    from harness.campaign.results import INDEX, RESULTS, RUNS, fly_again
+    from harness.files.input_file import InputError
+
+    folder = run.resolve().parent.parent
+    is_run = run.resolve().parent.name == RUNS and run.name.isdecimal() and (folder / INDEX).is_file()
+    if is_run and not run.exists():
+        again = fly_again(folder / RESULTS, int(run.name))
+        raise InputError(
+            f"{run}: no run folder was kept; `{again}` flies the run again with a recording, `recordings: thin` in the "
+            "campaign's file keeps one of every run"
+        )
 
 
 def report(
@@ -127,11 +144,13 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
     from harness.campaign.table import recordings_of, worst_first
     from harness.files.errors import RunFolderError
     from harness.recording.catalog import AT_ONCE, open_table
-    from harness.recording.properties import severity_told
+    from harness.recording.properties import NO_RECORDINGS, severity_told
     from harness.recording.viewer import ViewerError
 
     try:
         recordings = worst_first(folder, recordings_of(folder))
+        if not recordings:
+            raise RunFolderError(NO_RECORDINGS.format(folder))
         many = len(recordings) > AT_ONCE
         shows = (
             "the circular arrow beside the name shows those that have been added"

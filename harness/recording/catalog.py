@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 from harness.files.errors import RunFolderError
 from harness.recording.blueprint import FRAME, Frame
 from harness.recording.layout import layout_of
-from harness.recording.properties import RUN, VARIED
+from harness.recording.properties import NO_RECORDINGS, RUN, VARIED
 from harness.recording.viewer import (
     LOCALHOST,
     NO_DRIVER,
@@ -115,7 +115,7 @@ def catalog(name: str, recordings: Sequence[Path], opening_s: float = 0.0) -> It
         ViewerError: rerun's server is not installed or does not start.
     """
     if not recordings:
-        raise RunFolderError(f"{name} has no recordings; fly it with `recordings: all`, `thin` or `failures`")
+        raise RunFolderError(NO_RECORDINGS.format(name))
     try:
         import datafusion  # noqa: F401
     except ImportError as error:

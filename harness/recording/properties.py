@@ -20,6 +20,11 @@ RUN: Final = "run"
 VARIED: Final = "varied"
 """Name of the properties with the keys that a campaign varied."""
 
+NO_RECORDINGS: Final = (
+    "{} has no recordings: `recordings: thin` in the campaign's file keeps a small one of every run, `all` a whole "
+    "one, `failures` a whole one of those that failed"
+)
+"""Said of a campaign of which there is no table."""
 SEVERITY: Final = {
     "collision": 7.0,
     "lost_control": 6.0,

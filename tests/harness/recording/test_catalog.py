@@ -201,6 +201,26 @@ def test_severity_is_explained_where_the_table_is_opened(
     )
 
 
+def test_a_campaign_without_recordings_says_how_to_get_some(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On a machine without a screen too, before it says what it would open."""
+    (tmp_path / "campaign.json").write_text("{}")
+    for arguments in ([str(tmp_path)], [str(tmp_path), "--web"]):
+        assert main(["view", *arguments]) == 2
+        said = capsys.readouterr().err
+        assert said.startswith(
+            f"wayproof: {tmp_path} has no recordings: `recordings: thin` in the campaign's file "
+        )
+        assert len(said.splitlines()) == 1
+    for run in ("7", "07"):
+        assert main(["view", str(tmp_path / "runs" / run)]) == 2
+        said = capsys.readouterr().err
+        assert f"`wayproof fly --from {tmp_path}/results.parquet --run 7` flies the run again" in said
+    assert main(["view", str(tmp_path / "runs" / "none")]) == 2
+    assert "no such folder; give a run folder" in capsys.readouterr().err
+
+
 def test_headings_are_no_longer_than_a_browser_shows() -> None:
     """It makes a column as wide as the name of the figure, not as its heading: `clearance / want...`."""
     assert [name for name, heading in catalogs.COLUMNS.items() if len(heading) > len(name) + 1] == []
@@ -276,7 +296,7 @@ def test_a_server_that_waits_for_ever_keeps_nobody_waiting(monkeypatch: pytest.M
 
 
 def test_a_campaign_without_recordings_says_what_keeps_them(tmp_path: Path) -> None:
-    with pytest.raises(RunFolderError, match="recordings: all"), catalog("empty", recordings_of(tmp_path)):
+    with pytest.raises(RunFolderError, match="recordings: thin"), catalog("empty", recordings_of(tmp_path)):
         pass
 
 
