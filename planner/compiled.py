@@ -155,7 +155,10 @@ def compile_all() -> None:
 
 def _compile_waiting() -> None:
     while _waiting:
-        first = _waiting[0]
+        # The first function of a module calls no other one. The shortest tells soonest whether they are on disk.
+        first = min(
+            {each.__module__: each for each in reversed(_waiting)}.values(), key=lambda each: each.size
+        )
         _compile([first])
         if first.anew:
             _tell("wayproof: compiling for this machine, once; this takes some seconds")
