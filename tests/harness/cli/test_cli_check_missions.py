@@ -54,7 +54,7 @@ def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureF
         row(4, 18, 2, 0, 150, north_m=3000, up_m=100),
         row(5, 178, 0, 22),
         row(6, 31, 0, 150, north_m=4500, up_m=180),
-        row(7, 112, 5),
+        row(7, 186, 150, 3),
         row(8, 16, north_m=6500, up_m=180),
         row(9, 21, north_m=9000, up_m=0),
     )
@@ -76,7 +76,7 @@ def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureF
     )
     said = " ".join(capsys.readouterr().out.split())
     assert "items 9: 7 flown, 1 passed over, 1 not flown" in said
-    assert "item 7 condition delay, not flown: an aeroplane here cannot" in said
+    assert "item 7 change altitude, not flown: an aeroplane here cannot" in said
 
 
 def test_a_leg_that_is_all_corner_says_how_far_off_the_route_it_is(
