@@ -27,10 +27,10 @@ from harness.run.scenario_flight import (
     fly_to_folder,
     jsbsim_aircraft,
     make_loop,
-    start_conditions,
 )
 from harness.scenario.scenario import Scenario
 from harness.scenario.simulation import Simulation
+from harness.scenario.start import start_conditions
 
 FEWEST_ROUNDS, MOST_ROUNDS = 3, 10
 """Each round is one flight without and one with the recording, both in turns with the bare model."""

@@ -16,7 +16,6 @@ from harness.cli.options import aircraft as aircraft_names
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
-    from harness.scenario.scenario import Scenario
     from harness.world_files.siting import Craft, Site
 
 Pair = tuple[float, float]
@@ -212,41 +211,12 @@ def _checked(text: str, out: Path) -> None:
     from harness.scenario.scenario import parse_scenario
 
     try:
-        _check_trim(parse_scenario(text, str(out), folder=out.absolute().parent))
+        parse_scenario(text, str(out), folder=out.absolute().parent)
     except InputError as error:
         first = str(error).splitlines()[0]
         raise InputError(
             re.sub(rf"^{re.escape(str(out))}:\d+: ", "wayproof: the scenario would not fly: ", first)
         ) from error
-
-
-def _check_trim(scenario: Scenario) -> None:
-    """Raises InputError if the aircraft has no level flight at the altitude; says where it has one."""
-    from harness.files.input_file import InputError
-
-    altitude_m = scenario.mission.altitude_m
-    fault = _no_level_flight(scenario, altitude_m)
-    if fault is None:
-        return
-    lower = (LOWER_M * k for k in range(math.ceil(altitude_m / LOWER_M) - 1, -1, -1))
-    would_do = next((each for each in lower if _no_level_flight(scenario, each) is None), None)
-    told = "another --aircraft" if would_do is None else f"--altitude-m {would_do:g}, or another --aircraft,"
-    raise InputError(f"wayproof: the scenario would not fly: {fault}; {told} would do")
-
-
-def _no_level_flight(scenario: Scenario, altitude_m: float) -> str | None:
-    """Why the aircraft cannot begin a scenario at an altitude; None where it can."""
-    from dataclasses import replace
-
-    from aircraft.model_files import TrimError
-    from harness.run.scenario_flight import atmosphere, jsbsim_aircraft, start_conditions
-
-    start = replace(start_conditions(scenario), altitude_m=altitude_m)
-    try:
-        jsbsim_aircraft(scenario, start, atmosphere(scenario))
-    except TrimError as error:
-        return str(error)
-    return None
 
 
 def _write(out: Path, text: str) -> None:

@@ -36,6 +36,7 @@ from harness.scenario.performance import mission_of, performance_of
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.scenario.sections import Environment, Origin
+from harness.scenario.start import start_conditions, steady_wind_mps, towards
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
 from planner.interface import FloatArray
@@ -45,9 +46,6 @@ if TYPE_CHECKING:
 
 SENSOR_STREAM, TURBULENCE_STREAM, NAVIGATION_STREAM = 1, 2, 3
 """Numbers of the random streams that derive from the scenario's seed."""
-
-INSIDE_M = 1e-3
-"""A flight begins no nearer to the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
 
 
 Fly = Callable[[Loop, Sequence[Observer], Progress | None], Flight]
@@ -104,27 +102,10 @@ def guidance_law(scenario: Scenario) -> GuidanceLaw:
     return law_of(scenario.guidance, scenario.aircraft)
 
 
-def start_conditions(scenario: Scenario) -> StartConditions:
-    """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary.
-
-    A given path may begin outside the area; then the flight does, too.
-    """
-    xmin, ymin, xmax, ymax = scenario.area.bounds_m
-    east, north = scenario.mission.start_m
-    if xmin <= east <= xmax and ymin <= north <= ymax:
-        inside_m = min(INSIDE_M, 0.5 * (xmax - xmin), 0.5 * (ymax - ymin))
-        east = min(max(east, xmin + inside_m), xmax - inside_m)
-        north = min(max(north, ymin + inside_m), ymax - inside_m)
-    course = math.radians(_given(scenario.mission.course_deg))
-    return StartConditions(
-        east, north, scenario.mission.altitude_m, course, _given(scenario.aircraft.airspeed_mps)
-    )
-
-
 def atmosphere(scenario: Scenario) -> Atmosphere:
     """The air of a scenario."""
     air = scenario.environment
-    east, north = _towards(air.wind.speed_mps, air.wind.from_deg) if air.wind else (0.0, 0.0)
+    east, north = steady_wind_mps(scenario)
     turbulence, front = air.turbulence, air.gust
     return Atmosphere(
         wind_east_mps=east,
@@ -134,19 +115,13 @@ def atmosphere(scenario: Scenario) -> Atmosphere:
         seed=int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF,
         gust=Gust(
             front.shape,
-            *_towards(front.speed_mps, front.from_deg),
+            *towards(front.speed_mps, front.from_deg),
             front.start_s,
             math.inf if front.duration_s is None else front.duration_s,
         )
         if front
         else None,
     )
-
-
-def _towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
-    """East and north of a wind that blows from a direction."""
-    blows = math.radians(from_deg) + math.pi
-    return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
 
 
 def jsbsim_aircraft(

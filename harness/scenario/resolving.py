@@ -1,7 +1,8 @@
 """From what a scenario file says to a complete scenario: defaults that follow from other keys or from the aircraft.
 
 `resolve` reads top to bottom in the order in which defaults depend on one another. To learn what an aircraft can do
-under a guidance law it may have to be flown, which is then kept on disk; reading a file (`ScenarioKeys`) never does.
+under a guidance law it may have to be flown, which is then kept on disk, and it is trimmed as its flight begins.
+Reading a file (`ScenarioKeys`) does neither.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from harness.scenario.navigation import planning_margin_m
 from harness.scenario.performance import LEAST_CLEARANCE, mission_with, performance_of, wind_mps_of
 from harness.scenario.sections import AircraftSpec, Area, MissionSpec, Section
 from harness.scenario.simulation import step_rate_hz
+from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
 from planner.geometry.margin import tolerance_m
 
@@ -92,6 +94,8 @@ def resolve(
     )
 
     check_local_plane(scenario.area)
+    if not as_flown:
+        check_level_flight(scenario)
     scenario, names = _with_files_expanded(scenario, radius_m, folder)
     if ends_checked:
         check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)

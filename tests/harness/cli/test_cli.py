@@ -371,9 +371,9 @@ def test_a_flight_of_a_model_that_cannot_be_flown_ends_before_it(
     assert "aircraft.model: SGS cannot be trimmed for level flight at any speed" in capsys.readouterr().err
     too_high = ["--set", "mission.altitude_m=9000"]
     assert main(["fly", "paper_circles", *too_high, "--out", str(out)]) == 2
-    assert (
-        "wayproof: aerosonde cannot be trimmed for level flight at 25 m/s, 9000 m" in capsys.readouterr().err
-    )
+    said = capsys.readouterr().err
+    assert "mission.altitude_m: is 9000; must be at most 7" in said
+    assert "aerosonde cannot be trimmed for level flight at 25 m/s, 9000 m" in said
     assert not out.exists()
 
 

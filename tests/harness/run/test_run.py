@@ -14,11 +14,12 @@ from aircraft.airframes import AircraftError
 from aircraft.interface import FlightModel
 from aircraft.start import Atmosphere, StartConditions
 from harness.run import scenario_flight as run
-from harness.run.scenario_flight import atmosphere, flight_limits, fly_to_folder, make_loop, start_conditions
+from harness.run.scenario_flight import atmosphere, flight_limits, fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario, load_scenario
 from harness.scenario.shipped import scenario_path
+from harness.scenario.start import start_conditions
 from tests.point_mass import PointMass
 
 

@@ -23,6 +23,7 @@ from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from harness.files import strict_yaml
 from harness.files.strict_yaml import InputError
+from harness.run.scenario_flight import make_loop
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.performance import LEAST_CLEARANCE, mission_of, performance_of
 from harness.scenario.resolving import resolve
@@ -272,7 +273,7 @@ obstacle = st.fixed_dictionaries(
 @given(
     obstacles=st.lists(obstacle, max_size=4),
     seed=st.integers(0, 2**53),
-    altitude_m=st.floats(50, 20000),
+    altitude_m=st.floats(50, 7000),
     sensor=st.fixed_dictionaries(
         {},
         optional={"range_m": st.floats(2e4, 1e5), "rays": st.integers(3, 9999), "dropout": st.floats(0, 1)},
@@ -599,3 +600,31 @@ def test_resolving_leaves_what_was_read_as_it_is() -> None:
     complete = resolve(keys)
     assert "clearance_m" not in keys.planner.model_dump(exclude_none=True)
     assert complete.planner.clearance_m == parse_scenario(LEAST).planner.clearance_m
+
+
+@pytest.mark.parametrize("altitude_m", [7300, 9000, 20000])
+def test_an_altitude_without_level_flight_is_refused_where_it_stands(altitude_m: int, tmp_path: Path) -> None:
+    """Before anything is flown: `wayproof validate` says it, too; the altitude that is named can be flown."""
+    path = tmp_path / "high.yaml"
+    text = (
+        "schema: wayproof/scenario/1\nname: high\n"
+        "area: {bounds_m: [-9000, -9000, 9000, 9000], origin: {latitude_deg: 46, longitude_deg: 8}}\n"
+        "mission:\n  altitude_m: HIGH\n  start_m: [-8000, 0]\n  goal_m: [8000, 0]\n"
+    )
+    path.write_text(text.replace("HIGH", str(altitude_m)))
+    with pytest.raises(InputError) as fault:
+        load_scenario(path)
+    said = str(fault.value)
+    assert said.startswith(f"{path}:5: mission.altitude_m: is {altitude_m}; must be at most 7")
+    assert f"aerosonde cannot be trimmed for level flight at 25 m/s, {altitude_m} m above sea level" in said
+    bound = re.search(r"at most (\d+)", said)
+    assert bound is not None
+    path.write_text(text.replace("HIGH", bound[1]))
+    make_loop(load_scenario(path))  # trims the aircraft as a flight does
+
+
+def test_the_scenario_of_a_run_is_read_without_a_flight_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports and exports read it: it was flown."""
+    text = dump_scenario(scenario_from(yaml.safe_load(LEAST)))
+    monkeypatch.setattr("harness.scenario.resolving.check_level_flight", lambda _: pytest.fail("trimmed"))
+    assert parse_scenario(text, as_flown=True).mission.altitude_m == 300.0

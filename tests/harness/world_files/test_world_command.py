@@ -158,7 +158,7 @@ def test_a_map_too_small_names_the_cell_that_would_do(
         (["--altitude-m", "1"], "at least 5"),
         (
             ["--altitude-m", "12000"],
-            "aerosonde cannot be trimmed for level flight at 25 m/s, 12000 m above sea level; --altitude-m 7000, or",
+            "would not fly: mission.altitude_m: is 12000; must be at most 7200: aerosonde cannot be trimmed",
         ),
     ],
 )

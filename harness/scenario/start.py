@@ -1,0 +1,116 @@
+"""How a scenario's flight begins, and whether the aircraft can fly level there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final
+
+from aircraft.frames import LocalPlane
+from aircraft.start import Atmosphere, StartConditions
+from harness.scenario import guidance_keys
+from harness.scenario.keys import ScenarioKeys
+from harness.scenario.validation import KeyFault
+
+if TYPE_CHECKING:
+    from aircraft.model_files import ModelFiles
+
+INSIDE_M = 1e-3
+"""A flight begins no nearer to the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
+SURVEYED_M: Final = 300.0
+"""Altitude above the sea at which an aircraft's range of airspeeds is measured."""
+STEP_M: Final = 50.0
+"""To so much the highest altitude of level flight is told."""
+
+
+def start_conditions(scenario: ScenarioKeys) -> StartConditions:
+    """Where and how a scenario's flight begins: a hair inside the area where the start lies on its boundary.
+
+    A given path may begin outside the area; then the flight does, too.
+
+    Args:
+        scenario: its course and airspeed filled in.
+    """
+    course_deg, airspeed_mps = scenario.mission.course_deg, scenario.aircraft.airspeed_mps
+    assert course_deg is not None
+    assert airspeed_mps is not None
+    xmin, ymin, xmax, ymax = scenario.area.bounds_m
+    east, north = scenario.mission.start_m
+    if xmin <= east <= xmax and ymin <= north <= ymax:
+        inside_m = min(INSIDE_M, 0.5 * (xmax - xmin), 0.5 * (ymax - ymin))
+        east = min(max(east, xmin + inside_m), xmax - inside_m)
+        north = min(max(north, ymin + inside_m), ymax - inside_m)
+    return StartConditions(east, north, scenario.mission.altitude_m, math.radians(course_deg), airspeed_mps)
+
+
+def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
+    """East and north of the steady wind."""
+    wind = scenario.environment.wind
+    return towards(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
+
+
+def towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
+    """East and north of a wind that blows from a direction."""
+    blows = math.radians(from_deg) + math.pi
+    return speed_mps * math.sin(blows), speed_mps * math.cos(blows)
+
+
+def check_level_flight(scenario: ScenarioKeys) -> None:
+    """Trims the aircraft as the flight would.
+
+    Args:
+        scenario: its course and airspeed filled in; it can hold that near the sea.
+
+    Raises:
+        KeyFault: it cannot fly level at the altitude.
+    """
+    from aircraft.airframes import AircraftError
+
+    start, origin = start_conditions(scenario), scenario.area.origin
+    place = origin.latitude_deg, origin.longitude_deg
+    try:
+        files = guidance_keys.airframe_of(scenario.aircraft).files
+        heading_rad = start.heading_rad(Atmosphere(*steady_wind_mps(scenario)))
+        fault = _fault(files, place, start, heading_rad)
+    except (AircraftError, ValueError) as error:
+        raise KeyFault(("aircraft", "model"), str(error)) from error
+    if fault is None:
+        return
+
+    def flies(altitude_m: float) -> bool:
+        return _fault(files, place, replace(start, altitude_m=altitude_m), heading_rad) is None
+
+    if not flies(SURVEYED_M):
+        raise KeyFault(("aircraft", "airspeed_mps"), f"is {start.airspeed_mps:g}; must be another: {fault}")
+    good, bad = SURVEYED_M, start.altitude_m
+    while abs(good - bad) > STEP_M:
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if flies(middle) else (good, middle)
+    bound = "at most" if bad > good else "at least"
+    raise KeyFault(
+        ("mission", "altitude_m"), f"is {start.altitude_m:g}; must be {bound} {_told(good, bad):g}: {fault}"
+    )
+
+
+def _told(good_m: float, bad_m: float) -> float:
+    """An altitude of level flight without its last digits, on the side away from one without."""
+    steps = good_m / STEP_M
+    return STEP_M * (math.floor(steps) if bad_m > good_m else math.ceil(steps))
+
+
+@lru_cache(maxsize=512)
+def _fault(
+    files: ModelFiles, place: tuple[float, float], start: StartConditions, heading_rad: float
+) -> str | None:
+    """Why there is no level flight; None where there is."""
+    from aircraft.jsbsim_loading import load, trim
+    from aircraft.model_files import TrimError
+
+    plane = LocalPlane(*place)
+    true_rad = heading_rad + plane.convergence_rad(start.east_m, start.north_m)
+    try:
+        trim(load(files), files.name, plane, start, true_rad)
+    except TrimError as error:
+        return str(error)
+    return None
