@@ -23,6 +23,7 @@ from harness.flight.record import AcceptedPlan
 from harness.watching.address import Address
 from harness.watching.mavlink_mission import PlanAsMission
 from harness.watching.onlooker import Onlooker
+from harness.watching.pace import next_due
 
 NEEDS_PYMAVLINK: Final = "wayproof: --mavlink needs pymavlink; pip install 'wayproof[mavlink]'"
 SYSTEM_ID: Final = 1
@@ -109,11 +110,11 @@ class GroundStationLink(Onlooker):
             self._current = self._mission.current(steering.arc_length_m)
         self._answer()
         now = time.monotonic()
-        if now - self._slow_s >= SLOW_S:
-            self._slow_s = now
+        if now >= self._slow_s:
+            self._slow_s = next_due(self._slow_s, SLOW_S, now)
             self._send_slow(state)
-        if now - self._fast_s >= FAST_S:
-            self._fast_s = now
+        if now >= self._fast_s:
+            self._fast_s = next_due(self._fast_s, FAST_S, now)
             self._send_fast(state)
 
     def close(self) -> None:
@@ -166,6 +167,7 @@ class GroundStationLink(Onlooker):
             )
         )
         self._send(self._mav.sys_status_encode(0, 0, 0, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0))
+        self._send(self._mav.extended_sys_state_encode(0, self._m.MAV_LANDED_STATE_IN_AIR))
         self._send_home()
         self._send_current()
 
@@ -289,18 +291,61 @@ class GroundStationLink(Onlooker):
         """Sends a message that is asked for; refuses any other command."""
         m = self._m
         wanted = int(asked.param1) if math.isfinite(asked.param1) else -1
-        known = asked.command == m.MAV_CMD_REQUEST_MESSAGE and wanted in (
-            m.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-            m.MAVLINK_MSG_ID_HOME_POSITION,
-        )
-        result = m.MAV_RESULT_ACCEPTED if known else m.MAV_RESULT_UNSUPPORTED
+        if asked.command == m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
+            wanted = m.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+        elif asked.command == m.MAV_CMD_GET_HOME_POSITION:
+            wanted = m.MAVLINK_MSG_ID_HOME_POSITION
+        elif asked.command != m.MAV_CMD_REQUEST_MESSAGE:
+            wanted = -1
+        send = self._given_by(wanted)
+        result = m.MAV_RESULT_UNSUPPORTED if send is None else m.MAV_RESULT_ACCEPTED
         self._send(self._mav.command_ack_encode(asked.command, result, 0, 0, *_sender(asked)))
-        if known and wanted == m.MAVLINK_MSG_ID_HOME_POSITION:
-            self._send_home()
-        elif known:
-            able = m.MAV_PROTOCOL_CAPABILITY_MAVLINK2 | m.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-            zeros = [0] * 8
-            self._send(self._mav.autopilot_version_encode(able, 0, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0))
+        if send is not None:
+            send()
+
+    def _given_by(self, message: int) -> Callable[[], None] | None:
+        """What sends a message of a number; None for those that are never sent."""
+        m = self._m
+        if message == m.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            return self._send_version
+        if message == m.MAVLINK_MSG_ID_HOME_POSITION:
+            return self._send_home
+        if message == m.MAVLINK_MSG_ID_HEARTBEAT:
+            return lambda: self._heartbeat(m.MAV_STATE_ACTIVE)
+        if message == m.MAVLINK_MSG_ID_MISSION_CURRENT:
+            return self._send_current
+        fast = (m.MAVLINK_MSG_ID_ATTITUDE, m.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, m.MAVLINK_MSG_ID_VFR_HUD)
+        if message in fast:
+            return lambda: self._send_fast(self._last)
+        slow = (
+            m.MAVLINK_MSG_ID_GPS_RAW_INT,
+            m.MAVLINK_MSG_ID_SYS_STATUS,
+            m.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+        )
+        return (lambda: self._send_slow(self._last)) if message in slow else None
+
+    def _send_version(self) -> None:
+        able = self._m.MAV_PROTOCOL_CAPABILITY_MAVLINK2 | self._m.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+        zeros = [0] * 8
+        self._send(self._mav.autopilot_version_encode(able, 0, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0))
+
+    def _refuse_mode(self, asked: Any) -> None:
+        unsupported = self._m.MAV_RESULT_UNSUPPORTED
+        self._send(
+            self._mav.command_ack_encode(self._m.MAVLINK_MSG_ID_SET_MODE, unsupported, 0, 0, *_sender(asked))
+        )
+
+    def _keep_current(self, asked: Any) -> None:
+        """The current item is told as it is: a station cannot set it."""
+        self._send_current()
+
+    def _echo(self, asked: Any) -> None:
+        if asked.target_system == 0:  # else it is an answer itself
+            self._send(self._mav.ping_encode(asked.time_usec, asked.seq, *_sender(asked)))
+
+    def _give_time(self, asked: Any) -> None:
+        if asked.tc1 == 0:  # else it is an answer itself
+            self._send(self._mav.timesync_encode(1_000_000 * self._boot_ms, asked.ts1))
 
     _answers: Final[dict[str, Callable[[GroundStationLink, Any], None]]] = {
         "MISSION_REQUEST_LIST": _give_count,
@@ -308,6 +353,12 @@ class GroundStationLink(Onlooker):
         "MISSION_REQUEST": _give_item,
         "MISSION_COUNT": _refuse_mission,
         "MISSION_CLEAR_ALL": _refuse_mission,
+        "MISSION_WRITE_PARTIAL_LIST": _refuse_mission,
+        "MISSION_REQUEST_PARTIAL_LIST": _refuse_mission,
+        "MISSION_SET_CURRENT": _keep_current,
+        "SET_MODE": _refuse_mode,
+        "PING": _echo,
+        "TIMESYNC": _give_time,
         "PARAM_REQUEST_LIST": _give_parameter,
         "PARAM_REQUEST_READ": _give_parameter,
         "PARAM_SET": _give_parameter,

@@ -35,3 +35,9 @@ class Pace(Onlooker):
         self._flown_s = state.time_s
         while (left_s := self._due_s - time.monotonic()) > 0.0:
             time.sleep(min(left_s, _NAP_S))
+
+
+def next_due(due_s: float, every_s: float, now_s: float) -> float:
+    """When something is due again: a period after it was due, for what comes late must not make all else late."""
+    following_s = due_s + every_s
+    return following_s if following_s > now_s else now_s + every_s

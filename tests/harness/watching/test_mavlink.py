@@ -191,6 +191,75 @@ def test_nobody_can_command_or_change_the_flight(station: GroundStation, link: G
     assert (parameter.param_count, parameter.param_value) == (1, 1.0)
 
 
+def test_each_question_of_a_station_that_starts_up_has_its_answer(
+    station: GroundStation, link: GroundStationLink
+) -> None:
+    station.listen()
+    mav = station.link.mav
+
+    def command(number: int, first: float = 0.0) -> None:
+        mav.command_long_send(1, 1, number, 0, first, 0, 0, 0, 0, 0, 0)
+
+    asked: tuple[tuple[Callable[[], Any], str, dict[str, int]], ...] = (
+        (lambda: command(520, 1), "AUTOPILOT_VERSION", {"capabilities": 8196}),
+        (lambda: command(410), "HOME_POSITION", {"altitude": 100_000}),
+        (lambda: command(512, 242), "HOME_POSITION", {"altitude": 100_000}),
+        (lambda: command(512, 33), "GLOBAL_POSITION_INT", {"relative_alt": 200_000}),
+        (lambda: command(512, 245), "EXTENDED_SYS_STATE", {"landed_state": 2}),
+        (lambda: command(512, 0), "HEARTBEAT", {"system_status": 4}),
+        (lambda: command(512, 42), "MISSION_CURRENT", {"seq": 1, "total": 2}),
+        (lambda: command(512, 435), "COMMAND_ACK", {"command": 512, "result": 3}),  # AVAILABLE_MODES: none
+        (lambda: command(512, 397), "COMMAND_ACK", {"command": 512, "result": 3}),  # COMPONENT_METADATA: none
+        (lambda: command(511, 33), "COMMAND_ACK", {"command": 511, "result": 3}),
+        (lambda: mav.set_mode_send(1, 1, 0), "COMMAND_ACK", {"command": 11, "result": 3}),
+        (lambda: mav.mission_request_list_send(1, 1, 2), "MISSION_COUNT", {"count": 0, "mission_type": 2}),
+        (lambda: mav.mission_set_current_send(1, 1, 0), "MISSION_CURRENT", {"seq": 1}),
+        (lambda: mav.mission_write_partial_list_send(1, 1, 0, 1), "MISSION_ACK", {"type": 14}),
+        (lambda: mav.mission_request_partial_list_send(1, 1, 0, 1, 1), "MISSION_ACK", {"mission_type": 1}),
+        (lambda: mav.ping_send(77, 5, 0, 0), "PING", {"time_usec": 77, "seq": 5, "target_system": 255}),
+        (lambda: mav.timesync_send(0, 12345), "TIMESYNC", {"ts1": 12345}),
+    )
+    for ask, kind, wanted in asked:
+        ask()
+        told = answers(station, link, kind)
+        assert {name: getattr(told[0], name) for name in wanted} == wanted, kind
+    heard = Counter(message.get_type() for message in station.heard)
+    assert heard["EXTENDED_SYS_STATE"] > heard["SYS_STATUS"] - 1, "they were not waited for"
+
+
+def test_no_message_of_the_dialect_ends_the_flight(station: GroundStation, link: GroundStationLink) -> None:
+    from pymavlink.dialects.v20 import common
+
+    station.listen()
+    sender = common.MAVLink(None, 255, 0)
+    for row, kind in enumerate(common.mavlink_map.values()):
+        lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
+        for largest in (False, True):
+            fields = (
+                1
+                if name in ("target_system", "target_component")
+                else _value(of_type, lengths[name], largest)
+                for name, of_type in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+            )
+            station.link.port.sendto(kind(*fields).pack(sender), station.vehicle)
+            link.on_row(state(1.0 + row + 0.5 * largest), STEERED, 0)
+        station.listen()
+    station.link.mav.mission_request_list_send(1, 1)
+    assert len(answers(station, link, "MISSION_COUNT")) == 1
+
+
+def _value(of_type: str, length: int, largest: bool) -> Any:
+    """The least or the largest value of a field."""
+    if of_type == "char":
+        return (b"\xff" if largest else b"\x00") * max(length, 1)
+    if of_type in ("float", "double"):
+        value: float = math.nan if largest else -math.inf
+    else:
+        bits = int("".join(filter(str.isdigit, of_type)))
+        value = 2 ** (bits - (not of_type.startswith("u"))) - 1 if largest else 0
+    return [value] * length if length else value
+
+
 def test_what_is_no_mavlink_is_passed_over(station: GroundStation, link: GroundStationLink) -> None:
     station.listen()
     for data in (b"", b"\x00" * 300, b"\xfd\x09" + b"\xff" * 40, bytes(range(256)) * 4):
