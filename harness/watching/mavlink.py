@@ -19,8 +19,10 @@ from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
 from harness.files.input_file import InputError
+from harness.flight.observer import Caution
 from harness.flight.record import AcceptedPlan
 from harness.watching.address import Address
+from harness.watching.body_rates import body_rates_radps
 from harness.watching.mavlink_mission import PlanAsMission
 from harness.watching.onlooker import Onlooker
 from harness.watching.pace import next_due
@@ -88,6 +90,7 @@ class GroundStationLink(Onlooker):
         self._rates_radps = (0.0, 0.0, 0.0)
         self._fast_s = self._slow_s = -math.inf
         self._over = False
+        self._long_texts = 0
 
     def begin(self, place: EarthPosition) -> None:
         """Takes where the flight is on earth."""
@@ -100,7 +103,7 @@ class GroundStationLink(Onlooker):
 
     def on_event(self, time_s: float, text: str) -> None:
         """Tells of an event."""
-        self._say(text)
+        self._say(text, warns=isinstance(text, Caution))
 
     def on_row(self, state: AircraftState, steering: GuidanceOutput, plan_index: int) -> None:
         """Sends what is due, and answers what has come."""
@@ -133,9 +136,15 @@ class GroundStationLink(Onlooker):
             self._socket.send(message.pack(self._mav))
             self._mav.seq = (self._mav.seq + 1) % 256
 
-    def _say(self, text: str) -> None:
-        data = text.encode("ascii", "replace")[:TEXT_BYTES]
-        self._send(self._mav.statustext_encode(self._m.MAV_SEVERITY_INFO, data))
+    def _say(self, text: str, warns: bool = False) -> None:
+        """Sends a text; a longer one in pieces, of which the station makes one again."""
+        m, data = self._m, text.encode("ascii", "replace")
+        severity = m.MAV_SEVERITY_WARNING if warns else m.MAV_SEVERITY_INFO
+        number = 0
+        if len(data) > TEXT_BYTES:
+            number = self._long_texts = self._long_texts % 0xFFFF + 1
+        for piece, first in enumerate(range(0, max(len(data), 1), TEXT_BYTES)):
+            self._send(self._mav.statustext_encode(severity, data[first : first + TEXT_BYTES], number, piece))
 
     def _heartbeat(self, status: int) -> None:
         m = self._m
@@ -365,27 +374,6 @@ class GroundStationLink(Onlooker):
         "COMMAND_LONG": _obey,
         "COMMAND_INT": _obey,
     }
-
-
-def body_rates_radps(before: AircraftState, now: AircraftState) -> tuple[float, float, float]:
-    """Rates about the aircraft's axes (ahead, right, down) between two states, from its Euler angles; 0 at once."""
-    step_s = now.time_s - before.time_s
-    if step_s <= 0.0:
-        return 0.0, 0.0, 0.0
-    roll, pitch = now.roll_rad, now.pitch_rad
-    roll_rate, pitch_rate, yaw_rate = (
-        math.remainder(after - first, math.tau) / step_s
-        for first, after in (
-            (before.roll_rad, roll),
-            (before.pitch_rad, pitch),
-            (before.heading_rad, now.heading_rad),
-        )
-    )
-    return (
-        roll_rate - yaw_rate * math.sin(pitch),
-        pitch_rate * math.cos(roll) + yaw_rate * math.sin(roll) * math.cos(pitch),
-        yaw_rate * math.cos(roll) * math.cos(pitch) - pitch_rate * math.sin(roll),
-    )
 
 
 def _sender(message: Any) -> tuple[int, int]:

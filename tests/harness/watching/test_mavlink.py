@@ -20,10 +20,12 @@ from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
 from harness.cli.app import main
 from harness.flight.closed_loop import NOT_STEERED, fly
+from harness.flight.observer import Caution
 from harness.flight.record import digest
 from harness.run.scenario_flight import make_loop
 from harness.watching.address import Address
-from harness.watching.mavlink import EarthPosition, GroundStationLink, body_rates_radps
+from harness.watching.body_rates import body_rates_radps
+from harness.watching.mavlink import EarthPosition, GroundStationLink
 from harness.watching.mavlink_mission import PlanAsMission
 from harness.watching.onlooker import Onlooker
 from harness.watching.pace import Pace
@@ -115,6 +117,28 @@ def test_state_and_mission_are_told(station: GroundStation, link: GroundStationL
     assert heard["HOME_POSITION"].altitude == 100_000
     assert (heard["MISSION_CURRENT"].seq, heard["MISSION_CURRENT"].total) == (1, 2)
     assert heard["STATUSTEXT"].text == "plan 0: a way was found"
+
+
+def test_no_word_of_an_event_is_cut_and_what_should_not_happen_warns(
+    station: GroundStation, link: GroundStationLink
+) -> None:
+    station.listen()
+    long = "collision: the left wing touched obstacle 12, " + "a house of the old town, " * 5
+    for text in ("ring", Caution("no fix any more: the believed position drifts"), Caution(long), long, ""):
+        link.on_event(1.0, text)
+    link.close()
+    time.sleep(0.05)
+    told = [message for message in station.listen() if message.get_type() == "STATUSTEXT"]
+    assert [(each.text, each.severity, each.id) for each in told[:2]] == [
+        ("ring", 6, 0),
+        ("no fix any more: the believed position drifts", 4, 0),
+    ]
+    for number, severity in ((1, 4), (2, 6)):
+        pieces = [each for each in told if each.id == number]
+        assert [each.chunk_seq for each in pieces] == list(range(4))
+        assert {each.severity for each in pieces} == {severity}
+        assert "".join(each.text.ljust(50) for each in pieces).rstrip() == long.rstrip()
+    assert len(told) == 11
 
 
 def test_the_mission_is_given_item_by_item(station: GroundStation, link: GroundStationLink) -> None:
