@@ -15,8 +15,6 @@ Pose = tuple[complex, complex]
 
 SHORTEST_M = 1e-6
 NEAR = 1e-9
-PIECE_RAD = math.radians(4.0)
-"""An arc between waypoints is a polyline of such pieces: to 0.06 % of its radius."""
 
 
 def line(begin: complex, ahead: complex, length_m: float) -> list[Row]:
@@ -123,19 +121,3 @@ def towards(pose: Pose, place: complex, turn_m: float) -> list[Row]:
         return []
     _, turn, swept = min(ways)
     return arc(begin, ahead, turn, turn_m, swept)
-
-
-def arc_places(begin: complex, end: complex, clockwise_deg: float) -> list[complex]:
-    """Places along the arc of a circle between two places, the end among them, the beginning not.
-
-    Args:
-        begin: where it begins.
-        end: where it ends.
-        clockwise_deg: angle of the arc; negative: counter-clockwise; not a multiple of a whole turn.
-    """
-    angle = -math.radians(clockwise_deg)
-    turned = cmath.exp(1j * angle)
-    center = (end - begin * turned) / (1.0 - turned)
-    pieces = math.ceil(abs(angle) / PIECE_RAD)
-    shares = [number / pieces for number in range(1, pieces)]
-    return [*(center + (begin - center) * cmath.exp(1j * angle * share) for share in shares), end]

@@ -23,6 +23,7 @@ VTOL_TAKEOFF: Final = 84
 VTOL_LAND: Final = 85
 CONDITION_DELAY: Final = 112
 CONDITION_DISTANCE: Final = 114
+CONDITION_LOCATION: Final = 116
 JUMP: Final = 177
 CHANGE_SPEED: Final = 178
 LAND_START: Final = 189
@@ -30,7 +31,7 @@ TAG: Final = 600
 JUMP_TO_TAG: Final = 601
 SCRIPT: Final = 42702
 
-CONDITIONS: Final = (CONDITION_DELAY, CONDITION_DISTANCE)
+CONDITIONS: Final = (CONDITION_DELAY, CONDITION_DISTANCE, CONDITION_LOCATION)
 LOITERS: Final = (LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALTITUDE)
 TAKEOFFS: Final = {
     TAKEOFF: "the roll is not flown: the flight begins at the altitude of the takeoff",
@@ -39,7 +40,6 @@ TAKEOFFS: Final = {
 LANDINGS: Final = (LAND, VTOL_LAND)
 FLOWN: Final = (
     WAYPOINT,
-    ARC_WAYPOINT,
     SPLINE_WAYPOINT,
     *LOITERS,
     RETURN_TO_LAUNCH,
@@ -85,6 +85,7 @@ NAMES: Final = {
     113: "condition change altitude",
     CONDITION_DISTANCE: "condition distance",
     115: "condition yaw",
+    CONDITION_LOCATION: "condition location",
     176: "set mode",
     179: "set home",
     180: "set parameter",
@@ -122,6 +123,7 @@ NAMES: Final = {
     216: "sprayer",
     217: "send script message",
     218: "auxiliary function",
+    219: "change loiter radius",
     220: "mount quaternion",
     222: "guided limits",
     223: "engine control",
@@ -205,7 +207,10 @@ WITHOUT_EFFECT: Final = frozenset(
 """Cameras, servos, marks and the like: the path of an aeroplane is the same without them."""
 
 
-WHY_NOT: Final = {SCRIPT: "a script of the aircraft flies it"}
+WHY_NOT: Final = {
+    SCRIPT: "a script of the aircraft flies it",
+    ARC_WAYPOINT: "an arc of a multicopter: ArduPlane goes on to the next item",
+}
 """Of what is not flown, where there is more to say than that it cannot be."""
 
 

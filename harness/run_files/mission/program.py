@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from harness.files.input_file import InputError
+from harness.files.wording import counted
 from harness.run_files.mission import commands
 from harness.run_files.mission.items import HOME, LOCAL, Item, MissionAsRead
 from harness.run_files.mission.steps import (
@@ -36,9 +37,6 @@ MOST_HEIGHT_M: Final = 50_000.0
 DEGREE_M: Final = 111_200.0
 """Length of a degree of latitude."""
 
-WHOLE_TURN_DEG: Final = 360.0
-"""Of this and more an arc between two places has none."""
-
 SIDE_ALONE_M: Final = 1.0
 """A radius of 1 m or less says which way round, and no more: ArduPlane hands back 1 or -1 where it has none."""
 
@@ -59,10 +57,12 @@ def program(mission: MissionAsRead) -> Program:
         raise InputError(f"{mission.source}: has no mission items; there is nothing to fly")
     run = _Run(mission)
     run.go()
+    if len(run.steps) == 1:
+        run.begin_at_home()
     if len(run.steps) < 2:
         told = f" ({run.told[run.steps[0].item].name}, item {run.steps[0].item})" if run.steps else ""
         raise InputError(
-            f"{mission.source}: has {len(run.steps)} items to fly to{told}; a path has at least 2"
+            f"{mission.source}: has {counted(len(run.steps), 'item')} to fly to{told}; a path has at least 2"
         )
     items = tuple(
         run.told.get(item.number, Told(item.number, commands.name_of(item.command), NOT_REACHED))
@@ -112,6 +112,15 @@ class _Run:
                 raise InputError(
                     f"{item.place}: jumps make it more than {MOST_STEPS:,} legs; give fewer repeats"
                 )
+
+    def begin_at_home(self) -> None:
+        """The only step is flown to from above home, at its altitude, as nothing else says where from."""
+        (step,) = self.steps
+        if self.home is None or step.position in (None, self.home) or step.landing:
+            return
+        self.steps.insert(0, MissionStep(step.item, "home", self.home, step.height_m, step.above))
+        told = self.told[step.item]
+        self.told[step.item] = replace(told, why="; ".join(filter(None, (told.why, "from above home"))))
 
     def _jump(self, item: Item, at: int) -> int:
         """Where it goes on after a jump."""
@@ -185,7 +194,6 @@ class _Run:
         fly: dict[int, Callable[[Item], MissionStep | None]] = {
             commands.RETURN_TO_LAUNCH: self._home,
             commands.CONTINUE_AND_CHANGE_ALTITUDE: self._straight,
-            commands.ARC_WAYPOINT: self._arc,
             **dict.fromkeys(commands.LOITERS, self._loiter),
             **dict.fromkeys(commands.LANDINGS, self._land),
             **dict.fromkeys(commands.TAKEOFFS, self._takeoff),
@@ -238,20 +246,6 @@ class _Run:
             why = "as a plain waypoint"
         self._tell(item, FLOWN, why)
         return self._step(item, acceptance_m=max(item.params[1], 0.0))
-
-    def _arc(self, item: Item) -> MissionStep | None:
-        angle = item.params[0]
-        if item.position is None:
-            self._tell(item, NOT_FLOWN, "has no position")
-            return None
-        if not self.steps or not 0.0 < abs(angle) < WHOLE_TURN_DEG:
-            why = f"its angle is {angle:g} degrees" if self.steps else "nothing is before it"
-            self._tell(item, FLOWN, f"as a plain waypoint: {why}")
-            return self._step(item)
-        self._tell(
-            item, FLOWN, f"{abs(angle):g} degrees {'clockwise' if angle > 0.0 else 'counter-clockwise'}"
-        )
-        return self._step(item, arc_deg=angle)
 
     def _takeoff(self, item: Item) -> MissionStep | None:
         if self.steps and self.steps[-1].landing:

@@ -21,7 +21,6 @@ from harness.run_files.mission.circle import (
     Pose,
     Row,
     arc,
-    arc_places,
     direction_on,
     end_of,
     joins_at,
@@ -130,21 +129,7 @@ class _Build:
             self._land(step, at, altitude)
         else:
             agl = step.height_m if step.above == GROUND and self._flying.ground is not None else None
-            self._go(_Vertex(at, altitude, step.item, step.acceptance_m, agl), step.arc_deg)
-
-    def _go(self, vertex: _Vertex, arc_deg: float) -> None:
-        """Goes to a waypoint, straight or along an arc; altitudes, or heights above ground, are linear along it."""
-        here, before = self._here(), self._altitude_m
-        if here is not None and arc_deg and abs(vertex.place - here) > SAME_PLACE_M:
-            places = arc_places(here, vertex.place, arc_deg)
-            follows = vertex.agl_m is not None
-            begin = before - self._ground_m(here) if follows else before
-            end = vertex.agl_m if vertex.agl_m is not None else vertex.altitude_m
-            for number, place in enumerate(places[:-1], 1):
-                height = begin + number / len(places) * (end - begin)
-                ground = self._ground_m(place) if follows else 0.0
-                self._add(_Vertex(place, ground + height, None, 0.0, height if follows else None))
-        self._add(vertex)
+            self._add(_Vertex(at, altitude, step.item, step.acceptance_m, agl))
 
     def _here(self) -> complex | None:
         if self._run:

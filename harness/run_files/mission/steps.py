@@ -45,7 +45,6 @@ class MissionStep:
         loiter: circles about the position.
         landing: the flight ends on the way down to it.
         straight: goes straight on until the altitude is reached.
-        arc_deg: angle of the arc to it from where the step before ends, clockwise positive; 0: a straight line.
     """
 
     item: int
@@ -58,7 +57,6 @@ class MissionStep:
     loiter: Loiter | None = None
     landing: bool = False
     straight: bool = False
-    arc_deg: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -151,7 +151,7 @@ def test_a_script_may_fly_anywhere() -> None:
     assert told(done)[2] == ("not flown", "a script of the aircraft flies it")
 
 
-@pytest.mark.parametrize("condition", [112, 114])
+@pytest.mark.parametrize("condition", [112, 114, 116])
 def test_a_condition_holds_back_no_leg_but_a_change_of_speed(condition: int) -> None:
     done = run(at(1), item(2, condition, 10), item(3, 206, 25), at(4), item(5, 178, 0, 22), at(6))
     assert (flown(done), told(done)[2]) == ([1, 4, 6], ("passed over", "holds back no leg"))
@@ -160,13 +160,22 @@ def test_a_condition_holds_back_no_leg_but_a_change_of_speed(condition: int) -> 
     assert [step.airspeed_mps for step in done.steps] == [None, 22.0]
 
 
-def test_arcs_have_an_angle_and_something_before_them() -> None:
-    done = run(at(1, 36, first=90), at(2, 36, first=-90), item(3, 36, 90), at(4, 36, first=360), at(5, 36))
-    assert [(step.item, step.arc_deg) for step in done.steps] == [(1, 0.0), (2, -90.0), (4, 0.0), (5, 0.0)]
+def test_one_item_is_flown_to_from_above_home() -> None:
+    """A loiter without a place is named, as nothing is before it; that is no reason to refuse the rest."""
+    done = run(item(1, 18, 3, 0, 100), item(2, 219, 120, 1), at(3))
+    assert [(step.position, step.height_m) for step in done.steps] == [(HOME, 100.0), ((47.03, 8.0), 100.0)]
     assert told(done) == {
-        1: ("flown", "as a plain waypoint: nothing is before it"),
-        2: ("flown", "90 degrees counter-clockwise"),
-        3: ("not flown", "has no position"),
-        4: ("flown", "as a plain waypoint: its angle is 360 degrees"),
-        5: ("flown", "as a plain waypoint: its angle is 0 degrees"),
+        1: ("not flown", "has no position, and nothing is before it"),
+        2: ("not flown", "an aeroplane here cannot"),
+        3: ("flown", "from above home"),
     }
+    with pytest.raises(InputError, match=r"has 1 item to fly to \(land, item 1\); a path has at least 2"):
+        run(at(1, 21))
+    with pytest.raises(InputError, match="has 1 item to fly to"):
+        program(MissionAsRead("m", (at(1),), None, 0.0, Fences()))
+
+
+def test_arcs_are_named_as_aeroplanes_do_not_fly_them() -> None:
+    done = run(at(1), at(2, 36, first=90), at(3))
+    assert flown(done) == [1, 3]
+    assert told(done)[2] == ("not flown", "an arc of a multicopter: ArduPlane goes on to the next item")
