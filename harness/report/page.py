@@ -73,12 +73,33 @@ def report_html(
     )
 
 
+@dataclass(frozen=True)
+class JudgedBy:
+    """A figure of a leg that has a limit.
+
+    Attributes:
+        figure: its name in `trackability` of `metrics.json`.
+        label: what people are shown, with its unit.
+        most: the limit.
+    """
+
+    figure: str
+    label: str
+    most: float
+
+    def exceeded(self, leg: Mapping[str, Any]) -> bool:
+        """Whether a leg is over the limit; not where it has no such figure."""
+        value = leg.get(self.figure)
+        return value is not None and value > self.most
+
+
 def run_html(
     chapter: Chapter,
     legs: Sequence[Mapping[str, Any]],
     checked: Mapping[str, Any] | None,
     *,
     moments: Mapping[str, float],
+    judged: Sequence[JudgedBy],
     aircraft: str,
     scenario_yaml: str,
     command: str,
@@ -93,6 +114,7 @@ def run_html(
         legs: `trackability` of `metrics.json`.
         checked: `metrics.json` of a path that was given; None where a planner made the path.
         moments: when figures came about, by `Figure.short` (`harness.analysis.moments`).
+        judged: what else than the distance from the path legs were judged by.
         aircraft: its name.
         scenario_yaml: the scenario as flown.
         command: the command line that flew it.
@@ -100,13 +122,15 @@ def run_html(
         platform: what it flew on.
         written: date and time of the flight.
     """
+    lost = [leg for leg in legs if not leg["trackable"]]
     return rendered(
         "run.html",
         chapter=chapter,
         row=chapter.rows[0],
         number=number,
         legs=legs,
-        lost=[leg for leg in legs if not leg["trackable"]],
+        lost=lost,
+        exceeded=[each for each in judged if any(map(each.exceeded, lost))],
         checked=checked,
         moments=moments,
         aircraft=aircraft,

@@ -12,9 +12,9 @@ from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.files.wording import printable
 from harness.report.chapters import entry, optimum_of, run_chapter
-from harness.report.page import run_html
+from harness.report.page import JudgedBy, run_html
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
-from harness.scenario.scenario import parse_scenario
+from harness.scenario.scenario import Scenario, parse_scenario
 
 
 def write_report(folder: Path) -> Path:
@@ -53,6 +53,7 @@ def _written(run: Run, folder: Path) -> Path:
         moments=moments(
             run.track, scenario.planner.clearance_m or 0.0, run.metrics["bank_saturation_fraction"] > 0.0
         ),
+        judged=_judged_by(scenario),
         aircraft=Path(scenario.aircraft.model).name,
         scenario_yaml=run.scenario_yaml,
         command=command,
@@ -67,6 +68,17 @@ def _written(run: Run, folder: Path) -> Path:
     page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
     replace_text(page, text)
     return page
+
+
+def _judged_by(scenario: Scenario) -> list[JudgedBy]:
+    """What legs were judged by, beside their distance from the path."""
+    limits = scenario.trackability
+    given = (
+        ("max_altitude_error_m", "altitude error, m", limits.altitude_m),
+        ("max_airspeed_error_mps", "airspeed error, m/s", limits.airspeed_mps),
+        ("max_load_factor", "load factor", limits.load_factor),
+    )
+    return [JudgedBy(figure, label, most) for figure, label, most in given if most is not None]
 
 
 def _found_again(arguments: list[str], folder: Path) -> list[str]:

@@ -51,6 +51,35 @@ def test_report_is_written_into_the_run_folder(run: Path) -> None:
     assert "| outcome | reached |" in (run / "report.md").read_text()
 
 
+def test_a_leg_shows_the_limit_that_it_was_over(run: Path, tmp_path: Path) -> None:
+    """Beside its cross-track error, which may have been small."""
+    leg: dict[str, Any] = {
+        "start_s": 0.0,
+        "end_s": 9.0,
+        "max_cross_track_m": 0.8,
+        "threshold_m": 10.0,
+        "max_altitude_error_m": 12.5,
+    }
+    leg |= {
+        "max_airspeed_error_mps": None,
+        "max_load_factor": 1.4,
+        "trackable": False,
+        "cause": "navigation error",
+    }
+    page = page_with(run, tmp_path / "high", trackability=[leg])
+    assert "<p>1 of 1 legs were not. Allowed: cross-track 10 m, altitude error 10 m.</p>" in page
+    assert '<td>0.8</td><td class="bad">12.5</td><td class="bad">navigation error</td>' in page
+    wide = leg | {"max_cross_track_m": 11.0, "max_altitude_error_m": 0.1}
+    page = page_with(run, tmp_path / "wide", trackability=[wide])
+    assert '<td class="bad">11.0</td><td class="bad">navigation error</td>' in page
+    assert "altitude error, m" not in page
+    both = [leg | {"max_airspeed_error_mps": 4.0, "max_load_factor": 4.5}, wide]
+    page = page_with(run, tmp_path / "both", trackability=both)
+    assert "altitude error 10 m, airspeed error 2.5 m/s, load factor 3.8.</p>" in page
+    assert '<td>0.8</td><td class="bad">12.5</td><td class="bad">4</td><td class="bad">4.5</td>' in page
+    assert '<td class="bad">11.0</td><td>0.1</td><td>\N{EN DASH}</td><td>1.4</td>' in page
+
+
 def test_it_says_when_there_was_no_fix(run: Path, tmp_path: Path) -> None:
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
@@ -95,7 +124,7 @@ def test_the_page_says_when_the_figures_came_about(run: Path) -> None:
         assert f'<td class="dim">at {track.time_s[row]:.1f} s</td>' in cells.partition("</tr>")[0]
 
 
-def page_with(run: Path, folder: Path, **figures: float) -> str:
+def page_with(run: Path, folder: Path, **figures: Any) -> str:
     """The page of a copy of a run with other figures."""
     shutil.copytree(run, folder)
     metrics = json.loads((folder / "metrics.json").read_text())
