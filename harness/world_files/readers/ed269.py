@@ -31,12 +31,15 @@ def read(path: Path, reading: Reading) -> Contents:
         raise WorldFileError("has neither features nor UASZoneList; must be ED-269")
     notes: list[str] = []
     parts: list[Part] = []
-    free = timed = 0
+    free = timed = empty = 0
     for zone in zones:
         if not isinstance(zone, dict) or not isinstance(zone.get("geometry"), list):
             raise WorldFileError("has a zone without a list `geometry`; must be ED-269")
         if zone.get("restriction") in FREE:
             free += 1
+            continue
+        if not zone["geometry"]:
+            empty += 1
             continue
         times = zone.get("applicability") or ()
         timed += any(
@@ -46,7 +49,9 @@ def read(path: Path, reading: Reading) -> Contents:
         name = str(zone.get("identifier") or zone.get("name") or "")[:40]
         parts += [_part(each, name, notes) for each in zone["geometry"]]
     if not parts:
-        raise WorldFileError("has no zone; must have some")
+        raise WorldFileError("has no zone with a geometry; must have some")
+    if empty:
+        notes.append(f"{counted(empty, 'zone')} without a geometry passed over")
     if free:
         notes.append(f"{counted(free, 'zone')} without restriction passed over")
     if timed:

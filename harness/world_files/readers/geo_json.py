@@ -162,11 +162,12 @@ def _features(content: Any) -> Iterator[tuple[dict[str, Any], Any, str]]:
         if feature.get("type") == "Feature":
             tags = feature.get("properties")
             tags = tags if isinstance(tags, dict) else {}
-            name = tags.get("name") or tags.get("identifier") or feature.get("id") or ""
+            named = {key.lower(): value for key, value in tags.items()}
+            name = named.get("name") or named.get("identifier") or feature.get("id") or ""
             yield (
                 tags,
                 feature.get("geometry"),
-                (name if isinstance(name, str) else str(tags.get("identifier", "")))[:40],
+                (name if isinstance(name, str) else str(named.get("identifier", "")))[:40],
             )
         else:
             yield {}, feature, ""

@@ -148,6 +148,9 @@ def _take(space: _Airspace, command: str, rest: str, line: int) -> None:
     elif command == "DA":
         radius, begin, end = _numbers(rest, 3, line)
         away = radius * NAUTICAL_MILE_M
+        if begin != end and (end - begin) % 360.0 == 0.0:
+            space.circles.append(rings.circle(space.needed_center(line), away))
+            return
         space.ring += rings.arc(space.needed_center(line), begin, end, (away, away), space.clockwise)
     elif command == "DB":
         places = [_place_of(match, line) for match in _places_in(rest)]
@@ -155,6 +158,9 @@ def _take(space: _Airspace, command: str, rest: str, line: int) -> None:
             raise WorldFileError(f"line {line}: DB has {len(places)} places; must have two")
         center = space.needed_center(line)
         (begin, near), (end, far) = (rings.polar(center, place) for place in places)
+        if places[0] == places[1] and not space.ring:  # else a small arc whose ends were rounded
+            space.circles.append(rings.circle(center, near))
+            return
         space.ring += [
             places[0],
             *rings.arc(center, begin, end, (near, far), space.clockwise)[1:-1],

@@ -921,3 +921,46 @@ def test_a_file_is_read_once_however_its_folder_is_written(tmp_path: Path) -> No
     link = tmp_path / "N47E008.geojson"
     link.symlink_to(path)
     assert loaded_file(link, None, Reading()) is not loaded_file(path, None, Reading())
+
+
+@pytest.mark.parametrize(
+    ("command", "area"),
+    [
+        ("DA 3,0,360", math.pi),
+        ("DA 3,90,450", math.pi),
+        ("DB 50:03:00 N 010:00:00 E, 50:03:00 N 010:00:00 E", math.pi),
+        ("DA 3,0,180", math.pi / 2),
+    ],
+)
+def test_an_arc_all_the_way_round_is_a_circle(command: str, area: float, tmp_path: Path) -> None:
+    """It was lost, as its ends are one place."""
+    text = f"AC R\nAN round\nAL GND\nAH FL100\nV X=50:00:00 N 010:00:00 E\n{command}\n"
+    (part,) = read_any(written(tmp_path / "a.txt", text)).parts
+    miles = part.footprint.area * 60.0**2 * math.cos(math.radians(50.0))
+    assert miles == pytest.approx(9.0 * area, rel=0.01)
+
+
+def test_a_small_arc_whose_ends_are_one_place_is_no_circle(tmp_path: Path) -> None:
+    corners = "".join(f"DP 50:0{y}:00 N 010:0{x}:00 E\n" for x, y in ((0, 0), (5, 0), (5, 5)))
+    arc = "DB 50:05:00 N 010:00:00 E, 50:05:00 N 010:00:00 E\n"
+    text = f"AC R\nAN square\nAL GND\nAH FL100\n{corners}V X=50:00:00 N 010:00:00 E\n{arc}"
+    (part,) = read_any(written(tmp_path / "a.txt", text)).parts
+    assert part.footprint.area == pytest.approx((5 / 60) ** 2)
+
+
+def test_a_zone_of_ed269_without_a_geometry_is_counted(tmp_path: Path) -> None:
+    circle = {
+        "horizontalProjection": {"type": "Circle", "center": [8.0, 47.0], "radius": 500},
+        "upperLimit": 9,
+    }
+    zones = [{"identifier": "a", "geometry": [circle]}, {"identifier": "b", "geometry": []}]
+    found = read_any(written(tmp_path / "a.json", json.dumps({"features": zones})))
+    assert [part.name for part in found.parts] == ["a"]
+    assert "1 zone without a geometry passed over" in found.notes
+
+
+def test_names_of_zones_may_be_in_capitals(tmp_path: Path) -> None:
+    shape = {"type": "Polygon", "coordinates": [[[8, 47], [8.1, 47], [8.1, 47.1], [8, 47]]]}
+    zone = {"type": "Feature", "properties": {"NAME": "CTR", "UPPER": "900 ft MSL"}, "geometry": shape}
+    (part,) = read_any(geojson(tmp_path / "a.geojson", zone)).parts
+    assert part.name == "CTR"
