@@ -245,6 +245,31 @@ def test_a_table_of_corners_does_not_make_the_page_wider_than_a_phone(tmp_path: 
     assert f'<td>{leg["max_deviation_m"]:.1f}</td><td class="bad">{leg["cause"]}</td>' in text
 
 
+def test_the_page_of_a_given_path_has_no_figures_of_a_planner(tmp_path: Path, chromium: Any) -> None:
+    """Nor a clearance where there is no obstacle; and no word is broken within for a long cause beside it."""
+    path, checked = tmp_path / "strip.csv", tmp_path / "checked"
+    path.write_text("x_m,y_m\n0,0\n0,2000\n60,2000\n60,0\n")
+    given = ["check", str(path), "--aircraft", "aerosonde", "--out", str(checked), "--no-recording"]
+    around = "obstacles=[{circle: {center_m: [900, 800], radius_m: 150}}]"
+    asked = (
+        "clairvoyant optimum 2",
+        "ratio to the clairvoyant optimum",
+        "replans",
+        "wanted clearance",
+        "obstacles 0",
+    )
+    for more, shown_too in (([], False), (["--set", around], True)):
+        assert main([*given, *more]) == 1
+        assert main(["report", str(checked)]) == 0
+        said = (checked / "report.html").read_text().partition("<h2>How to repeat it")[0]
+        assert [text for text in asked if text in said] == (["wanted clearance"] if shown_too else [])
+    page = chromium.new_page(viewport={"width": 390, "height": 900})
+    page.goto((checked / "report.html").resolve().as_uri())
+    narrow = "[...document.querySelectorAll('table.one th')].map(each => each.getBoundingClientRect().width)"
+    assert min(page.evaluate(narrow)) > 110
+    page.close()
+
+
 def test_a_browser_would_tell_what_is_wrong(tmp_path: Path, chromium: Any) -> None:
     page = tmp_path / "bad.html"
     page.write_text(
