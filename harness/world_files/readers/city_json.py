@@ -16,6 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import BoolArray, Contents, FloatArray, Limit, Part, Reading, WorldFileError
 from harness.world_files.plane import flat_crs, has_heights, unit_that_is_no_metre, vertical_unit_m
@@ -52,6 +53,7 @@ class _Object(NamedTuple):
     end: int
     surfaces: list[Surface]
     attributes: dict[str, Any]
+    has_parts: bool
 
 
 def read(path: Path, reading: Reading) -> Contents:
@@ -103,7 +105,8 @@ def _objects(contents: Sequence[Any]) -> tuple[list[_Object], FloatArray, Counte
             kind = str(each.get("type", "?")) if isinstance(each, dict) else "?"
             if kind.startswith(SOLID):
                 passed[INSTANCE] += sum(each["type"] == INSTANCE for each in _geometries(each))
-                objects.append(_Object(name, begin, end, _surfaces_of(each), _attributes(each)))
+                surfaces, has_parts = _surfaces_of(each), bool(each.get("children"))
+                objects.append(_Object(name, begin, end, surfaces, _attributes(each), has_parts))
             else:
                 passed[kind] += 1
         begin = end
@@ -213,10 +216,13 @@ def _parts(
             at += len(surface)
     parts: list[Part] = []
     unknown = Counter[str]()
+    shapeless = 0
     for each, footprint, bottom, top in zip(
         objects, rings.shapes_of(batch), low.tolist(), high.tolist(), strict=True
     ):
-        if footprint is not None:
+        if footprint is None:
+            shapeless += not each.has_parts  # which stand for it
+        else:
             if top - bottom < LOW_M:
                 roof_m = max(limits.metres_of(each.attributes.get(key)) or -math.inf for key in ROOFS)
                 if roof_m > bottom:
@@ -226,6 +232,8 @@ def _parts(
                     top = bottom + high_m
             parts.append(Part(footprint, Limit(bottom), Limit(top), name=each.name[:40]))
     notes += limits.building_notes(unknown, reading)
+    if shapeless:
+        notes.append(f"{counted(shapeless, 'building')} without a shape passed over")
     return parts
 
 

@@ -11,6 +11,7 @@ from harness.world_files.parts import Contents, Reading, WorldFileError
 from harness.world_files.readers.osm_elements import (
     AREAS,
     FIRST_INLINE,
+    HEIGHT,
     POINTS,
     Collected,
     Elements,
@@ -192,7 +193,9 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
             found.point({tag.k: tag.v for tag in each.tags})
         entities = osmium.osm.NODE | osmium.osm.WAY
         for each in osmium.FileProcessor(str(path), entities).with_locations():
-            if not each.is_way() or not (each.id in needed or any(name in each.tags for name in AREAS)):
+            if not each.is_way() or not (
+                each.id in needed or any(name in each.tags for name in (*AREAS, HEIGHT))
+            ):
                 continue
             line = [(node.lon, node.lat) for node in each.nodes if node.location.valid()]
             tags = {tag.k: tag.v for tag in each.tags}
@@ -201,6 +204,8 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
             if is_building(tags):
                 taken.add(each.id)
                 found.way(tags, line, f"way {each.id}")
+            elif each.id not in needed:
+                found.other(tags)
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
         raise WorldFileError(
             f"cannot be read as PBF ({' '.join(str(error).split())[:80]}); it may be torn"

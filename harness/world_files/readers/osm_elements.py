@@ -36,6 +36,8 @@ TALL: Final = frozenset(
 """Of `man_made`, what stands up like a building; piers, pipelines and the like do not."""
 POINTS: Final = ("building", "man_made", "power")
 """What tags of a node have that may be something tall; it has no outline."""
+HEIGHT: Final = "height"
+"""Tag of what stands up, be it a building or not."""
 ENTRANCE: Final = "entrance"
 """Of `building`, a door."""
 
@@ -50,12 +52,19 @@ class Collected:
         self.unknown = Counter[str]()
         self.broken = self.closed = 0
         self._others: Mapping[str, int] = {}
+        self._high: list[float] = []  # heights of what is no building
         self._points: list[float] = []  # heights of what has no outline, 0 where none is known
 
     def point(self, tags: Mapping[str, str]) -> None:
         """A node with tags; what is tall and has no outline is counted."""
         if is_tall(tags):
             self._points.append(limits.metres_of(tags.get("height")) or 0.0)
+
+    def other(self, tags: Mapping[str, str]) -> None:
+        """A way that is no building; one that says how high it is is counted."""
+        height_m = limits.metres_of(tags.get(HEIGHT))
+        if height_m is not None and height_m > 0.0:
+            self._high.append(height_m)
 
     def way(self, tags: Mapping[str, str], line: Line, name: str) -> None:
         """A building that is one way; those that are whole rings are made all at once."""
@@ -106,6 +115,11 @@ class Collected:
             types = ", ".join(sorted(self._others))
             many = counted(sum(self._others.values()), "relation")
             notes.append(f"{many} of buildings that is no area passed over (type {types})")
+        if self._high:
+            many = counted(len(self._high), "way")
+            notes.append(
+                f"{many} with a height that are no building passed over, the highest {max(self._high):g} m"
+            )
         if self._points:
             highest_m = max(self._points)
             told = f", the highest {highest_m:g} m" if highest_m > 0.0 else ""
@@ -172,7 +186,11 @@ class Elements:
             found.point(tags)
         for number, tags in self._buildings.items():
             found.way(tags, line(number), f"way {number}")
-        ways = {number: line(number) for number in self._relations.ways() & self._spans.keys()}
+        needed = self._relations.ways()
+        for number, tags in self._heights.items():
+            if number not in needed:
+                found.other(tags)
+        ways = {number: line(number) for number in needed & self._spans.keys()}
         areas = self._relations.areas(self._buildings, self._heights)
         found.areas(areas, ways, self._relations.others)
         return found.contents()

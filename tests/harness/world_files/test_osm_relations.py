@@ -131,3 +131,18 @@ def test_an_outline_that_is_a_multipolygon_without_tags_has_its_courtyard(form: 
     (part,) = found.parts
     assert part.footprint.area == pytest.approx(0.64e-6, rel=1e-5)
     assert "1 relation of buildings that is no area passed over (type site)" in found.notes
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_ways_with_a_height_that_are_no_building_are_counted(form: str, tmp_path: Path) -> None:
+    """A mast as an area, a crane, a wall: they stand there, and nobody said that they are solid."""
+    ways = {
+        1: '<tag k="building" v="yes"/><tag k="height" v="9"/>',
+        2: '<tag k="power" v="tower"/><tag k="height" v="60"/>',
+        3: '<tag k="barrier" v="wall"/><tag k="height" v="3 m"/>',
+        4: '<tag k="highway" v="service"/><tag k="maxheight" v="4"/>',
+    }
+    path = osm_building(tmp_path, form, "", ways, '<tag k="type" v="route"/>')
+    found = read_any(path)
+    assert [part.name for part in found.parts] == ["way 1"]
+    assert found.notes == ("2 ways with a height that are no building passed over, the highest 60 m",)

@@ -964,3 +964,25 @@ def test_names_of_zones_may_be_in_capitals(tmp_path: Path) -> None:
     zone = {"type": "Feature", "properties": {"NAME": "CTR", "UPPER": "900 ft MSL"}, "geometry": shape}
     (part,) = read_any(geojson(tmp_path / "a.geojson", zone)).parts
     assert part.name == "CTR"
+
+
+def test_city_objects_without_a_shape_are_counted(tmp_path: Path) -> None:
+    """One whose parts have the shapes is none of them."""
+    vertices = [[x, y, z] for z in (0, 9) for x, y in ((0, 0), (5, 0), (5, 5), (0, 5))]
+    solid = {"type": "MultiSurface", "lod": "1", "boundaries": [[[0, 1, 2, 3]], [[4, 5, 6, 7]]]}
+    content = {
+        "type": "CityJSON",
+        "version": "2.0",
+        "CityObjects": {
+            "a": {"type": "Building", "children": ["b", "c"]},
+            "b": {"type": "BuildingPart", "parents": ["a"], "geometry": [solid]},
+            "c": {"type": "BuildingPart", "parents": ["a"], "geometry": []},
+            "d": {"type": "Building", "attributes": {"measuredHeight": 9}},
+        },
+        "vertices": vertices,
+        "transform": {"scale": [1, 1, 1], "translate": [84000, 446000, 0]},
+        "metadata": {"referenceSystem": "https://www.opengis.net/def/crs/EPSG/0/7415"},
+    }
+    found = read_any(written(tmp_path / "a.city.json", json.dumps(content)))
+    assert [part.name for part in found.parts] == ["b"]
+    assert found.notes == ("2 buildings without a shape passed over",)
