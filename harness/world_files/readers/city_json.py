@@ -53,7 +53,7 @@ class _Object(NamedTuple):
     end: int
     surfaces: list[Surface]
     attributes: dict[str, Any]
-    has_parts: bool
+    told: bool  # by its parts, or as a template: what it is without a shape of its own
 
 
 def read(path: Path, reading: Reading) -> Contents:
@@ -104,9 +104,10 @@ def _objects(contents: Sequence[Any]) -> tuple[list[_Object], FloatArray, Counte
         for name, each in found.items():
             kind = str(each.get("type", "?")) if isinstance(each, dict) else "?"
             if kind.startswith(SOLID):
-                passed[INSTANCE] += sum(each["type"] == INSTANCE for each in _geometries(each))
-                surfaces, has_parts = _surfaces_of(each), bool(each.get("children"))
-                objects.append(_Object(name, begin, end, surfaces, _attributes(each), has_parts))
+                instances = sum(each["type"] == INSTANCE for each in _geometries(each))
+                passed[INSTANCE] += instances
+                told = bool(each.get("children") or instances)
+                objects.append(_Object(name, begin, end, _surfaces_of(each), _attributes(each), told))
             else:
                 passed[kind] += 1
         begin = end
@@ -221,7 +222,7 @@ def _parts(
         objects, rings.shapes_of(batch), low.tolist(), high.tolist(), strict=True
     ):
         if footprint is None:
-            shapeless += not each.has_parts  # which stand for it
+            shapeless += not each.told
         else:
             if top - bottom < LOW_M:
                 roof_m = max(limits.metres_of(each.attributes.get(key)) or -math.inf for key in ROOFS)
