@@ -32,7 +32,7 @@ Point = tuple[float, float, float | None]
 
 
 def read_kml(text: str, source: str) -> PathAsRead:
-    """The path of a KML file: its one LineString or gx:Track; polygons are fences, points are passed over.
+    """The path of a KML file: its one LineString, gx:Track or gx:MultiTrack; polygons are fences, points passed over.
 
     Args:
         text: of the file.
@@ -47,7 +47,7 @@ def read_kml(text: str, source: str) -> PathAsRead:
         name = shown(_text(placemark, "name") or f"Placemark {number}")
         for element in placemark.iter():
             kind = _name(element)
-            if kind in ("LineString", "Track"):
+            if kind in ("LineString", "Track", "MultiTrack"):
                 lines.append((name, element))
             elif kind == "Polygon":
                 fences.append(_polygon(element, name, source))
@@ -56,6 +56,8 @@ def read_kml(text: str, source: str) -> PathAsRead:
             elif kind in BOUNDARIES:  # which hold the ring of a polygon
                 others["LinearRing"] -= sum(1 for _ in _all(element, "LinearRing"))
     others.update(kind for element in root.iter() if (kind := _name(element)) in LINKED)
+    joined = {id(track) for _, each in lines if _name(each) == "MultiTrack" for track in _all(each, "Track")}
+    lines = [(name, each) for name, each in lines if id(each) not in joined]
     if len(lines) != 1:
         told = f" ({', '.join(name for name, _ in lines[:4])})" if lines else ""
         raise InputError(f"{source}: has {len(lines)} lines{told}; must have exactly one, the path")
@@ -64,6 +66,8 @@ def read_kml(text: str, source: str) -> PathAsRead:
     mode = _text(line, "altitudeMode")
     flat = mode not in (ABSOLUTE, RELATIVE)
     notes = [f"{counted(count, kind)} beside the path passed over" for kind, count in (+others).items()]
+    if len(joined) > 1:
+        notes.append(_joined(len(joined)))
     if flat and any(altitude for *_, altitude in points):
         notes.append("altitudes passed over: their altitudeMode is clampToGround")
     return _path(points, source, name, Fences(tuple(fences)), tuple(notes), flat, mode == RELATIVE)
@@ -95,12 +99,16 @@ def read_gpx(text: str, source: str) -> PathAsRead:
     notes = []
     segments = sum(1 for _ in _all(lines[0], "trkseg"))
     if segments > 1:
-        notes.append(f"{segments} segments of the track joined by straight lines")
+        notes.append(_joined(segments))
     for found, kind in ((routes if tracks else [], "route"), (list(_all(root, "wpt")), "waypoint")):
         if found:
             notes.append(f"{counted(len(found), kind)} beside the path passed over")
     name = shown(_text(lines[0], "name") or tag)
     return _path(points, source, name, Fences(), tuple(notes), False, False)
+
+
+def _joined(segments: int) -> str:
+    return f"{segments} segments of the track joined by straight lines"
 
 
 def _path(
@@ -154,7 +162,7 @@ def _text(element: ElementTree.Element, name: str) -> str:
 
 def _kml_points(line: ElementTree.Element, name: str, source: str) -> list[Point]:
     # Of a track: longitude latitude altitude, one an element.
-    track = _name(line) == "Track"
+    track = _name(line) != "LineString"
     rows = [(each.text or "").split() for each in _all(line, "coord")] if track else _coordinates(line)
     return [_point(row, f"{source}: {name}: point {number}") for number, row in enumerate(rows)]
 

@@ -46,7 +46,8 @@ def finite(value: Any, where: str) -> float:
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{where}: is {shown(str(value))!r}; must be a finite number")
+        told = "missing, or null" if value is None else repr(shown(str(value)))
+        raise InputError(f"{where}: is {told}; must be a finite number")
     return number
 
 

@@ -161,7 +161,7 @@ def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_pa
         ("a.kml", '<!DOCTYPE kml [<!ENTITY a "b">]>' + kml(), ": declares a document type or entities"),
         ("a.gpx", gpx(""), ": has 0 routes; must have exactly one"),
         ("a.gpx", gpx(f"<trk>{SEGMENT}</trk><trk>{SEGMENT}</trk>"), ": has 2 tracks; must have exactly one"),
-        ("a.gpx", gpx('<trk><trkseg><trkpt lat="47"/></trkseg></trk>'), ": trkpt 0: lon: is 'None'"),
+        ("a.gpx", gpx('<trk><trkseg><trkpt lat="47"/></trkseg></trk>'), ": trkpt 0: lon: is missing, or null"),
         ("a.gpx", gpx(f"<trk><trkseg>{point('trkpt', 47, '')}{point('trkpt', 48)}</trkseg></trk>"), "at 1 of 2 points"),
         ("a.igc", "B1200005049413N00611520EA0013000195\n", ":1: must begin with an A record"),
         ("a.igc", igc(), ": has 0 fixes, none of them in flight"),
@@ -178,3 +178,18 @@ def test_says_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path)
     assert str(fault.value).startswith(f"{path}:")
     assert sentence in str(fault.value)
     assert len(str(fault.value).splitlines()) == 1
+
+
+def test_tracks_of_one_multi_track_are_one_path(tmp_path: Path) -> None:
+    """Google's My Tracks begins a new gx:Track after each pause; the altitudeMode is that of all."""
+    track = "<gx:Track><when>2014-04-12T14:26:16Z</when><gx:coord>8 47.0{0} 50{0}</gx:coord></gx:Track>"
+    tracks = "".join(track.format(number) for number in range(3))
+    path = tmp_path / "a.kml"
+    path.write_text(
+        '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2"><Placemark>'
+        f"<gx:MultiTrack><altitudeMode>absolute</altitudeMode>{tracks}</gx:MultiTrack></Placemark></kml>"
+    )
+    found = read_path(path)
+    assert found.altitudes_m.tolist() == [500.0, 501.0, 502.0]
+    assert found.points_m[:, 1] == pytest.approx([0.0, 1111.7, 2223.5], abs=1.0)
+    assert found.notes == ("3 segments of the track joined by straight lines",)
