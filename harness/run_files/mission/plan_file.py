@@ -60,9 +60,9 @@ def read_mission(mission: dict[str, Any], source: str, key: str) -> MissionAsRea
     listed = mission.get("items")
     if not isinstance(listed, list):
         raise InputError(f"{source}: {key}items: is missing; it is required")
-    home, home_altitude_m = _home(mission, source, key)
     items: list[Item] = []
     notes: list[str] = []
+    home, home_altitude_m = _home(mission, source, key, notes)
     for number, each in enumerate(listed):
         items += _items(each, f"{key}items[{number}]", source, len(items) + 1, notes)
     if len({item.number for item in items}) < len(items):
@@ -71,12 +71,18 @@ def read_mission(mission: dict[str, Any], source: str, key: str) -> MissionAsRea
     return MissionAsRead(source, tuple(items), home, home_altitude_m, Fences(), tuple(notes))
 
 
-def _home(mission: dict[str, Any], source: str, key: str) -> tuple[tuple[float, float] | None, float]:
+def _home(
+    mission: dict[str, Any], source: str, key: str, notes: list[str]
+) -> tuple[tuple[float, float] | None, float]:
+    """Place and altitude of home; QGroundControl writes null for what it does not know."""
     home = mission.get("plannedHomePosition")
-    if home is None:
+    if home is None or home == [None, None, None]:
         return None, 0.0
     if not isinstance(home, list) or len(home) != 3:
         raise InputError(f"{source}: {key}plannedHomePosition: must be [latitude, longitude, altitude]")
+    if home[2] is None:
+        notes.append("its home has no altitude: altitudes above home are counted from the sea")
+        home = [*home[:2], 0.0]
     latitude, longitude, altitude = (
         finite(value, f"{source}: {key}plannedHomePosition[{i}]") for i, value in enumerate(home)
     )

@@ -128,7 +128,7 @@ class _Run:
         if repeats >= 0:
             done = self.taken.get(item.number, 0)
             self.taken[item.number] = done + 1
-            self._tell(item, FLOWN, f"to item {item.params[0]:g}, {repeats} times")
+            self._tell(item, FLOWN, f"to item {item.params[0]:g}, {counted(repeats, 'time')}")
             return target if done < repeats else at + 1
         first = self._first_flown(target)
         if first is not None and self.told.get(first.number, Told(0, "", "")).what == FLOWN:

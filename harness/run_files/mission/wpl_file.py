@@ -25,6 +25,8 @@ RALLY: Final = "RALLY"
 def read_waypoints(text: str, source: str) -> MissionAsRead:
     """The mission of a plain-text file; its first item is home if it is a waypoint, lines after # are comments.
 
+    A waypoint above home that has another number than 0 is no home: it is left out of the file.
+
     Items of fences that stand among those of the mission are fences; rally points are counted.
 
     Args:
@@ -53,7 +55,7 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
     if not items:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
     items, notes = _numbered(items)
-    home = items[0] if items[0].command == commands.WAYPOINT else None
+    home = items[0] if _is_home(items[0]) else None
     others = items[1:] if home is not None else items
     if home is not None and FRAMES.get(home.frame, SEA) != SEA and home.params[6] != 0.0:
         altitude = f"its altitude, {home.params[6]:g} m, is taken as above the sea"
@@ -70,6 +72,11 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
         fence_items.fences_of(others, None if home is None else home.position),
         (*notes, *fence_items.rally_note(rally)),
     )
+
+
+def _is_home(first: Item) -> bool:
+    """Whether the first item of a file is home."""
+    return first.command == commands.WAYPOINT and (first.number == 0 or FRAMES.get(first.frame, SEA) == SEA)
 
 
 def _numbered(items: list[Item]) -> tuple[list[Item], tuple[str, ...]]:

@@ -433,3 +433,48 @@ def test_a_path_of_kml_may_have_blanks_round_its_commas(tmp_path: Path) -> None:
     found = read_path(path)
     assert len(found.points_m) == 3
     assert found.altitudes_m.tolist() == [500.0] * 3
+
+
+def test_a_first_waypoint_that_is_numbered_1_and_above_home_is_no_home(tmp_path: Path) -> None:
+    """It was taken for home, and the path began at the second waypoint."""
+    path = tmp_path / "m.waypoints"
+    rows = [(k, 0, 3, 16, 0, 0, 0, 0, 47 + k / 100, 8, 100, 1) for k in (1, 2, 3)]
+    path.write_text("QGC WPL 110\n" + "\n".join("\t".join(map(str, row)) for row in rows) + "\n")
+    found = read_path(path)
+    assert found.mission is not None
+    assert [step.item for step in found.mission.program.steps] == [1, 2, 3]
+    assert found.notes == ("has no home: altitudes above home are counted from the sea",)
+
+
+@pytest.mark.parametrize(
+    ("home", "note"),
+    [
+        ([None, None, None], "has no home: altitudes above home are counted from the sea"),
+        ([47.0, 8.0, None], "its home has no altitude: altitudes above home are counted from the sea"),
+    ],
+)
+def test_what_a_plan_does_not_know_of_home_is_null(
+    home: list[float | None], note: str, tmp_path: Path
+) -> None:
+    items = [
+        {
+            "type": "SimpleItem",
+            "command": 16,
+            "frame": 3,
+            "doJumpId": k,
+            "params": [0, 0, 0, None, 47 + k / 100, 8, 60],
+        }
+        for k in (1, 2)
+    ]
+    path = tmp_path / "m.plan"
+    path.write_text(
+        json.dumps({"fileType": "Plan", "mission": {"items": items, "plannedHomePosition": home}})
+    )
+    assert read_path(path).notes == (note,)
+    path.write_text(
+        json.dumps({"fileType": "Plan", "mission": {"items": items, "plannedHomePosition": [None, 8, 9]}})
+    )
+    with pytest.raises(
+        InputError, match=r"plannedHomePosition\[0\]: is missing, or null; must be a finite number"
+    ):
+        read_path(path)
