@@ -185,7 +185,7 @@ def _text(path: Path, first: bytes, ending: str) -> str | None:
     if not lines:
         return None
     words = lines[0].lower().split()
-    if words[0] in ("ncols", "nrows"):
+    if words[0] in GRID_KEYS and any(line.lower().startswith("ncols") for line in lines[:6]):
         return "ascii_grid"
     if words[0] == "type" and any(line == "map" for line in lines[:6]):
         return "moving_ai"
@@ -204,6 +204,18 @@ def _text(path: Path, first: bytes, ending: str) -> str | None:
     return None
 
 
+GRID_KEYS: Final = (
+    "ncols",
+    "nrows",
+    "xllcorner",
+    "yllcorner",
+    "xllcenter",
+    "yllcenter",
+    "cellsize",
+    "dx",
+    "dy",
+)
+"""Words with which an ESRI ASCII grid may begin."""
 _JSON_KINDS: Final = (
     (re.compile(rb'"CityObjects"\s*:'), "cityjson"),
     (re.compile(rb'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'), "plan_fence"),

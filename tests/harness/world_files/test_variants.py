@@ -986,3 +986,12 @@ def test_city_objects_without_a_shape_are_counted(tmp_path: Path) -> None:
     found = read_any(written(tmp_path / "a.city.json", json.dumps(content)))
     assert [part.name for part in found.parts] == ["b"]
     assert found.notes == ("2 buildings without a shape passed over",)
+
+
+def test_an_ascii_grid_may_begin_with_any_of_its_keys(tmp_path: Path) -> None:
+    """GDAL reads it so, too."""
+    text = "cellsize 10\nxllcorner 100\nyllcorner 200\nnrows 2\nncols 3\n1 2 3\n4 5 6\n"
+    found = read_any(written(tmp_path / "a.asc", text)).terrain
+    assert found is not None
+    assert found.values.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+    assert found.affine == (10.0, 0.0, 100.0, 0.0, -10.0, 220.0)
