@@ -67,6 +67,10 @@ MOVING_DIM: Colour = (96, 68, 56)
 START: Colour = (128, 140, 160)
 GOAL: Colour = (52, 160, 92)
 """Of start and goal: their labels are legible on black and on white."""
+START_LIGHT: Colour = (222, 230, 244)
+GOAL_LIGHT: Colour = (160, 246, 190)
+END_LIGHT: Colour = (255, 216, 210)
+"""Of these and of the mark of an end, on our own dark background: there a light browser puts labels on grey."""
 GOAL_DIM: Colour = (48, 112, 72)
 AIRCRAFT: Colour = (255, 255, 255)
 TRACK: Colour = (255, 179, 64)
@@ -94,6 +98,8 @@ TOLD: Colour = (134, 142, 156)
 WARNED: Colour = (214, 120, 20)
 """Of the lines of the event log, those of warnings last: legible on black and on white."""
 
+BELIEVED_OFF = "cross_track/believed"
+"""Below SERIES: the cross-track error that guidance sees."""
 SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     "cross_track/flown": ("cross-track error", TRACK, 1.5),
     "clearance/flown": ("clearance", TRACK, 1.5),
@@ -108,11 +114,11 @@ SERIES_STYLE: dict[str, tuple[str, Colour, float]] = {
     f"{NAVIGATION}/flown": ("navigation error", TRACK, 1.5),
     f"{THROTTLE}/flown": ("throttle", TRACK, 1.5),
     f"{RETURNS}/flown": ("beams that returned something", TRACK, 1.0),
-    "cross_track/believed": ("as believed", CHOSEN, 1.0),
+    BELIEVED_OFF: ("as believed", CHOSEN, 1.0),
 }
 """Name, colour and width of every line of the time series, by its entity below SERIES; of overlaid runs, only
 those called `flown` are drawn."""
-WHOLE_ONLY = ("bank/pitch", "cross_track/believed")
+WHOLE_ONLY = ("bank/pitch", BELIEVED_OFF)
 """Lines that a thin recording does not have."""
 SEARCH, DELAYS = "search/flown", f"{PLAN_DELAY}/flown"
 """Below SERIES: time of the search of each plan, and how late it took effect, drawn as points."""

@@ -169,7 +169,10 @@ class RerunLog:
         for lane, changes in self._states.changes(block).items():
             send_changes(self._rec, lane, changes)
         log_colours(self._rec, look.PLANNER_LANE, self._states.mode_colours())
-        send_curves(self._rec, curves(block, self._scene.held_m(block.arc_length_m)), block.time_s)
+        drawn = curves(block, self._scene.held_m(block.arc_length_m))
+        for empty in self._scene.empty_series:
+            drawn.pop(f"{empty}/flown", None)
+        send_curves(self._rec, drawn, block.time_s)
         send_levels(self._rec, self._scene, block.time_s)
         if block.has_beliefs:
             self._believed_point = send_believed(self._rec, block, self._piece_rows, self._believed_point)

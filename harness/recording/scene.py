@@ -53,7 +53,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
     )
     rec.log(look.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     rec.log(look.PLAN, rr.Transform3D(scale=[1.0, -1.0, 1.0]), static=True)
-    _log_area(rec, scene)
+    _log_area(rec, scene, thin)
     if scene.ground is not None:
         log_ground(rec, scene.ground)
     standing = [obstacle for obstacle in scene.obstacles if obstacle.stands_for_ever]
@@ -70,8 +70,11 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
         log_solids(rec, f"{look.WORLD}/{look.TRUE}", scene, standing, look.OBSTACLE)
     _log_aircraft(rec, scene, thin)
     for entity, (name, colour, width) in look.SERIES_STYLE.items():
-        if thin and (entity.partition("/")[0] not in THIN_SERIES or entity in look.WHOLE_ONLY):
+        plot = entity.partition("/")[0]
+        if thin and (plot not in THIN_SERIES or entity in look.WHOLE_ONLY):
             continue
+        if plot in scene.empty_series or (entity == look.BELIEVED_OFF and not scene.believes):
+            continue  # a layout is made by what there is
         style = rr.SeriesLines(names=[name], colors=[colour], widths=[width])
         rec.log(f"{look.SERIES}/{entity}", style, static=True)
     if not thin:
@@ -124,7 +127,7 @@ def send_believed(rec: rr.RecordingStream, block: Track, piece_rows: int, last_m
     assert block.believed_cross_track_m is not None
     for name, values in (
         (f"{look.NAVIGATION}/flown", block.navigation_error_m),
-        ("cross_track/believed", block.believed_cross_track_m),
+        (look.BELIEVED_OFF, block.believed_cross_track_m),
     ):
         rec.send_columns(f"{look.SERIES}/{name}", every, rr.Scalars.columns(scalars=values))
     return believed[-1:]
@@ -155,27 +158,25 @@ def log_trail_style(rec: rr.RecordingStream) -> None:
     rec.log(f"{look.WORLD}/{look.FLOWN}", rr.LineStrips3D.from_fields(radii=width), static=True)
 
 
-def log_end(rec: rr.RecordingStream, track: Track, outcome: str) -> None:
-    """Marks where a flight ended that did not reach its goal, with how it ended."""
+def log_end(rec: rr.RecordingStream, track: Track, outcome: str, thin: bool = False) -> None:
+    """Marks where a flight ended that did not reach its goal, with how it ended.
+
+    Args:
+        rec: where to.
+        track: its last row is the end.
+        outcome: how it ended.
+        thin: for a thin recording, which has the viewer's own background.
+    """
     last = np.array([[track.east_m[-1], track.north_m[-1], track.up_m[-1]]])
-    label = [outcome.replace("_", " ")]
-    rec.log(
-        f"{look.PLAN}/{look.END}",
-        rr.Points2D(
-            last[:, :2],
-            colors=[look.HIT],
-            radii=rr.Radius.ui_points(7.0),
-            labels=label,
-            show_labels=True,
-            draw_order=70,
-        ),
-        static=True,
-    )
-    rec.log(
-        f"{look.WORLD}/{look.END}",
-        rr.Points3D(last, colors=[look.HIT], radii=rr.Radius.ui_points(7.0), labels=label, show_labels=True),
-        static=True,
-    )
+    told: dict[str, Any] = {"labels": [outcome.replace("_", " ")], "show_labels": True}
+    mark: dict[str, Any] = {"colors": [look.HIT], "radii": rr.Radius.ui_points(7.0), **(told if thin else {})}
+    plan, world = f"{look.PLAN}/{look.END}", f"{look.WORLD}/{look.END}"
+    rec.log(plan, rr.Points2D(last[:, :2], draw_order=70, **mark), static=True)
+    rec.log(world, rr.Points3D(last, **mark), static=True)
+    if not thin:
+        told |= {"colors": [look.END_LIGHT], "radii": rr.Radius.ui_points(0.0)}
+        rec.log(f"{plan}/label", rr.Points2D(last[:, :2], draw_order=71, **told), static=True)
+        rec.log(f"{world}/label", rr.Points3D(last, **told), static=True)
 
 
 def log_summary(rec: rr.RecordingStream, scene: Scene, metrics: Mapping[str, Any] | None) -> None:
@@ -240,7 +241,8 @@ def quaternions(heading_deg: FloatArray, pitch_deg: FloatArray, roll_deg: FloatA
     )
 
 
-def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
+def _log_area(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
+    ends = [look.START, look.GOAL] if thin else [look.START_LIGHT, look.GOAL_LIGHT]
     xmin, ymin, xmax, ymax = scene.mission.bounds_m
     bounds = np.array([(xmin, ymin), (xmax, ymin), (xmax, ymax), (xmin, ymax), (xmin, ymin)])
     goal = circle(scene.mission.goal_m, scene.mission.goal_radius_m)
@@ -250,7 +252,7 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
         f"{look.PLAN}/ends",
         rr.Points2D(
             [scene.start_m, scene.mission.goal_m],
-            colors=[look.START, look.GOAL],
+            colors=ends,
             radii=rr.Radius.ui_points(5.0),
             labels=["start", "goal"],
             show_labels=True,
@@ -272,7 +274,7 @@ def _log_area(rec: rr.RecordingStream, scene: Scene) -> None:
         f"{look.WORLD}/ends",
         rr.LineStrips3D(
             poles,
-            colors=[look.START, look.GOAL],
+            colors=ends,
             radii=rr.Radius.ui_points(1.5),
             labels=["start", "goal"],
             show_labels=True,

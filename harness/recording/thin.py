@@ -146,7 +146,7 @@ class ThinLog:
         send_events(self._rec, [(*event, look.TOLD) for event in self._events])
         log_summary(self._rec, replace(self._scene, scenario_yaml=""), metrics)
         if self._last is not None and metrics["outcome"] not in ("reached", "unreachable"):
-            log_end(self._rec, self._last, metrics["outcome"])
+            log_end(self._rec, self._last, metrics["outcome"], thin=True)
         send_properties(self._rec, RUN, run or {})
         send_properties(self._rec, VARIED, varied or {})
         self._file.flush()

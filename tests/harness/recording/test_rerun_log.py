@@ -26,16 +26,17 @@ from harness.analysis.metrics import metrics
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.flight.observer import Caution
-from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
+from harness.flight.record import BELIEVED_FIELDS, AcceptedPlan, Flight, Outcome, Track
 from harness.mapping.scan import RangeScan
 from harness.recording import viewer
 from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
-from harness.recording.layout import series_views
+from harness.recording.layout import layout_of, series_views
 from harness.recording.log import RerunLog
 from harness.recording.overlay import runs_in, write_overlay
 from harness.recording.scene import quaternions
 from harness.recording.states import mode_of
 from harness.recording.summary import summary
+from harness.recording.thin import ThinLog
 from harness.recording.viewer import (
     NO_DRIVER,
     ViewerError,
@@ -716,6 +717,63 @@ def test_every_line_of_a_plot_is_named(recording: tuple[Path, Flight]) -> None:
     assert titles["series/bank"] == "Bank, deg; blue: command, red: limit 44.7, violet: pitch"
     assert titles["series/cross_track"] == "Cross-track, m; blue: believed"
     assert "believed" not in str(series_views(SCENE.frame, ("",), without=["navigation_error"])[0].name)
+
+
+@pytest.mark.parametrize(("obstacles", "believes"), [(OBSTACLES, False), (OBSTACLES, True), ((), False)])
+def test_a_browser_has_the_plots_that_the_file_has(
+    obstacles: tuple[Obstacle, ...],
+    believes: bool,
+    tmp_path: Path,
+    make_track: Callable[..., Track],
+) -> None:
+    """Its layout is made by what the file holds: no plot is empty, no title names a line that is not there."""
+    scene, believed = replace(SCENE, obstacles=obstacles, believes=believes), {}
+    if believes:
+        believed = dict.fromkeys(BELIEVED_FIELDS, 1.0)
+    track = make_track(101, plan_index=-1, clearance_m=500.0 if obstacles else np.inf, **believed)
+    log = RerunLog(tmp_path / "flight.rrd", scene, "a")
+    log.on_block(track)
+    log.close()
+    layout = layout_of(scene.frame, {str(entity) for entity in read(tmp_path / "flight.rrd")})
+    names = _names(layout.root_container)
+    layout.let_go()
+    assert ("Navigation error, m" in names) == ("Cross-track, m; blue: believed" in names) == believes
+    assert any(name.startswith("Clearance") for name in names) == bool(obstacles)
+    assert {"Speed, m/s; blue: over ground", "Altitude error, m", "Throttle, %"} <= names
+
+
+def _names(part: Any) -> set[str]:
+    below = getattr(part, "contents", ())
+    return {str(part.name)}.union(*(_names(each) for each in below if not isinstance(each, str)))
+
+
+def test_labels_are_legible_in_a_dark_and_in_a_light_viewer(
+    tmp_path: Path, make_track: Callable[..., Track]
+) -> None:
+    """On our dark background a light viewer puts them on a grey of 121, on its own white one on a grey of 230."""
+    for thin in (False, True):
+        path = tmp_path / f"{thin}.rrd"
+        log: Any = (ThinLog if thin else RerunLog)(path, SCENE, "a")
+        log.on_block(make_track(101, plan_index=-1))
+        flight = Flight(make_track(101, plan_index=-1), (), Outcome.COLLISION, "x", (), 10.0, 1.0)
+        log.close(metrics(flight, LIMITS))
+        entities = read(path)
+        for entity in ("ends", "end" if thin else "end/label"):
+            packed = np.ravel(column(entities, f"/plan/{entity}", "colors")[-1]).tolist()
+            colours = [(number >> 24 & 255, number >> 16 & 255, number >> 8 & 255) for number in packed]
+            for box in (17, 230 if thin else 121):
+                assert min(contrast(colour, (box,) * 3) for colour in colours) > 2.1, (entity, box)
+
+
+def contrast(colour: tuple[int, ...], ground: tuple[int, ...]) -> float:
+    """Ratio of the relative luminances of two colours, as WCAG 2 has it."""
+
+    def luminance(parts: tuple[int, ...]) -> float:
+        linear = [math.pow((part / 255 + 0.055) / 1.055, 2.4) for part in parts]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    low, high = sorted((luminance(colour), luminance(ground)))
+    return (high + 0.05) / (low + 0.05)
 
 
 def test_a_missing_driver_is_said(recording: tuple[Path, Flight], monkeypatch: pytest.MonkeyPatch) -> None:
