@@ -101,7 +101,7 @@ def area_about(
 def areas_of(
     contents: Sequence[Contents], mappings: Sequence[Mapping], altitude_m: float, turn_radius_m: float
 ) -> list[PlaneArea]:
-    """The area that some files cover; or of large ones several parts, the most crowded first.
+    """The area that some files cover; or of large ones several parts, the most crowded first, the corners last.
 
     Raises:
         WorldFileError: the files have nothing in common.
@@ -121,7 +121,10 @@ def areas_of(
     )
     half = [min(side, largest) / 2 for side in sides]
     areas = []
-    for x, y in _foci(contents, mappings, whole, altitude_m, largest):
+    foci = _foci(contents, mappings, whole, altitude_m, largest)
+    if not rasters:  # a zone larger than the area leaves room at the corners of what is about it
+        foci += [(whole[i], whole[j]) for i in (0, 2) for j in (1, 3)]
+    for x, y in foci:
         x, y = (min(max(v, whole[k] + half[k]), whole[k + 2] - half[k]) for k, v in enumerate((x, y)))
         areas.append(PlaneArea((x - half[0], y - half[1], x + half[0], y + half[1]), notes))
     return areas

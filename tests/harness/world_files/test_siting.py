@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -55,9 +56,23 @@ def test_another_part_is_taken_where_the_most_crowded_has_no_room(tmp_path: Path
     assert len(found.expanded.sources[0].polygons) == 2
 
 
+def test_a_zone_larger_than_an_area_is_flown_round_at_a_corner(tmp_path: Path) -> None:
+    found = sited(tmp_path / "a.geojson", zone(8.0, 47.0, 0.8))
+    (polygon,) = found.expanded.sources[0].polygons
+    xmin, ymin, xmax, ymax = found.bounds_m
+    assert 0.5 < polygon.area / ((xmax - xmin) * (ymax - ymin)) < 1.0
+    ends = shapely.points([found.start_m, found.goal_m])
+    assert (shapely.distance(ends, polygon) > CRAFT.clearance_m).all()
+
+
 def test_where_no_part_has_room_the_first_is_named(tmp_path: Path) -> None:
+    """A fence is not to be left, so there is nothing beyond what it holds."""
+    corners = [[46.2, 7.2], [47.8, 7.2], [47.8, 8.8], [46.2, 8.8]]
+    polygons = [{"inclusion": inside, "polygon": corners} for inside in (True, False)]
+    path = tmp_path / "a.plan"
+    path.write_text(json.dumps({"fileType": "Plan", "geoFence": {"polygons": polygons}}))
     with pytest.raises(WorldFileError, match="0% free, are too small for aerosonde"):
-        sited(tmp_path / "a.geojson", *(zone(8.0 + 6 * k, 47.0, 0.8) for k in range(2)))
+        site([FileSpec(path)], 100.0, CRAFT)
 
 
 def two_halls(path: Path, door: int) -> Path:
