@@ -13,6 +13,11 @@ from harness.run_files.path_as_read import PathAsRead
 FLYING_MPS: Final = 12.0
 """Before the first fix and after the last at this ground speed the aircraft rolls, or stands."""
 
+FASTEST_MPS: Final = 150.0
+STEEPEST_MPS: Final = 80.0
+"""Faster than these over the ground, and up or down, no glider flies: a fix that is so far from both its neighbours is
+an error of the receiver."""
+
 MOST_BROKEN: Final = 0.05
 """A file of which a larger share of fixes cannot be read is refused."""
 
@@ -34,14 +39,18 @@ def read_igc(text: str, source: str) -> PathAsRead:
     """
     fixes, broken = _fixes(text, source)
     valid = [fix for fix in fixes if abs(fix["lat"]) > 1e-9 or abs(fix["lon"]) > 1e-9]
-    flown = _in_flight(valid)
+    right = _without_leaps(valid)
+    flown = _in_flight(right)
     if len(flown) < 2:
         raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
     known, kind, notes = _with_altitudes(flown)
     if broken:
         notes.append(f"{broken} B records that cannot be read passed over")
-    if len(valid) > len(flown):
-        notes.append(f"{len(valid) - len(flown)} fixes on the ground not flown")
+    if len(valid) > len(right):
+        leaps = len(valid) - len(right)
+        notes.append(f"{leaps} {'fix' if leaps == 1 else 'fixes'} too far from both neighbours passed over")
+    if len(right) > len(flown):
+        notes.append(f"{len(right) - len(flown)} fixes on the ground not flown")
     if len(fixes) > len(valid):
         notes.append(f"{len(fixes) - len(valid)} fixes without a position passed over")
     return PathAsRead(
@@ -101,9 +110,33 @@ def _in_flight(fixes: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return fixes[flying[0] - 1 : flying[-1] + 1] if flying else []
 
 
+def _without_leaps(fixes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The fixes without those that are too far from both their neighbours, which are not too far from each other."""
+    kept = fixes[:1]
+    for place in range(1, len(fixes)):
+        fix, after = fixes[place], fixes[place + 1] if place + 1 < len(fixes) else None
+        if after is None or not (
+            _leaps(kept[-1], fix) and _leaps(fix, after) and not _leaps(kept[-1], after)
+        ):
+            kept.append(fix)
+    return kept
+
+
+def _leaps(before: dict[str, Any], after: dict[str, Any]) -> bool:
+    """Whether no glider gets from one fix to another in the time between them."""
+    elapsed_s = (after["datetime"] - before["datetime"]).total_seconds()
+    ends = before["gps_alt"], after["gps_alt"]
+    rise_m = ends[1] - ends[0] if all(ends) else 0.0  # 0: the logger has none
+    return elapsed_s > 0 and (
+        _speed_mps(before, after) > FASTEST_MPS or abs(rise_m) > STEEPEST_MPS * elapsed_s
+    )
+
+
 def _speed_mps(before: dict[str, Any], after: dict[str, Any]) -> float:
     """Ground speed between two fixes."""
     north = math.radians(after["lat"] - before["lat"])
-    east = math.radians(after["lon"] - before["lon"]) * math.cos(math.radians(after["lat"]))
+    east = math.radians(math.remainder(after["lon"] - before["lon"], 360.0)) * math.cos(
+        math.radians(after["lat"])
+    )
     elapsed_s = (after["datetime"] - before["datetime"]).total_seconds()
     return EARTH_M * math.hypot(north, east) / elapsed_s if elapsed_s > 0 else 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from harness.files.input_file import InputError
@@ -193,3 +194,24 @@ def test_tracks_of_one_multi_track_are_one_path(tmp_path: Path) -> None:
     assert found.altitudes_m.tolist() == [500.0, 501.0, 502.0]
     assert found.points_m[:, 1] == pytest.approx([0.0, 1111.7, 2223.5], abs=1.0)
     assert found.notes == ("3 segments of the track joined by straight lines",)
+
+
+def test_a_fix_that_no_glider_gets_to_is_passed_over(tmp_path: Path) -> None:
+    """One fix is 70 km off, another 8 km too high: errors of the receiver, which were flown to and back."""
+    fixes = [
+        f"B10{k // 15:02}{k % 15 * 4:02}47{round(k * 0.0006 * 60000):05}N00800000EA005{k:02}005{k:02}"
+        for k in range(60)
+    ]
+    path = tmp_path / "a.igc"
+    path.write_text(igc(*fixes))
+    whole = read_path(path)
+    assert len(whole.points_m) == 60
+    fixes[20] = fixes[20].replace("N00800000E", "N00900000E")
+    fixes[40] = fixes[40][:-5] + "09000"
+    path.write_text(igc(*fixes))
+    found = read_path(path)
+    assert len(found.points_m) == 58
+    assert np.ptp(found.points_m[:, 0]) < 1.0
+    assert found.altitudes_m.max() < 600.0
+    assert "2 fixes too far from both neighbours passed over" in found.notes
+    assert not any("neighbours" in note for note in whole.notes)
