@@ -8,7 +8,7 @@ import warnings
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import rerun as rr
 
@@ -32,13 +32,16 @@ FLOWN_LINE = "/flown"
 """Ends the entities of the time series that are drawn of every run."""
 
 
-def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> None:
-    """Writes the overlay of recordings to `path`.
+def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) -> str:
+    """Writes the overlay of recordings to `path`, in the world of the first.
 
     Args:
-        recordings: recordings of one scenario; incomplete ones may be among them.
+        recordings: the files; incomplete ones may be among them.
         names: name of each, for the legends.
         path: the file to write.
+
+    Returns:
+        Which of them are of other worlds, a sentence that stands in the summary too; empty where none is.
 
     Raises:
         RunFolderError: a recording cannot be read.
@@ -69,9 +72,40 @@ def write_overlay(recordings: Sequence[Path], names: Sequence[str], path: Path) 
             "log" if log else "none" if each else "unfinished"
             for log, each in zip(logs, figures, strict=True)
         ]
-        summary = _summary(names, figures, without)
+        told = _of_other_worlds(names, chunks)
+        summary = (f"**{escaped(told)}**\n\n" if told else "") + _summary(names, figures, without)
         rec.log(look.SUMMARY, rr.TextDocument(summary, media_type=rr.MediaType.MARKDOWN), static=True)
         file.end()
+        return told
+
+
+WORLD_ENTITIES: Final = tuple(f"/{look.PLAN}/{each}" for each in ("bounds", "outlines", look.DISCS))
+"""What tells one world from another in the plan view."""
+
+
+def _of_other_worlds(names: Sequence[str], chunks: Sequence[Sequence[rr.chunk.Chunk]]) -> str:
+    """Says which runs are not of the world that is shown; of a log, and of thin ones beside whole, it is unknown."""
+    worlds = [
+        {
+            (chunk.entity_path, name): values
+            for chunk in own
+            if chunk.entity_path in WORLD_ENTITIES
+            for name, values in chunk.to_record_batch().to_pydict().items()
+            if name.endswith((":strips", ":positions"))
+        }
+        for own in chunks
+    ]
+    entities = [{entity for entity, _ in world} for world in worlds]
+    thin = [f"/{look.PLAN}/{look.DISCS}" in each for each in entities]
+    others = [
+        name
+        for name, world, known, is_thin in zip(names, worlds, entities, thin, strict=True)
+        if known and is_thin == thin[0] and world != worlds[0]
+    ]
+    if not others:
+        return ""
+    were = "was" if len(others) == 1 else "were"
+    return f"The obstacles are those of {names[0]}; {', '.join(others)} {were} flown in another world."
 
 
 def send_recording(recording: Path, address: str) -> None:

@@ -86,7 +86,9 @@ def open_viewer(
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
-            write_overlay(recordings, run_names(run_dirs), shown)
+            told = write_overlay(recordings, run_names(run_dirs), shown)
+            if told:
+                tell(told)
         if web:
             with (
                 contextlib.suppress(KeyboardInterrupt),

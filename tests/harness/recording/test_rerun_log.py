@@ -590,6 +590,26 @@ def test_overlay_keeps_every_track_and_one_world(
     assert colours[0] != colours[1]
 
 
+def test_an_overlay_says_which_runs_are_of_other_worlds(
+    tmp_path: Path, make_track: Callable[..., Track]
+) -> None:
+    """Of a campaign that draws worlds two runs would be shown among the obstacles of one."""
+    elsewhere = replace(SCENE, obstacles=(Obstacle(Circle((500.0, 1250.0), 300.0)),))
+    for kind in (RerunLog, ThinLog):
+        for name, scene in (("a", SCENE), ("b", SCENE), ("c", elsewhere)):
+            log: Any = kind(tmp_path / f"{name}.rrd", scene, name)
+            log.on_block(make_track(11, plan_index=-1))
+            log.close(
+                metrics(Flight(make_track(11, plan_index=-1), (), Outcome.TIMEOUT, "x", (), 1.0, 1.0), LIMITS)
+            )
+        paths = [tmp_path / f"{name}.rrd" for name in "abc"]
+        told = write_overlay(paths, ["first", "second", "third"], tmp_path / "over.rrd")
+        assert told == "The obstacles are those of first; third was flown in another world."
+        (((page,),)) = (column(read(tmp_path / "over.rrd"), "/summary", "text")[-1],)
+        assert str(page).startswith(f"**{told}**")
+        assert write_overlay(paths[:2], ["first", "second"], tmp_path / "same.rrd") == ""
+
+
 def test_runs_with_events_at_once_are_overlaid_without_pandas(
     tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
 ) -> None:
