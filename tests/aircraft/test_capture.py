@@ -31,6 +31,7 @@ def last_error_s(name: str, kind: str, flight_s: float = 160.0, **keys: float) -
     return max(errors[-300:]) / speed
 
 
+@pytest.mark.flights
 def test_npfg_counts_on_no_faster_roll_than_the_rate_limit_allows() -> None:
     """A Cessna 182 rolls at 15 deg/s: with the time constant of its roll loop alone npfg swings from bank to bank."""
     limits = airframe("c182").guidance_limits()

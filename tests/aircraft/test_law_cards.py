@@ -87,6 +87,7 @@ def test_between_winds_a_card_is_linear_and_beyond_them_its_error_grows() -> Non
     assert wide.turn_radius_m == pytest.approx(1.25 * performance(AEROSONDE, 25.0, 7.5).turn_radius_m)
 
 
+@pytest.mark.flights
 @pytest.mark.usefixtures("_calm_only")
 def test_a_slow_law_gets_wider_turns() -> None:
     l1 = guidance_kinds()["l1"]

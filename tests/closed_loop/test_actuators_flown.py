@@ -68,6 +68,7 @@ def causes(flown: Scenario) -> set[str | None]:
     return {leg["cause"] for leg in told if not leg["trackable"]}
 
 
+@pytest.mark.flights
 def test_altitude_lost_behind_a_slow_elevator_is_the_servo_s() -> None:
     """In severe turbulence an elevator of 20 deg/s is at its rate limit, and 20 m are lost; a fast one loses 1 m."""
     severe = scenario().with_(

@@ -138,6 +138,7 @@ def test_load_factor(check: Check) -> None:
     assert causes(check(turn(112.0), trackability__load_factor=1.2)) == set()
 
 
+@pytest.mark.flights
 def test_speed_or_throttle(check: Check) -> None:
     """In a long turn so high up and so fast, the Cessna's full throttle does not hold the speed."""
     fast = {"aircraft__airspeed_mps": 60, "trackability__airspeed_mps": 1.0}

@@ -31,6 +31,7 @@ def fenced(small_world: SmallWorld, tmp_path: Path) -> Scenario:
     return small_world({"file": {"path": str(path)}}, navigation={"kind": "gnss"})
 
 
+@pytest.mark.flights
 def test_plans_keep_clearance_and_margin_from_a_fence(fenced: Scenario) -> None:
     margin_m = fenced.navigation.margin_m
     wanted_m = fenced.planner.clearance_m

@@ -55,6 +55,7 @@ def fields(draw: st.DrawFn, most_corners: int = 7) -> list[dict[str, Any]]:
     return [draw(obstacles(*cell, most_corners)) for cell, full in zip(cells, taken, strict=True) if full]
 
 
+@pytest.mark.flights
 @given(field=fields(most_corners=2))
 @BOUNDED
 def test_reaches_the_goal_among_circles_and_keeps_the_clearance(

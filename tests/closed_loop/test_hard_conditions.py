@@ -157,6 +157,7 @@ def test_is_reached_without_a_collision(family: str, condition: str) -> None:
         assert flight.outcome is Outcome.REACHED, f"{path.name}: {flight.reason}"
 
 
+@pytest.mark.flights
 @pytest.mark.skipif(not WORLDS.is_dir(), reason="the shared worlds are not beside this checkout")
 def test_a_way_without_room_to_turn_that_is_hard_to_see_is_found_in_the_end() -> None:
     flight, _ = flown(WORLDS / "barn" / "barn-world-265.json", "field of view 180 deg")

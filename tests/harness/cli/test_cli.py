@@ -377,6 +377,7 @@ def test_a_flight_of_a_model_that_cannot_be_flown_ends_before_it(
     assert not out.exists()
 
 
+@pytest.mark.flights
 def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "tracking", "--seeds", "1", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)

@@ -285,6 +285,7 @@ def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
     assert "an obstacle moves" in (place / "workers-1" / "report.html").read_text()
 
 
+@pytest.mark.flights
 def test_the_overlay_of_an_earlier_comparison_is_not_offered(
     place: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -332,6 +333,7 @@ def test_a_scenario_with_the_name_of_a_file_of_ours_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.flights
 def test_a_planner_in_a_file_may_lie_in_another_folder(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

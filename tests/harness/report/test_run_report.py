@@ -80,6 +80,7 @@ def test_a_leg_shows_the_limit_that_it_was_over(run: Path, tmp_path: Path) -> No
     assert '<td class="bad">11.0</td><td>0.1</td><td>\N{EN DASH}</td><td>1.4</td>' in page
 
 
+@pytest.mark.flights
 def test_it_says_when_there_was_no_fix(run: Path, tmp_path: Path) -> None:
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
@@ -101,6 +102,7 @@ def test_it_says_when_there_was_no_fix(run: Path, tmp_path: Path) -> None:
         assert (f"<li>without a fix {told}</li>" in page) if told else "without a fix" not in page
 
 
+@pytest.mark.flights
 def test_a_near_miss_is_said_before_the_figures(run: Path, tmp_path: Path) -> None:
     """Also where the goal was reached."""
     assert "nearer to an obstacle than wanted" not in (
@@ -159,6 +161,7 @@ def test_rows_that_some_flights_have_are_shown_where_they_do(run: Path, tmp_path
     assert float(row["navigation_error_max_m"]) == 41.5
 
 
+@pytest.mark.flights
 def test_the_report_of_a_campaigns_run_says_how_to_fly_it_again(tmp_path: Path) -> None:
     (tmp_path / "ring.yaml").write_text(SCENARIO)
     campaign = f"schema: wayproof/campaign/1\nname: c\nseed: 1\nscenarios: [{tmp_path}/ring.yaml]\nrecordings: thin\n"

@@ -31,6 +31,7 @@ def run_world(out: Path, *arguments: str) -> int:
     return main(["world", *arguments, "--out", str(out)])
 
 
+@pytest.mark.flights
 def test_a_hill_is_flown_round_and_the_expanded_scenario_flies_alone(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
