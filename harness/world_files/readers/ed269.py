@@ -9,7 +9,14 @@ from harness.files.wording import counted
 from harness.world_files.bounded import json_of
 from harness.world_files.parts import NO_BOTTOM, NO_TOP, WGS84, Contents, Limit, Part, Reading, WorldFileError
 from harness.world_files.readers import limits, rings
-from harness.world_files.readers.geo_json import FREE, footprint_of, places_of, radius_of, zone_limit
+from harness.world_files.readers.geo_json import (
+    FREE,
+    footprint_of,
+    limit_unit_m,
+    places_of,
+    radius_of,
+    zone_limit,
+)
 
 LISTS: Final = ("features", "UASZoneList")
 """What the list of zones is called, where the file is not the list itself."""
@@ -73,12 +80,12 @@ def _part(volume: Any, name: str, notes: list[str]) -> Part:
         raise WorldFileError(
             f"has zone {name!r} whose projection is neither a circle nor a polygon with an area"
         )
-    feet = str(volume.get("uomDimensions", "M")).upper().startswith("F")
-    if feet and projection.get("type") == "Circle":
+    unit_m = limit_unit_m(volume.get("uomDimensions"))
+    if unit_m != 1.0 and projection.get("type") == "Circle":
         notes.append(f"{name or 'a zone'}: its radius is taken as metres, its limits as feet")
     found: list[Limit | None] = []
     for word, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
         value = volume.get(f"{word}Limit")
         reference = str(volume.get(f"{word}VerticalReference") or "")
-        found.append(none if value is None else zone_limit(value, reference, feet, notes, name))
+        found.append(none if value is None else zone_limit(value, reference, unit_m, notes, name))
     return Part(footprint, *limits.band_of(found[0], found[1], notes, name), name=name)

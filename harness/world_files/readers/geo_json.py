@@ -31,7 +31,14 @@ from harness.world_files.readers import limits, rings
 DEEPEST: Final = 8
 ABOVE_GROUND: Final = ("AGL", "SFC", "GND")
 ABOVE_SEA: Final = ("AMSL", "MSL")
-ABOVE_ELLIPSOID: Final = ("WGS84", "HAE")
+ABOVE_ELLIPSOID: Final = ("WGS84", "W84", "HAE")
+LEVEL_M: Final = 100.0 * FOOT_M
+LIMIT_UNITS_M: Final = {
+    **dict.fromkeys(("m", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("ft", "f", "foot", "feet"), FOOT_M),
+    "fl": LEVEL_M,
+}
+"""Units of the limits of geozones."""
 FREE: Final = ("NO_RESTRICTION",)
 """Restrictions of a geozone that forbid nothing."""
 
@@ -78,11 +85,12 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
     """
     notes: list[str] = []
     parts: list[Part] = []
-    passed = free = timed = 0
+    passed = free = timed = empty = 0
     for tags, geometry, name in _features(_whole(path)):
         if str(tags.get("type", "")).upper() in FREE:
             free += 1
             continue
+        empty += geometry is None
         timed += bool(tags.get("limitedApplicability"))
         for one in _simple(geometry, 0):
             layer, extent = one.get("layer"), one.get("extent")
@@ -98,6 +106,8 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
             parts.append(Part(footprint, bottom, top, name=name))
     if not parts:
         raise WorldFileError("has no zone with an area; must be ED-318 with some")
+    if empty:
+        notes.append(f"{counted(empty, 'zone')} without a geometry passed over")
     if passed:
         notes.append(f"{counted(passed, 'geometry')} without an area passed over")
     if free:
@@ -108,28 +118,50 @@ def read_ed318(path: Path, reading: Reading) -> Contents:
 
 
 def _layer(layer: dict[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
-    feet = str(layer.get("uom", "m")).lower().startswith("f")
+    unit_m = limit_unit_m(layer.get("uom"))
     found: list[Limit | None] = []
     for word, none in (("lower", NO_BOTTOM), ("upper", NO_TOP)):
         value = layer.get(word)
         reference = str(layer.get(f"{word}Reference") or "")
-        found.append(none if value is None else zone_limit(value, reference, feet, notes, name))
+        found.append(none if value is None else zone_limit(value, reference, unit_m, notes, name))
     return limits.band_of(found[0], found[1], notes, name)
 
 
-def zone_limit(value: Any, reference: str, feet: bool, notes: list[str], name: str) -> Limit | None:
-    """A limit of a geozone: a number, in its own unit, above ground (AGL) or above mean sea level (AMSL, WGS84)."""
+def limit_unit_m(name: Any) -> float:
+    """Length of the unit of a geozone's limits; a metre where none is named.
+
+    Raises:
+        WorldFileError: it is none that is known.
+    """
+    word = str(name or "m").strip().lower()
+    if word not in LIMIT_UNITS_M:
+        raise WorldFileError(f"has limits in {word[:20]!r}; must be in m, ft or FL")
+    return LIMIT_UNITS_M[word]
+
+
+def zone_limit(value: Any, reference: str, unit_m: float, notes: list[str], name: str) -> Limit | None:
+    """A limit of a geozone, above ground (AGL) or above mean sea level (AMSL, WGS84).
+
+    Args:
+        value: a number, or one with a unit of its own.
+        reference: what it is counted from.
+        unit_m: length of the unit of a number; a hundred feet: flight levels, above mean sea level.
+        notes: are added to.
+        name: of the zone, for them.
+    """
     number = limits.metres_of(value)
     if number is None:
         return None
-    datum = Datum.GROUND if reference.upper() in ABOVE_GROUND else Datum.SEA
+    level = unit_m == LEVEL_M
+    datum = Datum.GROUND if reference.upper() in ABOVE_GROUND and not level else Datum.SEA
     if datum is Datum.GROUND and number == 0.0:
         return NO_BOTTOM
-    if datum is Datum.SEA and reference.upper() not in ABOVE_SEA:
+    if datum is Datum.SEA and reference.upper() not in ABOVE_SEA and not level:
         told = "are above the ellipsoid" if reference.upper() in ABOVE_ELLIPSOID else "name no reference"
         note = f"{name or 'a zone'}: its limits {told}; taken as above mean sea level"
         notes += [] if note in notes[-1:] else [note]
-    return Limit(number * (FOOT_M if feet else 1.0), datum)
+    has_unit = isinstance(value, str) and value.strip()[-1:].isalpha()
+    return Limit(number if has_unit else number * unit_m, datum)
 
 
 def radius_of(value: Any) -> float:

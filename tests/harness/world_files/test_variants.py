@@ -995,3 +995,58 @@ def test_an_ascii_grid_may_begin_with_any_of_its_keys(tmp_path: Path) -> None:
     assert found is not None
     assert found.values.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
     assert found.affine == (10.0, 0.0, 100.0, 0.0, -10.0, 220.0)
+
+
+@pytest.mark.parametrize(
+    ("uom", "upper", "top_m"),
+    [("FL", 95, 2895.6), ("ft", 95, 28.956), ("FT", "95 ft", 28.956), ("m", "95", 95.0), (None, 95, 95.0)],
+)
+@pytest.mark.parametrize("form", ["ed318", "ed269"])
+def test_limits_of_geozones_in_their_unit(
+    form: str, uom: str | None, upper: Any, top_m: float, tmp_path: Path
+) -> None:
+    """Flight levels were taken as feet, and a limit with a unit of its own was scaled twice."""
+    ring = [[[8, 47], [8.1, 47], [8.1, 47.1], [8, 47]]]
+    if form == "ed318":
+        layer = {"upper": upper, "upperReference": "AMSL", "uom": uom}
+        zone_shape = {"type": "Polygon", "coordinates": ring, "layer": layer}
+        zone = {
+            "type": "Feature",
+            "properties": {"identifier": "z", "type": "PROHIBITED"},
+            "geometry": zone_shape,
+        }
+        content: dict[str, Any] = {"type": "FeatureCollection", "features": [zone]}
+    else:
+        shape: dict[str, Any] = {
+            "horizontalProjection": {"type": "Polygon", "coordinates": ring},
+            "uomDimensions": uom,
+        }
+        content = {
+            "features": [
+                {
+                    "identifier": "z",
+                    "geometry": [{**shape, "upperLimit": upper, "upperVerticalReference": "AMSL"}],
+                }
+            ]
+        }
+    found = read_any(written(tmp_path / "a.json", json.dumps(content)))
+    assert [part.top.height_m for part in found.parts] == pytest.approx([top_m])
+    assert found.notes == ()
+    with pytest.raises(WorldFileError, match="has limits in 'nm'; must be in m, ft or FL"):
+        read_any(written(tmp_path / "b.json", json.dumps(content).replace(json.dumps(uom), '"NM"')))
+
+
+def test_a_zone_of_ed318_without_a_geometry_is_counted(tmp_path: Path) -> None:
+    ring = [[[8, 47], [8.1, 47], [8.1, 47.1], [8, 47]]]
+    shape = {
+        "type": "Polygon",
+        "coordinates": ring,
+        "layer": {"upper": 9, "upperReference": "AGL", "uom": "m"},
+    }
+    zones = [
+        {"type": "Feature", "properties": {"identifier": "z"}, "geometry": each} for each in (shape, None)
+    ]
+    found = read_any(
+        written(tmp_path / "a.json", json.dumps({"type": "FeatureCollection", "features": zones}))
+    )
+    assert found.notes == ("1 zone without a geometry passed over",)
