@@ -82,6 +82,8 @@ class _Unread:
             action()
         except BrokenPipeError:
             to_nowhere(self._stream)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, "standard output") from error
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)

@@ -167,7 +167,7 @@ def test_the_status_is_that_of_what_was_done_though_nobody_reads_of_it(
 def test_output_onto_a_full_disk(tmp_path: Path) -> None:
     with open("/dev/full", "w") as full:
         status, _, err = run(tmp_path, "schema", stdout=full)
-    assert (status, err) == (1, "wayproof: [Errno 28] No space left on device\n")
+    assert (status, err) == (1, "wayproof: [Errno 28] No space left on device: 'standard output'\n")
 
 
 @pytest.mark.flights
