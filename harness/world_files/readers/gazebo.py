@@ -17,6 +17,8 @@ from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, xml_events
 from harness.world_files.parts import Contents, FloatArray, Part, Reading, WorldFileError
 
+POPULATION: Final = "population"
+"""Copies of a model, as Gazebo spreads them."""
 BARN_CELL_M: Final = 0.15
 """Side of a cell of the BARN worlds: the diameter of their cylinders (Perille et al. 2020)."""
 UPRIGHT: Final = 0.01
@@ -40,6 +42,8 @@ class _Passed:
     """
 
     shapes: int = 0
+    seen: int = 0
+    spread: int = 0
     relative: int = 0
     scaled: int = 0
     changed: int = 0
@@ -50,6 +54,8 @@ class _Passed:
         """A sentence each."""
         told = (
             (self.shapes, "shape", "other than boxes, cylinders, spheres and capsules passed over"),
+            (self.seen, "link", "without a collision, which is only seen, passed over"),
+            (self.spread, "population", "of models, put at random by Gazebo, passed over"),
             (self.moved, "model", "put where the saved state of the world has it"),
             (self.scaled, "model", "scaled by the saved state of the world: taken as large as defined"),
             (self.changed, "model", "added or taken out by the saved state of the world: passed over"),
@@ -73,8 +79,9 @@ def read(path: Path, reading: Reading) -> Contents:
         _read_state(data, passed)
     depth, in_state = 0, False
     for event, element in xml_events(data, ends_only=False):
-        if element.tag == "state":
+        if element.tag in ("state", POPULATION):
             in_state = event == "start"
+            passed.spread += element.tag == POPULATION and in_state
         included += element.tag == "include" and event == "end" and not in_state
         if element.tag != "model" or in_state:
             continue
@@ -132,6 +139,7 @@ def _shapes(model: ElementTree.Element, pose: FloatArray, scale: float, passed: 
     found: list[Any] = []
     for link in model.findall("link"):
         at = pose @ _pose(link, passed)
+        passed.seen += link.find("collision") is None and link.find("visual") is not None
         for collision in link.findall("collision"):
             shape = _solid(collision, at @ _pose(collision, passed))
             passed.shapes += shape is None and collision.find("geometry/plane") is None

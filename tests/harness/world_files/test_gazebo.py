@@ -127,3 +127,15 @@ def test_leaning_solids_cover_their_points(tmp_path: Path) -> None:
         assert bounds(Contents("", None, (part,))) == pytest.approx(
             (*seen.min(axis=0), *seen.max(axis=0)), abs=1e-6
         )
+
+
+def test_what_is_only_seen_and_what_gazebo_spreads_is_told(tmp_path: Path) -> None:
+    """A population was taken as one model at the origin."""
+    sight = model("sight", "<link name='l'><visual name='v'><geometry>" + BOX + "</geometry></visual></link>")
+    crowd = f"<population name='p'>{model('tree', solid())}<model_count>5</model_count></population>"
+    found = world(tmp_path, sight + crowd + model("wall", solid()))
+    assert [part.name for part in found.parts] == ["wall"]
+    assert found.notes == (
+        "1 link without a collision, which is only seen, passed over",
+        "1 population of models, put at random by Gazebo, passed over",
+    )
