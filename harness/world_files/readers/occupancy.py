@@ -82,6 +82,10 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     occupied_from, free_to = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
     if not (_is_number(occupied_from) and _is_number(free_to)):
         raise WorldFileError("has thresholds that are no numbers")
+    if not (0.0 <= occupied_from <= 1.0 and 0.0 <= free_to <= 1.0):
+        raise WorldFileError(
+            f"has the thresholds {occupied_from:g} and {free_to:g}; must be shares between 0 and 1"
+        )
     negate = bool(keys.get("negate", 0))
 
     def solid_of(grey: FloatArray, opaque: BoolArray) -> FloatArray:

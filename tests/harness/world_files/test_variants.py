@@ -1050,3 +1050,12 @@ def test_a_zone_of_ed318_without_a_geometry_is_counted(tmp_path: Path) -> None:
         written(tmp_path / "a.json", json.dumps({"type": "FeatureCollection", "features": zones}))
     )
     assert found.notes == ("1 zone without a geometry passed over",)
+
+
+@pytest.mark.parametrize("thresholds", [(65, 0.2), (0.65, 19.6), (-0.1, 0.2)])
+def test_thresholds_of_a_ros_map_are_shares(thresholds: tuple[float, float], tmp_path: Path) -> None:
+    """In percent, nothing was occupied."""
+    Image.fromarray(np.array([[0, 254]], dtype=np.uint8)).save(tmp_path / "m.pgm")
+    text = "image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: {}\nfree_thresh: {}\n"
+    with pytest.raises(WorldFileError, match="must be shares between 0 and 1"):
+        read_any(written(tmp_path / "m.yaml", text.format(*thresholds)))
