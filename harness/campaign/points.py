@@ -80,7 +80,9 @@ STANDING_OUT: Final = {
 
 
 APART: Final = 1.5
-"""A figure so many times as large as that of any other run, or as small, is likely to be odd."""
+"""A figure so many times as large as that of any run of another case, or as small, is likely to be odd.
+
+Runs of one case share world, seed and draws: what is odd about the case is odd in all of them."""
 
 
 @dataclass(frozen=True)
@@ -92,10 +94,11 @@ class Extreme:
         run: its number.
         name: what of its world, planner and aircraft not all runs share.
         value: the figure: the largest of all runs, of clearance the least.
-        following: the same of the run that comes next; None where only one run has the figure.
+        following: the same of the run of another case that comes next; where there is one case, of the next run, None
+            where only one run has the figure.
         median: of all runs that have one.
-        apart: whether the figure is far from that of every other run, by the factor `APART`, or it alone came nearer
-            to an obstacle than was wanted.
+        apart: whether the figure is far from that of every run of another case, by the factor `APART`, or no other case
+            came nearer to an obstacle than was wanted.
     """
 
     figure: str
@@ -146,7 +149,10 @@ def _extreme(runs: Runs, figure: str, values: FloatArray) -> Extreme | None:
     row = int(order[0])
     if values[row] <= median:
         return None
-    following = float(values[order[1]]) if len(order) > 1 else None
+    others = [place for place in order[1:].tolist() if runs.case[place] != runs.case[row]] or order[
+        1:
+    ].tolist()
+    following = float(values[others[0]]) if others else None
     return Extreme(figure, int(runs.run[row]), own_name(runs, row), float(values[row]), following, median)
 
 

@@ -548,7 +548,7 @@ def assert_links_lead_somewhere(page: str) -> None:
     for number in set(re.findall(r'<a href="#run-(\d+)">', page)):
         assert page.count(f'<li id="run-{number}">') == 1
         (place,) = re.findall(rf'<li id="run-{number}">(.*?)</li>', page, re.DOTALL)
-        assert f"--run {number}</code>" in place
+        assert f"--run {number}</span></code>" in place
 
 
 ODD = {
@@ -577,9 +577,26 @@ def test_each_oddity_of_a_campaign_stands_out_on_its_page_though_runs_failed(tmp
     page = write_summary(summary, folder).read_text()
     for run, (figure, _) in ODD.items():
         assert (
-            f'<tr class="apart"><th scope="row">{figure}</th><td><a href="#run-{run}">{run}</a></td>' in page
+            f'<tr class="apart"><th scope="row">{figure}</th><td class="run"><a href="#run-{run}">{run}</a></td>'
+            in page
         )
     assert_links_lead_somewhere(page)
+
+
+def test_what_is_odd_about_a_case_stands_out_though_several_planners_flew_it(tmp_path: Path) -> None:
+    rows = [
+        row(run, case=run // 2, planner=("rolling_window", "bug2")[run % 2], **{"lost_returns.max": 0.02})
+        for run in range(20)
+    ]
+    for run, lost in ((6, 0.72), (7, 0.67)):  # both of case 3
+        rows[run] |= {"lost_returns.max": lost}
+    (lost_returns,) = summarise(campaign(tmp_path / "c", rows)).extremes
+    assert (lost_returns.run, lost_returns.apart) == (6, True)
+    assert lost_returns.following == pytest.approx(2.0)
+    alone = [row(run, case=0, **{"lost_returns.max": 0.1 * run}) for run in range(4)]
+    (lost_returns,) = summarise(campaign(tmp_path / "alone", alone)).extremes
+    assert lost_returns.run == 3
+    assert lost_returns.following == pytest.approx(20.0), "there is one case only"
 
 
 def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
