@@ -76,6 +76,7 @@ class GroundStationLink(Onlooker):
         self._m: Any = common
         self._mav: Any = common.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=1)
         self._place = EarthPosition(LocalPlane(0.0, 0.0), (0.0, 0.0))
+        self._has_fix: Callable[[], bool] = lambda: True
         try:
             family, kind, *_, target = socket.getaddrinfo(to.host, to.port, type=socket.SOCK_DGRAM)[0]
             self._socket = socket.socket(family, kind)
@@ -92,9 +93,9 @@ class GroundStationLink(Onlooker):
         self._over = False
         self._long_texts = 0
 
-    def begin(self, place: EarthPosition) -> None:
-        """Takes where the flight is on earth."""
-        self._place = place
+    def begin(self, place: EarthPosition, has_fix: Callable[[], bool] = lambda: True) -> None:
+        """Takes where the flight is on earth, and what tells whether its navigation has a fix."""
+        self._place, self._has_fix = place, has_fix
 
     def on_plan(self, accepted: AcceptedPlan, state: AircraftState) -> None:
         """The plan in effect becomes the mission."""
@@ -164,7 +165,7 @@ class GroundStationLink(Onlooker):
         self._send(
             self._mav.gps_raw_int_encode(
                 round(1e6 * state.time_s),
-                self._m.GPS_FIX_TYPE_3D_FIX,
+                self._m.GPS_FIX_TYPE_3D_FIX if self._has_fix() else self._m.GPS_FIX_TYPE_NO_FIX,
                 latitude,
                 longitude,
                 round(1e3 * state.up_m),

@@ -82,7 +82,7 @@ def fly_watched(
         def make(scenario: Scenario) -> Loop:
             loop = make_loop(scenario)
             if link is not None:
-                link.begin(_place(scenario, loop))
+                link.begin(_place(scenario, loop), lambda: loop.navigator.has_fix)
             if live is not None:
                 scene = scene_of(scenario, loop, dump_scenario(scenario))
                 live.begin(loop, scene, f"{scene.name}, live")

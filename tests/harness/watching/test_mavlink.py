@@ -23,12 +23,14 @@ from harness.flight.closed_loop import NOT_STEERED, fly
 from harness.flight.observer import Caution
 from harness.flight.record import digest
 from harness.run.scenario_flight import make_loop
+from harness.watching import mavlink
 from harness.watching.address import Address
 from harness.watching.body_rates import body_rates_radps
 from harness.watching.mavlink import EarthPosition, GroundStationLink
 from harness.watching.mavlink_mission import PlanAsMission
 from harness.watching.onlooker import Onlooker
 from harness.watching.pace import Pace
+from harness.watching.watched_flight import Onlookers, fly_watched
 from tests.closed_loop.conftest import world
 from tests.harness.conftest import MakePlan
 from tests.point_mass import PointMass
@@ -139,6 +141,27 @@ def test_no_word_of_an_event_is_cut_and_what_should_not_happen_warns(
         assert {each.severity for each in pieces} == {severity}
         assert "".join(each.text.ljust(50) for each in pieces).rstrip() == long.rstrip()
     assert len(told) == 11
+
+
+def test_in_an_outage_the_receiver_has_no_fix(
+    station: GroundStation, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mavlink, "SLOW_S", 0.0)  # at every row
+    scenario = world(
+        TREE, navigation={"kind": "gnss", "outages_s": [[2.0, 4.0]]}, mission={"time_limit_s": 6.0}
+    )
+    fly_watched(
+        scenario, tmp_path / "run", recording=False, onlookers=Onlookers(ground_station=station.address)
+    )
+    time.sleep(0.05)
+    fixes = {
+        round(each.time_usec / 1e6, 1): each.fix_type
+        for each in station.listen()
+        if each.get_type() == "GPS_RAW_INT"
+    }
+    assert len(fixes) > 20
+    for time_s, fix in fixes.items():
+        assert fix == (1 if 2.0 <= time_s < 4.0 else 3), time_s
 
 
 def test_the_mission_is_given_item_by_item(station: GroundStation, link: GroundStationLink) -> None:
