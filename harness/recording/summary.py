@@ -114,8 +114,9 @@ def _clearance(scene: Scene, metrics: Mapping[str, Any]) -> str:
     least = number(metrics["min_clearance_m"])
     if not least:
         return "no obstacle"
-    below = _text(metrics["clearance_violation_s"], 1)
-    return f"{least} m of {scene.limits.clearance_m:g} m; {below} s below"
+    below_s = metrics["clearance_violation_s"]
+    below = f"; {_text(below_s, 1)} s below" if below_s else ""  # a narrow view cuts what is longer
+    return f"{least} m of {scene.limits.clearance_m:g} m{below}"
 
 
 def _text(value: float | None, digits: int) -> str:

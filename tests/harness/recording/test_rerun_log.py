@@ -455,6 +455,18 @@ def test_the_summary_says_how_late_plans_were_and_what_the_sensor_lost(
     assert not any(name in summary(SCENE, figures) for name in ("plan delay", "returns lost"))
 
 
+def test_the_summary_says_for_how_long_it_was_too_near_only_where_it_was(
+    recording: tuple[Path, Flight],
+) -> None:
+    """The view at 1366 pixels cuts a longer cell before its end."""
+    figures = metrics(recording[1], LIMITS) | {"min_clearance_m": 150.0, "clearance_violation_s": 0.0}
+    assert "| least clearance | 150.0 m of 100 m |" in summary(SCENE, figures)
+    figures |= {"min_clearance_m": 62.8, "clearance_violation_s": 3.24}
+    assert "| least clearance | 62.8 m of 100 m; 3.2 s below |" in summary(SCENE, figures)
+    figures |= {"min_clearance_m": None}
+    assert "| least clearance | no obstacle |" in summary(SCENE, figures)
+
+
 def test_obstacles_stand_move_and_come_and_go(recording: tuple[Path, Flight]) -> None:
     entities = read(recording[0])
     (centre,) = column(entities, "/world/true_obstacles/circles", "centers")[0]
