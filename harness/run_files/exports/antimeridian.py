@@ -94,7 +94,12 @@ def _piece(
 
 
 def _between(values: FloatArray, row: int, share: float, turn: float) -> FloatArray:
-    """(1,) value at a share of the way from a row to the next; of angles the shorter way, where a turn is given."""
+    """(1,) value at a share of the way from a row to the next, the first where one is not finite.
+
+    Of angles it goes the shorter way, where a turn is given.
+    """
+    if not np.isfinite(values[row : row + 2]).all():  # the clearance where there is no obstacle
+        return values[row : row + 1]
     change = values[row + 1] - values[row]
     if turn:
         return np.array([(values[row] + share * math.remainder(change, turn)) % turn])

@@ -577,3 +577,23 @@ def plane_of_path(path: PathAsGiven) -> LocalPlane:
     """The plane of a path in degrees."""
     assert path.origin_deg is not None
     return LocalPlane(*path.origin_deg)
+
+
+def test_a_path_without_obstacles_is_cut_too(tmp_path: Path) -> None:
+    """Its clearance is infinite: null in the file, and no warning."""
+    (tmp_path / "w.yaml").write_text(
+        "schema: wayproof/scenario/1\nname: open-sea\n"
+        "area: {bounds_m: [-900, -900, 900, 900], origin: {latitude_deg: -16.8, longitude_deg: 180.0}}\n"
+        "mission: {start_m: [-400, 0], goal_m: [400, 0]}\n"
+    )
+    assert (
+        main(["fly", str(tmp_path / "w.yaml"), "--out", str(tmp_path / "run"), "--no-recording", "--quiet"])
+        == 0
+    )
+    out = tmp_path / "a.geojson"
+    assert main(["export", str(tmp_path / "run"), "--format", "geojson", "--out", str(out)]) == 0
+    (feature,) = json.loads(out.read_text())["features"]
+    assert feature["geometry"]["type"] == "MultiLineString"
+    clearances = feature["properties"]["coordinateProperties"]["clearance_m"]
+    assert [len(each) for each in clearances] == [len(line) for line in feature["geometry"]["coordinates"]]
+    assert set(itertools.chain(*clearances)) == {None}
