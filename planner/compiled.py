@@ -8,6 +8,7 @@ off: the same numbers give the same results.
 
 from __future__ import annotations
 
+import atexit
 import functools
 import gc
 import importlib
@@ -17,7 +18,7 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from fractions import Fraction
 from typing import Any, Generic, ParamSpec, TypeVar
 
@@ -135,17 +136,19 @@ def compile_all() -> None:
     The first time is told by one line on standard error, where that is a terminal. Where there are two processors, a
     second process compiles half of them meanwhile.
     """
+    global _second
     with _compiling:
         if not _waiting:
             return
-        # The compiler makes many objects that stay: to look through them for garbage takes a tenth of its time.
-        looked = gc.isenabled()
-        gc.disable()
-        try:
-            _compile_waiting()
-        finally:
-            if looked:
-                gc.enable()
+        with _no_garbage_looked_for():
+            while _waiting:
+                _start_second(0)
+                elsewhere = _second.names if _second else frozenset()
+                _compile([each for each in _waiting if each.__module__ not in elsewhere])
+                if _second:
+                    _second.wait()
+                    _second = None
+                _compile(list(_waiting))
         # The compiler stays for good. Once it is counted among the old objects, garbage is looked for there only when
         # as many new ones have come as would be a quarter of it: that would hold a flight up for a tenth of a second.
         gc.collect()
@@ -153,19 +156,17 @@ def compile_all() -> None:
             gc.freeze()
 
 
-def _compile_waiting() -> None:
-    while _waiting:
-        # The first function of a module calls no other one. The shortest tells soonest whether they are on disk.
-        first = min(
-            {each.__module__: each for each in reversed(_waiting)}.values(), key=lambda each: each.size
-        )
-        _compile([first])
-        if first.anew:
-            _tell("wayproof: compiling for this machine, once; this takes some seconds")
-            elsewhere = _half(_waiting) if first.kept and os.cpu_count() != 1 else set()
-            with _compiled_elsewhere(elsewhere):
-                _compile([each for each in _waiting if each.__module__ not in elsewhere])
-            _compile(list(_waiting))
+def begin_compiling(busy_bytes: int) -> None:
+    """Has a second process compile some of the functions imported so far, until `compile_all` needs them.
+
+    It does nothing where they are on disk, or where there is one processor.
+
+    Args:
+        busy_bytes: what this process has to do before it calls `compile_all`: it takes about as long as to compile so
+            much byte code.
+    """
+    with _compiling, _no_garbage_looked_for():
+        _start_second(busy_bytes)
 
 
 def compile_modules(names: Sequence[str]) -> None:
@@ -177,18 +178,74 @@ def compile_modules(names: Sequence[str]) -> None:
         _compile([each for each in _waiting if each.__module__ in names])
 
 
+class _SecondProcess:
+    """Compiles the functions of some modules; at its end they are on disk, unless it failed."""
+
+    def __init__(self, names: frozenset[str]) -> None:
+        self.names = names
+        code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
+        command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r})"]
+        nobody = subprocess.DEVNULL
+        self._process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody)
+        atexit.register(self._end)
+
+    def wait(self) -> None:
+        """Waits for its end."""
+        try:
+            self._process.wait()
+        finally:
+            self._end()
+
+    def _end(self) -> None:
+        self._process.kill()
+        self._process.wait()
+        atexit.unregister(self._end)
+
+
+_second: _SecondProcess | None = None
+
+
+def _start_second(busy_bytes: int) -> None:
+    """Compiles one function, and starts the second process where that was not on disk."""
+    global _second
+    if _second or not _waiting:
+        return
+    # The first function of a module calls no other one. The shortest tells soonest whether they are on disk.
+    first = min({each.__module__: each for each in reversed(_waiting)}.values(), key=lambda each: each.size)
+    _compile([first])
+    if not first.anew:
+        return
+    _tell("wayproof: compiling for this machine, once; this takes some seconds")
+    names = _share(_waiting, busy_bytes) if first.kept and os.cpu_count() != 1 else frozenset()
+    with suppress(OSError):  # All are then compiled here.
+        _second = _SecondProcess(names) if names else None
+
+
+@contextmanager
+def _no_garbage_looked_for() -> Iterator[None]:
+    """The compiler makes many objects that stay: to look through them for garbage takes a tenth of its time."""
+    looked = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if looked:
+            gc.enable()
+
+
 def _compile(functions: Sequence[Compiled[..., Any]]) -> None:
     for each in functions:
         each.compile()
         _waiting.remove(each)
 
 
-def _half(functions: Sequence[Compiled[..., Any]]) -> set[str]:
+def _share(functions: Sequence[Compiled[..., Any]], busy_bytes: int) -> frozenset[str]:
+    """The modules that a second process compiles, so that both end at the same time."""
     # Functions of one module call each other, so that a module stays whole.
     sizes: Counter[str] = Counter()
     for each in functions:
         sizes[each.__module__] += each.size
-    here, there = 0, STARTS_BYTES
+    here, there = busy_bytes, STARTS_BYTES
     names = set()
     for name, size in sizes.most_common():
         if here <= there:
@@ -196,27 +253,7 @@ def _half(functions: Sequence[Compiled[..., Any]]) -> set[str]:
         else:
             there += size
             names.add(name)
-    return names
-
-
-@contextmanager
-def _compiled_elsewhere(names: set[str]) -> Iterator[None]:
-    """Has another process compile some modules; at the end they are on disk, unless that process failed."""
-    code = f"import sys; sys.path[:] = {sys.path!r}; from planner.compiled import compile_modules; "
-    command = [sys.executable, "-c", code + f"compile_modules({sorted(names)!r})"]
-    nobody = subprocess.DEVNULL
-    try:
-        process = subprocess.Popen(command, stdin=nobody, stdout=nobody, stderr=nobody) if names else None
-    except OSError:
-        process = None  # All are then compiled here.
-    try:
-        yield
-        if process is not None:
-            process.wait()
-    finally:
-        if process is not None:
-            process.kill()
-            process.wait()
+    return frozenset(names)
 
 
 _process_is_ours = False

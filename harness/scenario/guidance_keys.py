@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from functools import cache
+from typing import TYPE_CHECKING, Any, Final
 
 from aircraft.guidance.registry import GuidanceKind, guidance_kinds, installed_kinds
 from harness.files.crash import sentence
@@ -11,6 +12,8 @@ from harness.files.printing import PrintingAside
 from harness.scenario import own_keys
 from harness.scenario.sections import AircraftSpec, GuidanceSpec
 from harness.scenario.validation import KeyFault
+from planner.compiled import begin_compiling
+from planner.registry import planner_kinds
 
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
@@ -44,6 +47,20 @@ def resolved(spec: GuidanceSpec, aircraft: AircraftSpec, as_flown: bool = False)
         return spec.model_copy(update={each.name: getattr(config, each.name) for each in fields(kind.config)})
 
 
+SURVEY_BYTES: Final = 11_000
+"""To survey an aircraft takes about as long as to compile so much byte code, the guidance law's compiling included."""
+
+
+@cache
+def _prepare(model: str) -> None:
+    """Has the planners compiled while an aircraft is surveyed that has not been before, as on a new machine."""
+    from aircraft.airframes import is_surveyed
+
+    if not is_surveyed(model):
+        planner_kinds()  # What is imported is compiled.
+        begin_compiling(SURVEY_BYTES)
+
+
 def airframe_of(spec: AircraftSpec) -> Airframe:
     """The airframe of a scenario, with its servos.
 
@@ -53,6 +70,7 @@ def airframe_of(spec: AircraftSpec) -> Airframe:
     from aircraft.actuators.actuator import Actuator, Actuators
     from aircraft.airframes import airframe
 
+    _prepare(spec.model)
     servos = spec.actuators
     if servos is None:
         return airframe(spec.model)

@@ -149,10 +149,10 @@ def _aircraft_names() -> tuple[str, ...]:
 
 
 def _cruise_mps(spec: AircraftSpec) -> float:
-    from aircraft.airframes import AircraftError, airframe
+    from aircraft.airframes import AircraftError
 
     try:
-        airframe(spec.model)
+        guidance_keys.airframe_of(spec.model_copy(update={"actuators": None}))
     except AircraftError as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
     try:

@@ -177,24 +177,33 @@ print(made.anew)
 
 
 def test_another_process_compiles_some_of_them(tmp_path: Path) -> None:
-    """Of three modules one is compiled elsewhere; all here where that cannot be, fails, or takes less than to start."""
+    """Of three modules one is compiled elsewhere; all here where that cannot be, fails, or takes less than to start.
+
+    Where it was begun before other work, it compiles all but the one that told that nothing is on disk.
+    """
     source = """
 import importlib, os, sys
 import planner.compiled
-from planner.compiled import compile_all
+from planner.compiled import begin_compiling, compile_all
 for folder, processors, python, starts_bytes in (
     ("two", 2, sys.executable, 0),
     ("one", 1, sys.executable, 0),
     ("fails", 2, "/bin/false", 0),
     ("missing", 2, "/no/such/file", 0),
     ("little", 2, sys.executable, planner.compiled.STARTS_BYTES),
+    ("begun", 2, sys.executable, 0),
+    ("begun_alone", 1, sys.executable, 0),
+    ("begun_fails", 2, "/bin/false", 0),
 ):
     os.cpu_count, sys.executable, planner.compiled.STARTS_BYTES = lambda: processors, python, starts_bytes
     made = [importlib.import_module(f"{folder}.{name}").it for name in "abc"]
+    if folder.startswith("begun"):
+        begin_compiling(10**9)
     compile_all()
     print(folder, *(each(1.0) for each in made), sum(each.anew for each in made))
 """
     here = {"two": "2", "one": "3", "fails": "3", "missing": "3", "little": "3"}
+    here |= {"begun": "1", "begun_alone": "3", "begun_fails": "3"}
     for folder in here:
         (tmp_path / folder).mkdir()
         for number, name in enumerate("abc"):
