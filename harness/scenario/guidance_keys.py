@@ -54,9 +54,13 @@ SURVEY_BYTES: Final = 11_000
 @cache
 def _prepare(model: str) -> None:
     """Has the planners compiled while an aircraft is surveyed that has not been before, as on a new machine."""
-    from aircraft.airframes import is_surveyed
+    from aircraft.airframes import AircraftError, is_surveyed
 
-    if not is_surveyed(model):
+    try:
+        surveyed = is_surveyed(model)
+    except AircraftError:
+        return  # The survey says more of it.
+    if not surveyed:
         planner_kinds()  # What is imported is compiled.
         begin_compiling(SURVEY_BYTES)
 
