@@ -115,7 +115,7 @@ class Relations:
                     own = tags_of.get(member.number, {})
                     yield Area({**tags, **own}, (member.number,), (), f"way {member.number}")
             for member in wanted:
-                if not member.way and member.number not in (*self._areas, *done):
+                if not member.way and member.number not in self._areas and member.number not in done:
                     done.add(member.number)
                     own, inside = self._plain.get(member.number, ({}, []))
                     yield _area({**tags, **own}, inside, f"relation {member.number}")
