@@ -125,7 +125,10 @@ class _Run:
     def _jump(self, item: Item, at: int) -> int:
         """Where it goes on after a jump."""
         target, repeats = self._target(item), int(item.params[1])
-        if repeats >= 0:
+        if repeats == 0:
+            self._tell(item, PASSED_OVER, "is never taken")
+            return at + 1
+        if repeats > 0:
             done = self.taken.get(item.number, 0)
             self.taken[item.number] = done + 1
             self._tell(item, FLOWN, f"to item {item.params[0]:g}, {counted(repeats, 'time')}")
@@ -286,7 +289,7 @@ class _Run:
         why = ""
         if item.command == commands.LOITER_TURNS:
             turns = _bounded(item, "loiters", max(first, 0.0), MOST_TURNS, "turns")
-            why = f"{turns:g} turns"
+            why = f"{turns:g} turn{'' if turns == 1.0 else 's'}"
         elif item.command == commands.LOITER_TIME:
             time_s = _bounded(item, "loiters for", max(first, 0.0), MOST_LOITER_S, "s")
             why = f"{time_s:g} s"

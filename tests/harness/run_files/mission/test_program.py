@@ -43,6 +43,12 @@ def test_a_jump_is_taken_as_often_as_it_says() -> None:
     assert flown(done) == [1, 2, 3, 2, 3, 2, 3, 5]
 
 
+def test_a_jump_that_is_never_taken_is_passed_over() -> None:
+    done = run(at(1), item(2, 177, 1, 0), at(3, 18, first=1.0))
+    assert flown(done) == [1, 3]
+    assert told(done) == {1: ("flown", ""), 2: ("passed over", "is never taken"), 3: ("flown", "1 turn")}
+
+
 def test_a_jump_without_end_forwards_is_a_way_and_backwards_closes_a_loop() -> None:
     done = run(item(1, 177, 4, -1), at(2), at(3), at(4), at(5), item(6, 177, 4, -1), at(7))
     assert flown(done) == [4, 5, 4]
