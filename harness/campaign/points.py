@@ -78,6 +78,8 @@ STANDING_OUT: Final = {
 }
 """Figures whose largest value is named with its run, by their column of the results; label, and factor for its unit."""
 
+OF_NAVIGATION: Final = ("navigation_error_m.max", "navigation_jump_m")
+"""Those that a run with perfect navigation does not have."""
 
 APART: Final = 1.5
 """A figure so many times as large as that of any run of another case, or as small, is likely to be odd.
@@ -120,7 +122,7 @@ def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
         runs: the same rows.
     """
     wanted_m = np.where((runs.wanted_clearance_m > 0.0) & runs.reached, runs.wanted_clearance_m, np.nan)
-    figures = {label: factor * column(results, name) for name, (label, factor) in STANDING_OUT.items()} | {
+    figures = {label: factor * _known(results, name) for name, (label, factor) in STANDING_OUT.items()} | {
         "longest search, ms": runs.planner_ms["max"]
     }
     least = _extreme(runs, "clearance over the wanted one, goal reached", -runs.min_clearance_m / wanted_m)
@@ -131,6 +133,12 @@ def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
     found = (least, *(_extreme(runs, label, values) for label, values in figures.items()))
     marked = [replace(each, apart=each.apart or _is_apart(each)) for each in found if each is not None]
     return tuple(sorted(marked, key=lambda each: not each.apart))
+
+
+def _known(results: pa.Table, name: str) -> FloatArray:
+    """A figure of all runs; of navigation errors 0 where navigation is perfect, if any run has some."""
+    values = column(results, name)
+    return np.nan_to_num(values) if name in OF_NAVIGATION and np.isfinite(values).any() else values
 
 
 def _is_apart(extreme: Extreme) -> bool:

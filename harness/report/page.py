@@ -10,6 +10,7 @@ from typing import Any
 import jinja2
 
 from harness.analysis.rows import DASH, Figure, Row, number, shown_figures
+from harness.report.remarks import Remark
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,7 @@ def run_html(
     *,
     moments: Mapping[str, float],
     judged: Sequence[JudgedBy],
+    remarks: Sequence[Remark],
     aircraft: str,
     scenario_yaml: str,
     command: str,
@@ -115,6 +117,7 @@ def run_html(
         checked: `metrics.json` of a path that was given; None where a planner made the path.
         moments: when figures came about, by `Figure.short` (`harness.analysis.moments`).
         judged: what else than the distance from the path legs were judged by.
+        remarks: what is said before the figures.
         aircraft: its name.
         scenario_yaml: the scenario as flown.
         command: the command line that flew it.
@@ -133,6 +136,7 @@ def run_html(
         exceeded=[each for each in judged if any(map(each.exceeded, lost))],
         checked=checked,
         moments=moments,
+        remarks=remarks,
         aircraft=aircraft,
         scenario_yaml=scenario_yaml,
         command=command,

@@ -84,7 +84,6 @@ class Program:
         local: positions are east and north in metres; else latitude and longitude in degrees.
         steps: in order.
         items: what became of every item, in the order of the file.
-        acts_on_ground: an altitude above ground is among them.
     """
 
     local: bool

@@ -583,6 +583,20 @@ def test_each_oddity_of_a_campaign_stands_out_on_its_page_though_runs_failed(tmp
     assert_links_lead_somewhere(page)
 
 
+def test_a_navigation_error_stands_out_where_the_other_runs_navigate_perfectly(tmp_path: Path) -> None:
+    """They have none: that is an error of 0."""
+    rows = [row(run, **{"navigation_error_m.max": None, "navigation_jump_m": None}) for run in range(20)]
+    rows[7] |= {"navigation_error_m.max": 44.2, "navigation_jump_m": 44.0}
+    folder = campaign(tmp_path / "one", rows)
+    summary = summarise(folder)
+    assert [(each.figure, each.run, each.following) for each in summary.extremes if each.apart] == [
+        ("navigation error, m", 7, 0.0),
+        ("jump of the believed position, m", 7, 0.0),
+    ]
+    page = write_summary(summary, folder).read_text()
+    assert "<p>Stands out by: navigation error, m; jump of the believed position, m.</p>" in page
+
+
 def test_what_is_odd_about_a_case_stands_out_though_several_planners_flew_it(tmp_path: Path) -> None:
     rows = [
         row(run, case=run // 2, planner=("rolling_window", "bug2")[run % 2], **{"lost_returns.max": 0.02})
