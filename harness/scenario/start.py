@@ -20,6 +20,11 @@ INSIDE_M = 1e-3
 """A flight begins no nearer to the boundary: the flight model keeps its place in degrees, to some 1e-9 m."""
 SURVEYED_M: Final = 300.0
 """Altitude above the sea at which an aircraft's range of airspeeds is measured."""
+NEAR_M: Final = (50.0, 1000.0)
+MIDDLE: Final = 1.05
+"""Between these altitudes an aircraft flies level at an airspeed that is by this factor within the range measured at
+`SURVEYED_M`: the density of the air differs by 7 % at most, which moves the ends of the range by less. It need not be
+trimmed. Near the ground the wheels may touch it."""
 STEP_M: Final = 50.0
 """To so much the highest altitude of level flight is told."""
 
@@ -57,7 +62,7 @@ def towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
 
 
 def check_level_flight(scenario: ScenarioKeys) -> None:
-    """Trims the aircraft as the flight would.
+    """Trims the aircraft as the flight would, unless its survey shows that it flies level.
 
     Args:
         scenario: its course and airspeed filled in; it can hold that near the sea.
@@ -70,8 +75,15 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     start, origin = start_conditions(scenario), scenario.area.origin
     place = origin.latitude_deg, origin.longitude_deg
     try:
-        files = guidance_keys.airframe_of(scenario.aircraft).files
         heading_rad = start.heading_rad(Atmosphere(*steady_wind_mps(scenario)))
+        frame = guidance_keys.airframe_of(scenario.aircraft)
+        slowest, fastest = frame.airspeed_range_mps
+        if (
+            NEAR_M[0] <= start.altitude_m <= NEAR_M[1]
+            and MIDDLE * slowest <= start.airspeed_mps <= fastest / MIDDLE
+        ):
+            return
+        files = frame.files
         fault = _fault(files, place, start, heading_rad)
     except (AircraftError, ValueError) as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error

@@ -623,6 +623,21 @@ def test_an_altitude_without_level_flight_is_refused_where_it_stands(altitude_m:
     make_loop(load_scenario(path))  # trims the aircraft as a flight does
 
 
+@pytest.mark.parametrize(
+    ("altitude_m", "airspeed_mps", "trims"), [(300, 25, 0), (20, 25, 1), (1200, 25, 1), (300, 32, 1)]
+)
+def test_an_aircraft_is_trimmed_only_where_its_survey_does_not_tell(
+    altitude_m: int, airspeed_mps: float, trims: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr("harness.scenario.start._fault", lambda *start: asked.append(start))
+    text = yaml.safe_load(LEAST)
+    text["mission"]["altitude_m"] = altitude_m
+    text["aircraft"] = {"airspeed_mps": airspeed_mps}
+    scenario_from(text)
+    assert len(asked) == trims
+
+
 def test_the_scenario_of_a_run_is_read_without_a_flight_model(monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports and exports read it: it was flown."""
     text = dump_scenario(scenario_from(yaml.safe_load(LEAST)))
