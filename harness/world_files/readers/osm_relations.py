@@ -75,19 +75,17 @@ class Relations:
 
     def outlines_missing(self) -> set[int]:
         """Relations that are members of buildings and are not here."""
-        every = (m.number for _, members in self._buildings.values() for m in members if not m.way)
-        return {number for number in every if number not in self._areas and number not in self._plain}
+        return self._nested() - self._areas.keys() - self._plain.keys()
 
     def ways(self) -> set[int]:
         """Ways that buildings may need."""
-        plain = (self._plain[n][1] for n in self._inside(self._plain))
+        plain = (self._plain[number][1] for number in self._nested() & self._plain.keys())
         lists = (*(each for _, each in (*self._areas.values(), *self._buildings.values())), *plain)
         return {member.number for members in lists for member in members if member.way}
 
-    def _inside(self, among: Mapping[int, object]) -> set[int]:
-        """Relations among some that are members of buildings."""
-        every = (m.number for _, members in self._buildings.values() for m in members if not m.way)
-        return {number for number in every if number in among}
+    def _nested(self) -> set[int]:
+        """Relations that are members of buildings."""
+        return {each.number for _, members in self._buildings.values() for each in members if not each.way}
 
     def areas(self, taken: Iterable[int], tags_of: Mapping[int, Tags]) -> Iterator[Area]:
         """The buildings.
