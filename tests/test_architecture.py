@@ -159,6 +159,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("baselines",),
         ("rolling_window",),
         ("memory", "world_stability"),
+        ("obstacle_labels",),
         ("geometry",),
         ("kernels",),
         ("compiled", "plan_checks"),

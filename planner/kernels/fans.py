@@ -38,31 +38,55 @@ def first_met(
         ux: along the ray.
         uy: along the ray.
     """
-    nearest, met = math.inf, 0
+    squares, begins, count = np.empty(len(first), dtype=np.intp), np.empty(len(first)), 0
     for block in range(len(first) - 1):
         dx, dy, reach = circles[0, block] - east, circles[1, block] - north, circles[2, block]
         ahead = dx * ux + dy * uy
-        if abs(dx * uy - dy * ux) >= reach or ahead <= -reach or ahead - reach >= nearest:
-            continue
+        if abs(dx * uy - dy * ux) < reach and ahead > -reach:
+            squares[count], begins[count] = block, ahead - reach
+            count += 1
+    nearest, met = math.inf, 0
+    for _ in range(count):
+        # The square that the ray may enter first.
+        least = 0
+        for i in range(1, count):
+            if begins[i] < begins[least]:
+                least = i
+        if begins[least] >= nearest:
+            break
+        begins[least] = math.inf
+        block = squares[least]
         for k in range(first[block], first[block + 1]):
             dx, dy = places[0, k] - east, places[1, k] - north
             ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
             room = places[2, k] * places[2, k] - beside * beside
             if room > 0.0 and ahead > 0.0:
                 entry = ahead - math.sqrt(room)
-                if entry < nearest:
+                if entry < nearest or (entry == nearest and k < met):
                     nearest, met = entry, k
     return max(nearest, 0.0), met
 
 
-@compiled(ROWS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT, FLOAT)
 def hugged(
-    own: FloatArray, east: float, north: float, ux: float, uy: float, outer: float, touch: float
+    own: FloatArray,
+    first: IntArray,
+    counts: IntArray,
+    side: float,
+    east: float,
+    north: float,
+    ux: float,
+    uy: float,
+    outer: float,
+    touch: float,
 ) -> float:
     """How far along a ray an outer distance from an obstacle, which it touches, is reached again; 0: it never is.
 
     Args:
         own: (3, m) east and north of the obstacle's points, and what is not asked for here.
+        first: where each cell begins among them,
+        counts: and how many it has.
+        side: of the cells.
         east: where the ray begins.
         north: where the ray begins.
         ux: along the ray.
@@ -71,16 +95,21 @@ def hugged(
         touch: distance along the ray at which it touches.
     """
     begin, end, count, least = np.empty(own.shape[1]), np.empty(own.shape[1]), 0, 0
-    for j in range(own.shape[1]):
-        dx, dy = own[0, j] - east, own[1, j] - north
-        ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
-        reach = outer * outer - beside * beside
-        if reach > 0.0 and ahead > -outer:
-            half = math.sqrt(reach)
-            begin[count], end[count] = ahead - half, ahead + half
-            if begin[count] < begin[least]:
-                least = count
-            count += 1
+    within = outer + 1.5 * side  # points of one cell lie no further apart than its diagonal
+    for cell in range(len(first)):
+        dx, dy = own[0, first[cell]] - east, own[1, first[cell]] - north
+        if abs(dx * uy - dy * ux) >= within or dx * ux + dy * uy <= -within:
+            continue
+        for j in range(first[cell], first[cell] + counts[cell]):
+            dx, dy = own[0, j] - east, own[1, j] - north
+            ahead, beside = dx * ux + dy * uy, dx * uy - dy * ux
+            reach = outer * outer - beside * beside
+            if reach > 0.0 and ahead > -outer:
+                half = math.sqrt(reach)
+                begin[count], end[count] = ahead - half, ahead + half
+                if begin[count] < begin[least]:
+                    least = count
+                count += 1
     if not count:
         return 0.0
     # Stretches of the ray near to a point, from the first on: those that overlap are one.
@@ -124,29 +153,30 @@ def _find_ends(
         outmost: the outmost point of each cell; written.
         ends: whether the fan ends there; written.
     """
-    side = 1.0 - row
-    for cell in range(len(first)):
+    side, cells = 1.0 - row, len(first)
+    east, north = np.empty(cells), np.empty(cells)
+    # Written without branches, which depend on numbers that no processor foresees.
+    for cell in range(cells):
         begin = furthest = first[cell]
         ux, uy, most = tangents[row, begin], tangents[row + 1, begin], 0.0
         for j in range(begin + 1, begin + counts[cell]):
             u, v = tangents[row, j], tangents[row + 1, j]
             beyond = side * (ux * v - uy * u)
-            if beyond > 0.0 and ux * u + uy * v < 0.0:
-                beyond = 2.0 - beyond  # grows with the angle between the two, up to pi
-            if beyond > most:
-                furthest, most = j, beyond
+            # It grows with the angle between the two, up to pi.
+            beyond = 2.0 - beyond if (beyond > 0.0) & (ux * u + uy * v < 0.0) else beyond
+            furthest = j if beyond > most else furthest
+            most = max(most, beyond)
         outmost[cell], ends[cell] = furthest, True
+        east[cell], north[cell] = tangents[row, furthest], tangents[row + 1, furthest]
     # The fan ends in a cell whose outmost tangent lies further out than those of the cells around it.
     for pair in range(len(one)):
-        j, k = outmost[one[pair]], outmost[other[pair]]
-        beyond = side * (tangents[row, j] * tangents[row + 1, k] - tangents[row + 1, j] * tangents[row, k])
-        if beyond > 0.0:
-            ends[one[pair]] = False
-        if beyond < 0.0:
-            ends[other[pair]] = False
+        a, b = one[pair], other[pair]
+        beyond = side * (east[a] * north[b] - north[a] * east[b])
+        ends[a] &= not beyond > 0.0
+        ends[b] &= not beyond < 0.0
 
 
-@compiled(ROWS, COUNTS, ROWS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT)
+@compiled(ROWS, COUNTS, ROWS, COUNTS, ROWS, COUNTS, COUNTS, COUNTS, COUNTS, FLOAT, FLOAT, FLOAT, FLOAT)
 def fan_edges(
     places: FloatArray,
     block: IntArray,
@@ -157,6 +187,7 @@ def fan_edges(
     counts: IntArray,
     one: IntArray,
     other: IntArray,
+    side: float,
     east: float,
     north: float,
     outer: float,
@@ -174,6 +205,7 @@ def fan_edges(
         counts: how many points it has.
         one: a cell,
         other: and one that touches it; each pair once.
+        side: of the cells.
         east: of the track point.
         north: of the track point.
         outer: distance from the obstacle of interest on a tangent.
@@ -197,7 +229,7 @@ def fan_edges(
     outmost, ends = np.empty(cells, dtype=np.intp), np.empty(cells, dtype=np.bool_)
     edges, hiding, hides, looked = np.empty((2 * cells, 6)), np.empty(2 * cells, dtype=np.intp), 0, 0
     for row in range(0, 4, 2):
-        side = 1.0 - row
+        hand = 1.0 - row
         _find_ends(tangents, row, first, counts, one, other, outmost, ends)
         for cell in range(cells):
             if not ends[cell]:
@@ -207,15 +239,15 @@ def fan_edges(
             touch2 = dx * dx + dy * dy - keep * keep
             if touch2 <= 0.0:
                 continue
-            off, x, y = side * EDGE_OFF_RAD, tangents[row, j], tangents[row + 1, j]
+            off, x, y = hand * EDGE_OFF_RAD, tangents[row, j], tangents[row + 1, j]
             towards, aside = x - off * y, y + off * x
             touch = math.sqrt(touch2)
             clear, met = first_met(places, block, circles, east, north, towards, aside)
             looked += 1
             if clear >= touch:
                 edges[count, 0], edges[count, 1], edges[count, 2] = towards, aside, touch
-                edges[count, 3], edges[count, 4] = clear, side
-                edges[count, 5] = hugged(own, east, north, towards, aside, outer, touch)
+                edges[count, 3], edges[count, 4] = clear, hand
+                edges[count, 5] = hugged(own, first, counts, side, east, north, towards, aside, outer, touch)
                 count += 1
             if clear < touch + places[2, met] and not (hides and hiding[hides - 1] == labels[met]):
                 hiding[hides] = labels[met]

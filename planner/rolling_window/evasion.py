@@ -77,7 +77,9 @@ class Threats:
         """What can be met within `AHEAD_S`; still_m: (n, 2) all edge points that stand still."""
         east, north = request.position_m
         reach_m = AHEAD_S * LATEST * mission.speed_mps + mission.clearance_m
-        near = np.hypot(still_m[:, 0] - east, still_m[:, 1] - north) < reach_m
+        dx, dy = still_m[:, 0] - east, still_m[:, 1] - north
+        beside = ((np.abs(dx) < reach_m) & (np.abs(dy) < reach_m)).nonzero()[0]
+        near = beside[np.hypot(dx[beside], dy[beside]) < reach_m]
         moving = [np.zeros((0, 5))]
         for each in request.seen.moving:
             seen = each.points_m + np.array(each.velocity_mps) * (request.time_s - each.time_s)

@@ -149,7 +149,7 @@ class Window:
         while pending:
             obstacle = pending.pop()
             own, squares = self._obstacle(obstacle)
-            found, hiding, looked = fan_edges(*blocked, labels, own, *squares, *origin, outer_m)
+            found, hiding, looked = fan_edges(*blocked, labels, own, *squares, self.cell_m, *origin, outer_m)
             self.tally.add(1, TANGENT, len(own[0]))
             self.tally.add(0, PLACE, looked * len(labels))
             self.tally.add(0, HUGGED, len(found) * len(own[0]))
