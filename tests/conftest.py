@@ -10,10 +10,14 @@ import pytest
 from hypothesis import settings
 
 from planner.compiled import compile_all
+from tests.examples import ALL, TIMES
+
+SOME = 25
+"""Random examples of a property test that asks for no other number."""
 
 # No test is timed: how long an example takes is the machine's affair. `pytest --hypothesis-profile all` tries more.
-settings.register_profile("wayproof", deadline=None, max_examples=30)
-settings.register_profile("all", deadline=None, max_examples=200)
+settings.register_profile("wayproof", deadline=None, max_examples=SOME)
+settings.register_profile(ALL, deadline=None, max_examples=TIMES * SOME)
 settings.load_profile("wayproof")
 
 ROOT = Path(__file__).parents[1]

@@ -141,6 +141,7 @@ def test_the_tour_can_be_gone_in_order(tmp_path: Path) -> None:
         assert (tmp_path / "runs" / page / "report.html").is_file()
 
 
+@pytest.mark.flights
 def test_ones_own_scenario_is_flown_and_a_mistake_in_it_refused_as_shown(tmp_path: Path) -> None:
     (text,) = blocks("yaml")
     (tmp_path / "my_world.yaml").write_text(text)
@@ -255,6 +256,7 @@ def test_ones_own_law_in_a_file_is_compared_on_the_command_line_and_in_python(tm
     assert json.loads(measured.stdout)["cases"]
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     "name", [longer([name])[0] if name == "harness/learning/README.md" else name for name in READMES]
 )

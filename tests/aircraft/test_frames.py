@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from aircraft.frames import PATCH_M, LocalPlane
 from aircraft.kernels import place_in_patch
+from tests.examples import examples
 
 GEOD = pyproj.Geod(ellps="WGS84")
 FURTHEST_M = 142_000.0
@@ -23,7 +24,7 @@ distances = st.floats(1.0, FURTHEST_M)
 
 
 @given(latitudes, longitudes, bearings, distances)
-@settings(max_examples=300)
+@settings(max_examples=examples(150))
 def test_position_agrees_with_the_geodesic(lat: float, lon: float, bearing: float, distance: float) -> None:
     point_lon, point_lat, _ = GEOD.fwd(lon, lat, math.degrees(bearing), distance)
     east, north = LocalPlane(lat, lon).plane(point_lat, point_lon)
@@ -43,7 +44,7 @@ def test_plane_is_the_azimuthal_equidistant_projection(lat: float) -> None:
 
 
 @given(latitudes, longitudes, bearings, distances, st.floats(0.0, 360.0))
-@settings(max_examples=300)
+@settings(max_examples=examples(150))
 def test_course_agrees_with_a_step_along_the_geodesic(
     lat: float, lon: float, bearing: float, distance: float, true_course_deg: float
 ) -> None:
@@ -65,7 +66,7 @@ def test_course_agrees_with_a_step_along_the_geodesic(
 
 
 @given(latitudes, longitudes, bearings, distances)
-@settings(max_examples=200)
+@settings(max_examples=examples(100))
 def test_geodetic_is_the_inverse(lat: float, lon: float, bearing: float, distance: float) -> None:
     plane = LocalPlane(lat, lon)
     east, north = distance * math.sin(bearing), distance * math.cos(bearing)
@@ -76,7 +77,7 @@ REACHES = st.floats(-1.0, 1.0)
 
 
 @given(latitudes, longitudes, bearings, distances, REACHES, REACHES)
-@settings(max_examples=300)
+@settings(max_examples=examples(150))
 def test_a_patch_agrees_with_the_plane_to_a_tenth_of_a_millimetre(
     lat: float, lon: float, bearing: float, distance: float, up: float, right: float
 ) -> None:

@@ -18,6 +18,7 @@ from aircraft.guidance.progress import route_rows
 from aircraft.interface import AircraftState, Route
 from aircraft.route import arc_point, route_length, route_point
 from aircraft.start import Atmosphere, StartConditions
+from tests.examples import examples
 from tests.point_mass import PointMass
 
 AIRSPEED = 25.0
@@ -164,7 +165,7 @@ def test_a_turn_rate_short_of_a_coordinated_turn_is_made_up_for_by_bank() -> Non
     st.floats(0.0, math.tau),
     st.sampled_from([(0.0, 0.0), (8.0, 3.0), (-5.0, -10.0)]),
 )
-@settings(max_examples=25)
+@settings(max_examples=examples(12))
 def test_a_far_off_start_ends_on_the_path(offset: float, course: float, wind: tuple[float, float]) -> None:
     flown = fly(joined([(0.0, 20000.0)]), northwards(offset, 0.0, course), 480.0, wind)
     assert all(abs(output.cross_track_m) < 0.1 for _, output in flown[-10 * UPDATE_RATE_HZ :])

@@ -76,6 +76,7 @@ def assert_reached(flight: Flight, clearance_m: float) -> None:
     assert flight.track.clearance_m.min() >= clearance_m
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("seed", [0, *longer(range(1, 4))])
 @pytest.mark.parametrize("flaws", [{}, {"dropout": 0.1, "false_return": 0.01}], ids=["noise", "all"])
 def test_with_noise_of_a_hundredth_of_the_range_edges_are_weighed(

@@ -57,6 +57,7 @@ def test_perfect_navigation_changes_no_bit(small_world: SmallWorld) -> None:
     assert not {"navigation_error_m", "navigation_margin_m"} & set(metrics(flight, flight_limits(scenario)))
 
 
+@pytest.mark.flights
 def test_it_is_seeded(scenario: Scenario, flight: Flight) -> None:
     assert digest(flown(scenario).track) == digest(flight.track)
     other = flown(scenario.with_({"seed": scenario.seed + 1}))
@@ -229,6 +230,7 @@ def test_a_map_that_starts_over_is_empty_and_goes_on_counting(small_world: Small
     np.testing.assert_array_equal(seen.edges_since(revision), edges)
 
 
+@pytest.mark.flights
 def test_run_folder_and_recording_have_truth_and_belief(
     scenario: Scenario, flight: Flight, tmp_path: Path
 ) -> None:

@@ -32,6 +32,7 @@ from harness.world.world import World
 from planner.geometry.clearance import distances
 from planner.geometry.curves import on_loiter, pose_at, sample
 from planner.interface import Path
+from tests.examples import examples
 from tests.point_mass import PointMass
 
 SmallWorld = Callable[..., Scenario]
@@ -182,7 +183,7 @@ def scenario_with(small_world: SmallWorld, obstacles: Obstacles, **mission: Any)
 
 @pytest.mark.flights
 @given(obstacles=separate() | mazes(), course_deg=st.integers(0, 359))
-@settings(BOUNDED, max_examples=12)
+@settings(BOUNDED, max_examples=examples(10))
 def test_every_plan_in_effect_is_safe_for_ever(
     small_world: SmallWorld, obstacles: Obstacles, course_deg: int
 ) -> None:

@@ -53,6 +53,7 @@ def test_three_processes_and_the_run_folder_agree(scenario: str, seconds: int | 
     assert (tmp_path / "c" / "scenario.yaml").read_text() == (tmp_path / "a" / "scenario.yaml").read_text()
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("scenario", "random"), [("one_of_everything", True), ("aerosonde_forest", False)])
 def test_the_seed_counts_where_something_is_random(scenario: str, random: bool, tmp_path: Path) -> None:
     def flown(seed: str) -> Any:

@@ -24,6 +24,7 @@ SHORT = ("--set", "mission.time_limit_s=15")
 LONG = ("fly", "paper_circles", "--out", "run", "--quiet")
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("signum", "recording"),
     [
@@ -85,6 +86,7 @@ def test_a_full_disk(size: int, tmp_path: Path) -> None:
     assert load_run(tmp_path / "run").manifest["complete"] is True
 
 
+@pytest.mark.flights
 def test_a_disk_that_is_full_for_the_track_alone(tmp_path: Path) -> None:
     status, _, err = run(tmp_path, *FLY, "--no-recording", file_bytes=60_000)
     assert status == 1
@@ -116,6 +118,7 @@ def test_two_flights_into_one_folder(tmp_path: Path) -> None:
     assert load_run(tmp_path / "run").metrics["outcome"] == "timeout"
 
 
+@pytest.mark.flights
 def test_two_comparisons_into_one_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "c").mkdir()
     lock = FolderLock(tmp_path / "c")
@@ -164,6 +167,7 @@ def test_the_status_is_that_of_what_was_done_though_nobody_reads_of_it(
     assert (status, err) == (0, "")
 
 
+@pytest.mark.flights
 def test_output_onto_a_full_disk(tmp_path: Path) -> None:
     with open("/dev/full", "w") as full:
         status, _, err = run(tmp_path, "schema", stdout=full)

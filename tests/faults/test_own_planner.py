@@ -138,6 +138,7 @@ def flown(place: Path, kind: str, *arguments: str) -> tuple[int, str, str]:
     return ran(place, "fly", "short.yaml", "--planner", kind, "--out", "run", "--no-recording", *arguments)
 
 
+@pytest.mark.flights
 def test_nothing_that_a_planner_prints_gets_into_the_result(place: Path) -> None:
     status, out, err = flown(place, "talks", "--json")
     assert (status, json.loads(out)["outcome"]) == (0, "reached"), err
@@ -162,6 +163,7 @@ def test_an_error_that_exits_when_it_is_told_is_a_planner_that_failed(place: Pat
     assert run.metrics["reason"] == "the planner raised Unspeakable: it cannot be told what"
 
 
+@pytest.mark.flights
 def test_a_config_that_exits_is_bad_input(place: Path) -> None:
     status, out, err = flown(place, "unresolved", "--quiet")
     assert (status, out) == (2, "")
@@ -169,6 +171,7 @@ def test_a_config_that_exits_is_bad_input(place: Path) -> None:
     assert not (place / "run").exists()
 
 
+@pytest.mark.flights
 def test_a_module_that_exits_when_it_is_loaded_is_no_success(place: Path) -> None:
     (place / "site" / "own_plugin.py").write_text("import sys\nsys.exit(0)\n")
     status, out, err = flown(place, "talks", "--quiet")
@@ -190,6 +193,7 @@ def test_a_sweep_survives_a_planner_that_ends_its_process(place: Path) -> None:
     assert json.loads(out)["outcomes"] == {"error": 1, "reached": 1}
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

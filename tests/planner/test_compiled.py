@@ -68,6 +68,7 @@ print(inside_bounds(Path([(0.0, 0.0, 1.0, 0.0, 0.0, 9.0)]), (0.0, 0.0, 10.0, 10.
     assert ran(source, tmp_path) == ["False", "True", "True"]
 
 
+@pytest.mark.flights
 def test_where_nothing_can_be_kept_functions_are_compiled_all_the_same(tmp_path: Path) -> None:
     """From a file that cannot be found again there is nowhere to keep them."""
     source = """
@@ -81,6 +82,7 @@ print(made(21.0))
     assert ran(source, tmp_path, HOME="/nonexistent") == ["42.0"]
 
 
+@pytest.mark.flights
 def test_where_the_disk_is_full_functions_are_compiled_all_the_same(tmp_path: Path) -> None:
     source = """
 import resource
@@ -163,6 +165,7 @@ def test_that_it_compiles_is_told_once_and_to_a_person_alone(
     assert terminal.getvalue().count("\n") == lines
 
 
+@pytest.mark.flights
 def test_what_was_kept_is_loaded_and_nothing_is_told(tmp_path: Path) -> None:
     source = """
 from planner.compiled import FLOAT, Compiled
@@ -176,6 +179,7 @@ print(made.anew)
     assert [ran(source, tmp_path, **paths) for _ in range(2)] == [["True"], ["False"]]
 
 
+@pytest.mark.flights
 def test_another_process_compiles_some_of_them(tmp_path: Path) -> None:
     """Of three modules one is compiled elsewhere; all here where that cannot be, fails, or takes less than to start.
 
@@ -214,6 +218,7 @@ for folder, processors, python, starts_bytes in (
     assert said == [word for folder in here for word in (folder, "1.0", "2.0", "3.0", here[folder])]
 
 
+@pytest.mark.flights
 def test_the_garbage_collector_of_a_callers_process_is_left_as_it_is(tmp_path: Path) -> None:
     source = """
 import gc

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from planner.interface import BoolArray, FloatArray, MovingEdges
 from planner.memory import MOVED, ObstacleMemory
+from tests.examples import examples
 
 CLEARANCE = 100.0
 SEEDS = st.integers(0, 2**32 - 1)
@@ -195,7 +196,7 @@ def test_without_being_told_where_it_is_met_it_is_where_it_is() -> None:
     np.testing.assert_array_equal(memory.take_in(seen), ring(0.0, 0.0))
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(25))
 @given(seed=SEEDS)
 def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_order(seed: int) -> None:
     """A search takes several scans: meanwhile obstacles move, others come into view, a place is refused."""
@@ -224,7 +225,7 @@ def test_what_was_given_does_not_change_and_points_that_stand_still_keep_their_o
         given_points, before = memory.points_m, memory.points_m.copy()
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(25))
 @given(seed=SEEDS)
 def test_taken_back_bit_by_bit_all_that_is_new_lies_behind_what_was_known_but_for_what_has_gone(
     seed: int,

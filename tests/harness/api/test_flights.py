@@ -214,6 +214,7 @@ def test_a_planner_from_a_file_flies_in_python_and_on_the_command_line(
     assert wayproof.load_run(tmp_path / "b").digest == flown.digest
 
 
+@pytest.mark.flights
 def test_a_run_of_a_planner_that_is_not_here_is_read_and_shown_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,6 +48,7 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {**measured, "told": told, "left": list(folder.iterdir())}
 
 
+@pytest.mark.flights
 def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
     cpu = result["cpu_s"]
     for name in ("closed_loop", "closed_loop_recording"):
@@ -55,6 +56,7 @@ def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
     assert result["bare_step_us"] == pytest.approx(1e6 * cpu["closed_loop"]["bare"] / result["steps"])
 
 
+@pytest.mark.flights
 def test_the_bare_run_takes_as_long_as_the_flight_at_120_steps_a_second(result: dict[str, Any]) -> None:
     assert result["outcome"] == "reached"
     assert (result["step_rate_hz"], result["bare_rate_hz"]) == (60, 120)
@@ -62,32 +64,38 @@ def test_the_bare_run_takes_as_long_as_the_flight_at_120_steps_a_second(result: 
     assert 2600 < 25 * result["sim_s"] < 4000
 
 
+@pytest.mark.flights
 def test_the_loop_costs_more_than_half_as_many_steps_and_the_recording_more_than_none(
     result: dict[str, Any],
 ) -> None:
     assert 0.5 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
 
 
+@pytest.mark.flights
 def test_every_block_has_its_share(result: dict[str, Any]) -> None:
     assert set(result["blocks"]) == BLOCKS
     assert sum(result["blocks"].values()) == pytest.approx(1.0)
     assert min(result["blocks"].values()) > 0.0
 
 
+@pytest.mark.flights
 def test_search_times_are_in_order(result: dict[str, Any]) -> None:
     planner = result["planner_ms"]
     assert 0.0 < planner["p50"] <= planner["p99"] <= planner["max"]
 
 
+@pytest.mark.flights
 def test_can_be_printed(result: dict[str, Any]) -> None:
     rows = bench_rows(result)
     assert {name.strip() for name in rows} >= BLOCKS
 
 
+@pytest.mark.flights
 def test_leaves_no_file_behind(result: dict[str, Any]) -> None:
     assert result["left"] == []
 
 
+@pytest.mark.flights
 def test_tells_of_every_round(result: dict[str, Any]) -> None:
     states, rounds = [state for _, _, state in result["told"]], result["rounds"]
     assert states[-rounds:] == [f"round {number}" for number in range(1, rounds + 1)]

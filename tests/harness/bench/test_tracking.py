@@ -47,6 +47,7 @@ def test_the_aerosonde_keeps_what_is_promised(case: Case) -> None:
     assert flown.within(promised(case)), flown
 
 
+@pytest.mark.flights
 def test_with_gnss_the_aircraft_is_off_by_what_it_does_not_know() -> None:
     """Guidance sees an error of decimetres; the true one is that of the position, which nothing is promised of."""
     (case,) = (each for each in CASES if each.navigation == "gnss")
@@ -59,6 +60,7 @@ def test_with_gnss_the_aircraft_is_off_by_what_it_does_not_know() -> None:
     assert perfect == tracked("aerosonde", CALM, [1])
 
 
+@pytest.mark.flights
 def test_two_courses_are_flown_no_better_than_the_worse_one() -> None:
     one, two = (tracked("aerosonde", CALM, [seed]) for seed in (4, 5))
     both = tracked("aerosonde", CALM, [4, 5])

@@ -216,7 +216,7 @@ def test_the_scenario_of_a_run_without_changes_is_the_file_but_for_its_seed(plac
     assert runs.run(0).seed != runs.run(1).seed
 
 
-@settings(derandomize=True, max_examples=15)
+@settings(derandomize=True, max_examples=10)
 @given(draws=st.integers(1, 6), more=st.integers(1, 6), seed=st.integers(0, 2**53))
 def test_more_draws_leave_the_runs_there_were_as_they_are(
     tmp_path_factory: pytest.TempPathFactory, draws: int, more: int, seed: int
@@ -534,7 +534,7 @@ def test_campaigns_are_no_scenarios_to_list() -> None:
     assert shipped_campaigns().keys().isdisjoint(shipped_scenarios())
 
 
-@settings(derandomize=True, max_examples=60)
+@settings(derandomize=True, max_examples=30)
 @given(
     st.recursive(
         st.none() | st.booleans() | st.integers(-3, 1000) | st.floats(allow_nan=False) | st.text(max_size=5),

@@ -29,6 +29,7 @@ from harness.cli.app import main
 from harness.cli.campaign_terminal import print_summary
 from harness.files.strict_yaml import InputError
 from harness.files.wording import printable
+from tests.examples import examples
 from tests.page import shown
 
 SCHEMA = pa.schema(
@@ -411,7 +412,7 @@ def test_results_without_a_metric_are_read(tmp_path: Path) -> None:
 
 
 @given(st.lists(st.none() | st.floats(-1e6, 1e6, allow_nan=False), max_size=60))
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 def test_every_number_has_one_group_between_its_edges(values: list[float | None]) -> None:
     axis, index = grouped("key", values)
     assert len(index) == len(values)

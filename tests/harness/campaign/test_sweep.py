@@ -472,6 +472,7 @@ def test_resume_refuses_another_aircraft_or_planner_of_the_same_name(
     assert 'planners.leaves was "campaign_plugin 1.0", is "campaign_plugin 2.0"' in capsys.readouterr().err
 
 
+@pytest.mark.flights
 def test_a_planner_that_cannot_be_made_is_a_row_whatever_it_raises(
     place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

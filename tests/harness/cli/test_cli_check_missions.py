@@ -45,6 +45,7 @@ def flown(
     return status, json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.flights
 def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(
         tmp_path / "m.waypoints",
@@ -149,6 +150,7 @@ def test_a_path_that_meets_terrain_is_told_where(tmp_path: Path, capsys: pytest.
     assert 40.0 < metrics["height_above_ground_m"]["min"] < 60.0
 
 
+@pytest.mark.flights
 def test_a_building_is_touched_only_below_its_roof(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -222,6 +224,7 @@ def test_a_real_mission_cut_off_is_refused_in_a_line_or_flown_so_far(
     assert told or path.suffix == ".txt"
 
 
+@pytest.mark.flights
 @needs_missions
 def test_real_missions_over_their_terrain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = REAL / "missions" / "ardupilot_ap-terrain.txt"

@@ -100,6 +100,7 @@ def test_killed_while_flying_leaves_an_incomplete_run_and_a_readable_recording(t
     assert not (out / "flight.rrd").exists()
 
 
+@pytest.mark.flights
 def test_interrupted_says_so_and_leaves_an_incomplete_run(tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start(tmp_path, "fly", "paper_circles", "--out", str(out), "--no-recording")

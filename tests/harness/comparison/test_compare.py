@@ -141,6 +141,7 @@ def files(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.flights
 def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path) -> None:
     assert files(flown) == {"comparison.csv", "comparison.json", "comparison.md", "report.html", "ring"}
     drawn = {
@@ -153,6 +154,7 @@ def test_writes_tables_figures_overlay_report_and_a_run_folder_each(flown: Path)
     assert json.loads((flown / "comparison.json").read_text())["complete"] is True
 
 
+@pytest.mark.flights
 def test_an_error_is_a_row_and_the_others_fly_on(flown: Path) -> None:
     rows = rows_of(flown)
     assert [row["planner"] for row in rows] == ["rolling_window", "corner", "dies", "raises"]
@@ -163,6 +165,7 @@ def test_an_error_is_a_row_and_the_others_fly_on(flown: Path) -> None:
     assert rows[3]["flown_length_m"] is None
 
 
+@pytest.mark.flights
 def test_figures_are_those_of_the_runs(flown: Path) -> None:
     for row in rows_of(flown)[:2]:
         said = load_run(flown / "ring" / row["planner"]).metrics
@@ -174,6 +177,7 @@ def test_figures_are_those_of_the_runs(flown: Path) -> None:
         assert row["ratio"] == pytest.approx(said["flown_length_m"] / OPTIMUM_M, rel=1e-9)
 
 
+@pytest.mark.flights
 def test_there_is_no_ratio_of_a_flight_that_did_not_arrive(flown: Path) -> None:
     said = load_run(flown / "ring" / "corner").metrics
     row = row_of(
@@ -190,6 +194,7 @@ def test_there_is_no_ratio_of_a_flight_that_did_not_arrive(flown: Path) -> None:
     assert row.tightest_turn == pytest.approx(2.0)
 
 
+@pytest.mark.flights
 def test_a_corner_is_tighter_than_the_aircraft_and_is_not_tracked(flown: Path) -> None:
     smooth, corner = rows_of(flown)[:2]
     assert smooth["tightest_turn"] == pytest.approx(1.0, abs=1e-6)
@@ -200,6 +205,7 @@ def test_a_corner_is_tighter_than_the_aircraft_and_is_not_tracked(flown: Path) -
     assert corner["cross_track_max_m"] > 10.0
 
 
+@pytest.mark.flights
 def test_csv_holds_the_same_rows(flown: Path) -> None:
     with (flown / "comparison.csv").open(newline="") as file:
         table = list(csv.DictReader(file))
@@ -227,6 +233,7 @@ class Page(HTMLParser):
         self.text += data
 
 
+@pytest.mark.flights
 def test_the_report_needs_nothing_but_itself_and_escapes_what_it_is_told(flown: Path) -> None:
     page = Page((flown / "report.html").read_text())
     assert page.references
@@ -248,6 +255,7 @@ def test_a_browser_shows_the_report_on_phone_and_screen(flown: Path, chromium: A
         assert (page.figures, page.missing) == (4, 0)
 
 
+@pytest.mark.flights
 def test_the_report_says_how_to_repeat_it(
     place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -20,9 +20,11 @@ from harness.falsify.folder import FALSIFIED, INDEX, PICTURES, TRIALS
 from harness.falsify.keys import number_text, scenario_at, vary_of
 from harness.files.strict_yaml import InputError
 from harness.scenario.scenario import Scenario, load_scenario
+from tests.examples import examples
 from tests.harness.breaking import WAY_M, broken, flown, stand_in
 
 
+@pytest.mark.flights
 def test_the_time_that_is_too_short_is_found(to_break: Path) -> None:
     result = broken(to_break, ("mission.time_limit_s", 300.0, 20.0), tolerance=0.005)
     assert (result.verdict, result.settled, result.not_monotone) == ("found", True, 0)
@@ -166,7 +168,7 @@ def test_what_is_not_monotone_is_reported(to_break: Path) -> None:
 
 @pytest.mark.flights
 @given(st.floats(0.3, 7.7))
-@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(10), suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_value_that_is_printed_fails_when_it_is_typed_in(to_break: Path, edge: float) -> None:
     def over(scenario: Scenario) -> dict[str, Any]:
         return stand_in("collision" if scenario.sensor.range_noise_m >= edge else "reached")

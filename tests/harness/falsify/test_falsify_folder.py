@@ -53,6 +53,7 @@ def test_a_condition_that_cannot_be_flown_leaves_everything_as_it_was(to_break: 
     assert content(to_break.parent / "out") == earlier
 
 
+@pytest.mark.flights
 def test_an_earlier_search_stays_until_the_new_one_has_ended(to_break: Path) -> None:
     def looks(scenario: Scenario) -> dict[str, Any]:
         found = content(to_break.parent / "out")

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from harness.falsify.search import POPULATION, STEPS, Point, Searched, Verdict, search
 from harness.files.strict_yaml import InputError
+from tests.examples import examples
 
 Fails = Callable[[Point], bool]
 
@@ -29,7 +30,7 @@ def found(
 
 
 @given(st.floats(0.001, 1.0), st.sampled_from([0.1, 0.03, 0.004]))
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 def test_one_key_is_narrowed_down_to_the_tolerance(edge: float, tolerance: float) -> None:
     result, asked = found(lambda point: point[0] >= edge, tolerance=tolerance)
     assert result.mildest is not None
@@ -58,7 +59,7 @@ Islands = st.lists(st.tuples(st.floats(0.01, 0.95), st.floats(0.005, 0.2)), min_
 
 
 @given(Islands, st.integers(12, 60), st.sampled_from([0.03, 0.01]))
-@settings(max_examples=80)
+@settings(max_examples=examples(40))
 def test_of_several_failing_islands_none_wider_than_the_widest_gap_is_milder(
     islands: list[tuple[float, float]], conditions: int, tolerance: float
 ) -> None:
@@ -179,7 +180,7 @@ def test_with_several_keys_every_condition_is_used_or_nothing_is_left(keys: int,
 
 
 @given(st.lists(st.floats(0.05, 0.95), min_size=2, max_size=3), st.integers(0, 3))
-@settings(max_examples=25)
+@settings(max_examples=examples(12))
 def test_where_every_key_makes_it_harder_the_mildest_is_found(edges: list[float], seed: int) -> None:
     keys, tolerance = len(edges), 0.02
     result, asked = found(

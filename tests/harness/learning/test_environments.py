@@ -47,6 +47,7 @@ def test_gymnasium_finds_nothing_to_complain_about(name: str) -> None:
         check_env(env.unwrapped)
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(("name", "outcome"), [(IDS[0], "reached"), (IDS[1], "reached")])
 def test_an_episode_flown_again_has_the_same_digest(name: str, outcome: str, tmp_path: Path) -> None:
     scenario = near()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from harness.mapping.cleared_space import NEARLY_RAD, nearly_towards, through_cells, through_places
 from planner.interface import BoolArray, FloatArray
+from tests.examples import examples
 
 RAYS = 48
 SEED = st.integers(0, 2**32 - 1)
@@ -63,7 +64,7 @@ def through(
 
 @pytest.mark.parametrize("share", [0.0, 0.4, 1.0, 1.7])
 @pytest.mark.parametrize(("field_rad", "rays"), [(math.tau, RAYS), (2.0, RAYS), (0.02, 2_000)])
-@settings(max_examples=20)
+@settings(max_examples=examples(10))
 @given(seed=SEED)
 def test_cells_are_looked_through_where_all_beams_that_meet_them_went_beyond(
     field_rad: float, rays: int, share: float, seed: int

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from harness.mapping.free_space import FreeSpace, _disc
 from harness.mapping.scan import RangeScan
 from harness.world.world import Circle
+from tests.examples import examples
 from tests.harness.looking import (
     BOUNDS,
     CLEARANCE,
@@ -56,7 +57,7 @@ def test_with_a_fifth_of_the_returns_lost_what_is_behind_walls_stays_unknown(see
     assert distance_to(world, points[seen.contains(points)]).min() > 0.0
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(15))
 @given(seed=SEEDS, field=st.sampled_from([360.0, 360.0, 120.0]), heading=st.floats(0.0, 6.0))
 def test_seen_free_is_true_only_where_there_is_nothing(seed: int, field: float, heading: float) -> None:
     world = random_world(seed)
@@ -67,7 +68,7 @@ def test_seen_free_is_true_only_where_there_is_nothing(seed: int, field: float, 
     assert distance_to(world, points[free]).min() > 0.0
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(10))
 @given(seed=SEEDS)
 def test_most_of_what_is_plainly_visible_is_seen_free(seed: int) -> None:
     world = random_world(seed)
@@ -128,7 +129,7 @@ def test_beams_that_touch_show_all_to_the_range_to_be_free_however_few() -> None
     assert seen.contains(points)[away < RANGE - 2.0 * FREE_CELL].all()
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(15))
 @given(seed=SEEDS, rays=st.sampled_from([12, 90, 720]), heading=st.floats(0.0, 7.0))
 def test_no_pole_stands_in_free_space_however_thin(seed: int, rays: int, heading: float) -> None:
     poles = np.random.default_rng(seed).uniform(2000.0, 8000.0, (12, 2))
@@ -194,7 +195,7 @@ def test_what_hides_just_beside_the_field_of_view_is_not_in_free_space(side: flo
     assert distance_to(world, points[free]).min() > 0.0
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(10))
 @given(
     seed=SEEDS,
     field=st.sampled_from([360.0, 120.0]),

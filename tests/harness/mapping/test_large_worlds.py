@@ -18,6 +18,7 @@ from harness.recording.sensed import NEAR_CELLS, Sensed, returns_m
 from harness.recording.solids import circle
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from planner.interface import FloatArray
+from tests.examples import examples
 
 NUMBER = 2 * PIECE + 3
 
@@ -125,7 +126,7 @@ def test_what_a_scan_shows_of_a_large_crowd_takes_little_memory() -> None:
 
 
 @given(st.lists(st.integers(3, 6), min_size=1, max_size=6))
-@settings(max_examples=30)
+@settings(max_examples=examples(15))
 def test_outlines_are_recorded_as_they_are(lengths: list[int]) -> None:
     def recorded(rings: list[FloatArray]) -> list[list[list[float]]]:
         batch = lines_2d(rings, (1, 2, 3), 1.0, 1).strips

@@ -19,6 +19,7 @@ from harness.world import ray_casting
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.world import World
 from planner.interface import BoolArray, ComplexArray, FloatArray, MovingEdges
+from tests.examples import examples
 from tests.harness.sensing import CLEARANCE, SCAN_S, SPEED, block, flight, off, regular, sensor, world_of
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -67,7 +68,7 @@ def passing(
 
 
 @pytest.mark.flights
-@settings(max_examples=40, derandomize=True)  # of a thousand passes three are told worse
+@settings(max_examples=20, derandomize=True)  # of a thousand passes three are told worse
 @given(
     speed=st.floats(1.0, 10.0),
     turned=st.floats(-1.4, 1.4),
@@ -250,7 +251,7 @@ STILL: list[dict[str, Any]] = [
 
 
 @pytest.mark.flights
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(
     seed=SEEDS,
     flaws=st.sampled_from(STILL),

@@ -16,6 +16,7 @@ from harness.mapping.free_space import FreeSpace
 from harness.mapping.obstacle_map import ObstacleMap
 from harness.mapping.scan import RangeScan
 from harness.world.world import Circle, Obstacle, Polygon, World
+from tests.examples import examples
 from tests.harness.looking import (
     BOUNDS,
     CLEARANCE,
@@ -70,7 +71,7 @@ MOST_IN_A_CELL = 1 + 4 * 4
 """Points in a cell: one, and of a near outline one in every sixteenth of it."""
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(15))
 @given(seed=SEEDS)
 def test_edges_lie_on_true_edges_and_cover_what_was_seen(seed: int) -> None:
     world = random_world(seed)

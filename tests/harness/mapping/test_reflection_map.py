@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from harness.mapping.reflection_map import ReflectionMap
 from harness.world.obstacle import Circle, Obstacle
 from harness.world.world import World
+from tests.examples import examples
 from tests.harness.sensing import (
     BOUNDS,
     CLEARANCE,
@@ -64,7 +65,7 @@ def random_world(seed: int) -> World:
     return world_of(*(shapes or [Circle((3200.0, 2500.0), 100.0)]))
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(10))
 @given(
     seed=SEEDS,
     flaws=st.sampled_from([{}, {"dropout": 0.1, "false_return": 0.01}, {"field_of_view_deg": 180.0}]),

@@ -150,7 +150,7 @@ def test_a_place_away_from_those_before_and_after_it_is_not_joined_to_them() -> 
     )
 
 
-@settings(max_examples=50, derandomize=True)
+@settings(max_examples=25, derandomize=True)
 @given(seed=st.integers(0, 10_000), places=st.integers(0, 40), points=st.integers(1, 40))
 def test_the_nearest_of_some_points(seed: int, places: int, points: int) -> None:
     rng = np.random.default_rng(seed)

@@ -17,6 +17,7 @@ from harness.mapping.sensed_map import SensedMap
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.world import World
 from planner.interface import MapView
+from tests.examples import examples
 from tests.harness.sensing import (
     BOUNDS,
     CLEARANCE,
@@ -140,7 +141,7 @@ def test_free_space_is_taken_back_where_something_appears_and_in_its_shadow_only
     assert not after.seen_free(points[inside | shadow]).any()
 
 
-@settings(max_examples=15)
+@settings(max_examples=examples(10))
 @given(seed=st.integers(0, 2**32 - 1), appears_s=st.sampled_from([5.0, 10.0, 15.0]))
 def test_what_is_seen_free_is_free_of_what_has_appeared_in_view(seed: int, appears_s: float) -> None:
     rng = np.random.default_rng(seed)
@@ -295,7 +296,7 @@ def test_with_much_noise_what_appears_is_told_at_once_and_what_it_hides_is_not_f
 
 
 @pytest.mark.flights
-@settings(max_examples=12)
+@settings(max_examples=examples(10))
 @given(seed=st.integers(0, 2**32 - 1), fov_deg=st.sampled_from([360.0, 180.0]))
 def test_with_much_noise_nothing_is_taken_to_move_that_stands(seed: int, fov_deg: float) -> None:
     rng = np.random.default_rng(seed)

@@ -300,6 +300,7 @@ def test_a_campaign_without_recordings_says_what_keeps_them(tmp_path: Path) -> N
         pass
 
 
+@pytest.mark.flights
 def test_the_table_is_drawn(campaign: Path, tmp_path: Path) -> None:
     pytest.importorskip("datafusion")
     png = tmp_path / "table.png"

@@ -504,6 +504,7 @@ def test_nothing_lies_before_zero_or_after_the_end(recording: tuple[Path, Flight
     assert (min(times), max(times)) == (0.0, 100.0)
 
 
+@pytest.mark.flights
 def test_killed_process_leaves_a_readable_recording(tmp_path: Path) -> None:
     script = f"""
 import os, sys
@@ -622,6 +623,7 @@ def test_an_overlay_says_which_runs_are_of_other_worlds(
         assert write_overlay(paths[:2], ["first", "second"], tmp_path / "same.rrd") == ""
 
 
+@pytest.mark.flights
 def test_runs_with_events_at_once_are_overlaid_without_pandas(
     tmp_path: Path, make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
 ) -> None:

@@ -51,6 +51,7 @@ def test_report_is_written_into_the_run_folder(run: Path) -> None:
     assert "| outcome | reached |" in (run / "report.md").read_text()
 
 
+@pytest.mark.flights
 def test_a_leg_shows_the_limit_that_it_was_over(run: Path, tmp_path: Path) -> None:
     """Beside its cross-track error, which may have been small."""
     leg: dict[str, Any] = {
@@ -135,6 +136,7 @@ def page_with(run: Path, folder: Path, **figures: Any) -> str:
     return (folder / "report.html").read_text()
 
 
+@pytest.mark.flights
 def test_rows_that_some_flights_have_are_shown_where_they_do(run: Path, tmp_path: Path) -> None:
     assert "navigation error" not in (run / "report.html").read_text()
     assert "navigation error" not in (run / "report.md").read_text()
@@ -225,6 +227,7 @@ def test_a_manifest_with_another_command_is_damaged(
     assert "damaged" in capsys.readouterr().err
 
 
+@pytest.mark.flights
 def test_a_browser_shows_the_report_on_phone_and_screen(run: Path, chromium: Any) -> None:
     for width_px in (390, 1280):
         page = shown(chromium, run / "report.html", width_px)
@@ -232,6 +235,7 @@ def test_a_browser_shows_the_report_on_phone_and_screen(run: Path, chromium: Any
         assert (page.figures, page.missing) == (2, 0)
 
 
+@pytest.mark.flights
 def test_a_table_of_corners_does_not_make_the_page_wider_than_a_phone(tmp_path: Path, chromium: Any) -> None:
     path, checked = tmp_path / "corners.csv", tmp_path / "checked"
     path.write_text("x_m,y_m\n0,0\n2000,0\n2000,1500\n4000,1500\n")
@@ -248,6 +252,7 @@ def test_a_table_of_corners_does_not_make_the_page_wider_than_a_phone(tmp_path: 
     assert f'<td>{leg["max_deviation_m"]:.1f}</td><td class="bad">{leg["cause"]}</td>' in text
 
 
+@pytest.mark.flights
 def test_the_page_of_a_given_path_has_no_figures_of_a_planner(tmp_path: Path, chromium: Any) -> None:
     """Nor a clearance where there is no obstacle; and no word is broken within for a long cause beside it."""
     path, checked = tmp_path / "strip.csv", tmp_path / "checked"

@@ -20,7 +20,7 @@ from harness.scenario.generators.generators import GENERATORS, WorldSpec, genera
 from harness.scenario.scenario import parse_scenario
 
 ROUNDING_M = 0.2
-BOUNDED = settings(derandomize=True, max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+BOUNDED = settings(derandomize=True, max_examples=12, suppress_health_check=[HealthCheck.too_slow])
 
 rooms = st.floats(100.0, 500.0)
 spans = st.tuples(st.floats(30.0, 150.0), st.floats(150.0, 400.0))

@@ -366,6 +366,7 @@ class Listens(Onlooker):
         self._station.listen()
 
 
+@pytest.mark.flights
 def test_a_whole_flight_is_shown_and_stays_the_same(station: GroundStation) -> None:
     scenario = world(TREE, mission={"goal_m": [2700.0, 2700.0]})
     alone = fly(make_loop(scenario, PointMass))

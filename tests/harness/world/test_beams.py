@@ -17,6 +17,7 @@ from harness.scenario.sections import Sensor
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
+from tests.examples import examples
 from tests.longer import longer
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
@@ -68,7 +69,7 @@ def nearest_within(obstacle: Obstacle, low: float, high: float, larger: bool) ->
 
 
 @pytest.mark.parametrize("share", [1.0, *longer([0.3, 1.6])])
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=examples(10), deadline=None)
 @given(
     seed=SEED,
     rays=st.sampled_from([4, 7, 36, 90]),
@@ -100,7 +101,7 @@ def test_each_beam_returns_the_nearest_edge_within_it(
 
 
 @given(seed=SEED, rays=st.sampled_from([3, 90, 720]), radius=st.sampled_from([1e-6, 0.01, 1.0]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 def test_nothing_is_so_thin_that_it_fits_between_beams_that_touch(
     seed: int, rays: int, radius: float
 ) -> None:
@@ -118,7 +119,7 @@ def test_nothing_is_so_thin_that_it_fits_between_beams_that_touch(
 
 
 @given(seed=SEED)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 def test_the_least_range_all_round_is_the_distance_to_the_nearest_edge(seed: int) -> None:
     obstacles = crowd(np.random.default_rng(seed))
     nearest = min(abs(World(obstacles, BOUNDS).clearance_at(0.0, 0.0, 0.0)), math.inf)
@@ -151,7 +152,7 @@ def test_a_moving_pole_is_met_where_it_is() -> None:
 
 
 @given(seed=SEED, rays=st.sampled_from([90, 360, 720]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 def test_places_of_a_face_that_several_beams_meet_lie_on_it(seed: int, rays: int) -> None:
     rng = np.random.default_rng(seed)
     bearing, away = rng.uniform(0.0, math.tau), rng.uniform(200.0, 500.0)
@@ -169,7 +170,7 @@ def test_places_of_a_face_that_several_beams_meet_lie_on_it(seed: int, rays: int
 
 
 @given(seed=SEED, rays=st.sampled_from([90, 720]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(20), deadline=None)
 def test_a_pole_is_no_further_than_half_a_beam_from_where_it_is_taken_to_be(seed: int, rays: int) -> None:
     rng = np.random.default_rng(seed)
     bearing, away = rng.uniform(0.0, math.tau), rng.uniform(50.0, 900.0)

@@ -147,7 +147,7 @@ ENDS = {"start": (-90.0, -5.0), "goal": (90.0, 5.0)}
 
 
 @given(field=fields, clearance=st.sampled_from([0.0, 3.0]))
-@settings(max_examples=60, derandomize=True)
+@settings(max_examples=30, derandomize=True)
 def test_the_drawn_path_keeps_the_clearance_and_has_the_length(
     field: list[Obstacle], clearance: float
 ) -> None:
@@ -166,7 +166,7 @@ def test_the_drawn_path_keeps_the_clearance_and_has_the_length(
 
 
 @given(field=fields, more=discs | blocks, clearance=st.sampled_from([0.0, 3.0]))
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=20, derandomize=True)
 def test_the_way_back_is_as_long_and_an_obstacle_more_makes_it_no_shorter(
     field: list[Obstacle], more: Obstacle, clearance: float
 ) -> None:

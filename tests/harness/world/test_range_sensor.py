@@ -15,6 +15,7 @@ from harness.mapping.scan import RangeScan
 from harness.scenario.sections import Sensor
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import Circle, Obstacle, Polygon, Surroundings, World
+from tests.examples import examples
 
 BOUNDS = (0.0, 0.0, 100_000.0, 100_000.0)
 EMPTY = World([], BOUNDS)
@@ -78,7 +79,7 @@ def first_crossing(directions: FloatArray, shape: Any) -> FloatArray:
     return distance
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(
     seed=st.integers(0, 2**32),
     count=st.integers(1, 12),
@@ -233,7 +234,7 @@ def test_moving_obstacles_are_seen_where_they_are() -> None:
     np.testing.assert_allclose([scan[3] for scan in scans], behind_m)
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(20))
 @given(seed=st.integers(0, 2**32), near=st.integers(0, 10), far=st.integers(1, 40), changing=st.booleans())
 def test_obstacles_out_of_range_do_not_change_a_bit(seed: int, near: int, far: int, changing: bool) -> None:
     rng = np.random.default_rng(seed)
@@ -251,7 +252,7 @@ def test_obstacles_out_of_range_do_not_change_a_bit(seed: int, near: int, far: i
         )
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32))
 def test_a_scan_does_not_depend_on_where_the_sensor_was_before(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -321,7 +322,7 @@ def test_a_scan_cannot_be_changed_and_keeps_no_array_of_others() -> None:
 
 
 @given(st.integers(0, 10_000), st.sampled_from([360.0, 90.0]))
-@settings(max_examples=40)
+@settings(max_examples=examples(20))
 def test_no_return_is_nearer_than_the_scan_says_before_its_rays_are_followed(seed: int, field: float) -> None:
     rng = np.random.default_rng(seed)
     world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
@@ -360,7 +361,7 @@ def test_flaws_are_drawn_as_scans_are_taken_not_as_they_are_read() -> None:
 
 
 @given(seed=st.integers(0, 10_000), field=st.sampled_from([360.0, 90.0]))
-@settings(max_examples=40)
+@settings(max_examples=examples(20))
 def test_what_returned_is_told_from_any_origin(seed: int, field: float) -> None:
     rng = np.random.default_rng(seed)
     world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)
@@ -377,7 +378,7 @@ def test_what_returned_is_told_from_any_origin(seed: int, field: float) -> None:
 
 
 @given(seed=st.integers(0, 10_000))
-@settings(max_examples=40)
+@settings(max_examples=examples(20))
 def test_the_nearest_face_is_as_far_as_it_is(seed: int) -> None:
     rng = np.random.default_rng(seed)
     world = World(random_obstacles(rng, 5, 300.0, 1500.0), BOUNDS)

@@ -18,6 +18,7 @@ import harness.world.world
 from harness.scenario import obstacles as scenario_obstacles
 from harness.scenario import sections
 from harness.world.world import Circle, Obstacle, Polygon, World
+from tests.examples import examples
 
 BOUNDS = (0.0, 0.0, 20_000.0, 20_000.0)
 REFEREE = Path(__file__).parents[4] / "shared" / "tools" / "referee.py"
@@ -129,7 +130,7 @@ def test_inside_and_outside_are_told_on_lines_through_corners() -> None:
             assert world.clearance_at(east, north, 0.0) == pytest.approx(truth, abs=1e-12)
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32), count=st.integers(0, 40), changing=st.booleans())
 def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(
     seed: int, count: int, changing: bool
@@ -144,7 +145,7 @@ def test_clearance_along_a_track_is_that_to_the_nearest_of_all_obstacles(
         assert clearance[row] == pytest.approx(truth, abs=1e-9)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 2**32 - 1), moves=st.booleans())
 def test_a_contact_on_the_way_is_found_where_shapely_finds_one(seed: int, moves: bool) -> None:
     """Thin bodies, met between two fixes: seen from the body, the way is another straight line."""
@@ -191,7 +192,7 @@ def test_what_appears_or_goes_on_the_way_is_met_while_it_is_there(
     assert (world.contact_between(begin, clearance[0], end, clearance[1]) < 0.0) is met
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32), count=st.integers(1, 40), changing=st.booleans())
 def test_clearance_at_a_point_is_the_row_of_the_track(seed: int, count: int, changing: bool) -> None:
     rng = np.random.default_rng(seed)
@@ -279,7 +280,7 @@ def test_the_boundary_belongs_to_the_area() -> None:
     assert not any(world.inside_bounds(*point) for point in outside)
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(25))
 @given(seed=st.integers(0, 2**32), radius=st.floats(0.0, 8000.0), time=st.floats(0.0, 300.0))
 def test_near_are_the_obstacles_within_the_radius(seed: int, radius: float, time: float) -> None:
     rng = np.random.default_rng(seed)
@@ -290,7 +291,7 @@ def test_near_are_the_obstacles_within_the_radius(seed: int, radius: float, time
     assert near == tuple(i for i, distance in enumerate(distances) if distance <= radius)
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(25))
 @given(seed=st.integers(0, 2**32), radius=st.floats(100.0, 8000.0))
 def test_surroundings_hold_every_face_within_the_radius(seed: int, radius: float) -> None:
     rng = np.random.default_rng(seed)

@@ -44,7 +44,7 @@ def grown(points: FloatArray) -> GrownObstacles:
     return known
 
 
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=20, derandomize=True)
 @given(
     points=st.lists(
         st.tuples(st.floats(4000.0, 5000.0), st.floats(4000.0, 5000.0)), min_size=1, max_size=14, unique=True

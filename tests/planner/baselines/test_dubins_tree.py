@@ -56,7 +56,7 @@ class Seen:
         return np.zeros(len(points_m), dtype=np.bool_)
 
 
-@settings(max_examples=150, derandomize=True)
+@settings(max_examples=75, derandomize=True)
 @given(start=poses, end=poses)
 def test_a_dubins_curve_joins_its_poses(start: Pose, end: Pose) -> None:
     way = dubins(start, end, 1.0)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from planner.geometry.clearance import distances, first_breach, first_entry, inside_bounds
 from planner.geometry.curves import Pose, along, full_turn, pose_at
 from planner.interface import FloatArray, Path
+from tests.examples import examples
 
 Integrated = Callable[..., FloatArray]
 SEEDS = st.integers(0, 2**32 - 1)
@@ -39,7 +40,7 @@ def dense_line(path: Path, integrated: Integrated) -> shapely.LineString:
     return shapely.LineString(integrated(path.segments[0, :4].tolist(), segments, 0.5)[:, :2])
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(pieces=PIECES, seed=SEEDS)
 def test_distances_and_their_stations(
     pieces: list[tuple[float, float]], seed: int, integrated: Integrated
@@ -55,7 +56,7 @@ def test_distances_and_their_stations(
     np.testing.assert_allclose(np.hypot(*(places - points).T), distance, atol=1e-6)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(pieces=PIECES, seed=SEEDS, radius=st.floats(1.0, 500.0))
 def test_a_breach_is_told_where_and_only_where_there_is_one(
     pieces: list[tuple[float, float]], seed: int, radius: float, integrated: Integrated
@@ -95,7 +96,7 @@ def test_a_second_pass_is_a_breach_where_the_first_does_not_count() -> None:
     assert first_breach(path, point, 150.0, from_m=back + 200.0) == math.inf
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(50))
 @given(pieces=PIECES, seed=SEEDS, full=st.booleans())
 def test_inside_bounds(
     pieces: list[tuple[float, float]], seed: int, full: bool, integrated: Integrated
@@ -117,7 +118,7 @@ def test_the_boundary_belongs_to_the_area() -> None:
     assert not inside_bounds(STRAIGHT, (0.1, -1.0, 1000.0, 10.0))
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(75))
 @given(seed=SEEDS, count=st.integers(1, 8))
 def test_first_entry_against_shapely(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)

@@ -13,6 +13,7 @@ from planner.geometry.course import Course
 from planner.geometry.curves import Point, end_of, pose_at
 from planner.interface import BoolArray, FloatArray, Path
 from planner.kernels.fans import encircled
+from tests.examples import examples
 
 GOAL = (1000.0, 0.0)
 BELOW: tuple[Point, ...] = ((500.0, -200.0), GOAL)
@@ -38,7 +39,7 @@ def winding(loop: FloatArray, point: FloatArray) -> int:
     return round(float(step.sum()) / math.tau)
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(50))
 @given(seed=st.integers(0, 2**32 - 1), sides=st.integers(3, 12))
 def test_encircled_is_an_odd_winding_number(seed: int, sides: int) -> None:
     rng = np.random.default_rng(seed)
@@ -62,7 +63,7 @@ def test_what_was_not_known_then_does_not_count() -> None:
     assert not course(BELOW, 2).same_side((START, *ABOVE), points)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(
     seed=st.integers(0, 2**32 - 1),
     one=st.lists(st.integers(-400, 400), min_size=1, max_size=4),

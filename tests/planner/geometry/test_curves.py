@@ -34,6 +34,7 @@ from planner.geometry.curves import (
 )
 from planner.geometry.path_samples import places_along, poses_at, turn_centres
 from planner.interface import FloatArray, Path
+from tests.examples import examples
 
 Integrated = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
@@ -299,7 +300,7 @@ def test_stations_on_a_loiter_go_round_and_round() -> None:
     assert on_loiter(straight, 400.0 + 2.5 * turn) == 400.0 + 2.5 * turn
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(start=POSES, pieces=PIECES, shares=st.lists(st.floats(-0.2, 1.2), min_size=1, max_size=20))
 def test_poses_at_many_stations_are_those_of_integration(
     start: Pose, pieces: list[tuple[float, float]], shares: list[float], integrated: Integrated
@@ -326,7 +327,7 @@ def test_a_path_may_be_given_column_by_column() -> None:
     np.testing.assert_array_equal(by_columns, poses_at(Path(np.array(rows)), arc_lengths_m))
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(start=POSES, pieces=PIECES, share=st.floats(0.0, 1.0))
 # Its length less that of the first segment is more than that of the last, by a rounding.
 @example(
@@ -348,7 +349,7 @@ def test_turns_off_a_path_begin_after_a_straight_where_it_turns_the_other_way(
         np.testing.assert_allclose(centre, np.add(begins[:2], across[:2]) / 2.0, atol=1e-6)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(
     start=POSES,
     pieces=PIECES,
@@ -387,7 +388,7 @@ def test_onward_stops_at_the_end_of_a_path_without_loiter() -> None:
 
 
 @given(pose=POSES, away=st.floats(1.0, 3000.0), bearing=ANGLES, radius=st.floats(50.0, 800.0))
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 def test_turns_onto_are_one_to_each_side_the_shorter_first(
     pose: Pose, away: float, bearing: float, radius: float, integrated: Integrated
 ) -> None:

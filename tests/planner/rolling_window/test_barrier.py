@@ -16,6 +16,7 @@ from planner.geometry.curves import Point
 from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges
 from planner.memory import ObstacleMemory
 from planner.rolling_window.barrier import PROVED_AT_ONCE, THIN, Barrier, Proof
+from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], MapView]
@@ -53,7 +54,7 @@ def circle_of(x: float, y: float, radius: float, spacing: float, gap_m: float = 
 
 
 @pytest.mark.flights
-@settings(max_examples=150)
+@settings(max_examples=examples(75))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(0, 220))
 def test_random_points_close_it_where_their_discs_part_the_area(seed: int, count: int) -> None:
     points = np.random.default_rng(seed).uniform(0.0, 1000.0, (count, 2))
@@ -89,7 +90,7 @@ def test_a_ring_is_closed_by_a_gap_of_no_more_than_two_clearances(
     assert parted(points, CLEARANCE) is closed
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(
     x=st.floats(100.0, 900.0),
     y=st.floats(100.0, 900.0),
@@ -185,7 +186,7 @@ def test_a_ring_round_both_parts_nothing() -> None:
     assert not barrier_of(points).closed
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 160), parts=st.integers(1, 12))
 def test_in_parts_it_is_the_same_as_at_once_and_never_opens_again(seed: int, count: int, parts: int) -> None:
     points = np.random.default_rng(seed).uniform(0.0, 1000.0, (count, 2))
@@ -197,7 +198,7 @@ def test_in_parts_it_is_the_same_as_at_once_and_never_opens_again(seed: int, cou
     assert closed is barrier_of(points).closed
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(60, 160))
 def test_order_does_not_matter_to_points_far_enough_apart(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)

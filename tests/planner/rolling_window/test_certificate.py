@@ -17,6 +17,7 @@ from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path
 from planner.rolling_window.certificate import DISC, Certified, Certifier, disc_radius_m, least_sensor_range_m
 from planner.rolling_window.route_optimisation import Terrain
+from tests.examples import examples
 
 AssertFlyable = Callable[[Path, float], None]
 
@@ -109,7 +110,7 @@ def disc_is_free(path: Path, arc_length_m: float, side: float, seen: FreeDiscs) 
     return bool(seen.seen_free(filled_disc(probe, DISC_M, 3.0)).all())
 
 
-@settings(max_examples=80)
+@settings(max_examples=examples(40))
 @given(pieces=PIECES, seed=st.integers(0, 2**32 - 1), count=st.integers(1, 8))
 def test_what_is_certified_is_free_everywhere(
     pieces: list[tuple[float, float]], seed: int, count: int, assert_flyable: AssertFlyable
@@ -140,7 +141,7 @@ def test_what_is_certified_is_free_everywhere(
             assert opposite or not terrain(points).admits(turn)
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(free_m=st.floats(300.0, 1800.0))
 def test_it_is_the_last_turn_off_the_path_that_is_free(free_m: float, assert_flyable: AssertFlyable) -> None:
     # Free space ends in a straight front across the path (a very large disc).

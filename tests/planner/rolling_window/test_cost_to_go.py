@@ -16,6 +16,7 @@ from planner.interface import FloatArray
 from planner.rolling_window import cost_to_go
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.window import Tally
+from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
 START, GOAL = (1000.0, 2500.0), (9000.0, 2500.0)
@@ -44,7 +45,7 @@ def test_round_a_wall(wall: MakePoints) -> None:
     assert 0.92 * way < to_go(START) < 1.01 * way
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(seed=st.integers(0, 10_000), count=st.integers(5, 120))
 def test_no_way_is_told_only_where_there_is_none(seed: int, count: int) -> None:
     points = np.random.default_rng(seed).uniform((0.0, 0.0), (10_000.0, 5000.0), (count, 2))

@@ -20,6 +20,7 @@ from planner.rolling_window.encounters import (
     meeting_s,
     met_at,
 )
+from tests.examples import examples
 
 SPEED, SPACING = 25.0, 20.0
 SEEDS = st.integers(0, 2**32 - 1)
@@ -44,7 +45,7 @@ def simulated_s(offset: FloatArray, velocity: FloatArray, speed: float) -> float
     return float(times[np.argmax(speed * times >= away)])
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(10))
 @given(seed=SEEDS, pace=PACES, course=COURSES)
 def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float) -> None:
     each = obstacle(seed, pace, course)
@@ -56,7 +57,7 @@ def test_the_time_is_that_of_a_simulation(seed: int, pace: float, course: float)
 
 @example(seed=1, pace=15.0, course=0.3, share=EARLIEST, later=0.0)
 @example(seed=1, pace=15.0, course=0.3, share=LATEST, later=LATER_S)
-@settings(max_examples=30)
+@settings(max_examples=examples(15))
 @given(
     seed=SEEDS, pace=PACES, course=COURSES, share=st.floats(EARLIEST, LATEST), later=st.floats(0.0, LATER_S)
 )
@@ -74,7 +75,7 @@ def test_whoever_flies_to_any_point_of_the_outline_meets_it_where_it_is_drawn(
         assert np.hypot(*(drawn - met).T).min() <= 0.5 * SPACING + 0.5 * SPACING * math.sqrt(2.0) + 1.0
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(15))
 @given(seed=SEEDS, pace=PACES, course=COURSES)
 def test_nothing_is_drawn_where_it_is_met_neither_too_early_nor_too_late(
     seed: int, pace: float, course: float

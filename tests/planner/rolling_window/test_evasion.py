@@ -28,6 +28,7 @@ from planner.rolling_window.evasion import (
     rolled_out,
 )
 from planner.rolling_window.planner import RollingWindow
+from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
     Seen,
@@ -80,7 +81,7 @@ VELOCITY = st.tuples(st.floats(-12, 12), st.floats(-12, 12))
 # Far from one thing, what is nearer to the way must not be stepped over: not even where it comes to meet one.
 @example([(0.0, 60.0), (600.0, 5.0)], [], 0.0)
 @example([(0.0, 60.0)], [((1150.0, 5.0), (-12.0, 0.0))], 0.0)
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 def test_room_is_the_least_distance_from_what_stands_and_from_what_is_met(
     still: list[tuple[float, float]],
     met: list[tuple[tuple[float, float], tuple[float, float]]],
@@ -100,7 +101,7 @@ def test_room_is_the_least_distance_from_what_stands_and_from_what_is_met(
 
 
 @given(PLACE, st.sampled_from([-1 / 230.0, 0.0]))
-@settings(max_examples=40)
+@settings(max_examples=examples(20))
 def test_from_what_has_just_appeared_it_keeps_further(place: tuple[float, float], curvature: float) -> None:
     """It is met wherever it can get to."""
     path = Path(np.array([(0.0, 0.0, 1.0, 0.0, curvature, 800.0)]))
@@ -220,7 +221,7 @@ def test_it_gives_way_to_what_will_be_in_the_way(ring: MakePoints) -> None:
     assert nearest_m(answer.path, 0.0) > 60.0
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(12))
 @given(st.lists(st.tuples(st.floats(150, 900), st.floats(-400, 400)), min_size=1, max_size=12))
 def test_where_something_has_appeared_what_is_flown_keeps_away_to_the_end_of_its_turn(
     places: list[tuple[float, float]],

@@ -19,6 +19,7 @@ from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.window import Tally, Window
+from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
 SPACING, KEEP, OUTER = 50.0, 212.0, 220.0
@@ -175,7 +176,7 @@ def test_two_circles_one_behind_the_other(ring: MakePoints) -> None:
 
 
 @pytest.mark.flights
-@settings(max_examples=25)
+@settings(max_examples=examples(12))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 4))
 def test_fields_of_circles(seed: int, count: int, ring: MakePoints) -> None:
     rng = np.random.default_rng(seed)
@@ -247,7 +248,7 @@ def connected(points: FloatArray, keep_m: float) -> bool:
 
 
 @pytest.mark.flights
-@settings(max_examples=40)
+@settings(max_examples=examples(20))
 @given(
     walls=st.lists(st.booleans(), min_size=2 * CELLS * (CELLS - 1), max_size=2 * CELLS * (CELLS - 1)),
     led=st.booleans(),

@@ -18,6 +18,7 @@ from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.pose_search import AWAY, search_poses
 from planner.rolling_window.route_optimisation import FlyableRoute, Terrain, optimise
 from planner.rolling_window.window import Tally
+from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
@@ -141,7 +142,7 @@ def test_the_area_is_not_left(assert_flyable: AssertFlyable) -> None:
     assert found_way(start, goal, np.zeros((0, 2)), assert_flyable, (-5000.0, -190.0, 5000.0, 190.0)) is None
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(20))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 12))
 @example(seed=351985684, count=11)  # far enough on, but not at the goal
 def test_whatever_is_found_can_be_flown(seed: int, count: int, assert_flyable: AssertFlyable) -> None:

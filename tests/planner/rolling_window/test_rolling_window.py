@@ -18,6 +18,7 @@ from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
 from planner.rolling_window.config import RollingWindowConfig
 from planner.rolling_window.planner import RollingWindow
+from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]
@@ -161,7 +162,7 @@ def test_flies_round_what_comes_into_view(ring: MakePoints) -> None:
     assert np.hypot(*np.diff(places, axis=0).T).sum() < 1.03 * 20_000.0
 
 
-@settings(max_examples=12)
+@settings(max_examples=examples(10))
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 6))
 def test_arrives_through_fields_of_separate_circles(
     seed: int, count: int, ring: MakePoints, assert_flyable: AssertFlyable

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from planner.interface import FloatArray
 from planner.rolling_window.window import SectorEdge, Window, free_sectors, guide_vector
+from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
 SPACING = 25.0
@@ -144,7 +145,7 @@ def random_window(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> 
     return window
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(30))
 @given(seed=SEEDS, count=st.integers(2, 6))
 def test_every_edge_is_free_and_tangent(seed: int, count: int, ring: MakePoints, wall: MakePoints) -> None:
     window = random_window(seed, count, ring, wall)
