@@ -82,6 +82,7 @@ def test_turn_radius_too_tight_for_a_corner_without_room(check: Check) -> None:
     assert causes(check(np.array(wide), corner_m=120.0)) == set()
 
 
+@pytest.mark.flights
 def test_turn_radius_too_tight_for_a_corner_cut_by_more_than_it_may_be(check: Check) -> None:
     """The arc of 110 m passes a corner of 170 degrees at 1.2 km, one of 90 degrees at 46 m."""
     sharp = check(np.array([(0.0, 0.0), (0.0, 3000.0), (525.0, 0.0)]), corner_m=120.0)

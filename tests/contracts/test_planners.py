@@ -20,6 +20,7 @@ from planner.contract import AHEAD, MISSION, START, PlannerContract, bits, make
 from planner.geometry.curves import on_loiter, pose_at
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.registry import PlannerKind, planner_kinds
+from tests.longer import longer
 
 KINDS = {
     name: kind
@@ -34,9 +35,21 @@ OBSTACLES = (
     Obstacle(Circle((15_500.0, 9000.0), 800.0)),
 )
 
+SLOW = {"dubins_tree"}
+"""Those whose searches take longer than the quick tests may."""
+
+SLOW_APART = [longer([name])[0] if name in SLOW else name for name in KINDS]
+
 # One class of tests for each kind: Test_rolling_window and so on.
 globals().update(
-    {f"Test_{name}": type(f"Test_{name}", (PlannerContract,), {"kind": kind}) for name, kind in KINDS.items()}
+    {
+        f"Test_{name}": type(
+            f"Test_{name}",
+            (PlannerContract,),
+            {"kind": kind, "pytestmark": [pytest.mark.flights] if name in SLOW else []},
+        )
+        for name, kind in KINDS.items()
+    }
 )
 
 
@@ -162,7 +175,7 @@ def truths(*roots: object) -> list[object]:
     ]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SLOW_APART)
 def test_the_true_world_cannot_be_reached_from_what_a_planner_has(kind: str) -> None:
     flight = Flight(kind, OBSTACLES)
     flight.go(40)
@@ -182,7 +195,7 @@ def test_the_spy_sees_a_world_that_is_planted(hide: str) -> None:
     assert planted in truths(flight.request)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SLOW_APART)
 def test_what_has_not_come_into_range_changes_nothing(kind: str) -> None:
     far = (
         *OBSTACLES,

@@ -142,9 +142,9 @@ def test_a_value_beyond_reason_is_refused(
 @pytest.mark.parametrize(
     ("key", "value"),
     [
-        ("sensor.rays", "100000"),
         *longer(
             [
+                ("sensor.rays", "100000"),
                 ("obstacles[0].circle.radius_m", "1e-9"),
                 ("area.bounds_m", "[-3e5, -3e5, 3e5, 3e5]"),
                 ("sensor.rate_hz", "120"),

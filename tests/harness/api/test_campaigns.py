@@ -23,6 +23,7 @@ planners: [bug2, vfh_plus]
 """
 
 
+@pytest.mark.flights
 def test_a_campaign_is_flown_and_read_back(tmp_path: Path) -> None:
     (tmp_path / "short.yaml").write_text(SCENARIO)
     (tmp_path / "two.yaml").write_text(CAMPAIGN)

@@ -162,6 +162,7 @@ def journal_lines(folder: Path) -> int:
     return journal.read_bytes().count(b"\n") if journal.exists() else 0
 
 
+@pytest.mark.flights
 def test_results_have_a_row_a_run_and_every_metric(unbroken: Path) -> None:
     table = pq.read_table(unbroken / "results.parquet")
     varied = ["environment.wind.speed_mps", "environment.wind.from_deg"]
@@ -210,6 +211,7 @@ def test_the_bytes_are_the_same_at_any_number_of_workers(place: Path, unbroken: 
     assert results(place / "out") == results(unbroken)
 
 
+@pytest.mark.flights
 def test_a_row_is_flown_again_alone_from_the_results_alone(
     place: Path, unbroken: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -250,6 +252,7 @@ def test_a_row_is_flown_again_alone_from_the_results_alone(
     assert len(said.splitlines()) == 1
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("of", ["[]", "{}", '{"schema": "wayproof/results/0"}', "no JSON"])
 def test_a_table_of_something_else_is_no_campaigns(
     of: str, place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
@@ -260,6 +263,7 @@ def test_a_table_of_something_else_is_no_campaigns(
     assert "is not the results.parquet of a campaign" in capsys.readouterr().err
 
 
+@pytest.mark.flights
 def test_a_row_that_was_flown_otherwise_is_told(
     place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -350,6 +354,7 @@ def test_resume_flies_only_what_is_missing(
     assert [json.loads(line)["run"] for line in lines[6:]] == [6, 7]
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize("torn", [TORN, b"\n", b"\x00\xff"])
 def test_resume_drops_a_torn_line(place: Path, unbroken: Path, torn: bytes) -> None:
     out = place / "out"
@@ -362,6 +367,7 @@ def test_resume_drops_a_torn_line(place: Path, unbroken: Path, torn: bytes) -> N
     assert json.loads(last)["run"] == 6
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
@@ -406,6 +412,7 @@ def cut_short(place: Path, unbroken: Path) -> None:
     (place / "out" / "journal.jsonl").write_bytes(b"".join(lines[:2]))
 
 
+@pytest.mark.flights
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -491,6 +498,7 @@ def test_a_planner_that_cannot_be_made_is_a_row_whatever_it_raises(
     assert not (place / "run").exists()
 
 
+@pytest.mark.flights
 def test_resume_refuses_other_versions(
     place: Path, unbroken: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

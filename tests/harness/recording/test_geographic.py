@@ -9,9 +9,10 @@ import pytest
 import rerun as rr
 
 from harness.cli.app import main
+from tests.longer import longer
 
 
-@pytest.mark.parametrize("longitude_deg", [179.99, -179.99, 8.0])
+@pytest.mark.parametrize("longitude_deg", [179.99, *longer([-179.99, 8.0])])
 def test_no_line_leads_round_the_earth(longitude_deg: float, tmp_path: Path) -> None:
     world = tmp_path / "a.yaml"
     world.write_text(

@@ -603,6 +603,7 @@ def test_overlay_keeps_every_track_and_one_world(
     assert colours[0] != colours[1]
 
 
+@pytest.mark.flights
 def test_an_overlay_says_which_runs_are_of_other_worlds(
     tmp_path: Path, make_track: Callable[..., Track]
 ) -> None:
@@ -676,6 +677,7 @@ def test_view_says_what_is_missing(tmp_path: Path) -> None:
         screenshot(tmp_path / "none.rrd", tmp_path / "a.png")
 
 
+@pytest.mark.flights
 def test_a_comparison_is_viewed_as_its_overlay(
     recording: tuple[Path, Flight], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -730,6 +732,7 @@ def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
     assert viewer.poll() is not None
 
 
+@pytest.mark.flights
 def test_views_draw_without_complaint(recording: tuple[Path, Flight]) -> None:
     path, _ = recording
     png = path.with_suffix(".png")

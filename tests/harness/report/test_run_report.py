@@ -181,6 +181,7 @@ def test_the_report_of_a_campaigns_run_says_how_to_fly_it_again(tmp_path: Path) 
     assert command in (moved / "runs" / "0" / "report.html").read_text()
 
 
+@pytest.mark.flights
 def test_report_escapes_what_it_is_told(run: Path, tmp_path: Path) -> None:
     copy = tmp_path / "run"
     shutil.copytree(run, copy)
@@ -278,6 +279,7 @@ def test_the_page_of_a_given_path_has_no_figures_of_a_planner(tmp_path: Path, ch
     page.close()
 
 
+@pytest.mark.flights
 def test_a_browser_would_tell_what_is_wrong(tmp_path: Path, chromium: Any) -> None:
     page = tmp_path / "bad.html"
     page.write_text(
