@@ -11,12 +11,12 @@ changes the map, and an edge lies about half a standard deviation before the wal
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.mapping.edge_grid import EdgeGrid
+from harness.mapping.reflection_counting import count_rays, decide, find_long
 from harness.mapping.scan import RangeScan, all_round, clockwise_from
 from harness.mapping.scan_comparison import near_any
 from planner.interface import BoolArray, FloatArray
@@ -35,6 +35,7 @@ FORGET_AT = 48.0
 """Counts are halved from so many on: what has gone fades, what is new counts."""
 STOOD_S = 20.0
 """What has been an edge for so long stands: what moves is elsewhere by then."""
+NO_RAYS = np.zeros(0, dtype=np.bool_)
 
 
 class ReflectionMap:
@@ -92,13 +93,9 @@ class ReflectionMap:
     def stands(self, points_m: FloatArray, since_s: float = STOOD_S) -> BoolArray:
         """(k,) which of (k, 2) places lie no further than ranges err from a cell that has been an edge so long."""
         reach = math.ceil(self._noise / self._cell)
-        aside = np.arange(-reach, reach + 1)
-        corner = (self._origin.real, self._origin.imag)
-        at = np.floor((points_m - corner) / self._cell).astype(np.int64)[:, :, None] + aside
-        column, row = at[:, 0].clip(0, self._nx - 1), at[:, 1].clip(0, self._ny - 1)
-        slots = self._slot.take(column[:, :, None] * self._ny + row[:, None, :])
-        long = self._edge[: self._count] & (self._since_s[: self._count] <= self._time_s - since_s)
-        found: BoolArray = np.append(long, False)[slots].any(axis=(1, 2))  # no slot: the last
+        at = np.floor((points_m - (self._origin.real, self._origin.imag)) / self._cell).astype(np.int64)
+        found = np.zeros(len(points_m), dtype=np.bool_)
+        find_long(found, at, self._slot, self._edge, self._since_s, self._nx, reach, self._time_s - since_s)
         return found
 
     def update(self, scan: RangeScan, ignored: BoolArray | None = None) -> None:
@@ -148,34 +145,36 @@ class ReflectionMap:
         offsets = self._points.take(slots) - complex(scan.east_m, scan.north_m)
         distance = np.abs(offsets)
         position = clockwise_from(scan.start_rad, offsets.real.copy(), offsets.imag.copy()) / scan.spacing_rad
-        ray = np.rint(position).astype(np.int64)
-        half = 0.5 * self._cell
-        ends: Literal["wrap", "clip"] = "wrap" if all_round(scan) else "clip"
-        aimed = np.abs(position - ray) * scan.spacing_rad * distance < half
-        # Beyond, a return is lost where noise takes it out of range.
-        aimed &= distance < scan.max_range_m - 2.0 * self._noise
-        if not all_round(scan):
-            aimed &= ray < len(scan.ranges_m)
-        if ignored is not None:
-            aimed &= ~ignored.take(ray, mode="wrap")
-        slots, distance, ray = slots[aimed], distance[aimed], ray[aimed]
-        counts = self._counts[slots]
-        counts += self._rays_did(scan.ranges_m.take(ray, mode=ends) - distance)
-        # Near by, several rays meet a cell: two more of them are asked.
-        aside = (0.7 * half / scan.spacing_rad / np.maximum(distance, half)).astype(np.int64)
-        several = (aside >= 1).nonzero()[0]
-        for side in (-1, 1):
-            beside = ray[several] + side * aside[several]
-            counts[several] += self._rays_did(scan.ranges_m.take(beside, mode=ends) - distance[several])
-        counts[counts.sum(axis=1) > FORGET_AT] *= 0.5
-        self._counts[slots] = counts
-        self._decide(slots, counts)
+        slots = self._counted(scan, ignored, slots, distance, position)
+        self._decide(slots)
 
-    def _rays_did(self, beyond_m: FloatArray) -> BoolArray:
-        """(k, 3) whether rays that ended so far beyond a cell were reflected, passed through, ended before it."""
-        half = 0.5 * self._cell
-        before = (beyond_m < -half) & (beyond_m > -half - 2.0 * self._noise)
-        return np.column_stack((np.abs(beyond_m) <= half, beyond_m > half, before))
+    def _counted(
+        self,
+        scan: RangeScan,
+        ignored: BoolArray | None,
+        slots: NDArray[np.int32],
+        distances: FloatArray,
+        positions: FloatArray,
+    ) -> NDArray[np.int32]:
+        """Slots of the cells that a ray was aimed at, which are counted."""
+        counted = np.empty(len(slots), dtype=np.int32)
+        many = count_rays(
+            counted,
+            slots,
+            distances,
+            positions,
+            scan.ranges_m,
+            NO_RAYS if ignored is None else ignored,
+            self._counts,
+            0.5 * self._cell,
+            scan.spacing_rad,
+            # Beyond, a return is lost where noise takes it out of range.
+            scan.max_range_m - 2.0 * self._noise,
+            self._noise,
+            FORGET_AT,
+            all_round(scan),
+        )
+        return counted[:many]
 
     def _in_range(self, sensor: complex) -> NDArray[np.int32]:
         """Slots of cells that a scan from here may tell something of."""
@@ -186,12 +185,10 @@ class ReflectionMap:
         slots = np.concatenate((self._near, np.arange(self._near_count, self._count, dtype=np.int32)))
         return slots
 
-    def _decide(self, slots: NDArray[np.int32], counts: NDArray[np.float32]) -> None:
-        reflected, passed, before = counts.T
-        stopped = reflected + STOPPED_SHORT * before
-        was = self._edge[slots]
-        share = np.where(was, DOUBT, 1.0)
-        now = (stopped >= share * LEAST_STOPPED) & (stopped >= share * self._least_share * (stopped + passed))
+    def _decide(self, slots: NDArray[np.int32]) -> None:
+        was, now = self._edge[slots], np.empty(len(slots), dtype=np.bool_)
+        limits = LEAST_STOPPED, self._least_share, STOPPED_SHORT, DOUBT
+        decide(now, slots, self._counts, self._edge, *limits)
         changed = (now != was).nonzero()[0]
         if len(changed):
             self.revision += 1

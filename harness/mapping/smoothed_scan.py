@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from harness.mapping.scan import RangeScan, all_round
+from planner.compiled import COUNT, COUNTS, FLOATS, FLOATS_OUT, compiled
 from planner.interface import FloatArray, IntArray
 
 HALVES = (2, 4, 8, 16)
@@ -45,10 +46,32 @@ def smoothed(scan: RangeScan, width_m: float) -> RangeScan:
 
 def _medians(ring: FloatArray, rays: IntArray, half: int) -> FloatArray:
     """(k,) medians of what so many rays to either side of each of (k,) returned; infinite where most did not."""
-    width = 2 * half + 1
-    around = np.lib.stride_tricks.sliding_window_view(ring, width)[rays + (HALVES[-1] - half)]
-    around = np.sort(around, axis=1)
-    returned = np.count_nonzero(around < math.inf, axis=1)
-    middle = np.where(2 * returned > width, (returned - 1) // 2, width - 1)
-    medians: FloatArray = around[np.arange(len(rays)), middle]
-    return np.where(2 * returned > width, medians, math.inf)
+    medians = np.empty(len(rays))
+    find_medians(medians, ring, rays, HALVES[-1] - half, 2 * half + 1)
+    return medians
+
+
+@compiled(FLOATS_OUT, FLOATS, COUNTS, COUNT, COUNT)
+def find_medians(medians: FloatArray, ring: FloatArray, rays: IntArray, offset: int, width: int) -> None:
+    """Medians of stretches of a list of ranges; of an even number the lower of the two in the middle.
+
+    Args:
+        medians: (k,) of what was returned, infinite where no more than half was; written.
+        ring: ranges, infinite where nothing was returned.
+        rays: (k,) each stretch begins so far behind `offset`.
+        offset: into the list.
+        width: of the stretches.
+    """
+    ordered = np.empty(width)
+    for i in range(len(rays)):
+        returned = 0
+        for j in range(width):
+            value = ring[rays[i] + offset + j]
+            if value < math.inf:
+                k = returned
+                while k > 0 and ordered[k - 1] > value:
+                    ordered[k] = ordered[k - 1]
+                    k -= 1
+                ordered[k] = value
+                returned += 1
+        medians[i] = ordered[(returned - 1) // 2] if 2 * returned > width else math.inf

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.mapping.scan import RangeScan
-from harness.mapping.smoothed_scan import ERR, smoothed
+from harness.mapping.smoothed_scan import ERR, find_medians, smoothed
 from harness.world.obstacle import Circle
 from tests.harness.sensing import CLEARANCE, RANGE, block, flight, sensor, world_of
 
@@ -78,3 +78,16 @@ def test_a_few_rays_are_enough() -> None:
         np.testing.assert_allclose(smoothed(scan, CLEARANCE).ranges_m, 500.0)
     for scan in scans(rays=3, count=3):
         assert (smoothed(scan, CLEARANCE).ranges_m == math.inf).all()
+
+
+def test_medians_are_those_of_what_was_returned() -> None:
+    rng = np.random.default_rng(3)
+    ring = np.where(rng.random(400) < 0.4, math.inf, rng.uniform(0.0, 100.0, 400).round())
+    for width in (5, 9, 33):
+        rays = np.arange(0, 400 - width, 3)
+        medians = np.empty(len(rays))
+        find_medians(medians, ring, rays, 0, width)
+        for ray, median in zip(rays.tolist(), medians.tolist(), strict=True):
+            returned = sorted(ring[ray : ray + width][np.isfinite(ring[ray : ray + width])].tolist())
+            lower = returned[(len(returned) - 1) // 2] if 2 * len(returned) > width else math.inf
+            assert median == lower
