@@ -30,7 +30,7 @@ def check(
         Path,
         typer.Argument(
             metavar="PATH",
-            help="A line (.csv, .geojson, .kml), a track (.gpx, .igc) or a mission (.plan, .waypoints).",
+            help="A line (.csv, .geojson, .kml, .kmz), a track (.gpx, .igc) or a mission (.plan, .waypoints).",
         ),
     ],
     aircraft: Annotated[

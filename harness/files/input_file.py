@@ -36,6 +36,11 @@ def read_text(path: Path, max_bytes: int, what: str, utf_16: bool = False) -> st
     Raises:
         InputError: it cannot be opened, is not a regular file, is too large or is not UTF-8 text.
     """
+    return decoded(read_data(path, max_bytes, what), str(path), what, utf_16)
+
+
+def read_data(path: Path, max_bytes: int, what: str) -> bytes:
+    """The bytes of a regular file; arguments and faults are those of `read_text`."""
     try:
         with open_regular(path) as file:
             data: bytes = file.read(max_bytes + 1)
@@ -48,16 +53,31 @@ def read_text(path: Path, max_bytes: int, what: str, utf_16: bool = False) -> st
         raise InputError(f"{path}: cannot be read ({reason}); give the path of a file") from error
     if len(data) > max_bytes:
         raise InputError(f"{path}: is larger than {max_bytes // 10**6} MB; must be {what}")
+    return data
+
+
+def decoded(data: bytes, source: str, what: str, utf_16: bool = False) -> str:
+    """The text that some bytes are, without a byte order mark.
+
+    Args:
+        data: of a file.
+        source: its name, for faults.
+        what: as that of `read_text`.
+        utf_16: likewise.
+
+    Raises:
+        InputError: they are no UTF-8 text.
+    """
     if utf_16 and data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         data = data.decode("utf-16", "replace").encode()
     if b"\0" in data:
-        raise InputError(f"{path}: is not a text file; must be {what}, as UTF-8")
+        raise InputError(f"{source}: is not a text file; must be {what}, as UTF-8")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise InputError(
-            f"{path}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
+            f"{source}:{line}: byte 0x{data[error.start]:02x} is not UTF-8; save the file as UTF-8"
         ) from error
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.frames import LocalPlane
-from harness.files.input_file import InputError, read_text
+from harness.files.input_file import InputError, decoded, read_data
+from harness.files.kmz import kml_of
 from harness.files.wording import counted
 from harness.run_files.csv_path import read_csv
 from harness.run_files.fences import Fence, Fences, checked
@@ -40,6 +41,8 @@ Place = tuple[float, float]
 MAX_BYTES: Final = 64_000_000
 MAX_SPAN_M: Final = 500e3
 JSON_ENDINGS: Final = (".json", ".txt", ".mission")
+PACKED: Final = (".kml", ".kmz")
+"""Endings of KML files, packed or not."""
 PLAN: Final = re.compile(r'"fileType"\s*:\s*"Plan"|"groundStation"\s*:\s*"MissionPlanner"')
 """What stands in every plan of QGroundControl, or mission of Mission Planner in JSON, whatever the name of its file."""
 
@@ -83,7 +86,7 @@ def read_path(
     """Reads a path; the name's ending says how it is written.
 
     Args:
-        path: .csv, .geojson or .json, .kml, .gpx, .igc; or a mission: .plan, .waypoints or .txt, .mission.
+        path: .csv, .geojson or .json, .kml or .kmz, .gpx, .igc; or a mission: .plan, .waypoints or .txt, .mission.
         any_altitude: the altitudes of a drawn line are left out, for a flight whose altitude is given otherwise.
         origin_deg: latitude and longitude of east = north = 0; None: those of the first point of a path in degrees.
         polygons: what the polygons beside a drawn path are that do not say so themselves: `exclusion`, `inclusion` or
@@ -95,11 +98,11 @@ def read_path(
     suffix = path.suffix.lower()
     if suffix not in (*LINES, *MISSIONS):
         raise InputError(f"{path}: is none of {', '.join((*LINES, *MISSIONS))}; save the path as one of them")
-    text = read_text(path, MAX_BYTES, "a path", utf_16=True)
+    text, name, notes = _text_of(path, suffix)
     mission = _mission_reader(text, suffix)
     if mission is not None:
         return _mission(mission(text, str(path)), origin_deg)
-    found = LINES[suffix](text, str(path))
+    found = LINES[suffix](text, name)
     if polygons is not None:
         found = _as_asked(found, polygons)
     if len(found.positions) < 2:
@@ -120,8 +123,17 @@ def read_path(
         altitudes_m=np.array(altitudes),
         above_ground=found.above_ground,
         fences=_fences(found.fences, origin, str(path)),
-        notes=found.notes,
+        notes=(*found.notes, *notes),
     )
+
+
+def _text_of(path: Path, suffix: str) -> tuple[str, str, tuple[str, ...]]:
+    """The text of a path's file, what it is called in faults, and notes on what was packed with it."""
+    data = read_data(path, MAX_BYTES, "a path")
+    if suffix not in PACKED:
+        return decoded(data, str(path), "a path", utf_16=True), str(path), ()
+    data, name, notes = kml_of(data, str(path), MAX_BYTES)
+    return decoded(data, name, "a path", utf_16=True), name, notes
 
 
 def _mission_reader(text: str, suffix: str) -> Callable[[str, str], MissionAsRead] | None:
@@ -284,6 +296,7 @@ LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
     ".geojson": read_geojson,
     ".json": read_geojson,
     ".kml": read_kml,
+    ".kmz": read_kml,
     ".gpx": read_gpx,
     ".igc": read_igc,
 }

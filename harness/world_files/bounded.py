@@ -5,8 +5,6 @@ from __future__ import annotations
 import codecs
 import gc
 import json
-import zipfile
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
@@ -16,6 +14,7 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from harness.files.input_file import InputError, open_regular
+from harness.files.zip_archive import Unpacked, unpacked
 from harness.world_files.parts import WorldFileError
 
 MAX_BYTES: Final = 400_000_000
@@ -178,26 +177,13 @@ def _refuse_entities(data: bytes) -> None:
         xml_tags(data, lambda name, attributes: None)
 
 
-def unzipped(data: bytes, suffixes: tuple[str, ...], most: int) -> tuple[str, bytes]:
-    """Name and bytes of the first file with one of these suffixes in a ZIP archive.
+def unzipped(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
+    """The file with an ending in a ZIP archive, as `harness.files.zip_archive.unpacked` has it.
 
     Raises:
-        WorldFileError: there is none, it is damaged or encrypted, or it unpacks to more than `most` bytes.
+        WorldFileError: there is none or several, it is damaged or encrypted, or it unpacks to more than `most` bytes.
     """
     try:
-        with zipfile.ZipFile(BytesIO(data)) as archive:
-            for info in archive.infolist():
-                if info.filename.lower().endswith(suffixes):
-                    with archive.open(info) as member:
-                        inner = member.read(most + 1)
-                    if len(inner) > most:
-                        raise WorldFileError(
-                            f"unpacks to more than {most // 10**6} MB; must be one {' or '.join(suffixes)} file"
-                        )
-                    return Path(info.filename).name, inner
-    except RuntimeError as error:  # it wants a password, or is of a method that zipfile does not know
-        why = " ".join(str(error).split())[:120]
-        raise WorldFileError(f"is a ZIP archive that cannot be unpacked ({why}); unpack it first") from error
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError) as error:
-        raise WorldFileError("is a damaged ZIP archive; get it again") from error
-    raise WorldFileError(f"is a ZIP archive without a {' or '.join(suffixes)} file")
+        return unpacked(data, ending, most, main)
+    except InputError as error:
+        raise WorldFileError(str(error)) from error

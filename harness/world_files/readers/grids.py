@@ -125,7 +125,7 @@ def read_srtm(path: Path, reading: Reading) -> Contents:
     """
     data, name = read_bytes(path), path.name
     if data[:2] == b"PK":
-        name, data = unzipped(data, (".hgt",), max(SIDES))
+        name, data, _ = unzipped(data, ".hgt", max(SIDES))
         name = name if _TILE.search(name) else path.name
     elif data[:2] == b"\x1f\x8b":
         try:
@@ -163,7 +163,7 @@ def read_numpy(path: Path, reading: Reading) -> Contents:
     data = read_bytes(path)
     arrays: dict[str, Any] = {}
     for key in ("elevation", "xmin", "xmax", "ymin", "ymax"):
-        name, member = unzipped(data, (f"{key}.npy",), MAX_MEMBER_BYTES)
+        name, member, _ = unzipped(data, f"{key}.npy", MAX_MEMBER_BYTES)
         try:
             stream = BytesIO(member)
             version = numpy_format.read_magic(stream)

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from harness.files.kmz import MAIN_KML, further_kml
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_TREE_BYTES, read_bytes, unzipped, xml_events
 from harness.world_files.parts import (
@@ -43,10 +44,10 @@ def read(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: it is not whole, or has no polygon.
     """
-    data = read_bytes(path, MAX_TREE_BYTES)
+    data, others = read_bytes(path, MAX_TREE_BYTES), 0
     if data[:2] == b"PK":
-        data = unzipped(data, (".kml",), MAX_TREE_BYTES)[1]
-    notes: list[str] = []
+        _, data, others = unzipped(data, ".kml", MAX_TREE_BYTES, MAIN_KML)
+    notes = [further_kml(others)] if others else []
     parts: list[Part] = []
     passed = flat = linked = 0
     for _, element in xml_events(data):

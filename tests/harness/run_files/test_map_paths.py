@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +70,74 @@ def test_a_line_of_kml_with_its_altitudes_and_fences(tmp_path: Path) -> None:
     assert given.notes == ("1 Point beside the path passed over",)
     assert read_path(path, polygons="inclusion").fences.every[0].inclusion
     assert read_path(path, polygons="none").fences.every == ()
+
+
+def kmz(doc: str | bytes | None = None, **others: str | bytes) -> bytes:
+    """An archive with a doc.kml, or none; in the names of others __ stands for a dot and ___ for a slash."""
+    named = {name.replace("___", "/").replace("__", "."): content for name, content in others.items()}
+    return archive_of({**named, **({} if doc is None else {"doc.kml": doc})})
+
+
+def archive_of(files: dict[str, str | bytes]) -> bytes:
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return packed.getvalue()
+
+
+@pytest.mark.parametrize("name", ["a.kmz", "a.KMZ", "a.kml"])
+def test_a_line_of_kmz_is_that_of_its_kml(name: str, tmp_path: Path) -> None:
+    """An archive called .kml is one, too; what macOS adds to archives has the endings of files and no content."""
+    path = tmp_path / name
+    path.write_bytes(archive_of({"__MACOSX/._line.kml": b"\0", "._a.kml": b"\0", "line.kml": kml(more=ZONE)}))
+    given = read_path(path)
+    assert (given.origin_deg, given.altitudes_m.tolist()) == ((47.0, 8.0), [500.0, 520.0, 540.0])
+    assert ([fence.name for fence in given.fences.every], given.notes) == (["zone"], ())
+    path.write_text(kml())
+    assert read_path(path).altitudes_m.tolist() == [500.0, 520.0, 540.0]
+
+
+def test_the_main_file_of_a_kmz_is_flown_and_others_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.kmz"
+    for files in (
+        {"a__kml": "no", "files___doc__kml": "no", "doc": kml()},
+        {"files___a__kml": "no", "files___b__kml": "no", "way__kml": kml()},
+    ):
+        path.write_bytes(kmz(image__png=b"1", **files))
+        given = read_path(path)
+        assert given.altitudes_m.tolist() == [500.0, 520.0, 540.0]
+        assert given.notes == ("2 further KML files in the archive passed over",)
+
+
+def locked() -> bytes:
+    data = bytearray(kmz(kml()))
+    data[6] |= 1
+    data[data.index(b"PK\1\2") + 8] |= 1
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (kmz(a__kml=kml(), b__kml=kml()), ": is a ZIP archive with 2 .kml files (a.kml, b.kml); must have one, or one"),
+        (kmz(image__png=b"1"), ": is a ZIP archive without a .kml file"),
+        (kmz(kml())[:-9], ": is a damaged ZIP archive; get it again"),
+        (kmz(b" " * 64_000_001), ": unpacks to more than 64 MB; must be one .kml file"),
+        (locked(), ": is a ZIP archive that cannot be unpacked (File 'doc.kml' is encrypted, password required for"),
+        (kmz(b"\0"), " (doc.kml): is not a text file; must be a path, as UTF-8"),
+        (kmz(kml()[:-20]), " (doc.kml):2: is not XML"),
+        (kmz(kml("8,47,5 8.1,far,5")), " (doc.kml): way: point 1: is 'far'; must be a finite number"),
+        (b"PK\3\4", ": is a damaged ZIP archive; get it again"),
+    ],
+)  # fmt: skip
+def test_says_what_is_wrong_with_a_kmz(data: bytes, sentence: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.kmz"
+    path.write_bytes(data)
+    with pytest.raises(InputError) as fault:
+        read_path(path)
+    assert str(fault.value).startswith(f"{path}{sentence}")
+    assert len(str(fault.value).splitlines()) == 1
 
 
 def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> None:

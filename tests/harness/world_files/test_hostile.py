@@ -99,6 +99,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
     "a torn ZIP": (data("a.zip", b"PK\x03\x04" + bytes(30)), "is a damaged ZIP archive"),
     "a ZIP with a password": (_locked_zip, "password required for extraction.; unpack it first"),
+    "a ZIP of two tiles": (
+        lambda folder: zipped(folder / "a.zip", N46E009__hgt=b"12", N46E010__hgt=b"12"),
+        "with 2 .hgt files .N46E009.hgt, N46E010.hgt.; must have one: unpack it",
+    ),
     "a ZIP of something": (
         lambda folder: zipped(folder / "a.zip", readme__txt=b"hello"),
         "is a ZIP archive with 'readme.txt'",

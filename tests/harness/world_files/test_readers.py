@@ -292,7 +292,9 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
     path.write_text(f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{places}</Document></kml>')
     found = read_any(path)
     assert [part.top for part in found.parts] == [Limit(570.0), Limit(570.0, Datum.GROUND), NO_TOP]
-    assert read_any(zipped(tmp_path / "a.kmz", doc__kml=path.read_bytes())).kind == "kml"
+    packed = zipped(tmp_path / "a.kmz", a__kml=b"<kml/>", doc__kml=path.read_bytes())
+    assert [part.top for part in read_any(packed).parts] == [part.top for part in found.parts]
+    assert "1 further KML file in the archive passed over" in read_any(packed).notes
 
 
 def test_fences_keep_in_and_out(tmp_path: Path) -> None:
