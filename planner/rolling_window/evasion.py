@@ -21,7 +21,7 @@ from planner.geometry.curves import Limits, Point, Pose, Segment, along, full_tu
 from planner.geometry.path_samples import poses_at
 from planner.interface import FloatArray, Mission, Path, PlanRequest
 from planner.kernels.buckets import Buckets, bucketed
-from planner.kernels.room import room_along
+from planner.kernels.room import near_place, room_along
 from planner.rolling_window.encounters import EARLIEST, LATEST
 
 AHEAD_S = 30.0
@@ -75,18 +75,15 @@ class Threats:
     @classmethod
     def about(cls, request: PlanRequest, still_m: FloatArray, mission: Mission) -> Threats:
         """What can be met within `AHEAD_S`; still_m: (n, 2) all edge points that stand still."""
-        east, north = request.position_m
         reach_m = AHEAD_S * LATEST * mission.speed_mps + mission.clearance_m
-        dx, dy = still_m[:, 0] - east, still_m[:, 1] - north
-        beside = ((np.abs(dx) < reach_m) & (np.abs(dy) < reach_m)).nonzero()[0]
-        near = beside[np.hypot(dx[beside], dy[beside]) < reach_m]
+        near_m = near_place(still_m, *request.position_m, reach_m)
         moving = [np.zeros((0, 5))]
         for each in request.seen.moving:
             seen = each.points_m + np.array(each.velocity_mps) * (request.time_s - each.time_s)
             now = np.concatenate((seen, far_side(seen, request.position_m)))
             told = (*each.velocity_mps, 0.0 if any(each.velocity_mps) else UNKNOWN_MPS)
             moving.append(np.column_stack((now, np.broadcast_to(told, (len(now), 3)))))
-        return cls(still_m[near], np.concatenate(moving), mission.speed_mps, step_along_m(mission))
+        return cls(near_m, np.concatenate(moving), mission.speed_mps, step_along_m(mission))
 
     def room_m(self, path: Path, least_m: float = -math.inf, later: float = LATER) -> float:
         """How far a way keeps from all, what is far along it counted as further away; m.
