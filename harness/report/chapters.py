@@ -87,6 +87,7 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
     """
     from harness.report import figures
     from harness.report.page import Chapter
+    from harness.report.planner_figure import planner_figure
 
     scene = _scene(scenario, optimum)
     numbered = [(place, drawn) for place, each in enumerate(entries) if (drawn := _drawn(each))]
@@ -97,12 +98,12 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
             _picture(folder / "map", tracks, f"{scene.name}: the tracks of all planners, from S to G.")
         )
         for place, drawn in numbered:
-            path = figures.planner_figure(scene, drawn, place)
+            path = planner_figure(scene, drawn, place)
             pictures.append(
                 _picture(
                     folder / f"path-{drawn.planner.replace(', ', '-')}",
                     path,
-                    f"{drawn.planner} on {scene.name}, alone.",
+                    f"{drawn.planner} on {scene.name}, alone{_enlarged(scene, drawn)}.",
                 )
             )
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
@@ -127,9 +128,10 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         path = path_figure(scene, drawn, flight.run.plans[0].waypoints_m, metrics)
         caption = f"The path of {scene.name} as given, and the track that was flown over it."
     else:
-        path = figures.planner_figure(scene, drawn, 0)
-        turn = ", and its tightest planned turn" if drawn.planned.tightest is not None else ""
-        caption = f"The track from S to G in {scene.name}{turn}."
+        from harness.report.planner_figure import planner_figure
+
+        path = planner_figure(scene, drawn, 0)
+        caption = f"The track from S to G in {scene.name}{_enlarged(scene, drawn)}."
     strips = figures.profiles(scene, [(0, drawn)])
     pictures = [
         _picture(folder / "path", path, caption),
@@ -141,6 +143,14 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
     if "check" in metrics and not scene.obstacles:
         del facts["obstacles"], facts["wanted clearance"]
     return Chapter(scene.name, facts, [flight.row], pictures, optimum.reason)
+
+
+def _enlarged(scene: FigureScene, drawn: DrawnRun) -> str:
+    """What the figure of a planner enlarges, as the end of a sentence."""
+    miss = "where it came nearest to an obstacle" if drawn.nearest(scene.clearance_m) is not None else ""
+    turn = "its tightest planned turn" if drawn.planned.tightest is not None else ""
+    enlarged = " and ".join(filter(None, (miss, turn)))
+    return f"; enlarged: {enlarged}" if enlarged else ""
 
 
 PROFILES = "Curvature times R, the turn radius that plans may ask for, and cross-track error along the way."

@@ -27,18 +27,18 @@ if TYPE_CHECKING:
     from harness.flight.record import FloatArray, Track
     from harness.world.obstacle import Obstacle
 
-PLANNED_DASHES: Any = (0, (4, 2))
 SOLID: dict[str, Any] = {"fc": "0.85", "ec": "0.45", "lw": 0.7}
 CHANGING = SOLID | {"ls": "--"}
 """Obstacles that stand for the whole flight, and others where they are at first."""
 
+TURN: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 9, "zorder": 8}
+NEAREST: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 7, "zorder": 8}
+"""Marks in the colour of a flight: its tightest planned turn; where it was nearest to an obstacle, and too near."""
+
 LEGEND_ROW_IN = 0.19
-CLOSE_UP_IN = 2.3
 TALLEST_MAP_IN = 6.0
 
-BEHIND_TEXT = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
 DRAWN_ROWS = 1500
-CLOSE_UP_RADII = 4.0
 SPARE = 1.35
 """A curvature plot reaches this much further than the turn limit or, where that is more, the flown curve."""
 
@@ -58,6 +58,20 @@ class DrawnRun:
     outcome: str
     track: Track
     planned: PlannedRows
+
+    def nearest(self, clearance_m: float) -> int | None:
+        """The row at which it was nearest to an obstacle, or hit it; None if never below the wanted clearance.
+
+        Args:
+            clearance_m: the wanted one.
+        """
+        below = self.track.clearance_m < clearance_m
+        if not below.any():
+            return None
+        # A contact between the last two rows is nearer than any row.
+        if self.outcome == "collision" and below[-1]:
+            return len(below) - 1
+        return int(np.nanargmin(self.track.clearance_m))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,41 +109,14 @@ Numbered: TypeAlias = Sequence[tuple[int, DrawnRun]]
 
 def overview(scene: FigureScene, runs: Numbered) -> Figure:
     """The map with the tracks of all planners."""
-    keys = _keys(scene, [run for _, run in runs])
-    with styled(map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(keys)) / 2)) as figure:
+    marks = legend_marks(scene, [run for _, run in runs])
+    with styled(map_height_in(scene) + LEGEND_ROW_IN * math.ceil((2 + len(runs) + len(marks)) / 2)) as figure:
         axes = figure.add_subplot()
         legend = draw_map(axes, scene)
         for index, run in runs:
-            legend.append(_flown(axes, scene, run, index, DASHES[index % len(DASHES)]))
+            legend.append(draw_flown(axes, scene, run, index, DASHES[index % len(DASHES)]))
         axes.set_title(scene.name)
-        figure.legend(handles=legend + keys, loc="outside lower center", ncols=2, frameon=False)
-    return figure
-
-
-def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
-    """One planner's path as in the paper's Figures 2 and 3, and the place where its plan bends most.
-
-    Args:
-        scene: the scenario.
-        run: the flight.
-        index: number of the planner, for its colour.
-    """
-    row = run.planned.tightest
-    below_in = [] if row is None else [CLOSE_UP_IN]
-    map_in, keys = map_height_in(scene), _keys(scene, [run])
-    with styled(map_in + sum(below_in) + LEGEND_ROW_IN * math.ceil((4 + len(keys)) / 2)) as figure:
-        rows = figure.add_gridspec(1 + len(below_in), 2, height_ratios=[map_in, *below_in])
-        axes = figure.add_subplot(rows[0, :])
-        legend = draw_map(axes, scene)
-        legend.append(_flown(axes, scene, run, index))
-        axes.set_title(f"{scene.name}: {run.planner}, {run.outcome.replace('_', ' ')}")
-        if row is not None:
-            planned = Line2D([], [], color="black", lw=0.9, ls=PLANNED_DASHES, label="planned (below)")
-            legend.append(planned)
-            close_up, curvature = figure.add_subplot(rows[1, 0]), figure.add_subplot(rows[1, 1])
-            _close_up(close_up, scene, run, index, row)
-            _curvature_near(curvature, scene, run, index, row)
-        figure.legend(handles=legend + keys, loc="outside lower center", ncols=2, frameon=False)
+        figure.legend(handles=legend + marks, loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 
@@ -139,13 +126,13 @@ def profiles(scene: FigureScene, runs: Numbered) -> Figure:
         strips = figure.subplots(2 * len(runs), 1, sharex=True, squeeze=False)[:, 0]
         for place, (index, run) in enumerate(runs):
             bend, cross = strips[2 * place], strips[2 * place + 1]
-            distance = _distance_m(run.track) / 1e3
+            distance = distance_m(run.track) / 1e3
             planned = run.planned.curvature_1pm * scene.turn_radius_m
-            flown = _flown_curvature(run.track) * scene.turn_radius_m
+            flown = flown_curvature(run.track) * scene.turn_radius_m
             most = float(np.nanmax(np.abs(planned), initial=0.0))
             bend.plot(*_extremes(distance, planned), color="0.55", lw=0.8, label=f"planned, up to {most:.3g}")
             bend.plot(*_extremes(distance, flown), color=colour(index), lw=0.9, label="flown")
-            _limits(bend, flown)
+            turn_limits(bend, flown)
             bend.set_ylabel("curvature · R")
             bend.set_title(run.planner, loc="left", color=colour(index))
             bend.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, borderpad=0)
@@ -197,24 +184,26 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
     return legend
 
 
-def outline(obstacle: Obstacle, grown_m: float, **style: Any) -> patches.Patch:
-    """An obstacle, moving ones where they appear, grown by a distance."""
+def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **style: Any) -> patches.Patch:
+    """An obstacle grown by a distance: where it is at a time, or where it appears."""
     shape = obstacle.shape
+    moved = np.array((0.0, 0.0) if at_s is None else obstacle.displacement_m(at_s)) / 1e3
     if isinstance(shape, Circle):
-        return patches.Circle(
-            (shape.center_m[0] / 1e3, shape.center_m[1] / 1e3), (shape.radius_m + grown_m) / 1e3, **style
-        )
+        east, north = np.array(shape.center_m) / 1e3 + moved
+        return patches.Circle((float(east), float(north)), (shape.radius_m + grown_m) / 1e3, **style)
     import shapely
 
     solid = shapely.Polygon(shape.vertices_m, shape.holes_m)
     # Rings of holes run the other way round, which is how they stay empty.
     solid = shapely.orient_polygons(solid.buffer(grown_m) if grown_m > 0 else solid)
-    rings = [Path(np.array(ring.coords) / 1e3, closed=True) for ring in (solid.exterior, *solid.interiors)]
+    rings = [
+        Path(np.array(ring.coords) / 1e3 + moved, closed=True) for ring in (solid.exterior, *solid.interiors)
+    ]
     return patches.PathPatch(Path.make_compound_path(*rings), **style)
 
 
-def _flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
-    """Draws a track and the place of its tightest planned turn; the first planner's lies on top."""
+def draw_flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes: Any = "-") -> Line2D:
+    """Draws a track and its places that `legend_marks` tells of; the first planner's lies on top."""
     points = thinned(np.column_stack((run.track.east_m, run.track.north_m)), scene)
     style: dict[str, Any] = {"color": colour(index), "lw": 1.5, "ls": dashes, "zorder": 5 + 1 / (1 + index)}
     (line,) = axes.plot(*points.T / 1e3, label=run.planner, **style)
@@ -223,23 +212,28 @@ def _flown(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, dashes: An
     row = run.planned.tightest
     if row is not None:
         place = run.planned.east_m[row] / 1e3, run.planned.north_m[row] / 1e3
-        axes.plot(*place, "o", mfc="none", mec=colour(index), mew=1.2, ms=9, zorder=8)
+        axes.plot(*place, ls="", **TURN | {"mec": colour(index)})
+    nearest = run.nearest(scene.clearance_m)
+    if nearest is not None:
+        place = run.track.east_m[nearest] / 1e3, run.track.north_m[nearest] / 1e3
+        axes.plot(*place, ls="", **NEAREST | {"mec": colour(index)})
     return line
 
 
-def _keys(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
+def legend_marks(scene: FigureScene, runs: Sequence[DrawnRun]) -> list[Any]:
     """What the legend says of marks that are there for some flights only."""
-    keys: list[Any] = []
+    marks: list[Any] = []
     if not all(obstacle.stands_for_ever for obstacle in scene.obstacles):
-        keys.append(patches.Patch(**CHANGING, label="moves, or stands for a time"))
+        marks.append(patches.Patch(**CHANGING, label="moves, or stands for a time"))
     if any(run.outcome != "reached" for run in runs):
-        keys.append(
+        marks.append(
             Line2D([], [], ls="", marker="X", color="0.2", ms=7, mec="white", label="ended, not at G")
         )
     if any(run.planned.tightest is not None for run in runs):
-        ring: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 8}
-        keys.append(Line2D([], [], ls="", label="tightest planned turn", **ring))
-    return keys
+        marks.append(Line2D([], [], ls="", label="tightest planned turn", **TURN))
+    if any(run.nearest(scene.clearance_m) is not None for run in runs):
+        marks.append(Line2D([], [], ls="", label="nearest to an obstacle", **NEAREST))
+    return marks
 
 
 def thinned(points: FloatArray, scene: FigureScene) -> FloatArray:
@@ -253,54 +247,7 @@ def thinned(points: FloatArray, scene: FigureScene) -> FloatArray:
     return drawn
 
 
-def _close_up(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: int) -> None:
-    """Planned and flown path round the tightest planned turn."""
-    half = CLOSE_UP_RADII * scene.turn_radius_m
-    middle = np.array((run.planned.east_m[row], run.planned.north_m[row]))
-    for obstacle in scene.obstacles:
-        for grown, style in (
-            (scene.clearance_m, {"fill": False, "ec": "0.6", "lw": 0.6, "ls": ":"}),
-            (0.0, SOLID),
-        ):
-            axes.add_patch(outline(obstacle, grown, **style))
-    planned = np.column_stack((run.planned.east_m, run.planned.north_m))
-    flown = np.column_stack((run.track.east_m, run.track.north_m))
-    for points, ink, width, dashes in (
-        (flown, colour(index), 1.8, "-"),
-        (planned, "black", 0.9, PLANNED_DASHES),
-    ):
-        near = (np.abs(points - middle) < 2 * half).all(axis=1)
-        axes.plot(*np.where(near[:, None], points, np.nan).T / 1e3, color=ink, lw=width, ls=dashes)
-    (east, north), half_km = middle / 1e3, half / 1e3
-    axes.set(xlim=(east - half_km, east + half_km), ylim=(north - half_km, north + half_km), aspect="equal")
-    axes.set_xticks([])
-    axes.set_yticks([])
-    bar_m = _round_length_m(half)
-    left, low = east - 0.9 * half_km, north - 0.88 * half_km
-    axes.plot([left, left + bar_m / 1e3], [low, low], color="black", lw=2, solid_capstyle="butt")
-    text = axes.annotate(f"{bar_m:g} m", (left, low), (0, 4), textcoords="offset points", fontsize=8)
-    text.set_bbox(BEHIND_TEXT)
-    axes.set_title("its tightest planned turn")
-
-
-def _curvature_near(axes: Axes, scene: FigureScene, run: DrawnRun, index: int, row: int) -> None:
-    """Planned and flown curvature a few turn radii before and behind a row."""
-    distance = _distance_m(run.track)
-    near = np.abs(distance - distance[row]) < 2 * CLOSE_UP_RADII * scene.turn_radius_m
-    along = distance[near] - distance[row]
-    flown = (_flown_curvature(run.track) * scene.turn_radius_m)[near]
-    planned = (run.planned.curvature_1pm * scene.turn_radius_m)[near]
-    axes.plot(along, flown, color=colour(index), lw=1.5)
-    axes.plot(along, planned, color="black", lw=0.9, ls=PLANNED_DASHES)
-    _limits(axes, flown)
-    most = float(np.nanmax(np.abs(planned), initial=0.0))
-    text = axes.annotate(f"planned up to {most:.3g}", (0.03, 0.04), xycoords="axes fraction", fontsize=8)
-    text.set_bbox(BEHIND_TEXT)
-    axes.set_xlabel("along the path, m")
-    axes.set_title("curvature · turn radius")
-
-
-def _limits(axes: Axes, flown: FloatArray) -> None:
+def turn_limits(axes: Axes, flown: FloatArray) -> None:
     """The aircraft's turn limit, and a scale on which the flown curve can be read; corners may leave it."""
     for limit in (-1.0, 1.0):
         axes.axhline(limit, color="0.35", lw=0.7, ls="--")
@@ -309,12 +256,12 @@ def _limits(axes: Axes, flown: FloatArray) -> None:
     axes.set_ylim(-reach, reach)
 
 
-def _distance_m(track: Track) -> FloatArray:
+def distance_m(track: Track) -> FloatArray:
     """(n,) distance flown up to each row."""
     return np.append(0.0, np.cumsum(flown_lengths(track)))
 
 
-def _flown_curvature(track: Track) -> FloatArray:
+def flown_curvature(track: Track) -> FloatArray:
     """(n,) curvature flown from each row to the next."""
     pieces = flown_profile(track).curvature_1pm
     return np.append(pieces, pieces[-1:]) if len(pieces) else np.zeros(len(track))
@@ -329,10 +276,3 @@ def _extremes(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     bins = np.array_split(np.arange(len(x)), DRAWN_ROWS // 2)
     chosen = np.unique([part[pick] for part in bins for pick in (y[part].argmin(), y[part].argmax())])
     return x[chosen], y[chosen]
-
-
-def _round_length_m(half_m: float) -> float:
-    """A round length of about a third of a picture."""
-    third = 2 * half_m / 3
-    size = 10.0 ** np.floor(np.log10(third))
-    return float(max(step * size for step in (1, 2, 5) if step * size <= third))

@@ -26,6 +26,7 @@ from harness.cli.app import main
 from harness.cli.compare_terminal import print_comparison
 from harness.flight.record import AcceptedPlan, Track
 from harness.report import figure_style, figures
+from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.world.obstacle import Circle, Obstacle
 from planner.interface import Path as PlanPath
@@ -595,12 +596,57 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
     scene, run = drawn[0], replace(drawn[1], outcome=outcome)
     if changes:
         scene = replace(scene, obstacles=(*scene.obstacles, Obstacle(Circle((0.0, 2000.0), 9.0), (1.0, 0.0))))
-    for figure in (figures.overview(scene, [(0, run)]), figures.planner_figure(scene, run, 0)):
+    for figure in (figures.overview(scene, [(0, run)]), planner_figure(scene, run, 0)):
         (legend,) = figure.legends
         told = {text.get_text() for text in legend.get_texts()}
         assert ("moves, or stands for a time" in told) is changes
         assert ("ended, not at G" in told) is (outcome == "timeout")
         assert "tightest planned turn" in told
+
+
+def test_a_near_miss_is_enlarged_before_the_tightest_turn(
+    drawn: tuple[figures.FigureScene, figures.DrawnRun], circle_plan: AcceptedPlan
+) -> None:
+    """With the obstacle where it was then, and the clearance that was wanted."""
+    scene, run = drawn
+    # Half the circle of 500 m is flown in 60 s; at 30 s the obstacle, which came from the west, is north of it.
+    begin_m = np.array((-265.0, 610.0))
+    obstacle = Obstacle(Circle((-265.0, 610.0), 80.0), velocity_mps=(10.0, 0.0))
+    track = run.track
+    points_m = np.column_stack((track.east_m, track.north_m))
+    track = replace(track, clearance_m=obstacle.distance(points_m, track.time_s))
+    run, scene = replace(run, track=track, outcome="reached"), replace(scene, obstacles=(obstacle,))
+    row = int(track.clearance_m.argmin())
+    assert 0.0 < track.clearance_m[row] < scene.clearance_m
+    figure = planner_figure(scene, run, 0)
+    whole, close_up, clearance, turn, _ = figure.axes
+    assert (
+        close_up.get_title()
+        == f"nearest: {number(float(track.clearance_m[row]))} m, at {track.time_s[row]:.1f} s"
+    )
+    assert turn.get_title() == "its tightest planned turn"
+    place = points_m[row] / 1e3
+    for axes in (whole, close_up):
+        marked = [np.asarray(line.get_xydata()) for line in axes.get_lines() if line.get_marker() == "s"]
+        assert marked == [pytest.approx(place[None, :])]
+    assert np.mean([close_up.get_xlim(), close_up.get_ylim()], axis=1) == pytest.approx(place)
+    (solid,) = [patch for patch in close_up.patches if patch.get_fill()]
+    moved_km = (begin_m + obstacle.displacement_m(track.time_s[row])) / 1e3
+    corners_km = close_up.transData.inverted().transform(solid.get_extents().get_points())
+    assert corners_km.mean(axis=0) == pytest.approx(moved_km, abs=1e-3)
+    assert any(np.allclose(line.get_ydata(), scene.clearance_m) for line in clearance.get_lines())
+    cut = track.part(0, row + 1)
+    crash = figures.DrawnRun("round", "collision", cut, planned_rows(cut, [circle_plan]))
+    collided = planner_figure(scene, crash, 0)
+    assert collided.axes[1].get_title() == f"its collision, at {track.time_s[row]:.1f} s"
+    (legend,) = figure.legends
+    assert "nearest to an obstacle" in {text.get_text() for text in legend.get_texts()}
+    fair = planner_figure(replace(scene, clearance_m=float(track.clearance_m[row])), run, 0)
+    assert [axes.get_title() for axes in fair.axes[1:]] == [
+        "its tightest planned turn",
+        "curvature · turn radius",
+    ]
+    assert "nearest to an obstacle" not in {text.get_text() for text in fair.legends[0].get_texts()}
 
 
 @pytest.mark.parametrize("kind", ["overview", "planner_figure", "profiles"])
@@ -610,7 +656,7 @@ def test_figures_are_the_same_bytes_every_time(
     scene, run = drawn
     draw: dict[str, Callable[[], Any]] = {
         "overview": lambda: figures.overview(scene, [(0, run)]),
-        "planner_figure": lambda: figures.planner_figure(scene, run, 0),
+        "planner_figure": lambda: planner_figure(scene, run, 0),
         "profiles": lambda: figures.profiles(scene, [(0, run)]),
     }
     content = figure_style.svg(draw[kind]())
