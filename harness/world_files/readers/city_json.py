@@ -21,6 +21,7 @@ from harness.world_files.bounded import json_of
 from harness.world_files.parts import BoolArray, Contents, FloatArray, Limit, Part, Reading, WorldFileError
 from harness.world_files.plane import flat_crs, has_heights, unit_that_is_no_metre, vertical_unit_m
 from harness.world_files.readers import limits, rings
+from harness.world_files.readers.lengths import metres_of
 
 SOLID: Final = ("Building", "Bridge", "OtherConstruction")
 """Beginnings of the types that are taken."""
@@ -216,7 +217,7 @@ def _parts(
                 batch[-1].append(flat[at : at + len(surface)])
             at += len(surface)
     parts: list[Part] = []
-    unknown = Counter[str]()
+    doubts = limits.Doubts()
     shapeless = 0
     for each, footprint, bottom, top in zip(
         objects, rings.shapes_of(batch), low.tolist(), high.tolist(), strict=True
@@ -225,14 +226,14 @@ def _parts(
             shapeless += not each.told
         else:
             if top - bottom < LOW_M:
-                roof_m = max(limits.metres_of(each.attributes.get(key)) or -math.inf for key in ROOFS)
+                roof_m = max(metres_of(each.attributes.get(key)) or -math.inf for key in ROOFS)
                 if roof_m > bottom:
                     top = roof_m
                 else:
-                    high_m = limits.building(each.attributes, footprint, reading, unknown).top.height_m
+                    high_m = limits.building(each.attributes, footprint, reading, doubts).top.height_m
                     top = bottom + high_m
             parts.append(Part(footprint, Limit(bottom), Limit(top), name=each.name[:40]))
-    notes += limits.building_notes(unknown, reading)
+    notes += doubts.notes(reading)
     if shapeless:
         notes.append(f"{counted(shapeless, 'building')} without a shape passed over")
     return parts

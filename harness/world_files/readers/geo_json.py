@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -27,6 +26,7 @@ from harness.world_files.parts import (
 )
 from harness.world_files.plane import in_degrees
 from harness.world_files.readers import limits, rings
+from harness.world_files.readers.lengths import metres_of, names_unit
 
 DEEPEST: Final = 8
 ABOVE_GROUND: Final = ("AGL", "SFC", "GND")
@@ -52,7 +52,7 @@ def read(path: Path, reading: Reading) -> Contents:
     content = _whole(path)
     notes: list[str] = []
     parts: list[Part] = []
-    unknown = Counter[str]()
+    doubts = limits.Doubts()
     features = list(_features(content))
     every = [(tags, name, one) for tags, geometry, name in features for one in _simple(geometry, 0)]
     passed, bare = sum(geometry is None for _, geometry, _ in features), 0
@@ -62,14 +62,14 @@ def read(path: Path, reading: Reading) -> Contents:
         if footprint is None:
             passed += 1
         elif limits.is_building(tags):
-            parts.append(limits.building(tags, footprint, reading, unknown, name))
+            parts.append(limits.building(tags, footprint, reading, doubts, name))
         else:
             bare += not limits.has_limits(tags)
             bottom, top = limits.limits(tags, notes, name)
             parts.append(Part(footprint, bottom, top, name=name))
     if not parts:
         raise WorldFileError("has no polygon; must be GeoJSON with some")
-    notes += limits.building_notes(unknown, reading)
+    notes += doubts.notes(reading)
     if bare:
         notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
     if passed:
@@ -149,7 +149,7 @@ def zone_limit(value: Any, reference: str, unit_m: float, notes: list[str], name
         notes: are added to.
         name: of the zone, for them.
     """
-    number = limits.metres_of(value)
+    number = metres_of(value)
     if number is None:
         return None
     level = unit_m == LEVEL_M
@@ -160,8 +160,7 @@ def zone_limit(value: Any, reference: str, unit_m: float, notes: list[str], name
         told = "are above the ellipsoid" if reference.upper() in ABOVE_ELLIPSOID else "name no reference"
         note = f"{name or 'a zone'}: its limits {told}; taken as above mean sea level"
         notes += [] if note in notes[-1:] else [note]
-    has_unit = isinstance(value, str) and value.strip()[-1:].isalpha()
-    return Limit(number if has_unit else number * unit_m, datum)
+    return Limit(number if names_unit(value) else number * unit_m, datum)
 
 
 def radius_of(value: Any) -> float:
@@ -170,7 +169,7 @@ def radius_of(value: Any) -> float:
     Raises:
         WorldFileError: it is none.
     """
-    radius = limits.metres_of(value)
+    radius = metres_of(value)
     if radius is None:
         raise WorldFileError("has a circle without a radius")
     return radius

@@ -9,10 +9,12 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 from harness.files.wording import counted
 from harness.world_files.parts import FOOT_M, LEVEL_M, NO_BOTTOM, NO_TOP, Datum, Limit, Part, Reading
+from harness.world_files.readers.lengths import lengths_of, metres_of
 
 _NUMBER: Final = re.compile(r"[-+]?\d+(?:\.\d*)?|[-+]?\.\d+")
 _SURFACE: Final = re.compile(r"^(SFC|GND|SURFACE|GROUND|0+(\s*(FT|M))?(\s*(AGL|GND|ASFC|SFC))?)$")
@@ -136,24 +138,44 @@ def band_of(lower: Limit | None, upper: Limit | None, notes: list[str], name: st
     return bottom, top
 
 
-def metres_of(value: Any) -> float | None:
-    """A height of a building, in metres unless it says feet: `12`, `12.5 m`, `40 ft`, feet and inches with marks."""
-    if isinstance(value, bool) or value is None:
-        return None
-    if isinstance(value, int | float):
-        return float(value) if math.isfinite(value) else None
-    text = str(value).strip().lower().replace(",", ".")
-    if text.isdecimal():
-        return float(text)
-    if match := re.fullmatch(r"(\d+)'(?:(\d+)(?:''|\"))?", text):
-        return (float(match[1]) + float(match[2] or 0) / 12.0) * FOOT_M
-    if match := re.fullmatch(r"([-+]?\d+(?:\.\d+)?)\s*(|m|mtr|metres?|meters?|ft|foot|feet)\.?", text):
-        return float(match[1]) * (FOOT_M if match[2].startswith("f") else 1.0)
-    return None
+@dataclass
+class Doubts:
+    """What has to be said of the heights of buildings.
+
+    Attributes:
+        guessed: buildings of which no height is known.
+        strange: heights that say nothing, and how often each comes.
+        rough: heights that are approximate, lists or ranges, likewise.
+    """
+
+    guessed: int = 0
+    strange: Counter[str] = field(default_factory=Counter)
+    rough: Counter[str] = field(default_factory=Counter)
+
+    def notes(self, reading: Reading) -> list[str]:
+        """A line of each."""
+        notes = []
+        if self.guessed:
+            notes.append(
+                f"{counted(self.guessed, 'building')} without height and levels taken as "
+                f"{reading.default_height_m:g} m high (default_height_m)"
+            )
+        if self.strange:
+            first = next(iter(self.strange))
+            notes.append(
+                f"{counted(self.strange.total(), 'height')} of buildings say nothing, {first} the first"
+            )
+        if self.rough:
+            first = next(iter(self.rough))
+            notes.append(
+                f"{counted(self.rough.total(), 'height')} of buildings approximate, a list or a range, {first} the "
+                "first: taken as they stand, of several the one that makes the building larger"
+            )
+        return notes
 
 
 def building(
-    tags: Mapping[str, Any], footprint: Any, reading: Reading, unknown: Counter[str], name: str = ""
+    tags: Mapping[str, Any], footprint: Any, reading: Reading, doubts: Doubts, name: str = ""
 ) -> Part:
     """A building from its tags.
 
@@ -165,42 +187,22 @@ def building(
         tags: attributes by name, as OpenStreetMap has them.
         footprint: shapely geometry.
         reading: has the default height.
-        unknown: counts the buildings whose height had to be guessed, and heights that cannot be read.
+        doubts: are added to.
         name: for messages.
     """
     tags = {key.lower(): value for key, value in tags.items()}
-    top = _first(tags, _HEIGHT, unknown)
-    levels = None if top is not None else _first(tags, _LEVELS, unknown)
+    top = _first(tags, _HEIGHT, doubts)
+    levels = None if top is not None else _first(tags, _LEVELS, doubts)
     if top is None and levels is not None:
-        top = (levels + (_first(tags, ("roof:levels", "roof_levels"), unknown) or 0.0)) * LEVEL_M
+        top = (levels + (_first(tags, ("roof:levels", "roof_levels"), doubts) or 0.0)) * LEVEL_M
     if top is None:
         top = reading.default_height_m
-        unknown[GUESSED] += 1
-    bottom = _first(tags, _MIN_HEIGHT, unknown, least=True)
+        doubts.guessed += 1
+    bottom = _first(tags, _MIN_HEIGHT, doubts, least=True)
     if bottom is None:
-        bottom = (_first(tags, _MIN_LEVEL, unknown, least=True) or 0.0) * LEVEL_M
+        bottom = (_first(tags, _MIN_LEVEL, doubts, least=True) or 0.0) * LEVEL_M
     begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
     return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
-
-
-GUESSED: Final = ""
-"""Counts, in `unknown` of `building`, those of which no height is known."""
-
-
-def building_notes(unknown: Counter[str], reading: Reading) -> list[str]:
-    """What is said of buildings whose height is not known, or cannot be read."""
-    notes = []
-    if unknown[GUESSED]:
-        notes.append(
-            f"{counted(unknown[GUESSED], 'building')} without height and levels taken as "
-            f"{reading.default_height_m:g} m high (default_height_m)"
-        )
-    strange = {text: count for text, count in unknown.items() if text != GUESSED}
-    if strange:
-        notes.append(
-            f"{counted(sum(strange.values()), 'height')} of buildings say nothing, {next(iter(strange))} the first"
-        )
-    return notes
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:
@@ -309,23 +311,23 @@ def _limit(value: Any, unit: str, datum: Datum) -> Limit | None:
 
 
 def _first(
-    tags: Mapping[str, Any], names: tuple[str, ...], unknown: Counter[str] | None = None, least: bool = False
+    tags: Mapping[str, Any], names: tuple[str, ...], doubts: Doubts | None = None, least: bool = False
 ) -> float | None:
-    """The first of some attributes that is a length or a number; of a list the largest, or the least.
+    """The first of some attributes that is a length or a number; of several the largest, or the least.
 
     Args:
         tags: attributes by lower-case name.
         names: of which the first that says something counts.
-        unknown: counts what says nothing: no number, or none above zero.
+        doubts: are added to by what is rough, or says nothing: no number, or none above zero.
         least: of the bottom of a building, which may be 0.
     """
     for name in names:
         if (given := tags.get(name)) is None:
             continue
-        values = [metres_of(each) for each in (given.split(";") if isinstance(given, str) else [given])]
-        known = [each for each in values if each is not None]
-        if len(known) == len(values) and (least or max(known) > 0):
-            return min(known) if least else max(known)
-        if unknown is not None and known != [0.0]:
-            unknown[f"{name}={str(given)[:20]!r}"] += 1
+        found, rough = lengths_of(given)
+        said = bool(found) and (least or max(found) > 0.0)
+        if doubts is not None and (rough or not said) and found != (0.0,):
+            (doubts.rough if said else doubts.strange)[f"{name}={str(given)[:20]!r}"] += 1
+        if said:
+            return min(found) if least else max(found)
     return None

@@ -11,13 +11,12 @@ from harness.world_files.parts import Contents, Reading, WorldFileError
 from harness.world_files.readers.osm_elements import (
     AREAS,
     FIRST_INLINE,
-    HEIGHT,
     POINTS,
     Collected,
     Elements,
     is_building,
 )
-from harness.world_files.readers.osm_relations import BUILDING, Line, Member, Relations
+from harness.world_files.readers.osm_relations import BUILDING, HEIGHT, Line, Member, Relations
 
 MAX_BYTES: Final = 400_000_000
 MOST_NUMBER: Final = 1 << 62
@@ -210,12 +209,12 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
         raise WorldFileError(
             f"cannot be read as PBF ({' '.join(str(error).split())[:80]}); it may be torn"
         ) from error
-    found.areas(relations.areas(taken, tags_of), ways, relations.others)
+    found.areas(relations.areas(taken, tags_of), ways, relations)
     return found.contents()
 
 
 def _pbf_relations(path: Path) -> Relations:
-    """The relations that buildings need, by three passes: most of a file's relations are none of them."""
+    """The relations that buildings need, and those with a height, by three passes: most relations are none of them."""
     import osmium
 
     relations = Relations()
@@ -226,7 +225,7 @@ def _pbf_relations(path: Path) -> Relations:
             members = [Member(m.ref, m.role, m.type == "w") for m in each.members if m.type in ("w", "r")]
             relations.add(each.id, members, tags, is_building(tags))
 
-    keep(osmium.filter.KeyFilter(*AREAS))
+    keep(osmium.filter.KeyFilter(*AREAS, HEIGHT))
     # Those of the first pass that are of this type come again, and replace themselves.
     keep(osmium.filter.TagFilter(("type", BUILDING)))
     if missing := relations.outlines_missing():

@@ -17,7 +17,8 @@ import numpy as np
 from harness.files.wording import counted
 from harness.world_files.parts import WGS84, BoolArray, Contents, FloatArray, Part, Reading, WorldFileError
 from harness.world_files.readers import limits, rings
-from harness.world_files.readers.osm_relations import Area, Line, Member, Relations
+from harness.world_files.readers.lengths import lengths_of
+from harness.world_files.readers.osm_relations import HEIGHT, Area, Line, Member, Relations
 
 AREAS: Final = ("building", "building:part", "man_made")
 TALL: Final = frozenset(
@@ -36,8 +37,6 @@ TALL: Final = frozenset(
 """Of `man_made`, what stands up like a building; piers, pipelines and the like do not."""
 POINTS: Final = ("building", "man_made", "power")
 """What tags of a node have that may be something tall; it has no outline."""
-HEIGHT: Final = "height"
-"""Tag of what stands up, be it a building or not."""
 ENTRANCE: Final = "entrance"
 """Of `building`, a door."""
 
@@ -49,22 +48,24 @@ class Collected:
         self.parts: list[Part] = []
         self.reading = reading
         self._rings: list[tuple[Mapping[str, str], Line, str]] = []
-        self.unknown = Counter[str]()
+        self.doubts = limits.Doubts()
         self.broken = self.closed = 0
         self._others: Mapping[str, int] = {}
         self._high: list[float] = []  # heights of what is no building
+        self._high_kinds = Counter[str]()  # ways and relations among it
         self._points: list[float] = []  # heights of what has no outline, 0 where none is known
 
     def point(self, tags: Mapping[str, str]) -> None:
         """A node with tags; what is tall and has no outline is counted."""
         if is_tall(tags):
-            self._points.append(limits.metres_of(tags.get("height")) or 0.0)
+            self._points.append(_height_m(tags))
 
-    def other(self, tags: Mapping[str, str]) -> None:
-        """A way that is no building; one that says how high it is is counted."""
-        height_m = limits.metres_of(tags.get(HEIGHT))
-        if height_m is not None and height_m > 0.0:
+    def other(self, tags: Mapping[str, str], kind: str = "way") -> None:
+        """A way or a relation that is no building; one that says how high it is is counted."""
+        height_m = _height_m(tags)
+        if height_m > 0.0:
             self._high.append(height_m)
+            self._high_kinds[kind] += 1
 
     def way(self, tags: Mapping[str, str], line: Line, name: str) -> None:
         """A building that is one way; those that are whole rings are made all at once."""
@@ -73,12 +74,14 @@ class Collected:
         else:
             self._add(tags, [line], [], name)
 
-    def areas(self, areas: Iterable[Area], ways: Mapping[int, Line], others: Mapping[str, int]) -> None:
-        """Buildings of several ways, as far as they are in the file; other relations are counted by their type."""
+    def areas(self, areas: Iterable[Area], ways: Mapping[int, Line], relations: Relations) -> None:
+        """Buildings of several ways, as far as they are in the file; other relations are counted."""
         for tags, outer, inner, name in areas:
             solid, hollow = ([ways[each] for each in numbers if each in ways] for numbers in (outer, inner))
             self._add(tags, solid, hollow, name)
-        self._others = others
+        self._others = relations.others
+        for tags in relations.high():
+            self.other(tags, "relation")
 
     def _add(self, tags: Mapping[str, str], outer: Sequence[Line], inner: Sequence[Line], name: str) -> None:
         import shapely
@@ -90,7 +93,7 @@ class Collected:
         self.closed += closed
         hollow, _ = _area(inner) if inner else (None, False)
         footprint = solid if hollow is None else shapely.difference(solid, hollow)
-        self.parts.append(limits.building(tags, footprint, self.reading, self.unknown, name))
+        self.parts.append(limits.building(tags, footprint, self.reading, self.doubts, name))
 
     def contents(self) -> Contents:
         """What was found.
@@ -103,10 +106,10 @@ class Collected:
             if shape is None:
                 self.broken += 1
                 continue
-            self.parts.append(limits.building(tags, shape, self.reading, self.unknown, name))
+            self.parts.append(limits.building(tags, shape, self.reading, self.doubts, name))
         if not self.parts:
             raise WorldFileError("has no building; must be an extract of OpenStreetMap with some")
-        notes = limits.building_notes(self.unknown, self.reading)
+        notes = self.doubts.notes(self.reading)
         if self.closed:
             notes.append(f"{counted(self.closed, 'building')} cut open by the edge of the extract closed")
         if self.broken:
@@ -116,7 +119,7 @@ class Collected:
             many = counted(sum(self._others.values()), "relation")
             notes.append(f"{many} of buildings that is no area passed over (type {types})")
         if self._high:
-            many = counted(len(self._high), "way")
+            many = " and ".join(counted(count, kind) for kind, count in self._high_kinds.items())
             notes.append(
                 f"{many} with a height that are no building passed over, the highest {max(self._high):g} m"
             )
@@ -192,7 +195,7 @@ class Elements:
                 found.other(tags)
         ways = {number: line(number) for number in needed & self._spans.keys()}
         areas = self._relations.areas(self._buildings, self._heights)
-        found.areas(areas, ways, self._relations.others)
+        found.areas(areas, ways, self._relations)
         return found.contents()
 
     def _places(self) -> tuple[FloatArray, BoolArray]:
@@ -215,6 +218,11 @@ def is_tall(tags: Mapping[str, str]) -> bool:
     if tags.get("building") == ENTRANCE:
         return False
     return is_building(tags) or tags.get("power") == "tower" or tags.get("generator:source") == "wind"
+
+
+def _height_m(tags: Mapping[str, str]) -> float:
+    """How high something is, 0 where it does not say so."""
+    return max(lengths_of(tags.get(HEIGHT)).metres, default=0.0)
 
 
 def _area(lines: Sequence[Line]) -> tuple[Any, bool]:

@@ -13,6 +13,8 @@ from typing import Final, NamedTuple
 
 MULTIPOLYGON: Final = "multipolygon"
 BUILDING: Final = "building"
+HEIGHT: Final = "height"
+"""Tag of what stands up, be it a building or not."""
 INNER: Final = "inner"
 """Role of a hole of a multipolygon."""
 OUTLINES: Final = ("outline", "outer", "")
@@ -61,6 +63,7 @@ class Relations:
         self._areas: dict[int, tuple[Tags, list[Member]]] = {}
         self._plain: dict[int, tuple[Tags, list[Member]]] = {}
         self._buildings: dict[int, tuple[Tags, list[Member]]] = {}
+        self._high: dict[int, Tags] = {}
         self.others = Counter[str]()
 
     def add(self, number: int, members: list[Member], tags: Tags, solid: bool) -> None:
@@ -72,6 +75,13 @@ class Relations:
             self._buildings[number] = tags, members
         elif solid:
             self.others[kind] += 1
+        if HEIGHT in tags and not solid and kind != BUILDING:
+            self._high[number] = tags
+
+    def high(self) -> list[Tags]:
+        """Tags of the relations that are no building, and no member of one, and may say how high they are."""
+        nested = self._nested() if self._high else set()
+        return [tags for number, tags in self._high.items() if number not in nested]
 
     def outlines_missing(self) -> set[int]:
         """Relations that are members of buildings and are not here."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 import zipfile
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +41,7 @@ def _read(path: Path, reading: Reading) -> Contents:
     import shapely
 
     notes: list[str] = []
-    unknown = Counter[str]()
+    doubts = limits.Doubts()
     parts: list[Part] = []
     crs: str | None = None
     passed = bare = 0
@@ -72,7 +71,7 @@ def _read(path: Path, reading: Reading) -> Contents:
                     continue
                 tags = {str(name): column[row] for name, column in zip(meta["fields"], columns, strict=True)}
                 tags = {name: value for name, value in tags.items() if value is not None and value == value}
-                parts.append(_part(tags, shape, reading, notes, unknown))
+                parts.append(_part(tags, shape, reading, notes, doubts))
                 bare += not (parts[-1].rigid or limits.has_limits(tags))
     except (DataSourceError, DataLayerError, ValueError, RuntimeError, OSError, MemoryError) as error:
         if isinstance(error, WorldFileError):
@@ -81,19 +80,19 @@ def _read(path: Path, reading: Reading) -> Contents:
     if not parts:
         raise WorldFileError("has no polygon; must have some")
     notes += _told(path, reading.crs or crs, bare)
-    notes += limits.building_notes(unknown, reading)
+    notes += doubts.notes(reading)
     if passed:
         notes.append(f"{counted(passed, 'shape')} without an area passed over")
     return Contents("vector", reading.crs or crs, tuple(parts), notes=tuple(notes))
 
 
 def _part(
-    tags: dict[str, object], shape: object, reading: Reading, notes: list[str], unknown: Counter[str]
+    tags: dict[str, object], shape: object, reading: Reading, notes: list[str], doubts: limits.Doubts
 ) -> Part:
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in tags.items()}
     name = str(plain.get("name", ""))[:40]
     if limits.is_building(plain):
-        return limits.building(plain, shape, reading, unknown, name)
+        return limits.building(plain, shape, reading, doubts, name)
     return Part(shape, *limits.limits(plain, notes, name), name=name)
 
 

@@ -146,3 +146,34 @@ def test_ways_with_a_height_that_are_no_building_are_counted(form: str, tmp_path
     found = read_any(path)
     assert [part.name for part in found.parts] == ["way 1"]
     assert found.notes == ("2 ways with a height that are no building passed over, the highest 60 m",)
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_relations_with_a_height_that_are_no_building_are_counted(form: str, tmp_path: Path) -> None:
+    """A bridge, or a tower that nobody calls one; a tower that is called one is taken, as a way is."""
+    ways = {1: '<tag k="building" v="yes"/><tag k="height" v="9"/>', 2: "", 3: ""}
+    bridge = '<tag k="type" v="multipolygon"/><tag k="man_made" v="bridge"/><tag k="height" v="~40"/>'
+    path = osm_building(tmp_path, "osm", '<member type="way" ref="2" role="outer"/>', ways, bridge)
+    member = '<member type="way" ref="3" role="outer"/><tag k="type" v="multipolygon"/>'
+    pylon = '<relation id="10" version="1"><tag k="type" v="site"/><tag k="height" v="60\'"/></relation>'
+    tower = f'<relation id="11" version="1">{member}<tag k="man_made" v="tower"/><tag k="height" v="50"/></relation>'
+    path.write_text(path.read_text().replace("</osm>", f"{pylon}{tower}</osm>"))
+    found = read_any(as_form(path, form))
+    assert {part.name: part.top.height_m for part in found.parts} == {"way 1": 9.0, "relation 11": 50.0}
+    assert found.notes == ("2 relations with a height that are no building passed over, the highest 40 m",)
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_a_relation_that_is_an_outline_of_a_building_is_not_counted_beside_it(
+    form: str, tmp_path: Path
+) -> None:
+    member = '<member type="relation" ref="10" role="outline"/>'
+    path = osm_building(tmp_path, "osm", member, {1: ""}, TYPE_BUILDING)
+    outline = (
+        '<member type="way" ref="1" role="outer"/><tag k="type" v="multipolygon"/><tag k="height" v="30"/>'
+    )
+    path.write_text(
+        path.read_text().replace("</osm>", f'<relation id="10" version="1">{outline}</relation></osm>')
+    )
+    found = read_any(as_form(path, form))
+    assert ([part.top.height_m for part in found.parts], found.notes) == ([30.0], ())

@@ -16,7 +16,9 @@ from PIL import Image
 from harness.world_files.kinds import kind_of, read
 from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
 from harness.world_files.plane import Mapping, Place
-from harness.world_files.readers.limits import limit_of, metres_of
+from harness.world_files.readers.geo_json import zone_limit
+from harness.world_files.readers.lengths import Lengths, lengths_of, metres_of
+from harness.world_files.readers.limits import limit_of
 from tests.harness.world_files.making import SQUARE, feature, geojson, geotiff, npy, osm, zipped
 
 
@@ -197,6 +199,21 @@ def test_limits_are_read_as_airspace_files_write_them(text: str, limit: Limit | 
         ("12,5 m", 12.5),
         ("20 ft", 20 * FOOT_M),
         ("6'6\"", 6.5 * FOOT_M),
+        ("6' 6\"", 6.5 * FOOT_M),
+        ("6'6''", 6.5 * FOOT_M),
+        ("6'6", 6.5 * FOOT_M),
+        ("6\N{PRIME}6\N{DOUBLE PRIME}", 6.5 * FOOT_M),
+        ("6 ft 6 in", 6.5 * FOOT_M),
+        ("50'", 50 * FOOT_M),
+        ("50.5'", 50.5 * FOOT_M),
+        ("15m", 15.0),
+        ("15 m.", 15.0),
+        ("300cm", 3.0),
+        ("0.3 km", 300.0),
+        ("30 in", 2.5 * FOOT_M),
+        ("~15", None),
+        ("15 yd", None),
+        ("15 m 3", None),
         (True, None),
         ("x", None),
         (None, None),
@@ -204,6 +221,36 @@ def test_limits_are_read_as_airspace_files_write_them(text: str, limit: Limit | 
 )
 def test_heights_of_buildings_are_read_in_their_unit(value: object, metres: float | None) -> None:
     assert metres_of(value) == (None if metres is None else pytest.approx(metres))
+
+
+@pytest.mark.parametrize(
+    ("value", "lengths"),
+    [
+        ("15", Lengths((15.0,))),
+        (15, Lengths((15.0,))),
+        ("~15", Lengths((15.0,), rough=True)),
+        ("15; 18;", Lengths((15.0, 18.0), rough=True)),
+        ("10\N{EN DASH}12", Lengths((10.0, 12.0), rough=True)),
+        ("3-4;6", Lengths((3.0, 4.0, 6.0), rough=True)),
+        ("-3", Lengths((-3.0,))),
+        ("2-1", Lengths(())),
+        ("1-2-3", Lengths(())),
+        ("~", Lengths(())),
+        (";", Lengths(())),
+        (None, Lengths(())),
+    ],
+)
+def test_rough_lengths_say_so(value: object, lengths: Lengths) -> None:
+    found = lengths_of(value)
+    assert found.metres == pytest.approx(lengths.metres)
+    assert (found.rough and bool(found.metres)) == lengths.rough
+
+
+@pytest.mark.parametrize("value", ["100'", "100 ft", "100ft.", 100, "100"])
+def test_a_limit_with_a_unit_of_its_own_is_not_converted_twice(value: object) -> None:
+    found = zone_limit(value, "AGL", FOOT_M, [], "zone")
+    assert found is not None
+    assert found.height_m == pytest.approx(100 * FOOT_M)
 
 
 def in_plane(shape: Any, longitude: float, latitude: float) -> Any:

@@ -216,9 +216,12 @@ def test_an_answer_of_overpass_as_json(geom: bool, tmp_path: Path) -> None:
     ("tags", "top_m", "said"),
     [
         ({"building": "yes", "height": -1}, 6.0, True),
-        ({"building": "yes", "height": "about 20"}, 6.0, True),
-        ({"building": "yes", "height": "about 20", "building:levels": "5"}, 15.0, True),
+        ({"building": "yes", "height": "like 20"}, 6.0, True),
+        ({"building": "yes", "height": "20?", "building:levels": "5"}, 15.0, True),
         ({"building": "yes", "building:levels": "3;5"}, 15.0, False),
+        ({"building": "yes", "building:levels": "4-3"}, 6.0, True),
+        ({"building": "yes", "building:levels": "0-3"}, 6.0, True),
+        ({"building": "yes", "height": "15;high"}, 6.0, True),
         ({"building": "yes", "height": "12 metres"}, 12.0, False),
         ({"building": "yes", "height": "40 feet"}, 40 * FOOT_M, False),
         ({"HEIGHT": 21.5}, 21.5, False),
@@ -233,6 +236,34 @@ def test_a_height_that_says_nothing_is_told(
     (part,) = found.parts
     assert part.top.height_m == pytest.approx(top_m)
     assert any("say nothing" in note for note in found.notes) == said
+
+
+@pytest.mark.parametrize(
+    ("tags", "bottom_m", "top_m"),
+    [
+        ({"height": "~15"}, -math.inf, 15.0),
+        ({"height": "~ 15 m"}, -math.inf, 15.0),
+        ({"height": "ca. 40 ft"}, -math.inf, 40 * FOOT_M),
+        ({"height": "15;18"}, -math.inf, 18.0),
+        ({"height": "10-12 m"}, -math.inf, 12.0),
+        ({"building:levels": "3-4"}, -math.inf, 12.0),
+        ({"building:levels": "~5"}, -math.inf, 15.0),
+        ({"height": "20", "min_height": "~3-4"}, 3.0, 20.0),
+    ],
+)
+def test_a_rough_height_is_taken_as_it_stands_and_told(
+    tags: dict[str, str], bottom_m: float, top_m: float, tmp_path: Path
+) -> None:
+    """As OpenStreetMap's mappers write them; they were taken as the default height."""
+    found = read_any(geojson(tmp_path / "a.geojson", feature({"building": "yes", **tags})))
+    (part,) = found.parts
+    assert part.bottom.height_m == bottom_m
+    assert part.top.height_m == pytest.approx(top_m)
+    name, value = list(tags.items())[-1]
+    assert found.notes == (
+        f"1 height of buildings approximate, a list or a range, {name}={value!r} the first: taken as they stand, of "
+        "several the one that makes the building larger",
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,93 @@
+"""Heights and lengths as people write them in attributes: `12`, `12.5 m`, `40 ft`, `7'4"`, `~15`, `15;18`, `3-4`.
+
+The units of OpenStreetMap: https://wiki.openstreetmap.org/wiki/Map_features/Units. Metres need none; feet and inches
+have marks. A missing blank and a decimal comma are mistakes there that leave no doubt.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any, Final, NamedTuple
+
+from harness.world_files.parts import FOOT_M
+
+_NUMBER: Final = r"\d+(?:\.\d+)?"
+_UNITS: Final = {
+    "": 1.0,
+    **dict.fromkeys(("m", "mtr", "metre", "metres", "meter", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet"), FOOT_M),
+    **dict.fromkeys(("in", "inch", "inches"), FOOT_M / 12.0),
+    "cm": 0.01,
+    "km": 1000.0,
+}
+_WITH_UNIT: Final = re.compile(rf"([-+]?{_NUMBER})\s*([a-z]*)\.?")
+_FEET: Final = re.compile(
+    rf"({_NUMBER})\s*(?:'|ft\.?|foot|feet)\s*(?:({_NUMBER})\s*(?:''|\"|in\.?|inch|inches)?)?"
+)
+_MARKS: Final = str.maketrans({"\N{RIGHT SINGLE QUOTATION MARK}": "'", "\N{PRIME}": "'", "\N{DOUBLE PRIME}": '"',
+                               "\N{RIGHT DOUBLE QUOTATION MARK}": '"', ",": "."})  # fmt: skip
+_ABOUT: Final = re.compile(r"(?:~|\u2248|ca\.?(?=[\s\d])|circa|approx(?:\.|imately)?|about)\s*")
+"""What says that a length is approximate."""
+_RANGE: Final = re.compile(rf"({_NUMBER})\s*([a-z']*)\s*[-\u2013]\s*({_NUMBER})\s*([a-z']*)")
+
+
+class Lengths(NamedTuple):
+    """What an attribute says.
+
+    Attributes:
+        metres: one or several; none where it says nothing that is certain.
+        rough: it is approximate, a list or a range.
+    """
+
+    metres: tuple[float, ...]
+    rough: bool = False
+
+
+def metres_of(value: Any) -> float | None:
+    """One length, in metres unless it says otherwise: `12`, `12.5 m`, `40 ft`, feet and inches with marks."""
+    if isinstance(value, bool) or value is None:
+        return None
+    if isinstance(value, int | float):
+        return float(value) if math.isfinite(value) else None
+    text = str(value).strip().lower().translate(_MARKS)
+    if text.isdecimal():
+        return float(text)
+    if (match := _WITH_UNIT.fullmatch(text)) and match[2] in _UNITS:
+        return float(match[1]) * _UNITS[match[2]]
+    if match := _FEET.fullmatch(text):
+        return (float(match[1]) + float(match[2] or 0.0) / 12.0) * FOOT_M
+    return None
+
+
+def names_unit(value: Any) -> bool:
+    """Whether a length that can be read says its unit."""
+    return isinstance(value, str) and re.fullmatch(r"[-+\d.,\s]*", value) is None
+
+
+def lengths_of(value: Any) -> Lengths:
+    """One length or several: also `~15`, lists with semicolons as `15;18`, and ranges as `10-12 m`, by their ends."""
+    one = metres_of(value)
+    if one is not None:
+        return Lengths((one,))
+    if not isinstance(value, str):
+        return Lengths(())
+    found: list[float] = []
+    for each in filter(None, (part.strip() for part in value.split(";"))):
+        read = _ends(_ABOUT.sub("", each.lower().translate(_MARKS), count=1))
+        if read is None:
+            return Lengths(())
+        found += read
+    return Lengths(tuple(found), rough=True)
+
+
+def _ends(text: str) -> tuple[float, ...] | None:
+    """A length, or both ends of a range from less to more; None where it is neither."""
+    one = metres_of(text)
+    if one is not None:
+        return (one,)
+    match = _RANGE.fullmatch(text)
+    if match is None:
+        return None
+    low, high = metres_of(f"{match[1]}{match[2] or match[4]}"), metres_of(f"{match[3]}{match[4] or match[2]}")
+    return (low, high) if low is not None and high is not None and 0.0 < low < high else None
