@@ -108,7 +108,7 @@ def read_path(
     if len(found.positions) < 2:
         raise InputError(f"{path}: has {counted(len(found.positions), 'point')}; a path has at least 2")
     origin = None if found.local else origin_deg or found.positions[0]
-    _check_degrees(origin, found.positions, "point", str(path))
+    _check_degrees(origin, found.positions, lambda place: f"point {place}", str(path))
     origin = _turned(origin)
     points = _in_plane(found.positions, origin)
     _check_span(points, str(path))
@@ -150,8 +150,9 @@ def _mission(found: MissionAsRead, origin_deg: Place | None) -> PathAsGiven:
     source, flown = found.source, program(found)
     positions = [step.position for step in flown.steps]
     placed = [position for position in positions if position is not None]
+    items = [step.item for step in flown.steps if step.position is not None]
     origin = None if flown.local else origin_deg or placed[0]
-    _check_degrees(origin, placed, "item", source)
+    _check_degrees(origin, placed, lambda place: f"item {items[place]}", source)
     origin = _turned(origin)
     points = _in_plane(placed, origin)
     _check_span(points, source)
@@ -228,11 +229,13 @@ def _check_altitudes(altitudes_m: Sequence[float], source: str) -> None:
             )
 
 
-def _check_degrees(origin: Place | None, positions: Sequence[Place], what: str, source: str) -> None:
+def _check_degrees(
+    origin: Place | None, positions: Sequence[Place], named: Callable[[int], str], source: str
+) -> None:
     for number, (latitude, longitude) in enumerate(positions if origin is not None else ()):
         if not (abs(latitude) <= 85.0 and abs(longitude) <= 360.0):
             raise InputError(
-                f"{source}: {what} {number} is at latitude {latitude:g}, longitude {longitude:g}; must be degrees "
+                f"{source}: {named(number)} is at latitude {latitude:g}, longitude {longitude:g}; must be degrees "
                 "within 85 and 360 (local metres can be given as CSV with the columns x_m,y_m)"
             )
 

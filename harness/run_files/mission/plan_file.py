@@ -14,7 +14,7 @@ from harness.files.input_file import InputError
 from harness.run_files.fences import Fence, Fences
 from harness.run_files.mission import commands
 from harness.run_files.mission.fence_items import rally_note
-from harness.run_files.mission.items import Item, MissionAsRead
+from harness.run_files.mission.items import MISSION, Item, MissionAsRead, filled, waiting_notes
 from harness.run_files.read_values import finite, parsed_json, shown, whole
 
 LANDING_PATTERNS: Final = {"fwLandingPattern": commands.LAND, "vtolLandingPattern": commands.VTOL_LAND}
@@ -68,6 +68,7 @@ def read_mission(mission: dict[str, Any], source: str, key: str) -> MissionAsRea
     if len({item.number for item in items}) < len(items):
         items = [replace(item, number=number) for number, item in enumerate(items, start=1)]
         notes.append("a doJumpId is there twice: items are counted from 1 instead")
+    notes += waiting_notes([item.number for item in items if item.waits])
     return MissionAsRead(source, tuple(items), home, home_altitude_m, Fences(), tuple(notes))
 
 
@@ -120,21 +121,15 @@ def _simple(item: dict[str, Any], key: str, source: str, number: int) -> Item:
     if not isinstance(params, list) or len(params) != 7:
         raise InputError(f"{source}: {key}.params: must be a list of 7")
     # QGroundControl writes null where something is left to the autopilot.
-    values = [
-        0.0 if value is None else finite(value, f"{source}: {key}.params[{i}]")
+    given = [
+        None if value is None else finite(value, f"{source}: {key}.params[{i}]")
         for i, value in enumerate(params)
     ]
     command, frame = (whole(item.get(name), f"{source}: {key}.{name}") for name in ("command", "frame"))
-    if (params[4] is None) != (params[5] is None) and command in commands.FLOWN:
-        missing = 4 if params[4] is None else 5
-        raise InputError(
-            f"{source}: {key}.params[{missing}]: is null; a place must have latitude and longitude"
-        )
-    if params[6] is None and command in (commands.WAYPOINT, commands.SPLINE_WAYPOINT):
-        raise InputError(f"{source}: {key}.params[6]: is null; a waypoint must have an altitude")
+    values = filled(given, command, frame, lambda i: f"{source}: {key}.params[{i}]: is null")
     jump_id = item.get("doJumpId")
     numbered = jump_id if isinstance(jump_id, int) and not isinstance(jump_id, bool) else number
-    return Item(f"{source}: {key}", numbered, command, frame, tuple(values))
+    return Item(f"{source}: {key}", numbered, command, frame, values, item.get("autoContinue") is False)
 
 
 def _with_place(params: list[Any], place: list[Any]) -> list[Any]:
@@ -174,7 +169,7 @@ def _landing(item: dict[str, Any], key: str, source: str, number: int, land: int
     first = (1.0, side * abs(radius), 0.0, 1.0) if turning else (0.0, 0.0, 0.0, 0.0)
     command = commands.LOITER_TO_ALTITUDE if turning else commands.WAYPOINT
     place = f"{source}: {key}"
-    yield Item(place, number, commands.LAND_START, 2, (0.0,) * 7)
+    yield Item(place, number, commands.LAND_START, MISSION, (0.0,) * 7)
     yield Item(place, number + 1, command, frames[0], (*first, *approach))
     yield Item(place, number + 2, land, frames[1], (0.0, 0.0, 0.0, 0.0, *landing))
 

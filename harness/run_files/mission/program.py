@@ -14,7 +14,7 @@ from typing import Final
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.run_files.mission import commands
-from harness.run_files.mission.items import HOME, LOCAL, Item, MissionAsRead
+from harness.run_files.mission.items import FRAMES, HOME, LOCAL, MISSION, Item, MissionAsRead
 from harness.run_files.mission.steps import (
     FLOWN,
     NOT_FLOWN,
@@ -39,6 +39,8 @@ DEGREE_M: Final = 111_200.0
 
 SIDE_ALONE_M: Final = 1.0
 """A radius of 1 m or less says which way round, and no more: ArduPlane hands back 1 or -1 where it has none."""
+
+NOT_LOADED: Final = "ArduPilot and QGroundControl load no mission with it"
 
 AIRSPEED, GROUND_SPEED = 0, 1
 """Kinds of speed of a change of speed, its first parameter."""
@@ -65,7 +67,9 @@ def program(mission: MissionAsRead) -> Program:
             f"{mission.source}: has {counted(len(run.steps), 'item')} to fly to{told}; a path has at least 2"
         )
     items = tuple(
-        run.told.get(item.number, Told(item.number, commands.name_of(item.command), NOT_REACHED))
+        run.told.get(
+            item.number, Told(item.number, commands.name_of(item.command), NOT_REACHED, run.doubt(item))
+        )
         for item in mission.items
     )
     return Program(run.local, tuple(run.steps), items)
@@ -119,8 +123,15 @@ class _Run:
         if self.home is None or step.position in (None, self.home) or step.landing:
             return
         self.steps.insert(0, MissionStep(step.item, "home", self.home, step.height_m, step.above))
-        told = self.told[step.item]
-        self.told[step.item] = replace(told, why="; ".join(filter(None, (told.why, "from above home"))))
+        self._add(step.item, "from above home")
+
+    def doubt(self, item: Item) -> str:
+        """Why autopilots may not load a mission for an item that is not even reached; empty where they do."""
+        if item.command == commands.JUMP and item.params[0] not in self.index:
+            return f"to item {item.params[0]:g}, which does not exist: {NOT_LOADED}"
+        if item.command in commands.FLOWN and item.position is not None and item.frame not in FRAMES:
+            return f"has the frame {item.frame}: autopilots load no mission with it"
+        return ""
 
     def _jump(self, item: Item, at: int) -> int:
         """Where it goes on after a jump."""
@@ -149,10 +160,14 @@ class _Run:
             for place, each in enumerate(self.mission.items):
                 if each.command == commands.TAG and each.params[0] == wanted:
                     return place
-            raise InputError(f"{item.place}: item {item.number} jumps to tag {wanted:g}, which no item has")
+            raise InputError(
+                f"{item.place}: item {item.number} jumps to tag {wanted:g}, which no item has; must be the tag of one "
+                "(600): ArduPilot would end the mission there"
+            )
         if wanted not in self.index:
             raise InputError(
-                f"{item.place}: item {item.number} jumps to item {wanted:g}, which does not exist"
+                f"{item.place}: item {item.number} jumps to item {wanted:g}, which does not exist; must be one from "
+                f"{min(self.index)} to {max(self.index)}: {NOT_LOADED}"
             )
         return self.index[int(wanted)]
 
@@ -201,9 +216,12 @@ class _Run:
             **dict.fromkeys(commands.LANDINGS, self._land),
             **dict.fromkeys(commands.TAKEOFFS, self._takeoff),
         }
+        again = item.number in self.told
         step = fly.get(item.command, self._waypoint)(item)
         if step is None:
             return
+        if item.frame == MISSION and step.height_m is not None and not again:
+            self._add(item.number, "frame 2 says nothing of altitudes: above the sea, as ArduPilot has it")
         self.steps.append(step)
         self.airspeed_mps = None
         ends = item.command in (commands.LOITER_UNLIMITED, commands.RETURN_TO_LAUNCH, *commands.LANDINGS)
@@ -333,6 +351,11 @@ class _Run:
 
     def _tell(self, item: Item, what: str, why: str = "") -> None:
         self.told.setdefault(item.number, Told(item.number, commands.name_of(item.command), what, why))
+
+    def _add(self, number: int, why: str) -> None:
+        """Adds to what is told of an item."""
+        told = self.told[number]
+        self.told[number] = replace(told, why="; ".join(filter(None, (told.why, why))))
 
 
 def _bounded(item: Item, verb: str, value: float, most: float, unit: str) -> float:

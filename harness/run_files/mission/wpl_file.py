@@ -6,16 +6,19 @@ The format: https://mavlink.io/en/file_formats/#mission_plain_text_file
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Final
 
 from harness.files.fence_commands import APART, RALLY_POINT
 from harness.files.input_file import InputError
 from harness.run_files.mission import commands, fence_items
-from harness.run_files.mission.items import FRAMES, SEA, Item, MissionAsRead
+from harness.run_files.mission.items import FRAMES, SEA, Item, MissionAsRead, filled, waiting_notes
 from harness.run_files.read_values import finite, whole
 
 WPL: Final = "QGC WPL"
 CELLS: Final = 12
+FIRST_PARAMETER: Final = 5
+"""The field, counted from 1, of the first parameter of an item."""
 COMMENT: Final = "#"
 NAN: Final = "nan"
 RALLY: Final = "RALLY"
@@ -49,9 +52,10 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
             raise InputError(f"{place}: has {len(cells)} fields; a mission item has {CELLS}")
         index, frame, command = (whole(cells[i], place) for i in (0, 2, 3))
         # What is left to the autopilot is 0, or no number.
-        params = [0.0 if cell.lower() == NAN else finite(cell, place) for cell in cells[4:8]]
-        params += [finite(cell, place) for cell in cells[8:11]]
-        items.append(Item(place, index, command, frame, tuple(params)))
+        given = [None if cell.lower() == NAN else finite(cell, place) for cell in cells[4:11]]
+        params = filled(given, command, frame, partial(_missing, place))
+        off = finite(cells[11], place) == 0.0
+        items.append(Item(place, index, command, frame, params, off))
     if not items:
         raise InputError(f"{source}: has no items; the first is home, the others are the path")
     items, notes = _numbered(items)
@@ -70,8 +74,17 @@ def read_waypoints(text: str, source: str) -> MissionAsRead:
         None if home is None else home.position,
         0.0 if home is None else home.params[6],
         fence_items.fences_of(others, None if home is None else home.position),
-        (*notes, *fence_items.rally_note(rally)),
+        (
+            *notes,
+            *fence_items.rally_note(rally),
+            *waiting_notes([item.number for item in flown if item.waits]),
+        ),
     )
+
+
+def _missing(place: str, index: int) -> str:
+    """What a fault says of a parameter that is no number."""
+    return f"{place}: field {FIRST_PARAMETER + index} is nan"
 
 
 def _is_home(first: Item) -> bool:

@@ -274,7 +274,7 @@ BROKEN = {
     "unknown frame": (
         "a.waypoints",
         wpl(*wpl_items(frame=9)),
-        ":3: item 1 has the frame 9; must be one of 0, 1, 3",
+        ":3: item 1 has the frame 9; must be one of 0, 1, 2, 3",
     ),
     "mixed frames": (
         "a.waypoints",
@@ -284,7 +284,7 @@ BROKEN = {
     "a jump to nowhere": (
         "a.waypoints",
         wpl(*wpl_items(), line(4, 0, 3, 177, 9, 2, 0, 0, 0, 0, 0, 1)),
-        ":6: item 4 jumps to item 9, which does not exist",
+        ":6: item 4 jumps to item 9, which does not exist; must be one from 1 to 4: ArduPilot and QGroundControl",
     ),
     "a jump to itself": (
         "a.waypoints",
@@ -419,7 +419,80 @@ def test_parameters_that_are_no_number_are_left_to_the_autopilot_and_places_must
     assert found.mission is not None
     assert len(found.mission.program.steps) == 3
     path.write_text(wpl(line(1, 0, 3, 16, 0, 0, 0, 0, "nan", 8.0, 120, 1), *wpl_items()[1:]))
-    with pytest.raises(InputError, match=":3: is 'nan'; must be a finite number"):
+    with pytest.raises(InputError, match=":3: field 9 is nan; a place must have latitude and longitude"):
+        read_path(path)
+
+
+@pytest.mark.parametrize("place", [("nan", "nan", "nan"), (0, 0, "nan"), ("nan", 8, 50)])
+def test_no_number_in_the_place_of_an_item_that_has_none_is_left_to_the_autopilot(
+    place: tuple[object, ...], tmp_path: Path
+) -> None:
+    """The mission was refused for a servo, a camera, or a return."""
+    path = tmp_path / "a.waypoints"
+    items = [line(number, 0, 2, command, *(0,) * 4, *place, 1) for number, command in ((4, 183), (5, 206))]
+    path.write_text(wpl(*wpl_items(), *items))
+    found = read_path(path)
+    assert found.mission is not None
+    assert [each.what for each in found.mission.program.items] == ["flown"] * 3 + ["passed over"] * 2
+
+
+@pytest.mark.parametrize(
+    ("command", "frame", "params", "name"),
+    [
+        (16, 3, [0, 0, 0, None, 47.0, 8.0, None], "waypoint"),
+        (22, 3, [0, 0, 0, None, 47.0, 8.0, None], "takeoff"),
+        (22, 3, [0, 0, 0, None, None, None, None], "takeoff"),
+        (19, 3, [9, 0, 0, None, 47.0, 8.0, None], "loiter time"),
+        (21, 0, [0, 0, 0, None, 47.0, 8.0, None], "land"),
+    ],
+)
+def test_no_altitude_is_not_an_altitude_of_zero(
+    command: int, frame: int, params: list[float | None], name: str, tmp_path: Path
+) -> None:
+    """A takeoff, a loiter or a landing without an altitude was flown at that of home, or of the sea."""
+    first, last = item(*POINTS[1], doJumpId=1), item(*POINTS[2], doJumpId=3)
+    path = tmp_path / "a.plan"
+    path.write_text(plan(item(0, 0, doJumpId=1, command=command, frame=frame, params=params), last))
+    with pytest.raises(InputError) as fault:
+        read_path(path)
+    assert str(fault.value) == (
+        f"{path}: mission.items[0].params[6]: is null; a {name} must have an altitude"
+    )
+    path = tmp_path / "a.waypoints"
+    cells = ["nan" if each is None else each for each in params]
+    path.write_text(wpl(line(1, 0, frame, command, *cells, 1), *wpl_items()[1:]))
+    with pytest.raises(InputError, match=f":3: field 11 is nan; a {name} must have an altitude"):
+        read_path(path)
+    here = item(0, 0, doJumpId=2, command=19, params=[9, 0, 0, None, None, None, None])
+    path = tmp_path / "b.plan"
+    path.write_text(plan(first, here, last))
+    found = read_path(path)
+    assert found.mission is not None
+    assert [step.height_m for step in found.mission.program.steps] == [120.0, None, 120.0]
+
+
+def test_items_whose_autocontinue_is_off_are_named(tmp_path: Path) -> None:
+    """PX4 waits there; the flight went on without a word."""
+    said = "autocontinue is off: PX4 waits there to be told to go on; flown on, as ArduPilot does"
+    path = tmp_path / "a.waypoints"
+    rows = wpl_items()
+    path.write_text(wpl(*rows[:2], rows[2][:-1] + "0", line(4, 0, 2, 183, *(0,) * 7, 0)))
+    assert f"item 3: {said}" in read_path(path).notes
+    path.write_text(wpl(*rows))
+    assert not any("autocontinue" in note for note in read_path(path).notes)
+    path = tmp_path / "a.plan"
+    path.write_text(
+        plan(*(item(*place, doJumpId=k, autoContinue=False) for k, place in enumerate(POINTS * 5, start=1)))
+    )
+    assert f"items 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, ...: {said}" in read_path(path).notes
+
+
+def test_a_place_that_is_none_is_told_by_the_number_of_its_item(tmp_path: Path) -> None:
+    path = tmp_path / "a.waypoints"
+    path.write_text(
+        wpl(line(1, 0, 2, 183, *(0,) * 7, 1), *wpl_items()[1:], line(4, 0, 3, 16, 0, 0, 0, 0, 91, 8, 9, 1))
+    )
+    with pytest.raises(InputError, match="item 4 is at latitude 91, longitude 8; must be degrees"):
         read_path(path)
 
 

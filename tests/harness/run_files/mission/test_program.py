@@ -116,11 +116,41 @@ def test_an_item_without_a_place_is_where_the_one_before_was() -> None:
 
 
 @pytest.mark.parametrize(
-    ("frame", "altitude"), [(0, 100.0), (5, 100.0), (3, 500.0), (6, 500.0), (10, 650.0), (11, 650.0)]
+    ("frame", "altitude"),
+    [(0, 100.0), (5, 100.0), (2, 100.0), (3, 500.0), (6, 500.0), (10, 650.0), (11, 650.0)],
 )
 def test_frames_say_what_an_altitude_is_above(frame: int, altitude: float) -> None:
     step = run(item(1, 16, 0, 0, 0, 0, 47.1, 8, 100, frame=frame), at(2)).steps[0]
     assert altitude_m(step, 400.0, 550.0, math.nan) == altitude
+
+
+def test_a_frame_that_says_nothing_of_altitudes_is_told() -> None:
+    """ArduPilot takes it as above the sea: AP_Mission::mavlink_int_to_mission_cmd; the mission was refused."""
+    said = "frame 2 says nothing of altitudes: above the sea, as ArduPilot has it"
+    there = (0, 0, 0, 0, 47.1, 8, 100)
+    done = run(item(1, 16, *there, frame=2), at(2), item(3, 18, 2, *there[1:], frame=2), item(4, 177, 1, 1))
+    assert flown(done) == [1, 2, 3, 1, 2, 3]
+    assert told(done)[1] == ("flown", said)
+    assert told(done)[3] == ("flown", f"2 turns; {said}")
+    done = run(at(1), item(2, 19, 30, frame=2), item(3, 20, frame=2))
+    assert (told(done)[2], flown(done)) == (("flown", "30 s"), [1, 2, 3])
+
+
+@pytest.mark.parametrize("frame", [7, 8, 9, 12, 20, 21])
+def test_frames_that_autopilots_do_not_load_are_refused(frame: int) -> None:
+    with pytest.raises(InputError, match=f"m:2: item 2 has the frame {frame}; must be one of 0, 1, 2, 3"):
+        run(at(1), item(2, 16, 0, 0, 0, 0, 47.1, 8, 100, frame=frame))
+
+
+def test_what_is_not_reached_and_would_not_be_loaded_is_told() -> None:
+    done = run(
+        at(1), at(2), item(3, 20), item(4, 177, 9, 1), item(5, 16, 0, 0, 0, 0, 47.1, 8, 9, frame=21), at(6)
+    )
+    assert [told(done)[number] for number in (4, 5, 6)] == [
+        ("not reached", "to item 9, which does not exist: ArduPilot and QGroundControl load no mission with it"),
+        ("not reached", "has the frame 21: autopilots load no mission with it"),
+        ("not reached", ""),
+    ]  # fmt: skip
 
 
 def test_a_landing_before_a_takeoff_is_flown_on_from() -> None:
