@@ -8,7 +8,7 @@ feasible, and guidance asked for all the bank there is nonetheless.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,6 +38,28 @@ ROUNDING = 1.001
 
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
+
+FINDINGS: Mapping[str, str] = {
+    "planner too late": "the aircraft was off the plan already when the plan took effect",
+    "turn radius too tight": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)), or the "
+    "aircraft was further from the path as given than allowed",
+    "sensor horizon": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)), near an obstacle "
+    "that the sensor shows too late for a wider turn",
+    "bank limit": "the bank command was at its limit, on a radius that the limit allows",
+    "wind drift": "the bank command was at its limit, on a radius that only the wind makes too tight; or the aircraft "
+    "was off downwind in a cross-wind",
+    "roll rate": "the aircraft rolled at its largest rate",
+    "actuator": "a servo was at its rate limit",
+    "load factor": "the load factor was larger than allowed",
+    "speed or throttle saturation": "the aircraft was off its airspeed, or off its altitude with the throttle at a "
+    "stop",
+    "climb too steep": "the aircraft was off its altitude, on a path steeper than its fastest climb",
+    "descent too steep": "the aircraft was off its altitude, on a path steeper than its fastest descent",
+    NAVIGATION_ERROR: "where the true position was furthest off, the believed one was within the limits",
+    "lost control": "the flight ended with loss of control",
+    "tracking error": "none of the other causes",
+}
+"""What each cause says was found, for people."""
 
 
 def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: float | None) -> bool:

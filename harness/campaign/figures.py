@@ -7,15 +7,21 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from harness.campaign.points import Failure, RunPoints
-from harness.campaign.summary import CURVE_POINTS, Table
+from harness.campaign.points import RunPoints
+from harness.campaign.summary import CURVE_POINTS, Summary, Table
+from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
+from harness.flight.record import FloatArray
 from harness.report.figure_style import DASHES, WIDTH_IN, colour, styled
-from harness.report.figures import draw_map, thinned
+from harness.report.figures import FigureScene, draw_map, thinned
 
 HEIGHT_IN = 2.9
 LEGEND_LETTERS, KEY_LETTERS = 66, 6
@@ -28,6 +34,8 @@ PANEL_IN = 1.5
 """Height of a panel of small multiples."""
 MAPS_A_ROW, MAP_TITLE_IN = 3, 0.45
 """Maps of failures beside one another, and what each has above and below it."""
+MOST_FAILURES: Final = 9
+"""Failures beyond these are not drawn."""
 MAP_TICKS_IN = 0.3
 """What each has beside it."""
 ROW_LETTERS = 56
@@ -162,3 +170,60 @@ def _columns(planners: Sequence[str]) -> int:
 def _legend(figure: Figure, planners: Sequence[str]) -> None:
     if len(planners) > 1:
         figure.legend(loc="outside lower center", ncols=_columns(planners), frameon=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """A run that did not reach the goal.
+
+    Attributes:
+        run: its number.
+        outcome: how it ended.
+        scene: its world.
+        track_m: (n, 2) what was flown, east and north.
+    """
+
+    run: int
+    outcome: str
+    scene: FigureScene
+    track_m: FloatArray
+
+
+def failures(summary: Summary, folder: Path) -> list[Failure]:
+    """The worst of the runs that failed, as far as their run folders were kept.
+
+    Args:
+        summary: of the campaign.
+        folder: of the campaign.
+    """
+    kept = (each for each in summary.worst if each.outcome != "reached" and each.folder)
+    return list(_failures([(each.run, each.outcome, folder / each.folder) for each in kept]))[:MOST_FAILURES]
+
+
+def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
+    from harness.run_files.run_folder import load_run
+    from harness.scenario.performance import mission_of
+    from harness.scenario.scenario import parse_scenario
+    from harness.scenario.validation import KeyFault
+    from harness.world.world import World
+
+    for number, outcome, folder in runs:
+        try:
+            run = load_run(folder)
+            scenario = parse_scenario(run.scenario_yaml, str(folder), as_flown=True)
+            mission = mission_of(scenario)
+        except (RunFolderError, InputError, KeyFault):
+            # It broke off, is of other versions, or of a guidance law that is not here: there is nothing to draw.
+            continue
+        scene = FigureScene(
+            name=scenario.name,
+            bounds_m=mission.bounds_m,
+            obstacles=World.from_scenario(scenario).obstacles,
+            start_m=scenario.mission.start_m,
+            goal_m=mission.goal_m,
+            goal_radius_m=mission.goal_radius_m,
+            clearance_m=mission.clearance_m,
+            turn_radius_m=mission.turn_radius_m,
+            optimum_m=np.zeros((0, 2)),
+        )
+        yield Failure(number, outcome, scene, np.column_stack((run.track.east_m, run.track.north_m)))

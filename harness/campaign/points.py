@@ -1,30 +1,47 @@
-"""The runs of a campaign one by one: points of figures and varied numbers, runs that stand out, ways of failures."""
+"""The runs of a campaign one by one: points of figures and varied numbers, those to look at and why."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import shlex
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.campaign.table import Runs, column, load_tables, own_name, runs_of, varied_keys
-from harness.files.errors import RunFolderError
-from harness.files.input_file import InputError
+from harness.campaign.results import ERROR, RESULTS, RUNS, fly_again
+from harness.campaign.table import (
+    HOW_BAD,
+    NAMED,
+    Runs,
+    allowed_for,
+    column,
+    load_tables,
+    own_name,
+    run_name,
+    runs_of,
+    varied_keys,
+)
 from harness.flight.record import FloatArray
+from harness.run_files.run_folder import RECORDING, REPORT
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from harness.campaign.summary import Summary
-    from harness.report.figures import FigureScene
 
-MOST_FAILURES: Final = 9
-"""Failures beyond these are not drawn."""
 MOST_KEYS: Final = 4
 """Numbers that were varied beyond these are not drawn."""
+WORST: Final = 10
+CLOSEST: Final = 3
+"""Runs shown where none failed: those that came closest to an obstacle."""
+FIRST: Final = 5
+"""Runs that are named of those that were not tracked for the same causes."""
+SEVERITY: Final = tuple(
+    f"collision lost_control out_of_bounds planner_failed {ERROR} timeout unreachable".split()
+)
+"""Outcomes other than `reached`, the worst first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,18 +82,18 @@ def run_points(folder: Path) -> RunPoints:
 
 
 STANDING_OUT: Final = {
-    "cross_track_m.max": ("cross-track error, m", 1.0),
-    "altitude_error_m.max": ("altitude error, m", 1.0),
-    "navigation_error_m.max": ("navigation error, m", 1.0),
-    "navigation_jump_m": ("jump of the believed position, m", 1.0),
-    "bank_saturation_fraction": ("time at the bank limit, %", 100.0),
-    "max_load_factor": ("load factor", 1.0),
-    "plan_delay_s.max": ("plan delay, s", 1.0),
-    "lost_returns.max": ("returns lost in the worst scan, %", 100.0),
-    "smoothness.flown.heading_change_deg": ("heading change, deg", 1.0),
-    "length_ratio": ("length over the optimum", 1.0),
+    "cross_track_m.max": ("cross-track error", "m", 1.0),
+    "altitude_error_m.max": ("altitude error", "m", 1.0),
+    "navigation_error_m.max": ("navigation error", "m", 1.0),
+    "navigation_jump_m": ("jump of the believed position", "m", 1.0),
+    "bank_saturation_fraction": ("time at the bank limit", "%", 100.0),
+    "max_load_factor": ("load factor", "", 1.0),
+    "plan_delay_s.max": ("plan delay", "s", 1.0),
+    "lost_returns.max": ("returns lost in the worst scan", "%", 100.0),
+    "smoothness.flown.heading_change_deg": ("heading change", "deg", 1.0),
+    "length_ratio": ("length over the optimum", "", 1.0),
 }
-"""Figures whose largest value is named with its run, by their column of the results; label, and factor for its unit."""
+"""Figures whose largest value is named with its run, by their column of the results; label, unit and factor for it."""
 
 OF_NAVIGATION: Final = ("navigation_error_m.max", "navigation_jump_m")
 """Those that a run with perfect navigation does not have."""
@@ -93,6 +110,7 @@ class Extreme:
 
     Attributes:
         figure: what it is of, with its unit.
+        unit: the unit alone, empty without one.
         run: its number.
         name: what of its world, planner and aircraft not all runs share.
         value: the figure: the largest of all runs, of clearance the least.
@@ -104,12 +122,18 @@ class Extreme:
     """
 
     figure: str
+    unit: str
     run: int
     name: str
     value: float
     following: float | None
     median: float
     apart: bool = False
+
+    @property
+    def quantity(self) -> str:
+        """What it is of, without its unit."""
+        return self.figure.removesuffix(f", {self.unit}")
 
 
 def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
@@ -122,15 +146,17 @@ def extremes(results: pa.Table, runs: Runs) -> tuple[Extreme, ...]:
         runs: the same rows.
     """
     wanted_m = np.where((runs.wanted_clearance_m > 0.0) & runs.reached, runs.wanted_clearance_m, np.nan)
-    figures = {label: factor * _known(results, name) for name, (label, factor) in STANDING_OUT.items()} | {
-        "longest search, ms": runs.planner_ms["max"]
-    }
-    least = _extreme(runs, "clearance over the wanted one, goal reached", -runs.min_clearance_m / wanted_m)
+    figures = {
+        (label, unit): factor * _known(results, name) for name, (label, unit, factor) in STANDING_OUT.items()
+    } | {("longest search", "ms"): runs.planner_ms["max"]}
+    least = _extreme(
+        runs, "clearance over the wanted one, goal reached", "", -runs.min_clearance_m / wanted_m
+    )
     if least is not None:
         following = None if least.following is None else -least.following
         least = replace(least, value=-least.value, following=following, median=-least.median)
         least = replace(least, apart=following is not None and least.value < 1.0 <= following)
-    found = (least, *(_extreme(runs, label, values) for label, values in figures.items()))
+    found = (least, *(_extreme(runs, *figure, values) for figure, values in figures.items()))
     marked = [replace(each, apart=each.apart or _is_apart(each)) for each in found if each is not None]
     return tuple(sorted(marked, key=lambda each: not each.apart))
 
@@ -148,7 +174,7 @@ def _is_apart(extreme: Extreme) -> bool:
     return more > 0.0 and more >= APART * less
 
 
-def _extreme(runs: Runs, figure: str, values: FloatArray) -> Extreme | None:
+def _extreme(runs: Runs, quantity: str, unit: str, values: FloatArray) -> Extreme | None:
     """The run with the largest value; None where none is larger than the median."""
     known = np.flatnonzero(np.isfinite(values))
     if not len(known):
@@ -161,7 +187,8 @@ def _extreme(runs: Runs, figure: str, values: FloatArray) -> Extreme | None:
         1:
     ].tolist()
     following = float(values[others[0]]) if others else None
-    return Extreme(figure, int(runs.run[row]), own_name(runs, row), float(values[row]), following, median)
+    figure, value = f"{quantity}, {unit}" if unit else quantity, float(values[row])
+    return Extreme(figure, unit, int(runs.run[row]), own_name(runs, row), value, following, median)
 
 
 def _numeric(values: tuple[object, ...]) -> bool:
@@ -171,59 +198,152 @@ def _numeric(values: tuple[object, ...]) -> bool:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Failure:
-    """A run that did not reach the goal.
+@dataclass(frozen=True)
+class WorstRun:
+    """A run to look at.
 
     Attributes:
         run: its number.
-        outcome: how it ended.
-        scene: its world.
-        track_m: (n, 2) what was flown, east and north.
+        name: scenario or world, planner and aircraft.
+        seed: of the flight.
+        outcome: as in `results.parquet`.
+        reason: the same as a sentence.
+        min_clearance_m: least distance to an obstacle edge.
+        clearance_ratio: the same over the wanted one, where that is known.
+        varied: the varied keys with their values.
+        folder: its run folder relative to the campaign's, empty where none was kept.
+        recording: whether there is a recording in it.
+        report: whether there is a report in it.
+        make_report: the command that writes one, empty without a run folder.
+        view: the command that shows the recording, empty without one.
+        command: flies it again.
     """
 
     run: int
+    name: str
+    seed: int
     outcome: str
-    scene: FigureScene
-    track_m: FloatArray
+    reason: str
+    min_clearance_m: float | None
+    clearance_ratio: float | None
+    varied: Mapping[str, Any]
+    folder: str
+    recording: bool
+    report: bool
+    make_report: str
+    view: str
+    command: str
 
 
-def failures(summary: Summary, folder: Path) -> list[Failure]:
-    """The worst of the runs that failed, as far as their run folders were kept.
+@dataclass(frozen=True)
+class Untracked:
+    """Runs that were not tracked for the same causes.
 
-    Args:
-        summary: of the campaign.
-        folder: of the campaign.
+    Attributes:
+        causes: of all their legs; empty where nothing was flown of a plan.
+        allowed_for: these are navigation errors alone, within what was planned for them.
+        count: how many runs.
+        runs: numbers of the first of them.
+        cross_track_max_m: the largest cross-track error of all of them; None where it is not known.
+        cross_track_median_m: of the largest of each run of the campaign, the median; likewise.
     """
-    kept = (each for each in summary.worst if each.outcome != "reached" and each.folder)
-    return list(_failures([(each.run, each.outcome, folder / each.folder) for each in kept]))[:MOST_FAILURES]
+
+    causes: str
+    allowed_for: bool
+    count: int
+    runs: tuple[int, ...]
+    cross_track_max_m: float | None = None
+    cross_track_median_m: float | None = None
 
 
-def _failures(runs: list[tuple[int, str, Path]]) -> Iterator[Failure]:
-    from harness.report.figures import FigureScene
-    from harness.run_files.run_folder import load_run
-    from harness.scenario.performance import mission_of
-    from harness.scenario.scenario import parse_scenario
-    from harness.scenario.validation import KeyFault
-    from harness.world.world import World
-
-    for number, outcome, folder in runs:
-        try:
-            run = load_run(folder)
-            scenario = parse_scenario(run.scenario_yaml, str(folder), as_flown=True)
-            mission = mission_of(scenario)
-        except (RunFolderError, InputError, KeyFault):
-            # It broke off, is of other versions, or of a guidance law that is not here: there is nothing to draw.
-            continue
-        scene = FigureScene(
-            name=scenario.name,
-            bounds_m=mission.bounds_m,
-            obstacles=World.from_scenario(scenario).obstacles,
-            start_m=scenario.mission.start_m,
-            goal_m=mission.goal_m,
-            goal_radius_m=mission.goal_radius_m,
-            clearance_m=mission.clearance_m,
-            turn_radius_m=mission.turn_radius_m,
-            optimum_m=np.zeros((0, 2)),
+def untracked_runs(results: pa.Table, runs: Runs) -> tuple[Untracked, ...]:
+    """Runs that were not tracked, by why, the most frequent first, but those allowed for last."""
+    rows = results.select([name for name in HOW_BAD if name in results.column_names]).to_pylist()
+    alike: dict[tuple[str, bool], list[int]] = {}
+    for place in np.flatnonzero(runs.trackable == 0.0).tolist():
+        why = rows[place].get("trackability.causes") or ""
+        alike.setdefault((why, allowed_for(rows[place])), []).append(place)
+    off_m = runs.cross_track_max_m
+    return tuple(
+        Untracked(
+            why,
+            allowed,
+            len(places),
+            tuple(runs.run[places[:FIRST]].tolist()),
+            _known_or_none(np.max, off_m[places]),
+            _known_or_none(np.median, off_m),
         )
-        yield Failure(number, outcome, scene, np.column_stack((run.track.east_m, run.track.north_m)))
+        for (why, allowed), places in sorted(alike.items(), key=lambda each: (each[0][1], -len(each[1])))
+    )
+
+
+def _known_or_none(figure: Callable[[FloatArray], Any], values: FloatArray) -> float | None:
+    """A figure of the values that are known; None where none is."""
+    known = values[np.isfinite(values)]
+    return float(figure(known)) if len(known) else None
+
+
+def worst_runs(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...]:
+    """Failures by severity, then by clearance over the wanted one, or by clearance where that is unknown.
+
+    Where nothing failed, the few that came closest.
+    """
+    ratio = _clearance_ratio(runs)
+    near = ratio if np.isfinite(ratio).any() else runs.min_clearance_m
+    severity = {outcome: place for place, outcome in enumerate((*SEVERITY, "reached"))}
+    outcomes = runs.names["outcome"]
+    order = sorted(
+        range(len(runs)),
+        key=lambda row: (
+            severity.get(outcomes[row], len(SEVERITY) - 1),
+            near[row] if np.isfinite(near[row]) else np.inf,
+            runs.run[row],
+        ),
+    )
+    failed = int((~runs.reached).sum())
+    shown = order[: min(failed, WORST)] if failed else order[:CLOSEST]
+    return tuple(_worst_run(runs, row, folder, keys) for row in shown)
+
+
+def named_runs(
+    runs: Runs,
+    folder: Path,
+    keys: Sequence[str],
+    standing_out: Sequence[Extreme],
+    untracked: Sequence[Untracked],
+    known: Collection[int],
+) -> tuple[WorstRun, ...]:
+    """The runs that are named by their number, but for those already known."""
+    numbers = {each.run for each in standing_out}.union(*(each.runs for each in untracked)) - {*known}
+    rows = [row for row, number in enumerate(runs.run.tolist()) if number in numbers]
+    return tuple(_worst_run(runs, row, folder, keys) for row in rows)
+
+
+def _clearance_ratio(runs: Runs) -> FloatArray:
+    """Least clearance over the wanted one; NaN where one of them is not known."""
+    ratio: FloatArray = runs.min_clearance_m / np.where(
+        runs.wanted_clearance_m > 0.0, runs.wanted_clearance_m, np.nan
+    )
+    return ratio
+
+
+def _worst_run(runs: Runs, row: int, folder: Path, keys: Sequence[str]) -> WorstRun:
+    number, names, ratio = int(runs.run[row]), runs.names, float(_clearance_ratio(runs)[row])
+    kept, clearance = Path(RUNS) / str(number), float(runs.min_clearance_m[row])
+    is_kept, recording = (folder / kept).is_dir(), (folder / kept / RECORDING).is_file()
+    return WorstRun(
+        run=number,
+        name=run_name(runs, row),
+        seed=int(runs.seed[row]),
+        outcome=names["outcome"][row],
+        reason=names["reason"][row],
+        min_clearance_m=clearance if np.isfinite(clearance) else None,
+        clearance_ratio=ratio if np.isfinite(ratio) else None,
+        varied={key: runs.varied[key][row] for key in keys if key not in NAMED},
+        folder=str(kept) if is_kept else "",
+        recording=recording,
+        report=(folder / kept / REPORT).is_file(),
+        make_report=shlex.join(["wayproof", "report", str(folder / kept)]) if is_kept else "",
+        view=shlex.join(["wayproof", "view", str(folder / kept)]) if recording else "",
+        command=fly_again(folder / RESULTS, number),
+    )

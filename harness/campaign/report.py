@@ -9,8 +9,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from harness.analysis.causes import FINDINGS
 from harness.analysis.rows import number
-from harness.campaign.points import failures, run_points
+from harness.campaign.points import run_points
 from harness.campaign.questions import QUESTIONS, difference, ratio, shade
 from harness.campaign.summary import Summary
 from harness.files.errors import WriteError
@@ -58,6 +59,8 @@ def summary_html(summary: Summary, folder: Path) -> str:
         questions=QUESTIONS,
         pictures=list(_pictures(summary, folder)) if summary.total.runs else [],
         failures=_failure_maps(summary, folder),
+        findings=FINDINGS,
+        command=shlex.join(["wayproof", "report", "--run-reports", str(folder)]),
         difference=difference,
         ratio=ratio,
         number=number,
@@ -79,7 +82,7 @@ def _pictures(summary: Summary, folder: Path) -> Iterator[Picture]:
         yield Picture(
             svg(campaign_figures.lengths(summary.lengths)),
             "Distribution of the flown length over the clairvoyant optimum",
-            "How long the ways were: the share of the goals reached with at most this length over the optimum.",
+            "Flown lengths: the share of the goals reached with at most this length over the clairvoyant optimum.",
         )
     scattered = campaign_figures.scatter(run_points(folder))
     if scattered is not None:
@@ -93,11 +96,12 @@ def _pictures(summary: Summary, folder: Path) -> Iterator[Picture]:
 
 def _failure_maps(summary: Summary, folder: Path) -> Picture | None:
     """Where runs failed; None where none did, or no run folder was kept of any that did."""
+    from harness.campaign.figures import failures, where_failed
+    from harness.report.figure_style import svg
+
     failed = failures(summary, folder)
     if not failed:
         return None
-    from harness.campaign.figures import where_failed
-    from harness.report.figure_style import svg
 
     return Picture(
         svg(where_failed(failed)),

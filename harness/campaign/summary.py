@@ -7,53 +7,43 @@ whose software failed counts as one that did not reach its goal; so does a goal 
 from __future__ import annotations
 
 import itertools
-import shlex
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.campaign.groups import Axis, grouped
 from harness.campaign.paired import CONFIDENCE, Duel, duels
-from harness.campaign.points import Extreme, extremes
-from harness.campaign.results import ERROR, RESULTS, fly_again
+from harness.campaign.points import (
+    Extreme,
+    Untracked,
+    WorstRun,
+    extremes,
+    named_runs,
+    untracked_runs,
+    worst_runs,
+)
 from harness.campaign.table import (
-    HOW_BAD,
     NAMED,
     Runs,
-    allowed_for,
     are_crossed,
     drawn_keys,
     load_tables,
     planned_runs,
-    run_name,
     runs_of,
     varied_keys,
 )
 from harness.files.strict_yaml import InputError
 from harness.flight.record import FloatArray
-from harness.run_files.run_folder import RECORDING
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-WORST: Final = 10
-CLOSEST: Final = 3
-"""Runs shown where none failed: those that came closest to an obstacle."""
-FIRST: Final = 5
-"""Runs that are named of those that were not tracked for the same causes."""
 BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of so many varied keys, the first ones."""
 
 CURVE_POINTS: Final = 201
-SEVERITY: Final = tuple(
-    f"collision lost_control out_of_bounds planner_failed {ERROR} timeout unreachable".split()
-)
-"""Outcomes other than `reached`, the worst first."""
 
 
 @dataclass(frozen=True)
@@ -104,56 +94,6 @@ class Table:
     rows: Axis
     columns: Axis | None
     cells: tuple[tuple[Cell, ...], ...]
-
-
-@dataclass(frozen=True)
-class WorstRun:
-    """A run to look at.
-
-    Attributes:
-        run: its number.
-        name: scenario or world, planner and aircraft.
-        seed: of the flight.
-        outcome: as in `results.parquet`.
-        reason: the same as a sentence.
-        min_clearance_m: least distance to an obstacle edge.
-        clearance_ratio: the same over the wanted one, where that is known.
-        varied: the varied keys with their values.
-        folder: its run folder relative to the campaign's, empty where none was kept.
-        recording: whether there is a recording in it.
-        view: the command that shows the recording, empty without one.
-        command: flies it again.
-    """
-
-    run: int
-    name: str
-    seed: int
-    outcome: str
-    reason: str
-    min_clearance_m: float | None
-    clearance_ratio: float | None
-    varied: Mapping[str, Any]
-    folder: str
-    recording: bool
-    view: str
-    command: str
-
-
-@dataclass(frozen=True)
-class Untracked:
-    """Runs that were not tracked for the same causes.
-
-    Attributes:
-        causes: of all their legs; empty where nothing was flown of a plan.
-        allowed_for: these are navigation errors alone, within what was planned for them.
-        count: how many runs.
-        runs: numbers of the first of them.
-    """
-
-    causes: str
-    allowed_for: bool
-    count: int
-    runs: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -216,9 +156,9 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
     singles = dict.fromkeys(itertools.chain(*chosen))
     drawn = drawn_keys(results)
     worst, standing_out, untracked = (
-        _worst(runs, folder, keys),
+        worst_runs(runs, folder, keys),
         extremes(results, runs),
-        _untracked(results, runs),
+        untracked_runs(results, runs),
     )
     return Summary(
         name=folder.resolve().name,
@@ -231,7 +171,7 @@ def summarise(folder: Path, by: Sequence[Sequence[str]] | None = None) -> Summar
         worst=worst,
         extremes=standing_out,
         untracked=untracked,
-        named=_named(runs, folder, keys, standing_out, untracked, {each.run for each in worst}),
+        named=named_runs(runs, folder, keys, standing_out, untracked, {each.run for each in worst}),
         duels=duels(runs),
         planned=planned_runs(results),
     )
@@ -316,79 +256,3 @@ def _lengths(runs: Runs) -> dict[str, tuple[float, ...]]:
         if len(ratios):
             curves[planner] = tuple(np.quantile(ratios, np.linspace(0.0, 1.0, CURVE_POINTS)).tolist())
     return curves
-
-
-def _untracked(results: pa.Table, runs: Runs) -> tuple[Untracked, ...]:
-    rows = results.select([name for name in HOW_BAD if name in results.column_names]).to_pylist()
-    alike: dict[tuple[str, bool], list[int]] = {}
-    for place in np.flatnonzero(runs.trackable == 0.0).tolist():
-        why = rows[place].get("trackability.causes") or ""
-        alike.setdefault((why, allowed_for(rows[place])), []).append(int(runs.run[place]))
-    return tuple(
-        Untracked(why, allowed, len(numbers), tuple(numbers[:FIRST]))
-        for (why, allowed), numbers in sorted(alike.items(), key=lambda each: (each[0][1], -len(each[1])))
-    )
-
-
-def _worst(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun, ...]:
-    """Failures by severity, then by clearance over the wanted one, or by clearance where that is unknown.
-
-    Where nothing failed, the few that came closest.
-    """
-    ratio = _clearance_ratio(runs)
-    near = ratio if np.isfinite(ratio).any() else runs.min_clearance_m
-    severity = {outcome: place for place, outcome in enumerate((*SEVERITY, "reached"))}
-    outcomes = runs.names["outcome"]
-    order = sorted(
-        range(len(runs)),
-        key=lambda row: (
-            severity.get(outcomes[row], len(SEVERITY) - 1),
-            near[row] if np.isfinite(near[row]) else np.inf,
-            runs.run[row],
-        ),
-    )
-    failed = int((~runs.reached).sum())
-    shown = order[: min(failed, WORST)] if failed else order[:CLOSEST]
-    return tuple(_worst_run(runs, row, folder, keys) for row in shown)
-
-
-def _named(
-    runs: Runs,
-    folder: Path,
-    keys: Sequence[str],
-    standing_out: Sequence[Extreme],
-    untracked: Sequence[Untracked],
-    known: Collection[int],
-) -> tuple[WorstRun, ...]:
-    """The runs that are named by their number, but for those already known."""
-    numbers = {each.run for each in standing_out}.union(*(each.runs for each in untracked)) - {*known}
-    rows = [row for row, number in enumerate(runs.run.tolist()) if number in numbers]
-    return tuple(_worst_run(runs, row, folder, keys) for row in rows)
-
-
-def _clearance_ratio(runs: Runs) -> FloatArray:
-    """Least clearance over the wanted one; NaN where one of them is not known."""
-    ratio: FloatArray = runs.min_clearance_m / np.where(
-        runs.wanted_clearance_m > 0.0, runs.wanted_clearance_m, np.nan
-    )
-    return ratio
-
-
-def _worst_run(runs: Runs, row: int, folder: Path, keys: Sequence[str]) -> WorstRun:
-    number, names, ratio = int(runs.run[row]), runs.names, float(_clearance_ratio(runs)[row])
-    kept, clearance = Path("runs") / str(number), float(runs.min_clearance_m[row])
-    recording = (folder / kept / RECORDING).is_file()
-    return WorstRun(
-        run=number,
-        name=run_name(runs, row),
-        seed=int(runs.seed[row]),
-        outcome=names["outcome"][row],
-        reason=names["reason"][row],
-        min_clearance_m=clearance if np.isfinite(clearance) else None,
-        clearance_ratio=ratio if np.isfinite(ratio) else None,
-        varied={key: runs.varied[key][row] for key in keys if key not in NAMED},
-        folder=str(kept) if (folder / kept).is_dir() else "",
-        recording=recording,
-        view=shlex.join(["wayproof", "view", str(folder / kept)]) if recording else "",
-        command=fly_again(folder / RESULTS, number),
-    )

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from harness.cli.options import FAILED, bad_input, flag
 from harness.cli.standard_output import say
+
+if TYPE_CHECKING:
+    from harness.campaign.summary import Summary
 
 
 def view(
@@ -65,6 +68,13 @@ def report(
         list[str] | None,
         typer.Option(metavar="KEY[,KEY]", help="Of a campaign: a table by these keys; can be repeated."),
     ] = None,
+    run_reports: Annotated[
+        bool,
+        flag(
+            "--run-reports",
+            "Of a campaign: also write the reports of the runs that its page describes (seconds each), and link them.",
+        ),
+    ] = False,
 ) -> int:
     """Writes report.html, one self-contained page, into a run folder; summary.html into that of a campaign.
 
@@ -80,7 +90,7 @@ def report(
     from harness.report.run_report import write_report
 
     if (run / RESULTS).is_file():
-        return _summary(run, by)
+        return _summary(run, by, run_reports)
     if (run / INDEX).is_file() and is_held(run / LOCK):
         raise InputError(
             f"{run}: its campaign is being flown and has no tables yet; ask again in a minute, or when it has ended"
@@ -93,6 +103,10 @@ def report(
         raise typer.BadParameter(
             f"{run} has no {RESULTS}; only a campaign has tables by keys", param_hint="--by"
         )
+    if run_reports:
+        raise typer.BadParameter(
+            f"{run} has no {RESULTS}; only a campaign has runs of its own", param_hint="--run-reports"
+        )
     try:
         say(f"report: {write_report(run)}")
     except RunFolderError as error:
@@ -100,18 +114,43 @@ def report(
     return 0
 
 
-def _summary(folder: Path, by: Sequence[str] | None) -> int:
-    """The answers of a campaign once more, by other keys."""
+def _summary(folder: Path, by: Sequence[str] | None, run_reports: bool) -> int:
+    """The answers of a campaign once more, by other keys or with the reports of its runs."""
     from harness.campaign.report import write_summary
     from harness.campaign.summary import summarise
     from harness.cli.campaign_terminal import print_summary
 
     chosen = [[_column(key.strip()) for key in each.split(",")] for each in by] if by else None
     summary = summarise(folder, by=chosen)
+    failed = False
+    if run_reports:
+        failed = not _run_reports(folder, summary)
+        summary = summarise(folder, by=chosen)
     page = write_summary(summary, folder)
     print_summary(summary, all_tables=by is not None)
     say(f"summary: {page}")
-    return 0
+    return FAILED if failed else 0
+
+
+def _run_reports(folder: Path, summary: Summary) -> bool:
+    """Writes the reports of the runs that a campaign's page describes; says which it could not, and whether all."""
+    from harness.files.errors import RunFolderError
+    from harness.files.input_file import InputError
+    from harness.report.run_report import write_report
+
+    described = [each for each in (*summary.worst, *summary.named) if each.folder]
+    if not described:
+        say(
+            "no run folder was kept of the runs on the page; `recordings: thin` in the campaign's file keeps all"
+        )
+    whole = True
+    for each in described:
+        try:
+            say(f"report: {write_report(folder / each.folder)}")
+        except (RunFolderError, InputError) as error:
+            whole = False
+            say(f"wayproof: no report of run {each.run}: {error}", err=True)
+    return whole
 
 
 def _column(key: str) -> str:

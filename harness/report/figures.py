@@ -176,7 +176,7 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
     axes.add_patch(patches.Circle((goal_east, goal_north), scene.goal_radius_m / 1e3, fill=False, lw=0.8))
     for place, name in (((east, north), "S"), ((goal_east, goal_north), "G")):
         axes.plot(*place, "o", color="black", ms=3.5, zorder=6)
-        low = place[1] < ymin + 0.9 * (ymax - ymin)
+        low = place[1] < ymin + 0.75 * (ymax - ymin)
         axes.annotate(
             name, place, (0, 6 if low else -6), textcoords="offset points", ha="center",
             va="bottom" if low else "top", weight="bold", zorder=7,

@@ -1,16 +1,19 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from harness.analysis.as_given import AsGiven
+from harness.analysis.causes import FINDINGS
 from harness.analysis.flight_limits import FlightLimits
-from harness.analysis.trackability import legs
+from harness.analysis.trackability import Leg, legs
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
 LIMITS = FlightLimits(
@@ -260,3 +263,10 @@ def test_a_navigation_error_is_told_where_the_true_error_is_largest(
     ):
         (leg,) = legs(make_track(201, **believed, **columns), [straight_plan], limits)
         assert leg.cause == cause
+
+
+def test_every_cause_is_explained_alike_on_pages_and_in_the_readme() -> None:
+    readme = (Path(__file__).parents[3] / "harness" / "run" / "README.md").read_text()
+    assert dict(re.findall(r"^\| `([^`]+)` \| (.+) \|$", readme, re.MULTILINE)) == FINDINGS
+    named = re.findall(r'"([a-z][^"]+)"', str(Leg.__doc__))
+    assert {*named} == {*FINDINGS}

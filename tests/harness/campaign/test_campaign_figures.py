@@ -12,9 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.campaign.figures import LABEL_LETTERS, lengths, scatter, success, where_failed
+from harness.campaign.figures import (
+    LABEL_LETTERS,
+    MOST_FAILURES,
+    failures,
+    lengths,
+    scatter,
+    success,
+    where_failed,
+)
 from harness.campaign.groups import Axis
-from harness.campaign.points import MOST_FAILURES, RunPoints, failures
+from harness.campaign.points import RunPoints
 from harness.campaign.summary import CURVE_POINTS, Cell, Table
 from harness.report.figure_style import svg
 from harness.run.scenario_flight import fly_to_folder, kinematic_loop

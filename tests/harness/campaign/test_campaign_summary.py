@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from harness.analysis.causes import FINDINGS
 from harness.campaign.figures import lengths
 from harness.campaign.groups import BINS, MOST_NAMES, NONE, grouped
 from harness.campaign.paired import mean_estimate
@@ -29,6 +30,8 @@ from harness.cli.app import main
 from harness.cli.campaign_terminal import print_summary
 from harness.files.strict_yaml import InputError
 from harness.files.wording import printable
+from harness.run.scenario_flight import fly_to_folder, kinematic_loop
+from tests.closed_loop.conftest import world
 from tests.examples import examples
 from tests.page import shown
 
@@ -38,7 +41,8 @@ SCHEMA = pa.schema(
     + [("environment.wind.speed_mps", pa.float64()), ("sensor.rays", pa.int64())]
     + [(name, pa.string()) for name in ("outcome", "reason", "error")]
     + [(name, pa.float64()) for name in ("flown_length_m", "min_clearance_m", "clearance_violation_s")]
-    + [("cross_track_m.p95", pa.float64()), ("trackability.legs", pa.int64()), ("trackable", pa.bool_())]
+    + [("cross_track_m.p95", pa.float64()), ("cross_track_m.max", pa.float64())]
+    + [("trackability.legs", pa.int64()), ("trackable", pa.bool_())]
     + [("optimum_m", pa.float64()), ("length_ratio", pa.float64()), ("wanted_clearance_m", pa.float64())]
     + [("max_load_factor", pa.float64()), ("trackability.causes", pa.string())]
     + [("bank_saturation_fraction", pa.float64()), ("plan_delay_s.max", pa.float64())]
@@ -548,7 +552,7 @@ def assert_links_lead_somewhere(page: str) -> None:
     """Each run that is linked to has one place on the page, with the command that flies it again."""
     for number in set(re.findall(r'<a href="#run-(\d+)">', page)):
         assert page.count(f'<li id="run-{number}">') == 1
-        (place,) = re.findall(rf'<li id="run-{number}">(.*?)</li>', page, re.DOTALL)
+        (place,) = re.findall(rf'<li id="run-{number}">(.*?)\n</li>', page, re.DOTALL)
         assert f"--run {number}</span></code>" in place
 
 
@@ -584,6 +588,12 @@ def test_each_oddity_of_a_campaign_stands_out_on_its_page_though_runs_failed(tmp
     assert_links_lead_somewhere(page)
 
 
+def said_of(page: str, run: int) -> list[str]:
+    """By what a run stands out, as its description on a page says."""
+    (place,) = re.findall(rf'<li id="run-{run}">(.*?)\n</li>', page, re.DOTALL)
+    return [re.sub(r"<[^>]+>", "", each) for each in re.findall("<li>(.*?)</li>", place)]
+
+
 def test_a_navigation_error_stands_out_where_the_other_runs_navigate_perfectly(tmp_path: Path) -> None:
     """They have none: that is an error of 0."""
     rows = [row(run, **{"navigation_error_m.max": None, "navigation_jump_m": None}) for run in range(20)]
@@ -595,7 +605,45 @@ def test_a_navigation_error_stands_out_where_the_other_runs_navigate_perfectly(t
         ("jump of the believed position, m", 7, 0.0),
     ]
     page = write_summary(summary, folder).read_text()
-    assert "<p>Stands out by: navigation error, m; jump of the believed position, m.</p>" in page
+    assert said_of(page, 7) == [
+        "Run 7 stands out by navigation error: 44.2 m; next run 0 m, median 0 m.",
+        "Run 7 stands out by jump of the believed position: 44 m; next run 0 m, median 0 m.",
+    ]
+
+
+def test_reports_of_runs_are_linked_where_there_are_and_asked_for_where_not(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = campaign(tmp_path / "c", [row(run, "timeout") for run in range(3)])
+    scenario = world(
+        {"circle": {"center_m": [3000.0, 3100.0], "radius_m": 300.0}}, mission={"time_limit_s": 20.0}
+    )
+    fly_to_folder(scenario, folder / "runs" / "0", recording=False, make=kinematic_loop)
+    (folder / "runs" / "1").mkdir()  # it broke off, and of run 2 no folder was kept
+    assert main(["report", str(folder)]) == 0
+    page = (folder / PAGE).read_text()
+    assert "2 runs described on this page have no report yet." in page
+    assert f"<code>wayproof report --run-reports {folder}</code>" in page
+    assert f"<code>wayproof report {folder}/runs/0</code>" in page
+    assert f"<code>wayproof report {folder}/runs/2</code>" not in page
+    assert "report.html" not in page
+    capsys.readouterr()
+    assert main(["report", "--run-reports", str(folder)]) == 1
+    out, err = capsys.readouterr()
+    assert f"report: {folder}/runs/0/report.html" in out.replace("\n", "")
+    assert "no report of run 1: " in err
+    assert (folder / "runs" / "0" / "report.html").is_file()
+    page = (folder / PAGE).read_text()
+    assert page.count('<a href="runs/0/report.html">Report</a>') == 1
+    assert page.count("report.html") == 1
+    assert f"<code>wayproof report {folder}/runs/0</code>" not in page
+    assert "1 run described on this page has no report yet." in page
+
+
+def test_only_a_campaign_has_reports_of_its_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "run").mkdir()
+    assert main(["report", "--run-reports", str(tmp_path / "run")]) == 2
+    assert "--run-reports" in capsys.readouterr().err
 
 
 def test_what_is_odd_about_a_case_stands_out_though_several_planners_flew_it(tmp_path: Path) -> None:
@@ -617,9 +665,9 @@ def test_what_is_odd_about_a_case_stands_out_though_several_planners_flew_it(tmp
 def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
     """Where navigation errs they are nearly all: their first ten would say nothing of the others."""
     untracked = {"trackable": False, "trackability.causes": "navigation error"}
-    rows = [row(run, **untracked) for run in range(20)]
+    rows = [row(run, **untracked, **{"cross_track_m.max": 0.5}) for run in range(20)]
     rows[0] |= {"trackable": True, "trackability.causes": ""}
-    rows[13] |= {"trackability.causes": "navigation error; bank limit"}
+    rows[13] |= {"trackability.causes": "navigation error; bank limit", "cross_track_m.max": 7.0}
     folder = campaign(tmp_path / "c", rows)
     summary = summarise(folder)
     assert [(each.causes, each.count, each.runs) for each in summary.untracked] == [
@@ -628,10 +676,17 @@ def test_runs_that_were_not_tracked_are_counted_by_why(tmp_path: Path) -> None:
     ]
     assert not any(each.allowed_for for each in summary.untracked), "it is not known what was planned for it"
     page = write_summary(summary, folder).read_text()
-    assert "Not every leg was tracked in 19 of 20 runs:" in page
+    assert "In 19 of 20 runs not every leg was tracked, for these causes:" in page
     said = re.sub(r'<a href="#run-(\d+)">\1</a>', r"\1", page)
-    assert "<li>navigation error: 18 runs (1, 2, 3, 4, 5, \N{HORIZONTAL ELLIPSIS})</li>" in said
-    assert "<li>navigation error; bank limit: 1 run (13)</li>" in said
+    off = "Largest cross-track error {} m; median of all runs 0.5 m."
+    assert (
+        f"<li>18 runs, 1, 2, 3, 4, 5, \N{HORIZONTAL ELLIPSIS}: navigation error. {off.format(0.5)}</li>"
+        in said
+    )
+    assert f"<li>Run 13: navigation error, bank limit. {off.format(7)}</li>" in said
+    for cause in ("navigation error", "bank limit"):
+        assert f"<strong>{cause}</strong>: {FINDINGS[cause]}.</p>" in page
+    assert "<strong>planner too late</strong>" not in page, "no run has that cause"
     assert_links_lead_somewhere(page)
     assert len(re.findall('<a href="#run-', page)) == 6 + len(summary.extremes)
 
@@ -651,7 +706,7 @@ def test_navigation_errors_that_were_planned_for_come_last_and_say_so(tmp_path: 
     ]
     page = write_summary(summary, folder).read_text()
     usual = page.index("navigation error, of position no more than <abbr")
-    assert page.index("<li>navigation error: 1 run") < page.index("planner too late: 1 run") < usual
+    assert page.index(": navigation error.") < page.index("planner too late.") < usual
     recordings = [folder / "runs" / str(run) / "flight.rrd" for run in (0, 4, 13, 19)]
     first = [int(path.parent.name) for path in worst_first(folder, recordings)][:2]
     assert sorted(first) == [4, 13], "they come first in the table of recordings too"
