@@ -72,7 +72,8 @@ class _Document:
     def finish(self) -> None:
         """The last element ends."""
         if self._kind == "node":
-            self.elements.point(self._tags)
+            if self._tags:  # most nodes are corners of ways, and have none
+                self.elements.point(self._tags)
         elif self._kind == "way":
             self.elements.way(self._number, self._refs, self._tags)
         elif self._kind == "relation":
@@ -145,7 +146,8 @@ def read_json(path: Path, reading: Reading) -> Contents:
             kind, tags = each.get("type"), {str(k): str(v) for k, v in (each.get("tags") or {}).items()}
             if kind == "node":
                 found.node(int(each["id"]), *_place(each))
-                found.point(tags)
+                if tags:
+                    found.point(tags)
             elif kind == "way":
                 found.way(int(each["id"]), refs_of(each), tags)
             elif kind == "relation":

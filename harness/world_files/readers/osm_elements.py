@@ -10,7 +10,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -41,13 +41,32 @@ ENTRANCE: Final = "entrance"
 """Of `building`, a door."""
 
 
+class _Building(NamedTuple):
+    """A building that was found.
+
+    Attributes:
+        tags: of it.
+        name: for messages.
+        outer: rings of its outline.
+        inner: rings of its holes.
+        closed: a ring of its outline was open.
+    """
+
+    tags: Mapping[str, str]
+    name: str
+    outer: Sequence[Line]
+    inner: Sequence[Line] = ()
+    closed: bool = False
+
+
 class Collected:
     """Parts so far, and what has to be said of them."""
 
     def __init__(self, reading: Reading) -> None:
         self.parts: list[Part] = []
         self.reading = reading
-        self._rings: list[tuple[Mapping[str, str], Line, str]] = []
+        self._ways: list[_Building] = []
+        self._areas: list[_Building] = []
         self.doubts = limits.Doubts()
         self.broken = self.closed = 0
         self._others: Mapping[str, int] = {}
@@ -68,9 +87,9 @@ class Collected:
             self._high_kinds[kind] += 1
 
     def way(self, tags: Mapping[str, str], line: Line, name: str) -> None:
-        """A building that is one way; those that are whole rings are made all at once."""
-        if len(line) >= 4 and line[0] == line[-1]:
-            self._rings.append((tags, line, name))
+        """A building that is one way."""
+        if _is_ring(line):
+            self._ways.append(_Building(tags, name, [line]))
         else:
             self._add(tags, [line], [], name)
 
@@ -84,16 +103,10 @@ class Collected:
             self.other(tags, "relation")
 
     def _add(self, tags: Mapping[str, str], outer: Sequence[Line], inner: Sequence[Line], name: str) -> None:
-        import shapely
-
-        solid, closed = _area(outer)
-        if solid is None:
-            self.broken += 1
-            return
-        self.closed += closed
-        hollow, _ = _area(inner) if inner else (None, False)
-        footprint = solid if hollow is None else shapely.difference(solid, hollow)
-        self.parts.append(limits.building(tags, footprint, self.reading, self.doubts, name))
+        """A building of several ways, or of one that is open."""
+        solid, closed = _rings(outer)
+        hollow, _ = _rings(inner)
+        self._areas.append(_Building(tags, name, solid, hollow, closed))
 
     def contents(self) -> Contents:
         """What was found.
@@ -101,12 +114,17 @@ class Collected:
         Raises:
             WorldFileError: nothing was.
         """
-        shapes = rings.shapes_of([[[np.array(line)]] for _, line, _ in self._rings], degrees=True)
-        for (tags, _, name), shape in zip(self._rings, shapes, strict=True):
-            if shape is None:
-                self.broken += 1
-                continue
-            self.parts.append(limits.building(tags, shape, self.reading, self.doubts, name))
+        lines = [[[np.array(each.outer[0])]] for each in self._ways]
+        for several, shapes in (
+            (self._areas, _areas_of(self._areas)),
+            (self._ways, rings.shapes_of(lines, degrees=True)),
+        ):
+            for each, shape in zip(several, shapes, strict=True):
+                if shape is None:
+                    self.broken += 1
+                    continue
+                self.closed += each.closed
+                self.parts.append(limits.building(each.tags, shape, self.reading, self.doubts, each.name))
         if not self.parts:
             raise WorldFileError("has no building; must be an extract of OpenStreetMap with some")
         notes = self.doubts.notes(self.reading)
@@ -210,7 +228,8 @@ class Elements:
 
 def is_building(tags: Mapping[str, str]) -> bool:
     """Whether tags are those of a building, of a part of one, or of what stands up like one."""
-    return any(tags.get(name, "no") != "no" for name in AREAS[:2]) or tags.get("man_made") in TALL
+    building, part, made = AREAS
+    return tags.get(building, "no") != "no" or tags.get(part, "no") != "no" or tags.get(made) in TALL
 
 
 def is_tall(tags: Mapping[str, str]) -> bool:
@@ -225,21 +244,59 @@ def _height_m(tags: Mapping[str, str]) -> float:
     return max(lengths_of(tags.get(HEIGHT)).metres, default=0.0)
 
 
-def _area(lines: Sequence[Line]) -> tuple[Any, bool]:
-    """The area inside lines that are rings or pieces of them, None without; and whether any had to be closed."""
+def _is_ring(line: Line) -> bool:
+    return len(line) >= 4 and line[0] == line[-1]
+
+
+def _rings(lines: Sequence[Line]) -> tuple[list[Line], bool]:
+    """Rings, pieces of which some lines may be, and whether any had to be closed."""
+    found, pieces = [], []
+    for line in lines:
+        if _is_ring(line):
+            found.append(line)
+        elif len(line) >= 2 and line[0] != line[-1]:
+            pieces.append(line)
+    if not pieces:
+        return found, False
     import shapely
 
-    closed_lines = [line for line in lines if len(line) >= 4 and line[0] == line[-1]]
-    pieces = [shapely.LineString(line) for line in lines if len(line) >= 2 and line[0] != line[-1]]
     closed = False
-    if pieces:
-        joined = shapely.line_merge(shapely.MultiLineString(pieces))
-        for chain in shapely.get_parts(joined):
-            corners = list(chain.coords)
-            if len(corners) >= 3:
-                closed |= corners[0] != corners[-1]
-                closed_lines.append(corners)
-    shapes = [shapely.Polygon(line) for line in closed_lines]
-    valid = [shapely.make_valid(each, method="structure", keep_collapsed=False) for each in shapes]
-    whole = valid[0] if len(valid) == 1 else shapely.union_all(valid)
-    return (None if whole.is_empty or whole.area == 0.0 else whole), closed
+    for chain in shapely.get_parts(shapely.line_merge(shapely.MultiLineString(pieces))):
+        corners = list(chain.coords)
+        if len(corners) >= 3:
+            closed |= corners[0] != corners[-1]
+            found.append(corners)
+    return found, closed
+
+
+def _areas_of(buildings: Sequence[_Building]) -> list[Any]:
+    """What lies inside the outlines of each and in none of its holes; None where that is nothing."""
+    import shapely
+
+    if not buildings:
+        return []
+    solid, hollow = (_insides(each) for each in ([b.outer for b in buildings], [b.inner for b in buildings]))
+    whole = np.array(solid, dtype=object)
+    holed = np.array([inner is not None for inner in hollow])
+    if holed.any():
+        whole[holed] = shapely.difference(whole[holed], np.array(hollow, dtype=object)[holed])
+    known = (outer is not None for outer in solid)
+    return [shape if there else None for shape, there in zip(whole, known, strict=True)]
+
+
+def _insides(every: Sequence[Sequence[Line]]) -> list[Any]:
+    """The area inside any of some rings, of many buildings at once; None where there is none."""
+    import shapely
+
+    flat = [line for lines in every for line in lines]
+    if not flat:
+        return [None] * len(every)
+    counts = [len(line) for line in flat]
+    corners = np.array([place for line in flat for place in line])
+    polygons = shapely.polygons(shapely.linearrings(corners, indices=np.repeat(np.arange(len(flat)), counts)))
+    valid = iter(shapely.make_valid(polygons, method="structure", keep_collapsed=False))
+    found: list[Any] = []
+    for lines in every:
+        shapes = [next(valid) for _ in lines]
+        found.append(shapely.union_all(shapes) if len(shapes) != 1 else shapes[0])
+    return [shape if area > 0.0 else None for shape, area in zip(found, shapely.area(found), strict=True)]

@@ -123,10 +123,12 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]], degrees: bool = F
     if not polygons:
         return found
     if degrees:
-        _check_degrees([ring for _, kept in polygons for ring in kept])
+        flat = [ring for _, kept in polygons for ring in kept]
+        _check_degrees(flat)
         first = {part: float(kept[0][0][0]) for part, kept in reversed(polygons)}
+        apart = iter(_apart(flat, [first[part] for part, kept in polygons for _ in kept]))
         polygons = [
-            (part, [short_ring(ring, first[part]) if _apart(ring, first[part]) else ring for ring in kept])
+            (part, [short_ring(ring, first[part]) if next(apart) else ring for ring in kept])
             for part, kept in polygons
         ]
     every = [ring for _, rings in polygons for ring in rings]
@@ -150,6 +152,9 @@ def shapes_of(batch: Sequence[Sequence[Sequence[FloatArray]]], degrees: bool = F
 
 def _check_degrees(every: Sequence[FloatArray]) -> None:
     """Raises WorldFileError if a ring of longitude and latitude has a place that is not on earth."""
+    highest = np.abs(np.concatenate(every)).max(axis=0)
+    if highest[0] <= TURN_DEG and highest[1] <= 0.25 * TURN_DEG:
+        return
     for ring in every:
         x, y = ring[np.abs(ring).argmax(axis=0), (0, 1)].tolist()
         if abs(x) > TURN_DEG or abs(y) > 0.25 * TURN_DEG:
@@ -158,9 +163,12 @@ def _check_degrees(every: Sequence[FloatArray]) -> None:
             )
 
 
-def _apart(ring: FloatArray, about_deg: float) -> bool:
-    """Whether a ring reaches farther than half a turn from a longitude."""
-    return bool(abs(ring[:, 0] - about_deg).max() > HALF_TURN_DEG)
+def _apart(every: Sequence[FloatArray], about_deg: Sequence[float]) -> list[bool]:
+    """Of each ring whether it reaches farther than half a turn from its longitude."""
+    counts = [len(ring) for ring in every]
+    off_deg = np.abs(np.concatenate(every)[:, 0] - np.repeat(about_deg, counts))
+    apart: list[bool] = (np.maximum.reduceat(off_deg, np.cumsum([0, *counts[:-1]])) > HALF_TURN_DEG).tolist()
+    return apart
 
 
 def together(shape: Any) -> Any:
