@@ -9,6 +9,7 @@ from typing import Any
 
 import jinja2
 
+from harness.analysis.causes import FINDINGS
 from harness.analysis.rows import DASH, Figure, Row, number, shown_figures
 from harness.report.remarks import Remark
 
@@ -133,6 +134,7 @@ def run_html(
         number=number,
         legs=legs,
         lost=lost,
+        findings={cause: FINDINGS[cause] for cause in FINDINGS if cause in {leg["cause"] for leg in lost}},
         exceeded=[each for each in judged if any(map(each.exceeded, lost))],
         checked=checked,
         moments=moments,

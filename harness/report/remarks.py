@@ -33,7 +33,7 @@ def remarks(row: Row, clearance_m: float, speed_mps: float, *, given: bool = Fal
     found = []
     if not given and (row.clearance_violation_s or 0.0) > 0.0:
         least, time = number(row.min_clearance_m), number(row.clearance_violation_s)
-        text = f"{least} m at the least; below the wanted clearance for {time} s"
+        text = f"{least} m at the least, where {number(clearance_m)} m are wanted; nearer than those for {time} s"
         found.append(Remark("nearer to an obstacle than wanted", text))
     if (row.bank_saturation_fraction or 0.0) > LONG_AT_LIMIT:
         found.append(
@@ -42,12 +42,13 @@ def remarks(row: Row, clearance_m: float, speed_mps: float, *, given: bool = Fal
     delay_s = row.plan_delay_max_s or 0.0
     if not given and delay_s * speed_mps > clearance_m > 0.0:
         far = number(delay_s * speed_mps)
-        text = f"up to {number(delay_s)} s pass from the scan that a plan is made from until it takes effect; the "
-        text += f"aircraft flies {far} m meanwhile, and the wanted clearance is {number(clearance_m)} m"
+        text = f"a plan took effect up to {number(delay_s)} s after the scan that it was made from; the aircraft flew "
+        text += f"{far} m meanwhile, more than the wanted clearance of {number(clearance_m)} m"
         found.append(Remark("late plans", text))
     if (row.lost_returns or 0.0) > MANY_LOST:
+        lost = number(row.lost_returns, 100.0)
         found.append(
-            Remark("many returns lost", f"the sensor lost {number(row.lost_returns, 100.0)} % of them")
+            Remark("many returns lost", f"{lost} % of the beams that met something returned nothing")
         )
     jump_m = row.navigation_jump_m or 0.0
     if jump_m > FAR_JUMP * clearance_m > 0.0:

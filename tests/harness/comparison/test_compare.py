@@ -26,6 +26,7 @@ from harness.cli.app import main
 from harness.cli.compare_terminal import print_comparison
 from harness.flight.record import AcceptedPlan, Track
 from harness.report import figure_style, figures
+from harness.report.page import Chapter, report_html
 from harness.report.planner_figure import planner_figure
 from harness.run_files.run_folder import load_run
 from harness.world.obstacle import Circle, Obstacle
@@ -602,6 +603,18 @@ def test_the_legend_explains_every_mark_that_is_there_and_no_other(
         assert ("moves, or stands for a time" in told) is changes
         assert ("ended, not at G" in told) is (outcome == "timeout")
         assert "tightest planned turn" in told
+
+
+def test_a_planner_that_came_too_near_is_marked_on_the_page() -> None:
+    near = Row("s", "near", "reached", "there", min_clearance_m=1.1, clearance_violation_s=66.2)
+    fair = Row("s", "fair", "reached", "there", min_clearance_m=102.2, clearance_violation_s=0.0)
+    html = report_html(
+        [Chapter("s", {}, [near, fair], [])], command="", versions={}, written="", kinematic=False
+    )
+    for text in ("1.1", "66.2"):
+        assert f'<td data-planner="near" class="bad">{text}</td>' in html
+    for text in ("102.2", "0"):
+        assert f'<td data-planner="fair">{text}</td>' in html
 
 
 def test_a_near_miss_is_enlarged_before_the_tightest_turn(

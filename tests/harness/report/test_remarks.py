@@ -35,16 +35,20 @@ def test_of_a_usual_flight_nothing_is_said() -> None:
         (
             {"min_clearance_m": 18.0, "clearance_violation_s": 2.7},
             "nearer to an obstacle than wanted",
-            "18 m at the least; below the wanted clearance for 2.7 s",
+            "18 m at the least, where 40 m are wanted; nearer than those for 2.7 s",
         ),
         ({"bank_saturation_fraction": 0.225}, "long at the bank limit", "22.5 % of the time"),
         (
             {"plan_delay_max_s": 9.1},
             "late plans",
-            "up to 9.1 s pass from the scan that a plan is made from until it takes effect; the aircraft flies 227.5 m "
-            "meanwhile, and the wanted clearance is 40 m",
+            "a plan took effect up to 9.1 s after the scan that it was made from; the aircraft flew 227.5 m meanwhile, "
+            "more than the wanted clearance of 40 m",
         ),
-        ({"lost_returns": 0.352}, "many returns lost", "the sensor lost 35.2 % of them"),
+        (
+            {"lost_returns": 0.352},
+            "many returns lost",
+            "35.2 % of the beams that met something returned nothing",
+        ),
         (
             {"navigation_jump_m": 44.2},
             "the believed position jumped",

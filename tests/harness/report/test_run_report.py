@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.analysis.causes import FINDINGS
 from harness.cli.app import main
 from harness.run_files.run_folder import REPORT_FILES, load_run
 from harness.scenario.scenario import dump_scenario, parse_scenario
@@ -68,6 +69,8 @@ def test_a_leg_shows_the_limit_that_it_was_over(run: Path, tmp_path: Path) -> No
         "cause": "navigation error",
     }
     page = page_with(run, tmp_path / "high", trackability=[leg])
+    assert f"<strong>navigation error</strong>: {FINDINGS['navigation error']}.</p>" in page
+    assert "<strong>bank limit</strong>" not in page, "no leg has that cause"
     assert "<p>1 of 1 legs were not. Allowed: cross-track 10 m, altitude error 10 m.</p>" in page
     assert '<td>0.8</td><td class="bad">12.5</td><td class="bad">navigation error</td>' in page
     wide = leg | {"max_cross_track_m": 11.0, "max_altitude_error_m": 0.1}
@@ -110,7 +113,7 @@ def test_a_near_miss_is_said_before_the_figures(run: Path, tmp_path: Path) -> No
         page_with(run, tmp_path / "fair", clearance_violation_s=0.0)
     )
     page = page_with(run, tmp_path / "near", min_clearance_m=5.49, clearance_violation_s=2.1)
-    said = "nearer to an obstacle than wanted</strong>: 5.49 m at the least; below the wanted clearance for 2.1 s"
+    said = "nearer to an obstacle than wanted</strong>: 5.49 m at the least, where 100.0 m are wanted;"
     assert page.index(said) < page.index("<table")
     assert '<td class="bad">5.49</td>' in page
     assert '<td class="bad">2.1</td>' in page
