@@ -30,7 +30,9 @@ Shape = Any
 
 
 def scenario_outside_assumptions(scenario: Scenario) -> tuple[str, ...]:
-    """`outside_assumptions` of a scenario."""
+    """`outside_assumptions` of a scenario; of one in which nothing moves no world is made."""
+    if not any(each.velocity_mps not in (None, (0.0, 0.0)) for each in scenario.obstacles):
+        return ()
     obstacles = World.from_scenario(scenario).obstacles
     airspeed_mps, range_m = scenario.aircraft.airspeed_mps, scenario.sensor.range_m
     return outside_assumptions(obstacles, airspeed_mps, range_m, scenario.mission.time_limit_s)
