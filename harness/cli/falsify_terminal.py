@@ -26,19 +26,19 @@ def breaking_rows(breaking: Breaking) -> dict[str, str]:
         rows["mildest found"] = "[bold red]already at the mild end[/]"
     else:
         share = max(found.displacement)
-        rows["mildest found"] = f"[bold red]{_values(found.values)}[/], {share:.1%} of the way"
+        rows["mildest found"] = f"[bold red]{_values(breaking, found.values)}[/], {share:.1%} of the way"
     if found is not None:
         rows["how it failed"] = plain(f"{found.outcome}: {found.reason}, seed {found.seed}")
     if breaking.passes is not None:
-        rows["passes below"] = f"at {_values(breaking.passes)}; {_milder(breaking)}"
+        rows["passes below"] = f"at {_values(breaking, breaking.passes)}; {_milder(breaking)}"
     if breaking.passes_above is not None:
-        rows["passes above"] = f"at {_values(breaking.passes_above)}, which is harder"
+        rows["passes above"] = f"at {_values(breaking, breaking.passes_above)}, which is harder"
     if len(breaking.vary) == 1:
         rows |= _of_one_key(breaking)
     elif breaking.example is not None:
         milder, harder = breaking.example
         rows["not monotone"] = (
-            f"fails at {_values(milder)} but passes at {_values(harder)}, which is harder; "
+            f"fails at {_values(breaking, milder)} but passes at {_values(breaking, harder)}, which is harder; "
             f"{counted(breaking.not_monotone, 'such pair')}: a milder failure may be left between what was tried"
         )
     if not breaking.settled:
@@ -58,6 +58,8 @@ def _milder(breaking: Breaking) -> str:
     """What became of the conditions milder than the failure, none of which failed."""
     if breaking.milder == 1:
         return "no other milder condition was tried"
+    if len(breaking.vary) > 1:
+        return f"so do all {breaking.milder} conditions tried of which the hardest key is milder"
     return f"so do all {breaking.milder} milder conditions that were tried"
 
 
@@ -96,5 +98,9 @@ def last_line(breaking: Breaking) -> str:
     return f"falsified: {keys}, the mildest found in {counted(breaking.conditions, 'condition')}"
 
 
-def _values(values: Sequence[float]) -> str:
-    return ", ".join(map(number_text, values))
+def _values(breaking: Breaking, values: Sequence[float]) -> str:
+    """A condition; with several keys, each value with its key."""
+    if len(values) == 1:
+        return number_text(values[0])
+    pairs = zip(breaking.vary, values, strict=True)
+    return ", ".join(plain(f"{each.key} {number_text(value)}") for each, value in pairs)

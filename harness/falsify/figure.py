@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from harness.falsify.keys import Vary, number_text
 from harness.report.figure_style import colour, png, styled, svg
 
 if TYPE_CHECKING:
@@ -44,9 +45,20 @@ def drawn(breaking: Breaking) -> Figure:
             axes.plot(*values, "*", color="black", ms=10, ls="", label="mildest that failed")
             corner = first.mild, second.mild
             width, height = values[0] - corner[0], values[1] - corner[1]
-            axes.add_patch(Rectangle(corner, width, height, fill=False, ec="0.4", lw=0.8, ls="--"))
-        axes.set(xlabel=first.key, ylabel=second.key)
+            axes.add_patch(
+                Rectangle(
+                    corner, width, height, fill=False, ec="0.4", lw=0.8, ls="--", label="milder in both"
+                )
+            )
+        axes.set(xlabel=_with_ends(first), ylabel=_with_ends(second))
         axes.margins(0.05)
         axes.set_title(f"{breaking.scenario}: {breaking.planner}, {breaking.aircraft}")
-        figure.legend(loc="outside lower center", ncols=3, frameon=False)
+        figure.legend(
+            loc="outside lower center", ncols=4, frameon=False, columnspacing=1.2, handletextpad=0.4
+        )
     return figure
+
+
+def _with_ends(vary: Vary) -> str:
+    """A key, and which of its ends is which: harder need not be more."""
+    return f"{vary.key}\nmild {number_text(vary.mild)}, hard {number_text(vary.hard)}"

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from aircraft.airframes import AircraftError
 from harness.cli.app import main
 from harness.cli.falsify_terminal import breaking_rows, last_line
+from harness.falsify.figure import drawn
 from harness.falsify.folder import FALSIFIED, INDEX, PICTURES, TRIALS
 from harness.falsify.keys import number_text, scenario_at, vary_of
 from harness.files.strict_yaml import InputError
@@ -193,6 +194,25 @@ def test_count_and_sentence_agree_with_few_conditions_for_two_keys(to_break: Pat
     rows = breaking_rows(few)
     assert "not settled" not in rows
     assert rows["tried"].startswith("2 conditions of 16 allowed: none is left to try that differs")
+
+
+def test_of_two_keys_each_value_is_told_with_its_key(to_break: Path) -> None:
+    def noisy(scenario: Scenario) -> dict[str, Any]:
+        return stand_in("collision" if scenario.sensor.range_noise_m >= 4.0 else "reached")
+
+    keys = ("sensor.range_noise_m", 0.0, 8.0), ("sensor.rays", 90.0, 30.0)
+    result = broken(to_break, *keys, flown=noisy, conditions=40)
+    rows = breaking_rows(result)
+    assert result.found is not None
+    noise, rays = result.found.values
+    assert (
+        f"sensor.range_noise_m {number_text(noise)}, sensor.rays {number_text(rays)}" in rows["mildest found"]
+    )
+    assert rows["passes below"].startswith("at sensor.range_noise_m ")
+    assert rows["passes below"].endswith("conditions tried of which the hardest key is milder")
+    (axes,) = (figure := drawn(result)).axes
+    assert axes.get_ylabel() == "sensor.rays\nmild 90, hard 30"
+    assert "milder in both" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_whole_numbers_stay_whole(to_break: Path) -> None:
