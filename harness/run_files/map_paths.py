@@ -62,7 +62,7 @@ def read_kml(text: str, source: str) -> PathAsRead:
         told = f" ({', '.join(name for name, _ in lines[:4])})" if lines else ""
         raise InputError(f"{source}: has {len(lines)} lines{told}; must have exactly one, the path")
     (name, line), *_ = lines
-    points = _kml_points(line, name, source)
+    points = _lifted(_kml_points(line, name, source), line, f"{source}: {name}")
     mode = _text(line, "altitudeMode")
     flat = mode not in (ABSOLUTE, RELATIVE)
     notes = [f"{counted(count, kind)} beside the path passed over" for kind, count in (+others).items()]
@@ -165,6 +165,15 @@ def _kml_points(line: ElementTree.Element, name: str, source: str) -> list[Point
     track = _name(line) != "LineString"
     rows = [(each.text or "").split() for each in _all(line, "coord")] if track else _coordinates(line)
     return [_point(row, f"{source}: {name}: point {number}") for number, row in enumerate(rows)]
+
+
+def _lifted(points: list[Point], line: ElementTree.Element, where: str) -> list[Point]:
+    """Points as high above theirs as gx:altitudeOffset of their line says."""
+    offset = _text(line, "altitudeOffset")
+    if not offset:
+        return points
+    by_m = finite(offset, f"{where}: altitudeOffset")
+    return [(north, east, None if height is None else height + by_m) for north, east, height in points]
 
 
 def _coordinates(element: ElementTree.Element) -> list[list[str]]:

@@ -163,7 +163,7 @@ def _names(path: Path) -> list[str]:
 
     try:
         with zipfile.ZipFile(path) as archive:
-            return [name.lower() for name in archive.namelist()[:1000]]
+            return [name.lower() for name in archive.namelist()]
     except (zipfile.BadZipFile, OSError, ValueError) as error:
         raise WorldFileError("is a damaged ZIP archive; get it again") from error
 

@@ -42,6 +42,9 @@ SIDE_ALONE_M: Final = 1.0
 
 NOT_LOADED: Final = "ArduPilot and QGroundControl load no mission with it"
 
+BACK_MPS: Final = -2.0
+"""A change to this speed, MAVLink says, goes back to that of the vehicle; to -1 changes nothing."""
+
 AIRSPEED, GROUND_SPEED = 0, 1
 """Kinds of speed of a change of speed, its first parameter."""
 
@@ -202,6 +205,9 @@ class _Run:
         if kind == AIRSPEED and speed > 0.0:
             self.airspeed_mps = speed
             self._tell(item, FLOWN, f"airspeed {speed:g} m/s")
+        elif kind == AIRSPEED and speed == BACK_MPS:
+            self.airspeed_mps = 0.0
+            self._tell(item, FLOWN, "back to the airspeed before any change")
         elif speed <= 0.0:
             self._tell(item, PASSED_OVER, "changes no speed")
         else:

@@ -106,9 +106,9 @@ class _Build:
         """Adds a step to the route."""
         step = self._steps[number]
         if step.airspeed_mps is not None:
-            self._asked_mps = step.airspeed_mps
+            self._asked_mps = step.airspeed_mps or self._flying.airspeed_mps
             low, high = self._flying.airspeed_range_mps
-            self._mps = min(max(step.airspeed_mps, low), high)
+            self._mps = min(max(self._asked_mps, low), high)
             if self._mps != self._asked_mps:
                 self._notes.append(
                     f"{self._asked_mps:g} m/s asked for before item {step.item}: flown at {self._mps:g} m/s; the "

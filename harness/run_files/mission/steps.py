@@ -41,7 +41,8 @@ class MissionStep:
         height_m: altitude; None: that of the step before.
         above: what it is above: `sea`, `home` or `ground`.
         acceptance_m: how far off it may be passed; 0 where the file does not say.
-        airspeed_mps: commanded from the begin of this step on; None: as before.
+        airspeed_mps: commanded from the begin of this step on; None: as before; 0: that of the flight before
+            any change.
         loiter: circles about the position.
         landing: the flight ends on the way down to it.
         straight: goes straight on until the altitude is reached.

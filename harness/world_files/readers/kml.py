@@ -6,6 +6,7 @@ nothing.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -122,10 +123,22 @@ def _polygon(
     if limits.has_limits(tags):
         return Part(shape, *limits.limits(tags, notes, name), name=name), False
     datum = DATUMS.get(_text(element, "altitudeMode"))
-    top_m = float(outer[0][:, 2].max())
+    top_m = float(outer[0][:, 2].max()) + _offset_m(element)
     if datum is None:
         return Part(shape, NO_BOTTOM, NO_TOP, name=name), True
     return Part(shape, NO_BOTTOM, Limit(top_m, datum), name=name), False
+
+
+def _offset_m(element: ElementTree.Element) -> float:
+    """How far a polygon is lifted as a whole: its gx:altitudeOffset."""
+    offset = _text(element, "altitudeOffset")
+    try:
+        by_m = float(offset or 0.0)
+    except ValueError:
+        by_m = math.nan
+    if not math.isfinite(by_m):
+        raise WorldFileError(f"has the altitudeOffset {offset[:20]!r}; must be metres")
+    return by_m
 
 
 def _rings(element: ElementTree.Element, boundary: str) -> Sequence[FloatArray]:

@@ -150,6 +150,16 @@ def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> Non
     assert given.notes == ("altitudes passed over: their altitudeMode is clampToGround",)
 
 
+def test_a_line_of_kml_lies_as_much_higher_as_its_offset_says(tmp_path: Path) -> None:
+    path = tmp_path / "a.kml"
+    for offset, lowest in (("", 500.0), ("<gx:altitudeOffset>-40.5</gx:altitudeOffset>", 459.5)):
+        path.write_text(kml().replace("<LineString>", f"<LineString>{offset}"))
+        assert read_path(path).altitudes_m.tolist() == [lowest, lowest + 20.0, lowest + 40.0]
+    path.write_text(path.read_text().replace("-40.5", "high"))
+    with pytest.raises(InputError, match=": way: altitudeOffset: is 'high'; must be a finite number"):
+        read_path(path)
+
+
 def test_what_else_is_in_a_kml_is_told(tmp_path: Path) -> None:
     path = tmp_path / "a.kml"
     ring = "<LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47</coordinates></LinearRing>"

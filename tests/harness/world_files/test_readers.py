@@ -14,7 +14,16 @@ import shapely
 from PIL import Image
 
 from harness.world_files.kinds import kind_of, read
-from harness.world_files.parts import FOOT_M, NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Reading
+from harness.world_files.parts import (
+    FOOT_M,
+    NO_BOTTOM,
+    NO_TOP,
+    Contents,
+    Datum,
+    Limit,
+    Reading,
+    WorldFileError,
+)
 from harness.world_files.plane import Mapping, Place
 from harness.world_files.readers.geo_json import zone_limit
 from harness.world_files.readers.lengths import Lengths, lengths_of, metres_of
@@ -85,6 +94,7 @@ def test_a_numpy_archive_may_have_its_north_as_ymin(tmp_path: Path) -> None:
     assert (x.tolist(), y.tolist()) == (pytest.approx([8.0, 8.2]), pytest.approx([47.1, 47.0]))
 
 
+GX = 'xmlns:gx="http://www.google.com/kml/ext/2.2"'
 RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
 
 
@@ -339,6 +349,15 @@ def test_kml_polygons_reach_from_the_ground_to_their_altitude(tmp_path: Path) ->
     path.write_text(f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{places}</Document></kml>')
     found = read_any(path)
     assert [part.top for part in found.parts] == [Limit(570.0), Limit(570.0, Datum.GROUND), NO_TOP]
+    offset = "<gx:altitudeOffset>30</gx:altitudeOffset>"
+    lifted = path.read_text().replace("<Polygon>", f"<Polygon>{offset}").replace("<kml ", f"<kml {GX} ")
+    path.with_name("b.kml").write_text(lifted)
+    assert [part.top for part in read_any(path.with_name("b.kml")).parts] == [
+        Limit(600.0), Limit(600.0, Datum.GROUND), NO_TOP
+    ]  # fmt: skip
+    path.with_name("b.kml").write_text(lifted.replace(">30<", ">high<"))
+    with pytest.raises(WorldFileError, match="has the altitudeOffset 'high'; must be metres"):
+        read_any(path.with_name("b.kml"))
     packed = zipped(tmp_path / "a.kmz", a__kml=b"<kml/>", doc__kml=path.read_bytes())
     assert [part.top for part in read_any(packed).parts] == [part.top for part in found.parts]
     assert "1 further KML file in the archive passed over" in read_any(packed).notes

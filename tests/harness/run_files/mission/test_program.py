@@ -70,6 +70,15 @@ def test_speeds_hold_from_where_they_are_changed() -> None:
     assert told(done)[6] == ("passed over", "changes no speed")
 
 
+def test_a_speed_of_minus_2_goes_back_to_that_of_the_flight() -> None:
+    """As ArduPlane and MAVLink have it; the mission flew on at the changed speed."""
+    back = item(4, 178, 0, -2)
+    done = run(at(1), item(2, 178, 0, 22), at(3), back, at(5), item(6, 178, 1, -2), at(7))
+    assert [step.airspeed_mps for step in done.steps] == [None, 22.0, 0.0, None]
+    assert told(done)[4] == ("flown", "back to the airspeed before any change")
+    assert told(done)[6] == ("passed over", "changes no speed")
+
+
 def test_loiters_have_turns_or_time_or_an_altitude_and_a_side() -> None:
     done = run(
         at(1),

@@ -134,6 +134,12 @@ def test_speeds_are_those_the_aircraft_holds_and_others_are_told() -> None:
     assert made.notes[0].startswith("13 m/s asked for before item 2: flown at 20 m/s")
 
 
+def test_a_speed_of_0_is_that_of_the_flight() -> None:
+    made = route((step(1), 0j), (step(2, airspeed_mps=28.0), 1000j), (step(3, airspeed_mps=0.0), 2000j))
+    assert made.profile.airspeeds(np.array([500.0, 1500.0])).tolist() == [28.0, 25.0]
+    assert made.notes == ()
+
+
 def test_above_ground_the_ground_is_followed() -> None:
     def hill(east: FloatArray, north: FloatArray) -> FloatArray:
         return 400.0 + 80.0 * np.exp(-(((north - 1500.0) / 400.0) ** 2)) + 0.0 * east
