@@ -80,7 +80,7 @@ def _add_contacts(metrics: Mapping[str, Any], rows: dict[str, str]) -> None:
 
 
 def _add_items(items: Sequence[Mapping[str, str]], rows: dict[str, str]) -> None:
-    """What became of the items of a mission: all are counted, those not flown are named."""
+    """What became of the items of a mission: all are counted, those of note are named."""
     if not items:
         return
     kinds = [item["what"] for item in items]
@@ -88,7 +88,9 @@ def _add_items(items: Sequence[Mapping[str, str]], rows: dict[str, str]) -> None
         f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)
     )
     told = [
-        item for item in items if item["what"] == "not flown" or (item["what"] == "flown" and item["why"])
+        item
+        for item in items
+        if item["what"] == "not flown" or (item["what"] in ("flown", "not reached") and item["why"])
     ]
     for item in told[:MOST_ITEMS]:
         why = f": {item['why']}" if item["why"] else ""

@@ -98,6 +98,24 @@ def test_a_leg_that_is_all_corner_says_how_far_off_the_route_it_is(
     assert f"{last['cause']}, {last['max_cross_track_m']:.3g} m off" in said
 
 
+def test_an_item_that_is_not_reached_and_keeps_autopilots_from_loading_the_mission_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write(
+        tmp_path / "m.waypoints",
+        *(row(1, 16, up_m=100), row(2, 17, north_m=900, up_m=100), row(3, 16, up_m=100), row(4, 177, 9, 1)),
+    )
+    given = ["check", str(path), "--aircraft", "aerosonde", "--no-recording", "--out", str(tmp_path / "run")]
+    assert main(given) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "items 4: 2 flown, 2 not reached" in said
+    assert (
+        "item 4 jump, not reached: to item 9, which does not exist: ArduPilot and QGroundControl load no"
+        in said
+    )
+    assert "item 3" not in said
+
+
 @pytest.mark.parametrize(("up_m", "cause"), [(700.0, "climb too steep"), (-320.0, "descent too steep")])
 def test_what_is_too_steep_is_told(
     up_m: float, cause: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
