@@ -179,7 +179,8 @@ def building(
 ) -> Part:
     """A building from its tags.
 
-    The rule: `height`; else storeys (`building:levels` and `roof:levels`) of 3 m each; else `default_height_m`. It
+    The rule: `height`, which is that of the whole building; else storeys (`building:levels`) of 3 m each, and above
+    them the roof, `roof:height` or else `roof:levels` of 3 m each; else `default_height_m`. It
     begins at `min_height`, else `building:min_level` times 3 m, else at the ground. Names are told in any case. A
     height of zero or less says nothing: some files mean by -1 that it is not known.
 
@@ -194,7 +195,10 @@ def building(
     top = _first(tags, _HEIGHT, doubts)
     levels = None if top is not None else _first(tags, _LEVELS, doubts)
     if top is None and levels is not None:
-        top = (levels + (_first(tags, ("roof:levels", "roof_levels"), doubts) or 0.0)) * LEVEL_M
+        roof = _first(tags, ("roof:height", "roof_height"), doubts)
+        if roof is None:
+            roof = (_first(tags, ("roof:levels", "roof_levels"), doubts) or 0.0) * LEVEL_M
+        top = levels * LEVEL_M + roof
     if top is None:
         top = reading.default_height_m
         doubts.guessed += 1

@@ -105,6 +105,12 @@ RING = [(8.0, 47.0), (8.001, 47.0), (8.001, 47.001), (8.0, 47.001)]
         ({"building": "yes", "height": "40 ft"}, -math.inf, 40 * FOOT_M),
         ({"building": "yes", "building:levels": "4"}, -math.inf, 12.0),
         ({"building": "yes", "building:levels": "4", "roof:levels": "1"}, -math.inf, 15.0),
+        (
+            {"building": "yes", "building:levels": "4", "roof:height": "5.5", "roof:levels": "2"},
+            -math.inf,
+            17.5,
+        ),
+        ({"building": "yes", "height": "12", "roof:height": "5"}, -math.inf, 12.0),
         ({"building": "yes", "height": "no idea"}, -math.inf, 6.0),
         ({"building:part": "yes", "height": "30", "min_height": "20"}, 20.0, 30.0),
         ({"building:part": "yes", "building:levels": "9", "building:min_level": "2"}, 6.0, 27.0),
