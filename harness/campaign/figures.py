@@ -32,8 +32,12 @@ ROTATED_FROM = 5
 """From so many groups on, their labels stand slanted."""
 PANEL_IN = 1.5
 """Height of a panel of small multiples."""
+MAP_TITLE_PT: Final = 7
+"""Letters above maps of failures, so that three titles have room beside one another."""
 MAPS_A_ROW, MAP_TITLE_IN = 3, 0.45
 """Maps of failures beside one another, and what each has above and below it."""
+MOST_OUTLINES: Final = 1500
+"""More points than these in a figure are drawn as dots of a picture."""
 MOST_FAILURES: Final = 9
 """Failures beyond these are not drawn."""
 MAP_TICKS_IN = 0.3
@@ -97,12 +101,14 @@ def lengths(curves: Mapping[str, Sequence[float]]) -> Figure:
 def scatter(points: RunPoints) -> Figure | None:
     """Every figure against every number that was varied, a point a run; None where no number was varied.
 
-    Runs that did not reach the goal are crosses.
+    Runs that did not reach the goal are crosses. Many points are drawn as a picture of dots: a browser takes seconds to
+    draw ten thousand outlines.
     """
     if not points.varied or not points.figures:
         return None
     rows, columns = len(points.figures), len(points.varied)
     names = [_wrapped(key, ROW_LETTERS // columns) for key in points.varied]
+    as_dots = rows * columns * len(points.reached) > MOST_OUTLINES
     with styled(0.5 + PANEL_IN * rows + ROW_IN * max(name.count("\n") for name in names)) as figure:
         grid = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
         for row, (label, values) in enumerate(points.figures.items()):
@@ -112,7 +118,15 @@ def scatter(points: RunPoints) -> Figure | None:
                     (points.reached, ".", colour(0)),
                     (~points.reached, "x", colour(1)),
                 ):
-                    axes.plot(numbers[among], values[among], marker, ms=3.5, color=shade, alpha=0.7)
+                    axes.plot(
+                        numbers[among],
+                        values[among],
+                        marker,
+                        ms=3.5,
+                        color=shade,
+                        alpha=0.7,
+                        rasterized=as_dots,
+                    )
                 axes.grid(color="0.9", lw=0.6)
                 if column == 0:
                     axes.set_ylabel(label)
@@ -134,7 +148,7 @@ def where_failed(failed: Sequence[Failure]) -> Figure:
             track_km = thinned(each.track_m, each.scene) / 1e3
             axes.plot(*track_km.T, color=colour(0), lw=1.2, zorder=5)
             axes.plot(*track_km[-1], "X", color=colour(1), ms=7, mec="white", mew=0.6, zorder=8)
-            axes.set_title(f"run {each.run}: {each.outcome.replace('_', ' ')}")
+            axes.set_title(f"run {each.run}: {each.outcome.replace('_', ' ')}", fontsize=MAP_TITLE_PT)
             axes.set(xlabel="", ylabel="")
             axes.tick_params(labelsize=6, length=2)
         for axes in grid:

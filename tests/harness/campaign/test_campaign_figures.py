@@ -97,6 +97,23 @@ def test_names_below_panels_do_not_run_into_each_other() -> None:
     assert figure.axes[0].get_xlabel() == "environment.\nwind.speed_mps"
 
 
+def test_a_thousand_runs_are_drawn_as_dots_and_a_few_as_outlines() -> None:
+    """A browser takes seconds for the outlines of ten thousand marks."""
+    sizes = {}
+    for count in (20, 1000):
+        values = np.random.default_rng(1).random(count)
+        points = RunPoints(dict.fromkeys("abc", values), dict.fromkeys("xyz", values[::-1]), values < 0.7)
+        figure = scatter(points)
+        assert figure is not None
+        content = svg(figure)
+        sizes[count] = len(content)
+        assert (b"<image" in content) is (count == 1000)
+        again = scatter(points)
+        assert again is not None
+        assert svg(again) == content
+    assert sizes[1000] < 600_000
+
+
 @pytest.fixture
 def failed(tmp_path: Path) -> tuple[Any, Path]:
     """A campaign of which two runs failed; the folder of one was kept, beside that of a run that broke off."""
@@ -127,6 +144,11 @@ def test_where_runs_failed_is_drawn_as_far_as_they_were_kept(failed: tuple[Any, 
         svg(figure)
         many = where_failed([replace(one, run=number) for number in range(5)])
         svg(many)
+    named = where_failed([replace(one, run=99_990 + k, outcome="planner_failed") for k in range(3)])
+    svg(named)
+    titles = [axes.title.get_window_extent() for axes in named.axes]
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(titles))
+    assert titles[-1].x1 < named.bbox.x1
     (axes,) = figure.axes
     assert axes.get_title() == "run 3: timeout"
     end: Any = axes.lines[-1]
