@@ -1,7 +1,7 @@
 """Heights and lengths as people write them in attributes: `12`, `12.5 m`, `40 ft`, `7'4"`, `~15`, `15;18`, `3-4`.
 
 The units of OpenStreetMap: https://wiki.openstreetmap.org/wiki/Map_features/Units. Metres need none; feet and inches
-have marks. A missing blank and a decimal comma are mistakes there that leave no doubt.
+have marks. A missing blank and a decimal comma are mistakes there that leave no doubt, but before three digits.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ _FEET: Final = re.compile(
 )
 _MARKS: Final = str.maketrans({"\N{RIGHT SINGLE QUOTATION MARK}": "'", "\N{PRIME}": "'", "\N{DOUBLE PRIME}": '"',
                                "\N{RIGHT DOUBLE QUOTATION MARK}": '"', ",": "."})  # fmt: skip
+_THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")
+"""As `1,200`: twelve hundred to some, one and a fifth to others."""
 _ABOUT: Final = re.compile(r"(?:~|\u2248|ca\.?(?=[\s\d])|circa|approx(?:\.|imately)?|about)\s*")
 """What says that a length is approximate."""
 _RANGE: Final = re.compile(rf"({_NUMBER})\s*([a-z']*)\s*[-\u2013]\s*({_NUMBER})\s*([a-z']*)")
@@ -50,6 +52,8 @@ def metres_of(value: Any) -> float | None:
         return None
     if isinstance(value, int | float):
         return float(value) if math.isfinite(value) else None
+    if _THOUSANDS.search(str(value)):
+        return None
     text = str(value).strip().lower().translate(_MARKS)
     if text.isdecimal():
         return float(text)
@@ -70,7 +74,7 @@ def lengths_of(value: Any) -> Lengths:
     one = metres_of(value)
     if one is not None:
         return Lengths((one,))
-    if not isinstance(value, str):
+    if not isinstance(value, str) or _THOUSANDS.search(value):
         return Lengths(())
     found: list[float] = []
     for each in filter(None, (part.strip() for part in value.split(";"))):
