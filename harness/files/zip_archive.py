@@ -53,9 +53,8 @@ def unpacked(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
     """
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
-            held = [each for each in archive.infolist() if _is_a(each.filename.lower(), ending)]
-            chosen = _chosen(held, ending, main)
-            with archive.open(chosen.filename) as member:
+            name, others = chosen(archive.namelist(), (ending,), main)
+            with archive.open(name) as member:
                 inner = member.read(most + 1)
     except InputError:
         raise
@@ -66,7 +65,7 @@ def unpacked(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
         raise InputError("is a damaged ZIP archive; get it again") from error
     if len(inner) > most:
         raise InputError(f"unpacks to more than {most // 10**6} MB; must be one {ending} file")
-    return Unpacked(_base(chosen.filename), inner, len(held) - 1)
+    return Unpacked(_base(name), inner, others)
 
 
 DAMAGES: Final = (
@@ -82,31 +81,38 @@ DAMAGES: Final = (
 """What Python's unpacking raises of damaged archives."""
 
 
-def _is_a(name: str, ending: str) -> bool:
-    return name.endswith(ending) and not name.startswith(FORKS[0]) and not _base(name).startswith(FORKS[1])
+def _is_a(name: str, endings: tuple[str, ...]) -> bool:
+    return name.endswith(endings) and not name.startswith(FORKS[0]) and not _base(name).startswith(FORKS[1])
 
 
 def _base(name: str) -> str:
     return name.rpartition("/")[2]
 
 
-def _chosen(held: Sequence[zipfile.ZipInfo], ending: str, main: str) -> zipfile.ZipInfo:
-    """The file that is meant.
+def chosen(names: Sequence[str], endings: tuple[str, ...], main: str = "") -> tuple[str, int]:
+    """The file that is meant of those in an archive, and how many more have such an ending.
+
+    Args:
+        names: of all.
+        endings: in lower case.
+        main: as that of `unpacked`.
 
     Raises:
         InputError: there is none, or it cannot be told.
     """
+    held = [name for name in names if _is_a(name.lower(), endings)]
+    kind = " or ".join(endings)
     if not held:
-        raise InputError(f"is a ZIP archive without a {ending} file")
-    depth = min(each.filename.count("/") for each in held)
-    near = [each for each in held if each.filename.count("/") == depth] if main else held
-    called = [each for each in near if main and _base(each.filename).lower() == main]
+        raise InputError(f"is a ZIP archive without a {kind} file")
+    depth = min(name.count("/") for name in held)
+    near = [name for name in held if name.count("/") == depth] if main else held
+    called = [name for name in near if main and _base(name).lower() == main]
     if len(near) > 1 and len(called) != 1:
-        names = ", ".join(printable(each.filename)[:MOST_SHOWN] for each in near[:TOLD])
+        told = ", ".join(printable(name)[:MOST_SHOWN] for name in near[:TOLD])
         more = ", ..." if len(near) > TOLD else ""
         wanted = f"one, or one called {main}" if main else "one"
         raise InputError(
-            f"is a ZIP archive with {counted(len(near), f'{ending} file')} ({names}{more}); must have {wanted}: unpack "
-            "it and give the file that is meant"
+            f"is a ZIP archive with {counted(len(near), f'{kind} file')} ({told}{more}); must have {wanted}: unpack it "
+            "and give the file that is meant"
         )
-    return called[0] if called else near[0]
+    return (called or near)[0], len(held) - 1

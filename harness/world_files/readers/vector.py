@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.files.input_file import InputError
 from harness.files.wording import counted
+from harness.files.zip_archive import chosen
 from harness.world_files.bounded import MAX_BYTES
 from harness.world_files.parts import Contents, Part, Reading, WorldFileError
 from harness.world_files.plane import in_degrees
@@ -97,10 +99,10 @@ def _part(
 
 
 def _source(path: Path) -> Path | str:
-    """What GDAL opens: the file, or the first in an archive.
+    """What GDAL opens: the file, or the one in an archive.
 
     Raises:
-        WorldFileError: it unpacks to too much.
+        WorldFileError: it unpacks to too much, or the archive has none or several.
     """
     if path.suffix.lower() != ".zip":
         return path
@@ -113,9 +115,10 @@ def _source(path: Path) -> Path | str:
         raise WorldFileError(
             f"unpacks to more than {MAX_BYTES // 10**6} MB; cut the area of interest out of it"
         )
-    inner = next((each.filename for each in members if each.filename.lower().endswith(PACKED)), None)
-    if inner is None:
-        raise WorldFileError(f"is a ZIP archive without a {' or '.join(PACKED)} file")
+    try:
+        inner, _ = chosen([each.filename for each in members], PACKED)
+    except InputError as error:
+        raise WorldFileError(str(error)) from error
     return f"/vsizip/{path.absolute()}/{inner}"
 
 

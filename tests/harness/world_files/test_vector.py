@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -48,6 +49,18 @@ def test_a_shapefile_may_be_packed_and_other_archives_are_named(tmp_path: Path) 
             archive.write(each, f"town/{each.name}")
     (part,), (wanted,) = (read(path, None, Reading()).parts for path in (packed, plain))
     assert part == wanted
+    with zipfile.ZipFile(packed, "w") as archive:
+        for each in sorted(tmp_path.glob("a.[sdp]*")):
+            archive.writestr(f"__MACOSX/town/._{each.name}", "a fork of macOS")
+            archive.write(each, f"town/{each.name}")
+    assert read(packed, None, Reading()).parts == (wanted,)
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name, each in itertools.product(("town", "lake"), sorted(tmp_path.glob("a.[sdp]*"))):
+            archive.write(each, f"{name}{each.suffix}")
+    with pytest.raises(
+        WorldFileError, match=r"2 \.shp or \.gpkg files \(town\.shp, lake\.shp\); must have one: unpack"
+    ):
+        read(packed, None, Reading())
     with zipfile.ZipFile(packed, "w") as archive:
         archive.writestr("dem/", "")
         archive.writestr("dem/heights.csv", "1,2\n")
