@@ -290,7 +290,7 @@ class Plan:
 class Planner(Protocol):
     """A local planner for one flight. It is asked after every scan, in order of time.
 
-    Between scans it is asked at every step of guidance for as long as its last answer has `wants_more_time`.
+    Between scans it is asked twice a guidance interval (20 times a second) while its last answer has `wants_more_time`.
     Its inputs are read-only; its output goes to standard error.
     """
 

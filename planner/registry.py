@@ -91,14 +91,19 @@ BUILT_IN = (
 )
 
 
+class PluginError(ImportError):
+    """A planner of another distribution cannot be loaded; the message says which, why, and what to do."""
+
+
 def installed_kinds() -> dict[str, PlannerKind]:
-    """The planner kinds that every process finds, by name, built-in ones first."""
+    """The planner kinds that every process finds, by name, built-in ones first.
+
+    Raises:
+        PluginError: one of another distribution cannot be loaded.
+    """
     kinds = {kind.kind: kind for kind in BUILT_IN}
     for point in _outside(entry_points, tuple(sys.path)):
-        with redirect_stdout(sys.stderr):
-            outside = point.load()
-        if not isinstance(outside, PlannerKind):
-            raise TypeError(f"entry point {point.name!r} ({point.value}) is not a PlannerKind")
+        outside = _loaded(point)
         kinds.setdefault(outside.kind, outside)
     return kinds
 
@@ -126,7 +131,7 @@ def distribution_of(kind: str) -> str | None:
     if kind in (built_in.kind for built_in in BUILT_IN):
         return None
     for point in _outside(entry_points, tuple(sys.path)):
-        if point.load().kind == kind and point.dist is not None:
+        if _loaded(point).kind == kind and point.dist is not None:
             return f"{point.dist.name} {point.dist.version}"
     return None
 
@@ -135,3 +140,24 @@ def distribution_of(kind: str) -> str | None:
 def _outside(find: Callable[..., EntryPoints], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""
     return tuple(find(group=GROUP))
+
+
+def _loaded(point: EntryPoint) -> PlannerKind:
+    """What an entry point of another distribution names.
+
+    Raises:
+        PluginError: it names something else, or cannot be loaded.
+    """
+    owner = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "another distribution"
+    told = f"the planner of entry point {point.name!r} ({point.value}) of {owner}"
+    try:
+        with redirect_stdout(sys.stderr):
+            outside = point.load()
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise PluginError(
+            f"{told} cannot be loaded: {reason}; mend or uninstall that distribution"
+        ) from error
+    if not isinstance(outside, PlannerKind):
+        raise PluginError(f"{told} is no PlannerKind; mend or uninstall that distribution")
+    return outside

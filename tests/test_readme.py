@@ -273,7 +273,7 @@ def test_python_shown_runs(name: str, tmp_path: Path) -> None:
 def test_ones_own_planner_as_a_distribution_is_found_and_flown(tmp_path: Path) -> None:
     text = READMES["planner/README.md"]
     (planner,), (project,), (scenario,) = blocks("python", text), blocks("toml", text), blocks("yaml")
-    (tmp_path / "my_planner.py").write_text(planner)
+    (tmp_path / "straight_on.py").write_text(planner)
     (tmp_path / "pyproject.toml").write_text(project)
     (tmp_path / "my_world.yaml").write_text(scenario)
     build = f"import hatchling.build; hatchling.build.build_wheel({str(tmp_path)!r})"

@@ -110,17 +110,19 @@ def guidance_kinds() -> dict[str, GuidanceKind]:
     return {**installed_kinds(), **_registered}
 
 
+class PluginError(ImportError):
+    """A guidance law of another distribution cannot be loaded; the message says which, why, and what to do."""
+
+
 def installed_kinds() -> dict[str, GuidanceKind]:
     """The guidance laws that every process finds, by name, built-in ones first.
 
     Raises:
-        TypeError: an entry point names something else.
+        PluginError: one of another distribution cannot be loaded.
     """
     kinds = {kind.kind: kind for kind in BUILT_IN}
     for point in _outside(entry_points, tuple(sys.path)):
-        outside = point.load()
-        if not isinstance(outside, GuidanceKind):
-            raise TypeError(f"entry point {point.name!r} ({point.value}) is not a GuidanceKind")
+        outside = _loaded(point)
         kinds.setdefault(outside.kind, outside)
     return kinds
 
@@ -130,7 +132,7 @@ def distribution_of(kind: str) -> str | None:
     if kind in (built_in.kind for built_in in BUILT_IN):
         return None
     for point in _outside(entry_points, tuple(sys.path)):
-        if point.load().kind == kind and point.dist is not None:
+        if _loaded(point).kind == kind and point.dist is not None:
             return f"{point.dist.name} {point.dist.version}"
     return None
 
@@ -139,3 +141,23 @@ def distribution_of(kind: str) -> str | None:
 def _outside(find: Callable[..., EntryPoints], path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
     """Entry points of other distributions; to look for them takes as long as all else of reading a scenario."""
     return tuple(find(group=GROUP))
+
+
+def _loaded(point: EntryPoint) -> GuidanceKind:
+    """What an entry point of another distribution names.
+
+    Raises:
+        PluginError: it names something else, or cannot be loaded.
+    """
+    owner = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "another distribution"
+    told = f"the guidance law of entry point {point.name!r} ({point.value}) of {owner}"
+    try:
+        outside = point.load()
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise PluginError(
+            f"{told} cannot be loaded: {reason}; mend or uninstall that distribution"
+        ) from error
+    if not isinstance(outside, GuidanceKind):
+        raise PluginError(f"{told} is no GuidanceKind; mend or uninstall that distribution")
+    return outside

@@ -15,7 +15,7 @@ import numpy as np
 
 from harness.analysis.as_given import AsGiven
 from harness.analysis.flight_limits import LOAD_S, FlightLimits
-from harness.analysis.smoothness import planned_profile, window_m
+from harness.analysis.smoothness import planned_profile, turn_onto_first_plan_1pm, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
 LEAD_S = 5.0
@@ -43,9 +43,11 @@ FINDINGS: Mapping[str, str] = {
     "planner too late": "the aircraft was off the plan already when the plan took effect",
     "turn radius too tight": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)), or the "
     "aircraft was further from the path as given than allowed",
-    "sensor horizon": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)), near an obstacle "
-    "that the sensor shows too late for a wider turn",
-    "bank limit": "the bank command was at its limit, on a radius that the limit allows",
+    "sensor horizon": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)), within "
+    "sensing range of an obstacle, and `sensor.range_m` is too short for a turn before a wall (clearance, turn radius, "
+    "and the way flown while sensing, computing and rolling in)",
+    "bank limit": "the bank command was at its limit, on a radius that the limit allows: the aircraft was late or "
+    "disturbed, not the plan too tight",
     "wind drift": "the bank command was at its limit, on a radius that only the wind makes too tight; or the aircraft "
     "was off downwind in a cross-wind",
     "roll rate": "the aircraft rolled at its largest rate",
@@ -155,7 +157,7 @@ def _lateral_cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], lim
 
 
 def _tightest_1pm(lead: Track, plans: Sequence[AcceptedPlan]) -> float:
-    """Largest curvature of what was planned, up to a window beyond the last station.
+    """Largest curvature of what was planned, up to a window beyond the last station, and of the turn onto it.
 
     An aircraft that overshoots a corner stays at its station.
     """
@@ -163,7 +165,8 @@ def _tightest_1pm(lead: Track, plans: Sequence[AcceptedPlan]) -> float:
     reach = lead.arc_length_m.copy()
     reach[-1] += window
     planned = planned_profile(replace(lead, arc_length_m=reach), plans, window)
-    return float(np.abs(planned.curvature_1pm).max(initial=0.0))
+    onto = turn_onto_first_plan_1pm(lead, plans, window)
+    return float(np.abs(planned.curvature_1pm).max(initial=onto))
 
 
 def saturated(track: Track, bank_limit_rad: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

@@ -158,6 +158,22 @@ def planned_profile(track: Track, plans: Sequence[AcceptedPlan], window_m: float
     return Profile(length, curvature)
 
 
+def turn_onto_first_plan_1pm(track: Track, plans: Sequence[AcceptedPlan], window_m: float) -> float:
+    """Curvature of the corner from the course of the aircraft onto the first plan, where it takes that up.
+
+    Args:
+        track: rows of a flown track; 0 is returned where they do not hold the beginning of the first plan.
+        plans: as `planned_profile` takes them.
+        window_m: length over which the corner is taken to be turned.
+    """
+    flown = np.flatnonzero(track.plan_index >= 0)
+    if not len(flown) or track.plan_index[flown[0]] != 0 or track.arc_length_m[flown[0]] > window_m:
+        return 0.0
+    course = math.radians(float(track.course_deg[flown[0]]))
+    onto = _tangent(plans[0], float(track.arc_length_m[flown[0]]))
+    return sum(abs(each[1]) for each in _corner((math.sin(course), math.cos(course)), onto, window_m))
+
+
 def polyline_profile(points_m: FloatArray, window_m: float) -> Profile:
     """Curvature profile of a polyline.
 

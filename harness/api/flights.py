@@ -16,6 +16,7 @@ from harness.scenario.scenario import Scenario, load_scenario, parse_scenario
 
 if TYPE_CHECKING:
     from harness.flight.observer import Progress
+    from harness.run_files.run_folder import Run
 
 
 def fly(
@@ -80,12 +81,27 @@ def load_run(folder: str | Path) -> FlightResult:
     track, plans = run_folder.tables(run.folder)
     return FlightResult(
         parse_scenario(run.scenario_yaml, str(run.folder / run_folder.SCENARIO), as_flown=True),
-        Metrics.of(run.metrics),
+        _metrics(run),
         track,
         plans,
         run.folder,
         run.manifest,
     )
+
+
+def _metrics(run: Run) -> Metrics:
+    from pydantic import ValidationError
+
+    from harness.run_files import run_folder
+
+    try:
+        return Metrics.of(run.metrics)
+    except ValidationError as error:
+        first = error.errors()[0]
+        file, key = run.folder / run_folder.METRICS, ".".join(map(str, first["loc"]))
+        raise InputError(
+            f"{file}: {key}: {first['msg']}; another version of wayproof flew this run, or the file was changed"
+        ) from error
 
 
 def in_python(what: str) -> str:

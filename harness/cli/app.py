@@ -130,11 +130,13 @@ def _flush() -> None:
 
 def _report(error: Exception) -> int:
     """Says on standard error what went wrong and returns the exit status."""
+    from aircraft.guidance.registry import PluginError as GuidancePluginError
     from harness.files.crash import PlannerError, sentence
     from harness.files.errors import WriteError
     from harness.files.input_file import InputError
+    from planner.registry import PluginError as PlannerPluginError
 
-    if isinstance(error, PlannerError):
+    if isinstance(error, (PlannerError, PlannerPluginError, GuidancePluginError)):
         say(f"wayproof: {error}", err=True)
         return BAD_INPUT
     if isinstance(error, InputError):

@@ -61,7 +61,11 @@ def check(
     ] = None,
     tolerance_m: Annotated[
         float | None,
-        typer.Option(metavar="T", help="Largest distance from the path. Default: a tenth of C in calm air."),
+        typer.Option(
+            metavar="T",
+            help="Largest distance from the path. Default: a tenth of C, or twice the "
+            "tracking error if that is more.",
+        ),
     ] = None,
     corner_m: Annotated[
         float | None,

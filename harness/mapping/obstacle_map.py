@@ -2,9 +2,10 @@
 
 Edges are points on a square grid of cells, at most one a cell, each where a ray hit or between two such
 places. Near by, where the edge of an obstacle stands out against what is behind it, finer grids keep more of
-them: paths bend about such places. Evidence decides: a cell that was hit in two scans holds an edge; one that
-several scans looked through, with neighbouring rays agreeing, does not. So one false return makes no wall and
-one lost return opens none. The grids cover the area with a border, so that the map cannot outgrow them.
+them: paths bend about such places. Evidence decides: a cell that was hit holds an edge, where the sensor has false
+returns one that was hit in two scans; one that several scans looked through, with neighbouring rays agreeing, does
+not. So one false return makes no wall and one lost return opens none. The grids cover the area with a border, so that
+the map cannot outgrow them.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from aircraft.airframes import airframe
 from aircraft.guidance import registry
 from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
-from aircraft.guidance.registry import BUILT_IN, GROUP, GuidanceKind, guidance_kinds
+from aircraft.guidance.registry import BUILT_IN, GROUP, GuidanceKind, PluginError, guidance_kinds
 from aircraft.interface import Route
 from aircraft.start import StartConditions
 from tests.point_mass import PointMass
@@ -57,7 +57,7 @@ def test_a_law_of_another_distribution_is_found_by_its_name(monkeypatch: pytest.
 
 def test_an_entry_point_that_is_no_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     found_outside(monkeypatch, "math:tau")
-    with pytest.raises(TypeError, match=r"'mine' \(math:tau\) is not a GuidanceKind"):
+    with pytest.raises(PluginError, match=r"'mine' \(math:tau\) of .* is no GuidanceKind; mend or uninstall"):
         guidance_kinds()
 
 

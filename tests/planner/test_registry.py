@@ -9,7 +9,7 @@ import pytest
 
 from planner import registry
 from planner.interface import Mission, Plan, PlanRequest, PlanStatus
-from planner.registry import BUILT_IN, GROUP, PlannerKind, planner_kinds
+from planner.registry import BUILT_IN, GROUP, PlannerKind, PluginError, planner_kinds
 
 
 @dataclass(frozen=True)
@@ -69,5 +69,13 @@ def test_built_in_names_win(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_is_no_planner_kind_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, "NOT_A_KIND")
-    with pytest.raises(TypeError, match=r"'not_a_kind' \(.*:NOT_A_KIND\) is not a PlannerKind"):
+    with pytest.raises(PluginError, match=r"'not_a_kind' \(.*:NOT_A_KIND\) of .* is no PlannerKind; mend or"):
+        planner_kinds()
+
+
+def test_what_cannot_be_loaded_is_told_with_its_distribution(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, "ABSENT")
+    with pytest.raises(
+        PluginError, match=r":ABSENT\) of .* cannot be loaded: AttributeError: .*'ABSENT'; mend or"
+    ):
         planner_kinds()

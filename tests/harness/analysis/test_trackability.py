@@ -79,6 +79,26 @@ def test_cause_is_a_turn_tighter_than_can_be_flown(
     assert legs(track, [wide], LIMITS)[0].cause == "bank limit"
 
 
+@pytest.mark.parametrize(("course_deg", "cause"), [(0.0, "turn radius too tight"), (90.0, "bank limit")])
+def test_a_first_plan_that_leads_off_sideways_is_a_corner(
+    make_track: Callable[..., Track],
+    make_plan: Callable[..., AcceptedPlan],
+    course_deg: float,
+    cause: str,
+) -> None:
+    """The plan leads east. Who flies north when it takes effect is asked for a right angle on the spot."""
+    off = np.minimum(np.arange(151) / 2.0, 40.0)
+    track = make_track(
+        151,
+        arc_length_m=np.maximum(2.5 * np.arange(151) - 40.0, 0.0),
+        cross_track_m=off,
+        course_deg=np.full(151, course_deg),
+        roll_command_deg=np.full(151, 45.0),
+    )
+    east = make_plan([(0, 0, 1, 0, 0.0, 900.0)])
+    assert legs(track, [east], LIMITS)[0].cause == cause
+
+
 def test_cause_is_a_corner_that_is_overshot(
     make_track: Callable[..., Track], make_plan: Callable[..., AcceptedPlan]
 ) -> None:

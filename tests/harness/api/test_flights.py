@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -96,6 +98,20 @@ def test_reprs_are_short_and_a_notebook_sees_a_table(
 def test_the_manifest_says_that_it_was_python(kept: wayproof.FlightResult) -> None:
     (command,) = kept.manifest["command"]
     assert command.startswith("wayproof.fly('short', planner='rolling_window', ")
+
+
+def test_a_figure_that_a_run_lacks_is_told(kept: wayproof.FlightResult, tmp_path: Path) -> None:
+    assert kept.folder is not None
+    folder = tmp_path / "run"
+    shutil.copytree(kept.folder, folder)
+    metrics = json.loads((folder / "metrics.json").read_text())
+    del metrics["bank_saturation_fraction"]
+    (folder / "metrics.json").write_text(json.dumps(metrics))
+    said = re.escape(
+        f"{folder / 'metrics.json'}: bank_saturation_fraction: Field required; another version of"
+    )
+    with pytest.raises(wayproof.InputError, match=said):
+        wayproof.load_run(folder)
 
 
 def test_nothing_of_the_caller_is_frozen(run: wayproof.FlightResult) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from aircraft.model_files import AircraftError
 from harness.cli import names
 from harness.cli.app import main
 from harness.scenario import shipped
+from planner import registry
 from planner.registry import planner_kinds
 
 
@@ -111,3 +113,15 @@ def test_the_last_column_goes_on_below_itself(
     first, second, *_ = names._row(cells, "word " * 20).splitlines()
     assert first == cells + " ".join(["word"] * 6)
     assert second == " " * 51 + " ".join(["word"] * 6)
+
+
+def test_what_of_another_distribution_cannot_be_loaded_is_told_in_a_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    point = EntryPoint("absent", "math:no_planner", registry.GROUP)
+    monkeypatch.setattr(registry, "entry_points", lambda group: EntryPoints([point]))
+    assert main(["list", "planners"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("wayproof: the planner of entry point 'absent' (math:no_planner) of another")
+    assert "AttributeError" in said
+    assert said.count("\n") == 1
