@@ -24,8 +24,8 @@ DECLARED: Final = ("<!DOCTYPE", "<!ENTITY")
 BOUNDARIES: Final = ("outerBoundaryIs", "innerBoundaryIs")
 LINKED: Final = ("NetworkLink", "GroundOverlay", "ScreenOverlay", "PhotoOverlay")
 COMMA: Final = re.compile(r"\s*,\s*")
-ABSOLUTE, RELATIVE = "absolute", "relativeToGround"
-"""Values of KML's altitudeMode; with any other the altitude means nothing."""
+ABSOLUTE, RELATIVE, CLAMPED = "absolute", "relativeToGround", "clampToGround"
+"""Values of KML's altitudeMode; with any other the altitude means nothing. The last is the default."""
 
 Point = tuple[float, float, float | None]
 """Latitude, longitude, altitude."""
@@ -69,7 +69,7 @@ def read_kml(text: str, source: str) -> PathAsRead:
     if len(joined) > 1:
         notes.append(_joined(len(joined)))
     if flat and any(altitude for *_, altitude in points):
-        notes.append("altitudes passed over: their altitudeMode is clampToGround")
+        notes.append(f"altitudes passed over: their altitudeMode is {shown(mode or CLAMPED)}")
     return _path(points, source, name, Fences(tuple(fences)), tuple(notes), flat, mode == RELATIVE)
 
 

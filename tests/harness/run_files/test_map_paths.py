@@ -148,6 +148,10 @@ def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> Non
     given = read_path(path)
     assert (given.altitudes_m.tolist(), given.above_ground) == ([], False)
     assert given.notes == ("altitudes passed over: their altitudeMode is clampToGround",)
+    path.write_text(kml().replace("<altitudeMode>absolute</altitudeMode>", ""))
+    assert read_path(path).notes == given.notes
+    path.write_text(kml(mode="relativeToSeaFloor"))
+    assert read_path(path).notes == ("altitudes passed over: their altitudeMode is relativeToSeaFloor",)
 
 
 def test_a_line_of_kml_lies_as_much_higher_as_its_offset_says(tmp_path: Path) -> None:
