@@ -189,7 +189,7 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
         needed, taken = relations.ways(), set[int]()
         ways: dict[int, Line] = {}
         tags_of: dict[int, Mapping[str, str]] = {}
-        points = osmium.filter.KeyFilter(*POINTS)
+        points = osmium.filter.KeyFilter(*POINTS, HEIGHT)
         for each in osmium.FileProcessor(str(path), osmium.osm.NODE).with_filter(points):
             found.point({tag.k: tag.v for tag in each.tags})
         entities = osmium.osm.NODE | osmium.osm.WAY

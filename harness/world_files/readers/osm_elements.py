@@ -71,16 +71,18 @@ class Collected:
         self.broken = self.closed = 0
         self._others: Mapping[str, int] = {}
         self._high: list[float] = []  # heights of what is no building
-        self._high_kinds = Counter[str]()  # ways and relations among it
+        self._high_kinds = Counter[str]()  # what of it are ways, relations and points
         self._points: list[float] = []  # heights of what has no outline, 0 where none is known
 
     def point(self, tags: Mapping[str, str]) -> None:
-        """A node with tags; what is tall and has no outline is counted."""
+        """A node with tags; what is tall and has no outline is counted, and what else says how high it is."""
         if is_tall(tags):
             self._points.append(_height_m(tags))
+        else:
+            self.other(tags, "point")
 
     def other(self, tags: Mapping[str, str], kind: str = "way") -> None:
-        """A way or a relation that is no building; one that says how high it is is counted."""
+        """A way, a relation or a point that is no building; one that says how high it is is counted."""
         height_m = _height_m(tags)
         if height_m > 0.0:
             self._high.append(height_m)
@@ -138,8 +140,9 @@ class Collected:
             notes.append(f"{many} of buildings that is no area passed over (type {types})")
         if self._high:
             many = " and ".join(counted(count, kind) for kind, count in self._high_kinds.items())
+            verb = "is" if len(self._high) == 1 else "are"
             notes.append(
-                f"{many} with a height that are no building passed over, the highest {max(self._high):g} m"
+                f"{many} with a height that {verb} no building passed over, the highest {max(self._high):g} m"
             )
         if self._points:
             highest_m = max(self._points)
@@ -167,7 +170,7 @@ class Elements:
 
     def point(self, tags: Mapping[str, str]) -> None:
         """Tags of a node."""
-        if is_tall(tags):
+        if HEIGHT in tags or is_tall(tags):
             self._points.append(tags)
 
     def node(self, number: int, longitude: float, latitude: float) -> None:

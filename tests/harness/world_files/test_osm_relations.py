@@ -202,3 +202,25 @@ def test_buildings_of_several_ways_are_made_all_at_once(
     parts = read_any(path).parts
     assert [part.footprint.area for part in parts] == [pytest.approx(1e-6)] * 40
     assert len(calls) < 5
+
+
+@pytest.mark.parametrize("form", ["osm", "json", "osm.pbf"])
+def test_points_with_a_height_that_are_no_building_are_counted(form: str, tmp_path: Path) -> None:
+    """A crane, a flagpole: as a way they were counted, as a point they were not."""
+    ways = {1: '<tag k="building" v="yes"/><tag k="height" v="9"/>', 2: '<tag k="height" v="3"/>'}
+    path = osm_building(tmp_path, "osm", "", ways, '<tag k="type" v="route"/>')
+    nodes = "".join(
+        f'<node id="{number}" version="1" lon="8" lat="47"><tag k="man_made" v="{kind}"/>{tag}</node>'
+        for number, kind, tag in (
+            (1, "crane", '<tag k="height" v="~80 m"/>'),
+            (2, "flagpole", '<tag k="height" v="12"/>'),
+            (3, "flagpole", ""),
+            (4, "mast", '<tag k="height" v="70"/>'),
+        )
+    )
+    path.write_text(path.read_text().replace('<osm version="0.6">', f'<osm version="0.6">{nodes}'))
+    notes = read_any(as_form(path, form)).notes
+    (high,) = [note for note in notes if "with a height that are no building" in note]
+    assert {*high.split(" with ")[0].split(" and ")} == {"2 points", "1 way"}
+    assert high.endswith("passed over, the highest 80 m")
+    assert any(note.startswith("1 point for towers, masts or buildings") for note in notes)

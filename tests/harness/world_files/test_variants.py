@@ -906,6 +906,7 @@ def test_towers_that_are_points_are_counted(form: str, tmp_path: Path) -> None:
         path = tmp_path / "a.osm.pbf"
     count = sum(tall for _, tall in POINTS)
     assert read_any(path).notes == (
+        "1 point with a height that is no building passed over, the highest 30 m",
         f"{count} points for towers, masts or buildings without an outline passed over, the highest 179.832 m",
     )
 
