@@ -92,7 +92,7 @@ def _near_miss(left: Axes, right: Axes, scene: FigureScene, run: DrawnRun, index
     right.axhline(0.0, color="0.8", lw=0.6)
     right.axhline(scene.clearance_m, color="0.35", lw=0.7, ls="--", label="wanted")
     right.legend(loc="upper center", edgecolor="none", borderpad=0)
-    right.set_xlabel("along the path, m")
+    _label_along(right)
     most_m = CLEARANCES_SHOWN * scene.clearance_m or half_m
     right.set_ylim(min(0.0, float(track.clearance_m[row])) - 0.1 * most_m, most_m)
     right.set_title("clearance, m")
@@ -113,7 +113,7 @@ def _tightest_turn(left: Axes, right: Axes, scene: FigureScene, run: DrawnRun, i
     most = float(np.nanmax(np.abs(planned), initial=0.0))
     text = right.annotate(f"planned up to {most:.3g}", (0.03, 0.04), xycoords="axes fraction", fontsize=8)
     text.set_bbox(BEHIND_TEXT)
-    right.set_xlabel("along the path, m")
+    _label_along(right)
     right.set_title("curvature · turn radius")
 
 
@@ -122,6 +122,12 @@ def _along(run: DrawnRun, row: int, half_m: float) -> tuple[FloatArray, Any]:
     distance = distance_m(run.track)
     along_m: FloatArray = distance - distance[row]
     return along_m, np.abs(along_m) < 2 * half_m
+
+
+def _label_along(axes: Axes) -> None:
+    """Few ticks: a panel of half a figure has no room for more with four digits."""
+    axes.locator_params(axis="x", nbins=4)
+    axes.set_xlabel("along the path, m")
 
 
 def _enlarged(

@@ -33,7 +33,7 @@ def remarks(row: Row, clearance_m: float, speed_mps: float, *, given: bool = Fal
     found = []
     if not given and (row.clearance_violation_s or 0.0) > 0.0:
         least, time = number(row.min_clearance_m), number(row.clearance_violation_s)
-        text = f"{least} m at the least, where {number(clearance_m)} m are wanted; nearer than those for {time} s"
+        text = f"{least} m at the least; for {time} s nearer than the wanted {number(clearance_m)} m"
         found.append(Remark("nearer to an obstacle than wanted", text))
     if (row.bank_saturation_fraction or 0.0) > LONG_AT_LIMIT:
         found.append(

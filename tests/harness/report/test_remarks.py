@@ -35,7 +35,7 @@ def test_of_a_usual_flight_nothing_is_said() -> None:
         (
             {"min_clearance_m": 18.0, "clearance_violation_s": 2.7},
             "nearer to an obstacle than wanted",
-            "18 m at the least, where 40 m are wanted; nearer than those for 2.7 s",
+            "18 m at the least; for 2.7 s nearer than the wanted 40 m",
         ),
         ({"bank_saturation_fraction": 0.225}, "long at the bank limit", "22.5 % of the time"),
         (

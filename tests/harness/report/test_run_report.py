@@ -113,7 +113,7 @@ def test_a_near_miss_is_said_before_the_figures(run: Path, tmp_path: Path) -> No
         page_with(run, tmp_path / "fair", clearance_violation_s=0.0)
     )
     page = page_with(run, tmp_path / "near", min_clearance_m=5.49, clearance_violation_s=2.1)
-    said = "nearer to an obstacle than wanted</strong>: 5.49 m at the least, where 100.0 m are wanted;"
+    said = "nearer to an obstacle than wanted</strong>: 5.49 m at the least; for 2.1 s nearer than the wanted 100.0 m"
     assert page.index(said) < page.index("<table")
     assert '<td class="bad">5.49</td>' in page
     assert '<td class="bad">2.1</td>' in page
