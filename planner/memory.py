@@ -150,3 +150,5 @@ class ObstacleMemory:
         self._refused += 0 if genuine else len(fresh)
         self._count, self._with_moving = total, None
         self._labels.add(total)
+        if not self.ever_cleared:  # They stay: a search, which takes longest, finds them gathered.
+            self._labels.of(self._points[:total])
