@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import tempfile
 import threading
-import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -19,10 +18,10 @@ from harness.recording.properties import NO_RECORDINGS, RUN, VARIED
 from harness.recording.viewer import (
     LOCALHOST,
     NO_DRIVER,
-    SETTLE_S,
     ViewerError,
     address_of,
     answers,
+    draw_settled,
     free_port,
     need_screen,
     viewer_process,
@@ -333,8 +332,7 @@ def table_screenshot(
         window(name, recordings, Path(scratch), arguments) as (_, client),
     ):
         try:
-            time.sleep(2.0 * SETTLE_S)
-            client.save_screenshot(str(png.resolve()))
+            draw_settled(client, png.resolve())
         except ConnectionError as error:
             # Without a driver it listens for a moment before it gives up.
             raise ViewerError(NO_DRIVER) from error

@@ -20,6 +20,7 @@ import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
 from harness.files.errors import RunFolderError
@@ -34,6 +35,8 @@ LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
 SETTLE_S = 1.5
 """The viewer draws a new time within a few frames; a software renderer needs about a second for them."""
+MOST_PICTURES = 20
+"""What goes on changing is drawn no more often than this."""
 
 
 ALONE = ".rrd"
@@ -363,3 +366,15 @@ def answers(port: int, viewer: subprocess.Popen[str]) -> bool:
             return True
         time.sleep(0.05)
     return False
+
+
+def draw_settled(client: Any, png: Path) -> None:
+    """Draws what a viewer shows once two pictures in a row are alike: until then rows may be on their way."""
+    time.sleep(SETTLE_S)
+    before = b""
+    for _ in range(MOST_PICTURES):
+        time.sleep(SETTLE_S)
+        client.save_screenshot(str(png))
+        if png.read_bytes() == before:
+            return
+        before = png.read_bytes()
