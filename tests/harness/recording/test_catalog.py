@@ -356,6 +356,12 @@ def rows_of(png: Path) -> Image.Image:
         return picture.convert("RGB").crop(ROWS)
 
 
+def alike(one: Image.Image, other: Image.Image) -> bool:
+    """Whether two pictures show the same. A software renderer is off by some; two rows that changed places by 190."""
+    off = np.asarray(ImageChops.difference(one, other)).max(axis=2)
+    return int((off > 64).sum()) < 50
+
+
 def seen(client: Any, there: Callable[[Any], object]) -> Any:
     """What a viewer shows, as soon as that is there; fails where it does not come."""
     until_s = time.monotonic() + 30.0
@@ -375,7 +381,7 @@ def test_the_table_of_many_is_drawn_worst_first_and_the_worst_opens(many: Path, 
         with driven():
             table_screenshot("many", order, tmp_path / f"{name}.png")
         rows.append(rows_of(tmp_path / f"{name}.png"))
-    assert ImageChops.difference(*rows).getbbox() is None, "the order of the rows is that of the files"
+    assert alike(*rows), "the order of the rows is that of the files"
     assert len(rows[0].getcolors(1 << 24) or ()) > 20, "there are rows"
     with window(worst, tmp_path) as client:
         table = seen(client, lambda state: "/dataset/" in state.location).location
