@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from typing import NamedTuple
 
 from harness.files.crash import sentence, trace
 from harness.files.printing import PrintingAside
@@ -24,11 +25,20 @@ class PlannerFailedError(RuntimeError):
         self.trace = trace
 
 
+class Answer(NamedTuple):
+    """What a planner answered."""
+
+    plan: Plan
+    """The plan, checked."""
+    own: Plan
+    """The same as the object that the planner gave; it gets this one back as `PlanRequest.flown`."""
+
+
 class AskedPlanner:
     """A planner as the loop asks it.
 
-    The planner reads the map but cannot change it, gets its own answers back as `PlanRequest.flown`, and prints to
-    standard error. What it answers has been checked (`planner.plan_checks`) when the loop gets it.
+    The planner reads the map but cannot change it, and prints to standard error. What it answers has been checked
+    (`planner.plan_checks`) when the loop gets it.
 
     Args:
         planner: the planner.
@@ -38,27 +48,23 @@ class AskedPlanner:
 
     def __init__(self, planner: Planner, mission: Mission, seen: MapView) -> None:
         self._planner, self._mission, self._seen = planner, mission, ReadOnlyMap(seen)
-        self._answers: dict[int, tuple[Plan, Plan]] = {}
-        """The plan in effect and the one on its way, by identity: as checked, and as the planner gave them."""
         self.compute_ms = math.nan
         """Wall-clock time that the last answer took the planner."""
 
-    def plan(self, request: PlanRequest) -> Plan:
-        """The checked answer to a request; `request.flown` is one that was given before.
+    def plan(self, request: PlanRequest) -> Answer:
+        """The answer to a request; its `flown` is the `own` of the answer in effect.
 
         Raises:
             PlannerFailedError: the planner raised, or its answer cannot be flown.
             KeyboardInterrupt: as ever.
         """
-        flown = request.flown
-        own = self._answers.get(id(flown), (flown, flown))[1]
-        asked = PlanRequest(*request[:3], self._seen, own, *request[5:])
+        request = request._replace(seen=self._seen)
         begun = time.perf_counter()
         try:
             with PrintingAside():
-                answer = self._planner.plan(asked)
+                own = self._planner.plan(request)
                 self.compute_ms = 1e3 * (time.perf_counter() - begun)
-                plan = checked_plan(answer, request.position_m, self._mission)
+                return Answer(checked_plan(own, request.position_m, self._mission), own)
         except KeyboardInterrupt:
             raise
         except WrongAnswerError as error:
@@ -66,7 +72,3 @@ class AskedPlanner:
         except BaseException as error:  # whatever it is, it is no more than a plan that failed
             with PrintingAside():
                 raise PlannerFailedError(f"the planner raised {sentence(error)}", trace(error)) from None
-        if plan is not answer:
-            kept = self._answers.get(id(flown))
-            self._answers = {id(plan): (plan, answer)} | ({id(flown): kept} if kept else {})
-        return plan

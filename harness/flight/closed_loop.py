@@ -5,23 +5,22 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from aircraft.guidance.interface import GuidanceLaw, GuidanceOutput, VerticalLaw
-from aircraft.guidance.progress import RouteProgress
-from aircraft.interface import FlightModel, Route
+from aircraft.interface import FlightModel
 from harness.files.crash import sentence, trace
-from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress, RowObserver
-from harness.flight.plans import LATE_S, Plans
+from harness.flight.observer import PROGRESS_EVERY_S, Caution, Observer, Progress
+from harness.flight.plans import Plans
+from harness.flight.position_errors import FixEvents, TrueCrossTrack
 from harness.flight.record import Flight, Outcome
+from harness.flight.sensing import Sensing
 from harness.flight.signals import held_back
 from harness.flight.state_estimator import PerfectEstimator, StateEstimator
 from harness.flight.termination import Ending, Termination
-from harness.flight.timetable import intervals
-from harness.flight.track_log import TrackLog
-from harness.mapping.scan import RangeScan
+from harness.flight.timetable import Instant, intervals
+from harness.flight.track_log import FlightLog
 from harness.mapping.sensed_map import SensedMap
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
@@ -67,7 +66,7 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
 
     Args:
         loop: all parts of the flight; used up by it.
-        observers: look on.
+        observers: are told of scans, plans, rows and events.
         progress: told of the flight every few simulated seconds.
 
     Raises:
@@ -77,14 +76,14 @@ def fly(loop: Loop, observers: Sequence[Observer] = (), progress: Progress | Non
     next_report_s = 0.0
     with held_back() as interrupt:
         flying = ClosedLoop(loop, observers)
-        while flying.verdict is None:
+        while flying.ending is None:
             interrupt()
             if progress is not None and flying.true.time_s >= next_report_s:
-                progress(flying.true.time_s, flying.to_go_m, flying.word)
+                progress(flying.true.time_s, flying.to_go_m, flying.status_label)
                 next_report_s = flying.true.time_s + PROGRESS_EVERY_S
             flying.step()
         if progress is not None:
-            progress(flying.true.time_s, flying.to_go_m, flying.word)
+            progress(flying.true.time_s, flying.to_go_m, flying.status_label)
         return flying.flight()
 
 
@@ -97,7 +96,7 @@ class ClosedLoop:
 
     Args:
         loop: all parts of the flight; used up by it.
-        observers: look on.
+        observers: are told of scans, plans, rows and events.
 
     Raises:
         ValueError: the scan rate does not divide the simulation rate.
@@ -105,139 +104,94 @@ class ClosedLoop:
     """
 
     def __init__(self, loop: Loop, observers: Sequence[Observer] = ()) -> None:
-        self.verdict: Ending | None = None
+        self.ending: Ending | None = None
         """How the flight ended; None while it goes on."""
         self.steering = NOT_STEERED
-        """What guidance decided last."""
+        """The latest output of the guidance law."""
         self.plans = Plans(loop.planner, loop.mission, loop.seen, observers)
-        """What has been planned."""
+        """The plan in effect, the one that is computed, and all before."""
         self.plans.wants_more_time = loop.sensor is None
-        self._loop, self._observers, self._begun_s = loop, observers, time.perf_counter()
-        self._log = TrackLog(
-            loop.world.clearance,
-            [observer.on_block for observer in observers],
-            ground=loop.world.ground_heights,
-        )
-        self._row_observers = [each for each in observers if isinstance(each, RowObserver)]
-        self._own_roll_rad: float | None = None
-        # Where the true aircraft is on a plan, and on which; only where navigation is not perfect.
-        self._measured: RouteProgress | None = None
-        self._measured_index = -1
-        self._law_error: str | None = None
-        self._scans_on_their_way: deque[RangeScan] = deque()
-        self._jumps, self._had_fix = 0, True
-        scan_rate_hz = loop.scan_rate_hz if loop.sensor else 0.0
-        timetable = intervals(loop.model.step_rate_hz, scan_rate_hz)
-        self._intervals, self._first_steps = itertools.cycle(timetable), timetable[0][0].steps
-        self._locate()
+        self.true = loop.model.state()
+        """The true state at the end of the last step."""
+        self.believed = loop.navigator.believed(self.true)
+        """The same state as navigation estimates it."""
         if self.true.time_s > 0.0:
             raise RuntimeError(
                 f"this loop has been flown for {self.true.time_s:g} s already; "
                 "every flight needs a loop of its own"
             )
-        self._over(loop.termination.verdict(self.true, loop.model.fault()))
+        self._loop, self._observers, self._begun_s = loop, observers, time.perf_counter()
+        self._sensing = Sensing(loop.sensor, loop.seen, observers)
+        self._fixes = FixEvents(loop.navigator, observers)
+        self._true_error = TrueCrossTrack(self.plans)
+        self._log = FlightLog(loop.world, observers)
+        self._roll_override_rad: float | None = None
+        self._law_error: str | None = None
+        timetable = intervals(loop.model.step_rate_hz, loop.scan_rate_hz if loop.sensor else 0.0)
+        self._intervals, self._first_steps = itertools.cycle(timetable), timetable[0][0].steps
+        self._check_navigation()
+        self._finish_if_ended(self._judge())
 
     def step(self, roll_command_rad: float | None = None) -> None:
         """Flies one guidance interval, or up to the end of the flight if that comes first.
 
         Args:
-            roll_command_rad: held in place of what the guidance law decides; None: the law steers.
+            roll_command_rad: held in place of the command of the guidance law; None: the law steers.
         """
-        loop, self._own_roll_rad = self._loop, roll_command_rad
+        self._roll_override_rad = roll_command_rad
         for instant in next(self._intervals):
             if instant.scan:
-                self._sense()
-            mapped = self._map()
-            planning = mapped or (instant.guidance and self.plans.wants_more_time)
-            if planning and self._over(self._plan(mapped)):
-                return
-            if instant.guidance and self._over(self._guide()):
-                return
-            if self._over(self._advance(instant.steps)):
-                return
-            self._locate()
-            if self._over(loop.termination.verdict(self.true, loop.model.fault())):
+                self._sensing.scan(self.true, self.believed)
+            scanned = self._map()
+            ending = (
+                self._plan(scanned, instant)
+                or self._guide(instant)
+                or self._advance(instant.steps)
+                or self._judge()
+            )
+            if self._finish_if_ended(ending):
                 return
 
-    def _log_row(self) -> None:
-        """Logs where the aircraft is and what it was told last."""
-        steered = not math.isnan(self.steering.cross_track_m)
-        index = self.plans.index if steered else -1  # a law may fail in its first update
-        if self.believed is self.true:
-            self._log.add(self.true, self.steering, index)
-        else:
-            self._log.add(self.true, self.steering, index, self.believed, self._true_cross_track_m(index))
-        for observer in self._row_observers:
-            observer.on_row(self.true, self.steering, index)
-
-    def _locate(self) -> None:
-        """Reads the state, and what the aircraft believes of it."""
+    def _read_state(self) -> None:
+        """Reads the true state, and what navigation makes of it."""
         self.true = self._loop.model.state()
-        """The state at the end of the last step."""
         self.believed = self._loop.navigator.believed(self.true)
-        """What the aircraft believes it to be."""
-        if self._loop.navigator.jumps != self._jumps:
-            self._jump()
-        if self._had_fix and not self._loop.navigator.has_fix:
-            self._lose_fix()
+        self._check_navigation()
 
-    def _lose_fix(self) -> None:
-        """Tells observers; that a fix is back is told as the jump that comes with it."""
-        self._had_fix = False
-        at_start = self.true.time_s == 0.0
-        told = f"no fix {'at the start' if at_start else 'any more'}: the believed position drifts"
-        for observer in self._observers:
-            observer.on_event(self.true.time_s, told if at_start else Caution(told))
-
-    def _jump(self) -> None:
-        """Forgets the map and scans on their way, all entered from elsewhere, after the believed position has jumped.
+    def _check_navigation(self) -> None:
+        """Forgets the map if the believed position has jumped: it was entered from elsewhere.
 
         The planner is asked with the next scan, and checks its plan against what that shows.
         """
-        self._jumps, self._had_fix = self._loop.navigator.jumps, True
-        self._scans_on_their_way.clear()
-        self._loop.seen.start_over(self.true.time_s)
-        for observer in self._observers:
-            observer.on_event(
-                self.true.time_s,
-                Caution("a fix again: the believed position jumps, the map is forgotten"),
-            )
-
-    def _sense(self) -> None:
-        """Takes a scan of the true world; the map will have it from where the aircraft believes to be."""
-        true, believed, sensor = self.true, self.believed, self._loop.sensor
-        assert sensor is not None
-        scan = sensor.scan(true.east_m, true.north_m, true.heading_rad, true.time_s)
-        for observer in self._observers:
-            observer.on_scan(scan, true)
-        if believed is not true:
-            scan = scan.taken_from(believed.east_m, believed.north_m, believed.heading_rad)
-        self._scans_on_their_way.append(scan)
+        if self._fixes.jumped(self.true.time_s):
+            self._sensing.start_over(self.true.time_s)
 
     def _map(self) -> bool:
-        """Enters the oldest scan into the map, if it has become available; returns whether one has."""
-        scans = self._scans_on_their_way
-        if not scans or scans[0].available_s > self.true.time_s + LATE_S:
+        """Enters a scan that has become available into the map; returns whether there was one."""
+        scan = self._sensing.enter(self.true.time_s)
+        if scan is None:
             return False
-        scan = scans.popleft()
-        self._loop.seen.update(scan)
         self.plans.scan_s = scan.time_s
         return True
 
-    def _plan(self, mapped: bool) -> Ending | None:
-        """Asks the planner; returns how the flight ends, if that is its answer."""
-        return self.plans.ask(self.believed, self.steering.arc_length_m, mapped)
+    def _plan(self, scanned: bool, instant: Instant) -> Ending | None:
+        """Asks the planner after a scan, or while it wants more time; returns the ending if that is its answer."""
+        if not (scanned or (instant.guidance and self.plans.wants_more_time)):
+            return None
+        return self.plans.ask(self.believed, self.steering.arc_length_m, scanned)
 
-    def _guide(self) -> Ending | None:
-        """Steers along the plan in effect, and logs where the aircraft is and what it is told."""
-        loop, plans, true, believed = self._loop, self.plans, self.true, self.believed
-        verdict = plans.take_effect(believed, loop.guidance) or self._steer()
-        if verdict is not None:
-            return verdict
+    def _guide(self, instant: Instant) -> Ending | None:
+        """Steers along the plan in effect where guidance is due, and logs a row of the track."""
+        if not instant.guidance:
+            return None
+        loop, true, believed = self._loop, self.true, self.believed
+        ending = self.plans.take_effect(believed, loop.guidance) or self._steer()
+        if ending is not None:
+            return ending
         altitude_m, airspeed_mps = loop.vertical.command(believed, self.steering.arc_length_m)
         loop.model.command(
             self.steering.roll_command_rad,
-            # The model holds true values: what it is believed to be off is what it will be off.
+            # The model's loops hold true values: the navigation error is added to the command.
             altitude_m + (true.up_m - believed.up_m),
             self.steering.airspeed_or(airspeed_mps) + (true.airspeed_mps - believed.airspeed_mps),
         )
@@ -245,7 +199,7 @@ class ClosedLoop:
         return None
 
     def _steer(self) -> Ending | None:
-        """Asks the guidance law, if there is a plan; it may raise anything, which ends the flight."""
+        """Updates the guidance law, if there is a plan; an exception or a number that is not finite ends the flight."""
         if self.plans.index >= 0:
             try:
                 steering = self._loop.guidance.update(self.believed)
@@ -262,49 +216,52 @@ class ClosedLoop:
                     f"{steering.arc_length_m} m; all must be finite, the airspeed finite or NaN",
                 )
             self.steering = steering
-        if self._own_roll_rad is not None:
-            self.steering = self.steering._replace(roll_command_rad=self._own_roll_rad)
+        if self._roll_override_rad is not None:
+            self.steering = self.steering._replace(roll_command_rad=self._roll_override_rad)
         return None
-
-    def _true_cross_track_m(self, index: int) -> float:
-        """Distance of the true position from the plan of an index; NaN before the first."""
-        if index < 0:
-            return math.nan
-        if index != self._measured_index:
-            plan, self._measured_index = self.plans.accepted[index], index
-            self._measured = RouteProgress(Route(plan.segments, plan.loiter), self.steering.arc_length_m)
-        if self._measured is None:
-            return math.nan
-        return self._measured.nearest(self.true.east_m, self.true.north_m).cross_track_m
 
     def _advance(self, steps: int) -> Ending | None:
-        """Flies on; a planner that wants more time is asked again half way, and may end the flight there."""
-        model = self._loop.model
+        """Advances the flight model; a planner that wants more time is asked again half way."""
+        model, ending = self._loop.model, None
         if self.plans.wants_more_time:
             model.advance(steps // 2)
-            self._locate()
-            verdict = self._plan(mapped=False)
-            if verdict is not None:
-                return verdict
             steps -= steps // 2
-        model.advance(steps)
-        return None
+            self._read_state()
+            ending = self.plans.ask(self.believed, self.steering.arc_length_m, scanned=False)
+        if ending is None:
+            model.advance(steps)
+            self._read_state()
+        return ending
 
-    def _over(self, verdict: Ending | None) -> bool:
-        """Ends the flight if there is a verdict; returns whether it is over."""
-        if verdict is None:
+    def _judge(self) -> Ending | None:
+        """How the flight ends at the true state; None while it goes on."""
+        return self._loop.termination.verdict(self.true, self._loop.model.fault())
+
+    def _log_row(self) -> None:
+        """Logs the state and the latest steering as a row of the track."""
+        steered = not math.isnan(self.steering.cross_track_m)
+        index = self.plans.index if steered else -1  # a law may fail in its first update
+        if self.believed is self.true:
+            self._log.add(self.true, self.steering, index)
+        else:
+            true_m = self._true_error.cross_track_m(self.true, self.steering.arc_length_m, index)
+            self._log.add(self.true, self.steering, index, self.believed, true_m)
+
+    def _finish_if_ended(self, ending: Ending | None) -> bool:
+        """Closes the flight if it has ended; returns whether it has."""
+        if ending is None:
             return False
-        if self.true.time_s == 0.0:  # a track begins before it ends
+        if self.true.time_s == 0.0:  # a track has at least two rows
             self._log_row()
             self._loop.model.advance(self._first_steps)
-            self._locate()
-        if verdict.outcome is not Outcome.LOST_CONTROL:
-            self._steer()  # the last row is of the end of the flight, not of the update before
+            self._read_state()
+        if ending.outcome is not Outcome.LOST_CONTROL:
+            self._steer()  # so that the last row has the steering at the end
         self._log_row()
-        self.verdict = Ending(verdict.outcome, verdict.reason + self.plans.last_word(verdict.outcome))
-        told = f"{self.verdict.outcome.value}: {self.verdict.reason}"
+        self.ending = Ending(ending.outcome, ending.reason + self.plans.failure_suffix(ending.outcome))
+        text = f"{self.ending.outcome.value}: {self.ending.reason}"
         for observer in self._observers:
-            observer.on_event(self.true.time_s, told if verdict.outcome is Outcome.REACHED else Caution(told))
+            observer.on_event(self.true.time_s, text if ending.outcome is Outcome.REACHED else Caution(text))
         return True
 
     @property
@@ -313,9 +270,9 @@ class ClosedLoop:
         return self._loop.termination.to_go_m(self.true)
 
     @property
-    def word(self) -> str:
-        """One word for people: how the flight goes, or how it ended."""
-        return self.plans.state if self.verdict is None else self.verdict.outcome.value
+    def status_label(self) -> str:
+        """The state of the flight in one word: waiting, following, holding, or its outcome."""
+        return self.plans.status_label if self.ending is None else self.ending.outcome.value
 
     def flight(self) -> Flight:
         """The flight, once it is over.
@@ -323,12 +280,12 @@ class ClosedLoop:
         Raises:
             RuntimeError: it is not over.
         """
-        if self.verdict is None:
+        if self.ending is None:
             raise RuntimeError(f"the flight is not over; it has come to {self.true.time_s:g} s")
         return Flight(
             self._log.close(),
             tuple(self.plans.accepted),
-            *self.verdict,
+            *self.ending,
             tuple(self.plans.compute_ms),
             sim_s=self.true.time_s,
             wall_s=time.perf_counter() - self._begun_s,

@@ -9,7 +9,7 @@ from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.files.crash import in_a_line, sentence, trace
-from harness.flight.asked_planner import AskedPlanner, PlannerFailedError
+from harness.flight.asked_planner import Answer, AskedPlanner, PlannerFailedError
 from harness.flight.observer import Caution, Observer
 from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import Ending
@@ -34,7 +34,8 @@ class Plans:
     ) -> None:
         self._planner, self._seen = AskedPlanner(planner, mission, seen), seen
         self._latency_s, self._observers = mission.compute_latency_s, observers
-        self._coming: tuple[float, float, Plan, Route] | None = None
+        self._coming: tuple[float, float, Answer, Route] | None = None
+        self._own: Plan | None = None  # the plan in effect, as the planner gave it
         self.scan_s = math.nan
         """When the latest scan that the map has was taken."""
         self._due_s = math.inf  # when the plan on its way takes effect
@@ -52,8 +53,8 @@ class Plans:
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
 
     @property
-    def state(self) -> str:
-        """One word for people."""
+    def status_label(self) -> str:
+        """The state of the flight in one word: waiting, following or holding."""
         if not self.accepted:
             return "waiting"
         return "holding" if self._arc_length_m > self._loiters_from_m else "following"
@@ -76,10 +77,11 @@ class Plans:
         request = self._request(state, arc_length_m)
         self._scanned = False
         try:
-            plan = self._planner.plan(request)
+            answer = self._planner.plan(request)
         except PlannerFailedError as error:
             self.error = error.trace
             return Ending(Outcome.PLANNER_FAILED, str(error))
+        plan = answer.plan
         self._told, self.wants_more_time = plan.reason, plan.wants_more_time
         if plan.status is PlanStatus.KEPT:
             return None
@@ -92,7 +94,7 @@ class Plans:
             self._stuck, self._in_vain = "", set()
             assert plan.path is not None
             route = Route(plan.path.segments, plan.path.loiter)
-            self._coming = (self._planner.compute_ms, self.scan_s, plan, route)
+            self._coming = (self._planner.compute_ms, self.scan_s, answer, route)
             self._due_s = state.time_s + self._latency_s - LATE_S
         return None
 
@@ -108,7 +110,7 @@ class Plans:
         """
         if self._coming is None or state.time_s < self._due_s:
             return None
-        compute_ms, scan_s, plan, route = self._coming
+        compute_ms, scan_s, answer, route = self._coming
         late_s = state.time_s - (self._due_s - self._latency_s)
         self._coming, self._due_s = None, math.inf
         try:
@@ -118,7 +120,8 @@ class Plans:
             return Ending(
                 Outcome.LOST_CONTROL, f"the guidance law raised {sentence(error)} when it was given a plan"
             )
-        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, plan, scan_s)
+        accepted = AcceptedPlan(len(self.accepted), state.time_s, compute_ms, answer.plan, scan_s)
+        self._own = answer.own
         self.accepted.append(accepted)
         self.index = accepted.plan_index
         turn_m = float(route.segments[-1, 5]) if route.loiter else -math.inf
@@ -127,18 +130,18 @@ class Plans:
             observer.on_plan(accepted, state)
         return None
 
-    def last_word(self, outcome: Outcome) -> str:
-        """What the planner has to say of an end that is not its own: why it never, or no longer, found anything."""
+    def failure_suffix(self, outcome: Outcome) -> str:
+        """The planner's reason for having found no plan, to be added to the reason of an ending; else empty."""
         if outcome in (Outcome.PLANNER_FAILED, Outcome.UNREACHABLE):
             return ""
         if not (self.accepted or self._coming) and self._told:
             return f"; no plan was ever found: {in_a_line(self._told)}"
         if outcome is Outcome.TIMEOUT and self._stuck:
-            return f"; the planner's last word: {in_a_line(self._stuck)}"
+            return f"; the planner's last reason: {in_a_line(self._stuck)}"
         return ""
 
     def _request(self, state: AircraftState, arc_length_m: float) -> PlanRequest:
-        flown = self.accepted[-1].plan if self.accepted else None
+        flown = self._own
         speed_mps = max(state.groundspeed_mps, 1e-9)
         return PlanRequest(
             time_s=state.time_s,

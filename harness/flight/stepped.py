@@ -69,10 +69,10 @@ class SteppedLoop:
             ValueError: the roll command is not finite.
         """
         flying = self._flight_begun()
-        if flying.verdict is not None:
+        if flying.ending is not None:
             raise RuntimeError(
                 f"step() after the end: the flight is over after {flying.true.time_s:g} s "
-                f"({flying.verdict.outcome.value}: {flying.verdict.reason}); reset() begins the next"
+                f"({flying.ending.outcome.value}: {flying.ending.reason}); reset() begins the next"
             )
         if roll_command_rad is not None and not math.isfinite(roll_command_rad):
             raise ValueError(f"roll_command_rad is {roll_command_rad}; must be finite")
@@ -87,7 +87,7 @@ class SteppedLoop:
             RuntimeError: no flight has begun.
         """
         flying = self._flight_begun()
-        outcome, reason = (None, "") if flying.verdict is None else flying.verdict
+        outcome, reason = (None, "") if flying.ending is None else flying.ending
         return Status(
             time_s=flying.true.time_s,
             state=flying.true,
@@ -103,7 +103,7 @@ class SteppedLoop:
     @property
     def done(self) -> bool:
         """Whether the flight that was begun last is over."""
-        return self._flight_begun().verdict is not None
+        return self._flight_begun().ending is not None
 
     @property
     def standing(self) -> str:
@@ -111,9 +111,9 @@ class SteppedLoop:
         flying = self._flying
         if flying is None:
             return "not begun"
-        if flying.verdict is None:
-            return f"at {flying.true.time_s:g} s, {flying.word}"
-        return f"over after {flying.true.time_s:g} s, {flying.word}"
+        if flying.ending is None:
+            return f"at {flying.true.time_s:g} s, {flying.status_label}"
+        return f"over after {flying.true.time_s:g} s, {flying.status_label}"
 
     def flight(self) -> Flight:
         """The flight, once it is over.

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
+from harness.flight.observer import Observer, RowObserver
 from harness.flight.record import FloatArray, Track
+from harness.world.world import World
 
 Clearance = Callable[[FloatArray, FloatArray], FloatArray]
 """(k, 2) points and (k,) times -> (k,) true distance to the nearest active obstacle edge, m."""
@@ -160,6 +162,34 @@ class TrackLog:
         self._blocks.append(block)
         for sink in self._sinks:
             sink(block)
+
+
+class FlightLog(TrackLog):
+    """The track of one flight in a world, with those who look on row by row and block by block.
+
+    Args:
+        world: clearance and ground are measured in it.
+        observers: get every finished block; a `RowObserver` every row.
+    """
+
+    def __init__(self, world: World, observers: Sequence[Observer]) -> None:
+        super().__init__(
+            world.clearance, [observer.on_block for observer in observers], ground=world.ground_heights
+        )
+        self._row_observers = [each for each in observers if isinstance(each, RowObserver)]
+
+    def add(
+        self,
+        state: AircraftState,
+        steering: GuidanceOutput,
+        plan_index: int,
+        believed: AircraftState | None = None,
+        true_cross_track_m: float = math.nan,
+    ) -> None:
+        """Adds one row, as `TrackLog.add`."""
+        super().add(state, steering, plan_index, believed, true_cross_track_m)
+        for observer in self._row_observers:
+            observer.on_row(state, steering, plan_index)
 
 
 def _believed(rows: np.ndarray[Any, Any]) -> dict[str, FloatArray]:

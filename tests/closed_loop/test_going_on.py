@@ -154,4 +154,4 @@ def test_why_nothing_is_found_is_told_once_and_ends_the_reason_of_a_timeout(
     flight = fly(make_loop(small_world(**keys), PointMass), [events])
     # Once for each plan that is in effect meanwhile.
     assert [text for _, text in events.told[:-1]] == [said[1], said[0], said[0], said[1]]
-    assert flight.reason.endswith(" m from the goal; the planner's last word: nothing is seen to be free")
+    assert flight.reason.endswith(" m from the goal; the planner's last reason: nothing is seen to be free")

@@ -1,0 +1,71 @@
+"""Errors of the believed position: fixes lost and found again, and the true distance from the plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from aircraft.guidance.progress import RouteProgress
+from aircraft.interface import AircraftState, Route
+from harness.flight.observer import Caution, Observer
+from harness.flight.plans import Plans
+from harness.flight.state_estimator import StateEstimator
+
+
+class FixEvents:
+    """Notices when satellite navigation loses its fix, and when the fix is back.
+
+    Args:
+        navigator: the state estimator.
+        observers: are told of both.
+    """
+
+    def __init__(self, navigator: StateEstimator, observers: Sequence[Observer]) -> None:
+        self._navigator, self._observers = navigator, observers
+        self._jumps, self._had_fix = 0, True
+
+    def jumped(self, time_s: float) -> bool:
+        """Whether the believed position has jumped to a new fix since the last call."""
+        navigator = self._navigator
+        jumped = navigator.jumps != self._jumps
+        if jumped:
+            self._jumps, self._had_fix = navigator.jumps, True
+            self._tell(time_s, Caution("a fix again: the believed position jumps, the map is forgotten"))
+        if self._had_fix and not navigator.has_fix:
+            self._had_fix = False
+            if time_s == 0.0:
+                self._tell(time_s, "no fix at the start: the believed position drifts")
+            else:
+                self._tell(time_s, Caution("no fix any more: the believed position drifts"))
+        return jumped
+
+    def _tell(self, time_s: float, text: str) -> None:
+        for observer in self._observers:
+            observer.on_event(time_s, text)
+
+
+class TrueCrossTrack:
+    """Distance of the true position from the plan being flown, where navigation is not perfect.
+
+    Args:
+        plans: the plans of the flight.
+    """
+
+    def __init__(self, plans: Plans) -> None:
+        self._plans, self._index = plans, -1
+        self._progress: RouteProgress | None = None
+
+    def cross_track_m(self, true: AircraftState, arc_length_m: float, index: int) -> float:
+        """Distance to the right of the plan of an index; NaN before the first plan.
+
+        Args:
+            true: the true state.
+            arc_length_m: where guidance is on the plan; the search of a new plan begins there.
+            index: of the plan being flown.
+        """
+        if index < 0:
+            return math.nan
+        if self._progress is None or index != self._index:
+            plan, self._index = self._plans.accepted[index], index
+            self._progress = RouteProgress(Route(plan.segments, plan.loiter), arc_length_m)
+        return self._progress.nearest(true.east_m, true.north_m).cross_track_m

@@ -1,0 +1,50 @@
+"""Takes scans of the true world and enters them into the map once they are available."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+from aircraft.interface import AircraftState
+from harness.flight.observer import Observer
+from harness.flight.plans import LATE_S
+from harness.mapping.scan import RangeScan
+from harness.mapping.sensed_map import SensedMap
+from harness.world.range_sensor import RangeSensor
+
+
+class Sensing:
+    """The range sensor, its scans that are not available yet, and the map.
+
+    Args:
+        sensor: range sensor; None: nothing is sensed.
+        seen: obstacle map.
+        observers: are told of every scan.
+    """
+
+    def __init__(self, sensor: RangeSensor | None, seen: SensedMap, observers: Sequence[Observer]) -> None:
+        self._sensor, self._seen, self._observers = sensor, seen, observers
+        self._pending: deque[RangeScan] = deque()
+
+    def scan(self, true: AircraftState, believed: AircraftState) -> None:
+        """Takes a scan from the true state; the map receives it as taken from the believed one."""
+        assert self._sensor is not None
+        scan = self._sensor.scan(true.east_m, true.north_m, true.heading_rad, true.time_s)
+        for observer in self._observers:
+            observer.on_scan(scan, true)
+        if believed is not true:
+            scan = scan.taken_from(believed.east_m, believed.north_m, believed.heading_rad)
+        self._pending.append(scan)
+
+    def enter(self, time_s: float) -> RangeScan | None:
+        """Enters the oldest scan into the map if it is available; returns it, else None."""
+        if not self._pending or self._pending[0].available_s > time_s + LATE_S:
+            return None
+        scan = self._pending.popleft()
+        self._seen.update(scan)
+        return scan
+
+    def start_over(self, time_s: float) -> None:
+        """Forgets the map and the pending scans."""
+        self._pending.clear()
+        self._seen.start_over(time_s)
