@@ -179,6 +179,22 @@ class Frame:
         return max(xmax - xmin, ymax - ymin)
 
 
+def series_lines(name: str, colour: tuple[int, ...], width: float) -> rr.SeriesLines:
+    """Style of a curve. Where a pixel has many values it shows their least and greatest, so that no peak is lost.
+
+    Args:
+        name: in the legend.
+        colour: red, green, blue and perhaps opacity, 0 to 255.
+        width: of the line in points of the screen.
+    """
+    return rr.SeriesLines(
+        names=[name],
+        colors=[colour],
+        widths=[width],
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """What is known before the flight, true world included.

@@ -218,7 +218,7 @@ def _style(rec: rr.RecordingStream, run: str, place: int, name: str) -> None:
         rec.log(f"{entity}/{run}aircraft/shape", shape, static=True)
     for line in look.SERIES_STYLE:
         if line.endswith(FLOWN_LINE):
-            style = rr.SeriesLines(names=[name], colors=[colour], widths=[1.5])
+            style = look.series_lines(name, colour, 1.5)
             rec.log(f"{look.SERIES}/{line}/{place}", style, static=True)
     points = rr.SeriesPoints(names=[name], colors=[colour], marker_sizes=[2.0])
     for line in (look.SEARCH, look.DELAYS):

@@ -75,7 +75,7 @@ def log_scene(rec: rr.RecordingStream, scene: Scene, thin: bool = False) -> None
             continue
         if plot in scene.empty_series or (entity == look.BELIEVED_OFF and not scene.believes):
             continue  # a layout is made by what there is
-        style = rr.SeriesLines(names=[name], colors=[colour], widths=[width])
+        style = look.series_lines(name, colour, width)
         rec.log(f"{look.SERIES}/{entity}", style, static=True)
     if not thin:
         log_colours_page(rec, scene)

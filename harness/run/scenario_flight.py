@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import shlex
 import sys
@@ -23,6 +24,7 @@ from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.files.errors import WriteError
+from harness.files.versions import versions
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.navigation import Navigator, pose_error_m
 from harness.flight.observer import Observer, Progress
@@ -193,7 +195,8 @@ def fly_to_folder(
         make: makes the parts of the flight.
         watching: look on besides those that write the folder.
         pilot: stands in the recording's name; default: the planner's kind.
-        identity: of the recording among others; default: scenario, planner, aircraft and seed.
+        identity: of the recording among others; default: scenario, planner, aircraft, seed, and a hash of all
+            settings and versions.
         varied: keys that a campaign varied, for the recording's properties.
         thin: whether the recording has no more than track, plans and obstacles.
         flown_by: flies the parts to an end.
@@ -244,9 +247,11 @@ def _recording(scene: Scene, loop: Loop, folder: RunFolder, identity: str | None
     from harness.recording.log import RerunLog
     from harness.recording.thin import ThinLog
 
+    settings = hashlib.sha256(f"{scene.scenario_yaml}{versions()}".encode()).hexdigest()
+    identity = identity or f"{scene.name} ({settings[:8]})"
     if thin:
-        return ThinLog(folder.recording_path, scene, identity or scene.name)
-    return RerunLog(folder.recording_path, scene, identity or scene.name, moving=lambda: loop.seen.moving)
+        return ThinLog(folder.recording_path, scene, identity)
+    return RerunLog(folder.recording_path, scene, identity, moving=lambda: loop.seen.moving)
 
 
 def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None) -> Scene:

@@ -756,6 +756,18 @@ def test_every_line_of_a_plot_is_named(recording: tuple[Path, Flight]) -> None:
     assert "believed" not in str(series_views(SCENE.frame, ("",), without=["navigation_error"])[0].name)
 
 
+def test_no_peak_of_a_curve_is_averaged_away(recording: tuple[Path, Flight]) -> None:
+    entities = read(recording[0])
+    policies = {
+        entity: column(entities, entity, "aggregation_policy")
+        for entity, columns in entities.items()
+        if any(name.endswith("SeriesLines:names") for name in columns)
+    }
+    least_and_greatest = rr.components.AggregationPolicy.MinMax.value
+    assert len(policies) > 8
+    assert {entity: value for entity, value in policies.items() if value != [[least_and_greatest]]} == {}
+
+
 @pytest.mark.parametrize(("obstacles", "believes"), [(OBSTACLES, False), (OBSTACLES, True), ((), False)])
 def test_a_browser_has_the_plots_that_the_file_has(
     obstacles: tuple[Obstacle, ...],
