@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from planner.geometry.margin import tolerance_m
-
 SPEED_S = 20.0
 """Airspeed is averaged over this, so that it is what the engine can hold and not what a gust adds."""
 
@@ -23,7 +21,6 @@ class FlightLimits:
         clearance_m: wanted distance from every obstacle edge.
         bank_limit_rad: largest roll command of the guidance.
         turn_radius_m: smallest radius a plan may have, in the flight's wind and turbulence.
-        tracking_error_m: cross-track error that the guidance is to stay within.
         airspeed_mps: true airspeed to be held; NaN where it is not judged.
         calm_radius_m: what `turn_radius_m` would be in calm air; None: the same.
         tightest_radius_m: radius that the bank limit gives at that airspeed in calm air, nothing kept back;
@@ -31,26 +28,25 @@ class FlightLimits:
         roll_rate_radps: fastest change of the roll command.
         sensor_range_m: how far obstacles are seen.
         horizon_m: how far they have to be seen, so that a turn along a wall straight ahead keeps the clearance.
-        max_cross_track_m: largest cross-track error; None: the larger of a tenth of the clearance and two
-            tracking errors.
+        max_cross_track_m: largest cross-track error, before the navigation margin.
         max_altitude_error_m: largest altitude error.
         max_airspeed_error_mps: largest error of the airspeed averaged over `SPEED_S`.
         max_load_factor: largest load factor averaged over `LOAD_S`.
-        navigation_margin_m: what the planner keeps from obstacles beyond the clearance, for the navigation error.
+        navigation_margin_m: what the planner keeps from obstacles beyond the clearance, for the navigation error; the
+            cross-track error may be larger by so much.
     """
 
     altitude_m: float
     clearance_m: float
     bank_limit_rad: float
     turn_radius_m: float
-    tracking_error_m: float
     airspeed_mps: float = math.nan
     calm_radius_m: float | None = None
     tightest_radius_m: float | None = None
     roll_rate_radps: float = math.inf
     sensor_range_m: float = math.inf
     horizon_m: float = 0.0
-    max_cross_track_m: float | None = None
+    max_cross_track_m: float = 10.0
     max_altitude_error_m: float = math.inf
     max_airspeed_error_mps: float = math.inf
     max_load_factor: float = math.inf
@@ -59,6 +55,4 @@ class FlightLimits:
     @property
     def cross_track_threshold_m(self) -> float:
         """What the cross-track error may be."""
-        if self.max_cross_track_m is not None:
-            return self.max_cross_track_m
-        return tolerance_m(self.clearance_m, self.tracking_error_m)
+        return self.max_cross_track_m + self.navigation_margin_m

@@ -34,10 +34,12 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     plans that were in effect. `min_clearance_m` is that of the rows, or at a contact between the last two;
     `min_altitude_above_ground_m` is over the true ground, None where that is not known. Cross-track
     figures are of the rows flown under a plan, altitude figures of all rows, all of them of the true position.
-    `navigation_error_m`, how far from there the aircraft believed to be, `navigation_jump_m`, the most that this error
-    changes from one row to the next (as a vector), and `navigation_margin_m`, what was planned for it, are there unless
-    navigation is perfect. `plan_delay_s` is from the latest scan that a plan could know of until it took effect,
-    `lost_returns` how much of what beams met the sensor lost. `clearance_violation_s` counts the
+    Errors have the names of performance-based navigation (ICAO Doc 9613): `total_system_error_m` is how far the true
+    position is off the path, `flight_technical_error_m` how far the believed one is; without a given path the first is
+    `cross_track_m`. `navigation_error_m`, how far from there the aircraft believed to be, `navigation_jump_m`, the most
+    that this error changes from one row to the next (as a vector), and `navigation_margin_m`, what was planned for it,
+    are there unless navigation is perfect. `plan_delay_s` is from the latest scan that a plan could know of until it
+    took effect, `lost_returns` how much of what beams met the sensor lost. `clearance_violation_s` counts the
     intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
     `replans` counts the plans accepted after the first. `compute_ms` is over all calls in which the planner searched,
     `smoothness` is defined in `harness.analysis.smoothness`, `trackability` in `harness.analysis.trackability`;
@@ -73,6 +75,8 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "min_altitude_above_ground_m": _least(track.altitude_above_ground_m),
         "clearance_violation_s": clearance_violation_s(track.time_s, nearest_m, limits.clearance_m),
         "cross_track_m": error_figures(followed),
+        "total_system_error_m": error_figures(followed),
+        "flight_technical_error_m": error_figures(_believed_off_m(track)),
         **_navigation(track, limits),
         "altitude_error_m": error_figures(track.up_m - (given.altitude_m if given else limits.altitude_m)),
         "smoothness": {
@@ -95,6 +99,13 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "digest": digest(track),
         "error": flight.error,
     }
+
+
+def _believed_off_m(track: Track) -> FloatArray:
+    """How far off the plan guidance believed to be, in the rows flown under one."""
+    off = track.cross_track_m if track.believed_cross_track_m is None else track.believed_cross_track_m
+    believed: FloatArray = off[track.plan_index >= 0]
+    return believed
 
 
 def _navigation(track: Track, limits: FlightLimits) -> dict[str, Any]:

@@ -195,6 +195,8 @@ class Metrics(Figures):
         min_altitude_above_ground_m: least height above the true ground; None where that is not known.
         clearance_violation_s: time below the wanted clearance.
         cross_track_m: distance from the plan being flown.
+        total_system_error_m: distance of the true position from the path: the plan, or the path as given.
+        flight_technical_error_m: distance of the believed position from it.
         navigation_error_m: distance from the true position to the believed one; None where navigation is perfect.
         navigation_jump_m: largest change of this error from one row of the track to the next; likewise.
         navigation_margin_m: distance that the planner kept beyond the clearance because of this error; likewise.
@@ -227,6 +229,8 @@ class Metrics(Figures):
     min_altitude_above_ground_m: float | None = None
     clearance_violation_s: float
     cross_track_m: Spread
+    total_system_error_m: Spread = Spread()
+    flight_technical_error_m: Spread = Spread()
     altitude_error_m: Spread
     navigation_error_m: Spread | None = None
     navigation_jump_m: float | None = None

@@ -57,15 +57,17 @@ def check(
         ),
     ] = None,
     clearance_m: Annotated[
-        float | None, typer.Option(metavar="C", help="Wanted clearance. Default: one turn radius.")
+        float | None, typer.Option(metavar="C", help="Wanted clearance. Default: WORLD's, if written.")
     ] = None,
     tolerance_m: Annotated[
         float | None,
         typer.Option(
             metavar="T",
-            help="Largest distance from the path. Default: a tenth of C, or twice the "
-            "tracking error if that is more.",
+            help="Largest distance from the path. Default: a tenth of C, or 10 m without C.",
         ),
+    ] = None,
+    altitude_tolerance_m: Annotated[
+        float | None, typer.Option(metavar="A", help="Largest distance from the altitude. Default: 10 m.")
     ] = None,
     corner_m: Annotated[
         float | None,
@@ -73,7 +75,7 @@ def check(
             metavar="R",
             min=0.0,
             help="Largest distance from corners. Default: T; at waypoints of a mission the acceptance radius in the "
-            "file, else C.",
+            "file, else 90 m.",
         ),
     ] = None,
     polygons: Annotated[
@@ -121,7 +123,7 @@ def check(
     sections: dict[str, dict[str, Any]] = {
         "aircraft": _given(model=aircraft, airspeed_mps=airspeed_mps),
         "planner": _given(clearance_m=clearance_m),
-        "trackability": _given(cross_track_m=tolerance_m),
+        "trackability": _given(cross_track_m=tolerance_m, altitude_m=altitude_tolerance_m),
         "environment": _given(wind=_wind(wind), turbulence=_turbulence(turbulence)),
     }
     overrides = chosen(seed=seed, guidance=guidance)
@@ -141,7 +143,11 @@ def check(
         "clearance_m": clearance_m,
         "seed": seed,
     }
-    numbers |= {"tolerance_m": tolerance_m, "corner_m": corner_m}
+    numbers |= {
+        "tolerance_m": tolerance_m,
+        "altitude_tolerance_m": altitude_tolerance_m,
+        "corner_m": corner_m,
+    }
     words = {
         "scenario": scenario,
         "guidance": guidance,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from harness.cli.terminal import legible, plain, spread
+from harness.cli.terminal import error_rows, legible, plain, spread
 from harness.files.wording import counted
 
 MOST_ITEMS = 12
@@ -24,7 +24,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     legs, check = metrics["trackability"], metrics["check"]
     point = "item" if check["items"] else "waypoint"
     bad = [{"number": number, **leg} for number, leg in enumerate(legs, start=1) if not leg["trackable"]]
-    cross, off = metrics["cross_track_m"], metrics["deviation_from_given_m"]
+    off = metrics["deviation_from_given_m"]
     style, (word, _, why) = "bold green" if check["ok"] else "bold red", check["verdict"].partition(":")
     rows = {
         "flown as given": f"[{style}]{word}[/]:{plain(why)}",
@@ -36,7 +36,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     rows["off the path given"] = f"{spread(off, ('p95', 'max'))} m, allowed {tolerance}"
     if legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"]):
         rows["off the path given"] += ", at corners as below"
-    rows["cross-track error"] = f"{spread(cross)} m"
+    rows |= error_rows(metrics)
     rows["altitude error"] = f"{spread(metrics['altitude_error_m'])} m"
     if "height_above_ground_m" in metrics:
         height = metrics["height_above_ground_m"]

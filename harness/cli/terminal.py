@@ -105,8 +105,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         "least clearance": f"{legible(metrics['min_clearance_m'])} m, "
         f"below the wanted one for {legible(metrics['clearance_violation_s'])} s",
         **_over_ground(metrics),
-        "cross-track error": f"{spread(metrics['cross_track_m'])} m",
-        **_navigated(metrics),
+        **error_rows(metrics),
         "altitude error": f"{spread(metrics['altitude_error_m'])} m",
         "trackable": _tracked(metrics),
         "replans": str(metrics["replans"]),
@@ -121,13 +120,21 @@ def _over_ground(metrics: Mapping[str, Any]) -> dict[str, str]:
     return {} if least_m is None else {"above ground": f"at least {legible(least_m)} m"}
 
 
-def _navigated(metrics: Mapping[str, Any]) -> dict[str, str]:
-    """A row on how far off the believed position was, where it was not perfect."""
-    error = metrics.get("navigation_error_m")
-    if error is None:
-        return {}
-    margin = f"{legible(metrics['navigation_margin_m'])} m planned for it beyond the clearance"
-    return {"navigation error": f"{spread(error)} m; {margin}"}
+def error_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
+    """Rows on how far the true and the believed position were off the path; one where navigation was perfect.
+
+    The names are those of performance-based navigation (ICAO Doc 9613).
+    """
+    legs, margin_m = metrics["trackability"], metrics.get("navigation_margin_m")
+    total = metrics.get("total_system_error_m", metrics["cross_track_m"])
+    threshold_m = legs[0].get("threshold_m") if legs else None
+    allowed = "" if threshold_m is None else f", allowed {threshold_m:.3g} m"
+    kept = f", of which {legible(margin_m)} m are the navigation margin that was planned" if margin_m else ""
+    rows = {"total system error": f"{spread(total)} m{allowed}{kept}"}
+    if metrics.get("navigation_error_m") is not None:
+        rows["  flight technical error"] = f"{spread(metrics['flight_technical_error_m'])} m"
+        rows["  navigation error"] = f"{spread(metrics['navigation_error_m'])} m"
+    return rows
 
 
 def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from harness.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from harness.world_files.expansion import FileSpec
+
+CORNER_M: Final = 90.0
+"""How far off a waypoint of a mission may be passed that says nothing itself: ArduPilot Plane's default WP_RADIUS."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,19 +58,16 @@ class PathCheck:
         return {step.item: step.acceptance_m for step in self.given.mission.program.steps}
 
     def allowed_cut_m(self, waypoint: int) -> float:
-        """How far off a corner may be passed.
+        """How far off a corner may be passed; nothing of the aircraft or its guidance enters.
 
-        At a waypoint of a mission it is the acceptance radius of the file, else `corner_m`, else the clearance that
-        the scenario wants, by default one turn radius. A drawn path is to be flown as drawn: it is `corner_m`, else
-        the cross-track threshold.
+        It is `corner_m` where that is given. Else a drawn path is to be flown as drawn: it is the cross-track limit. At
+        a waypoint of a mission it is the acceptance radius of the file, else `CORNER_M`.
         """
-        accepted = self._accepted_m.get(waypoint, 0.0)
-        if accepted > 0.0:
-            return accepted
         if self.corner_m is not None:
             return self.corner_m
-        own = self.scenario.trackability.cross_track_m
-        return own if self.given.drawn else self.scenario.planner.clearance_m
+        if self.given.drawn:
+            return self.scenario.trackability.cross_track_m
+        return self._accepted_m.get(waypoint) or CORNER_M
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,9 @@ import numpy as np
 from aircraft.guidance.altitude import slewed
 from harness.analysis.as_given import AsGiven
 from harness.analysis.breaches import Kept, kept
-from harness.analysis.deviation import allowed_m, deviation
+from harness.analysis.deviation import Deviation, allowed_m, deviation, distances_m
 from harness.analysis.flight_limits import FlightLimits
-from harness.analysis.metrics import metrics
+from harness.analysis.metrics import error_figures, metrics
 from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.flight.record import Flight, Outcome, Track
 from harness.run.path_layers import layer_contacts
@@ -69,7 +69,8 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     """
     track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
     corners = [_Corner(corner, check.allowed_cut_m(corner.waypoint)) for corner in way.corners]
-    found = deviation(track, way.given_m, SPACING_SHARE * tolerance, WINDOW_RADII * limits.turn_radius_m)
+    window_m = WINDOW_RADII * limits.turn_radius_m
+    found = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
     allowed = allowed_m(track, tolerance, corners)
     figures = metrics(flight, limits, _as_given(check.plan, track, corners, found.by_row_m, allowed))
     others = layer_contacts(track, check.scenario, check.files)
@@ -84,6 +85,8 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
     mission = check.given.mission
     return {
         **figures,
+        "total_system_error_m": error_figures(found.rows_m),
+        "flight_technical_error_m": error_figures(_believed_off_m(track, way.given_m, window_m, found)),
         **_kept_figures(seen),
         "deviation_from_given_m": found.figures(),
         "check": {
@@ -98,6 +101,15 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
             "notes": [*check.given.notes, *check.plan.notes],
         },
     }
+
+
+def _believed_off_m(track: Track, given_m: FloatArray, window_m: float, found: Deviation) -> FloatArray:
+    """(n,) how far off the path as given the aircraft believed to be, where its true distance is known."""
+    if not track.has_beliefs:
+        return found.rows_m
+    rows = np.isfinite(found.rows_m)
+    believed = np.column_stack((track.believed_m[rows, :2], np.maximum.accumulate(track.arc_length_m[rows])))
+    return distances_m(believed, given_m, window_m)
 
 
 def _line(plan: PathPlan) -> FloatArray:

@@ -24,10 +24,16 @@ if TYPE_CHECKING:
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: so much, and so much of its span."""
 
-AIR_AND_OBSTACLES: Final = ("environment", "obstacles", "ground", "sources")
-
 OF_THE_WORLD: Final = ("seed", "area", "obstacles", "ground", "sources", "environment")
-"""What a check takes from a scenario that it flies a path in; mission, aircraft, sensor and planner are its own."""
+"""Sections that a check takes from a scenario that it flies a path in; mission, aircraft and sensor are its own."""
+
+KEYS_OF_THE_WORLD: Final = (
+    ("mission", "altitude_m"),
+    ("planner", "clearance_m"),
+    ("trackability", "cross_track_m"),
+    ("trackability", "altitude_m"),
+)
+"""Single keys that it takes from there too: the altitude, and what sets the limits."""
 
 
 def scenario_for(
@@ -41,17 +47,16 @@ def scenario_for(
 ) -> Scenario:
     """The mission of a path as a scenario: from its start to its end.
 
-    A path that ends about where it begins has its furthest point as the goal. What the aircraft may be off is by
-    default what it may be in calm air: the room about a path does not grow with the wind. Start and goal may lie
-    anywhere, in an obstacle too: that is then what the flight finds.
+    A path that ends about where it begins has its furthest point as the goal. Start and goal may lie anywhere, in an
+    obstacle too: that is then what the flight finds.
 
     Args:
         name: of the scenario.
         points_m: (n, 2) the path.
         sections: `aircraft`, `environment`, ... as in a file; what is left out has its default.
         overrides: keys to replace.
-        world: a scenario file with the obstacles, the area, the air, the altitude and the seed. None: nothing is
-            there, and the area reaches beyond the path.
+        world: a scenario file with the obstacles, the area, the air, the altitude, the clearance and the seed. None:
+            nothing is there, and the area reaches beyond the path.
         files: files among the obstacles are obstacles where they are solid at the altitude of the start; else they
             are left out, for a path that is not flown at one altitude, see `files_of`.
         ground: in place of what these files say of it.
@@ -116,9 +121,6 @@ def _root(
         root = with_key(
             root, (key,), Node({**kept, **new}, keys[key].line) if isinstance(new, dict) else keys[key]
         )
-    tolerance_m = _calm(root, overrides, source, world).trackability.cross_track_m
-    if root.at(("trackability", "cross_track_m")) is None:
-        root = with_key(root, ("trackability", "cross_track_m"), Node(tolerance_m, strict_yaml.COMMAND_LINE))
     return overridden(root, overrides), source
 
 
@@ -138,10 +140,12 @@ def _base(world: FilePath | None) -> tuple[Node, str]:
     validated(root, str(world), world.parent)  # its faults are told as those of a scenario
     assert isinstance(root.value, dict)
     kept = {key: node for key, node in root.value.items() if key in OF_THE_WORLD}
-    altitude = root.at(("mission", "altitude_m"))
-    if altitude is not None:
-        kept["mission"] = Node({"altitude_m": altitude}, altitude.line)
-    return Node(kept, root.line), str(world)
+    base = Node(kept, root.line)
+    for section, key in KEYS_OF_THE_WORLD:
+        written = root.at((section, key))
+        if written is not None:
+            base = with_key(base, (section, key), written)
+    return base, str(world)
 
 
 def _folder(world: FilePath | None) -> FilePath | None:
@@ -174,11 +178,3 @@ def _sections(
         **({"area": area} if area else {}),
         "mission": {**mission, **sections.get("mission", {})},
     }
-
-
-def _calm(root: Node, overrides: Sequence[tuple[str, str]], source: str, world: FilePath | None) -> Scenario:
-    """The same in calm air, with nothing there."""
-    assert isinstance(root.value, dict)
-    kept = {key: node for key, node in root.value.items() if key not in AIR_AND_OBSTACLES}
-    own = [each for each in overrides if not each[0].strip().startswith(AIR_AND_OBSTACLES)]
-    return validated(overridden(Node(kept, root.line), own), source, _folder(world), ends_checked=False)

@@ -138,8 +138,13 @@ def jsbsim_aircraft(
     return JsbsimModel(airframe_of(scenario.aircraft), start, plane, air, rate_hz, climb_limit_mps)
 
 
-def flight_limits(scenario: Scenario) -> FlightLimits:
-    """What a scenario's flight is measured against."""
+def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
+    """What a scenario's flight is measured against.
+
+    Args:
+        scenario: a complete scenario.
+        planned: a planner makes the path, and keeps a margin for navigation errors; else it is given.
+    """
     performance, limits = performance_of(scenario), scenario.trackability
     calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
     guidance = airframe_of(scenario.aircraft).guidance_limits()
@@ -153,7 +158,6 @@ def flight_limits(scenario: Scenario) -> FlightLimits:
         clearance_m=clearance,
         bank_limit_rad=guidance.bank_limit_rad,
         turn_radius_m=performance.turn_radius_m,
-        tracking_error_m=performance.tracking_error_m,
         airspeed_mps=speed,
         calm_radius_m=calm.turn_radius_m,
         tightest_radius_m=speed * speed / (GRAVITY_MPS2 * math.tan(guidance.bank_limit_rad)),
@@ -164,7 +168,7 @@ def flight_limits(scenario: Scenario) -> FlightLimits:
         max_altitude_error_m=_given(limits.altitude_m),
         max_airspeed_error_mps=_given(limits.airspeed_mps),
         max_load_factor=_given(limits.load_factor),
-        navigation_margin_m=_given(scenario.navigation.margin_m),
+        navigation_margin_m=_given(scenario.navigation.margin_m) if planned else 0.0,
     )
 
 
@@ -223,7 +227,7 @@ def fly_to_folder(
                 stack.callback(log.end)
                 observers.append(log)
             flight = flown_by(loop, observers, progress)
-            figures = measured_by(flight, flight_limits(scenario))
+            figures = measured_by(flight, flight_limits(scenario, planned=pilot is None))
             if log is not None:
                 log.close(figures, run_properties(scenario, figures), varied)
             folder.finish(flight.track, flight.plans, figures)
@@ -269,7 +273,7 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
         f"{scenario.name}, {pilot or scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}",
         loop.mission,
         scenario.mission.start_m,
-        flight_limits(scenario),
+        flight_limits(scenario, planned=pilot is None),
         tuple(loop.world.obstacles),
         text,
         searches=pilot is None,

@@ -22,9 +22,12 @@ from harness.scenario.sections import AircraftSpec, Area, MissionSpec, Section
 from harness.scenario.simulation import step_rate_hz
 from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
-from planner.geometry.margin import tolerance_m
+from planner.geometry.margin import TOLERATED_SHARE
 
 POUND_KG: Final = 0.45359237
+
+TOLERANCE_M: Final = 10.0
+"""What a flight may be off in altitude, and off its path where no clearance is written (m)."""
 
 Part = TypeVar("Part", bound=Section)
 
@@ -81,11 +84,9 @@ def resolve(
     )
     navigation = _filled(keys.navigation, margin_m=margin_m)
     limits = _filled(
-        keys.trackability, cross_track_m=tolerance_m(planner.clearance_m, performance.tracking_error_m)
-    )
-    limits = _filled(
-        limits,
-        altitude_m=max(10.0, limits.cross_track_m),
+        keys.trackability,
+        cross_track_m=TOLERATED_SHARE * keys.planner.clearance_m if keys.planner.clearance_m else TOLERANCE_M,
+        altitude_m=TOLERANCE_M,
         airspeed_mps=0.1 * aircraft.airspeed_mps,
         load_factor=_limit_load_factor(aircraft),
     )

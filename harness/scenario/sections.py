@@ -286,16 +286,16 @@ class TrackabilitySpec(Section):
     """What a leg of the flight may be off before it counts as not trackable."""
 
     cross_track_m: float = key(
-        "Distance from the plan.",
+        "Distance of the true position from the plan; what the planner keeps for navigation errors comes on top.",
         unit="m",
-        derived="the larger of a tenth of planner.clearance_m and twice the aircraft's tracking error",
+        derived="a tenth of planner.clearance_m where the file gives that, else 10 m",
         gt=0,
         le=MAX_COORDINATE_M,
     )
     altitude_m: float = key(
         "Distance from mission.altitude_m.",
         unit="m",
-        derived="the larger of 10 m and cross_track_m",
+        derived="10 m",
         gt=0,
         le=MAX_COORDINATE_M,
     )

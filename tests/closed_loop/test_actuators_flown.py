@@ -82,7 +82,7 @@ def test_altitude_lost_behind_a_slow_elevator_is_the_servo_s() -> None:
 
 
 LIMITS = FlightLimits(
-    300.0, 100.0, 0.78, 110.0, 0.3, 25.0,
+    300.0, 100.0, 0.78, 110.0, 25.0,
     max_cross_track_m=5.0, max_altitude_error_m=5.0, max_airspeed_error_mps=2.0,
 )  # fmt: skip
 

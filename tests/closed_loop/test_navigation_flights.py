@@ -91,7 +91,7 @@ def test_metrics_have_the_error_and_its_cause(scenario: Scenario, flight: Flight
     assert figures["navigation_error_m"]["max"] == pytest.approx(off.max())
     assert figures["navigation_margin_m"] == scenario.navigation.margin_m
     assert 10.0 < figures["navigation_jump_m"] < off.max() + 10.0  # back from the drift of the outage
-    tight = replace(flight_limits(scenario), max_cross_track_m=2.0)
+    tight = replace(flight_limits(scenario), max_cross_track_m=2.0, navigation_margin_m=0.0)
     causes = [leg["cause"] for leg in metrics(flight, tight)["trackability"]]
     assert causes[0] == "navigation error"
     both = replace(flight.track, believed_cross_track_m=flight.track.cross_track_m)

@@ -25,7 +25,7 @@ LIMITS = FlightLimits(
     clearance_m=200.0,
     bank_limit_rad=math.radians(45),
     turn_radius_m=110.0,
-    tracking_error_m=0.5,
+    max_cross_track_m=20.0,
 )
 KEYS = {
     "outcome",
@@ -37,6 +37,8 @@ KEYS = {
     "min_altitude_above_ground_m",
     "clearance_violation_s",
     "cross_track_m",
+    "total_system_error_m",
+    "flight_technical_error_m",
     "altitude_error_m",
     "smoothness",
     "bank_saturation_fraction",

@@ -21,14 +21,15 @@ LIMITS = FlightLimits(
     clearance_m=50.0,
     bank_limit_rad=math.radians(45),
     turn_radius_m=110.0,
-    tracking_error_m=1.0,
+    max_cross_track_m=5.0,
 )
 OFF = np.where(np.abs(np.arange(201) - 100) < 20, 6.0, 0.0)
 
 
-def test_threshold_is_the_margin_planners_keep() -> None:
+def test_the_navigation_margin_comes_on_top_of_the_cross_track_limit_and_of_no_other() -> None:
     assert LIMITS.cross_track_threshold_m == 5.0
-    assert FlightLimits(300.0, 10.0, 0.8, 110.0, 1.0).cross_track_threshold_m == 2.0
+    kept = replace(LIMITS, navigation_margin_m=12.5, max_altitude_error_m=10.0)
+    assert (kept.cross_track_threshold_m, kept.max_altitude_error_m) == (17.5, 10.0)
 
 
 @pytest.mark.parametrize(("error_m", "trackable"), [(5.0, True), (-5.0, True), (5.1, False), (-5.1, False)])

@@ -91,7 +91,7 @@ def test_reprs_are_short_and_a_notebook_sees_a_table(
     assert repr(run) == "FlightResult(short: reached; rolling_window, aerosonde, seed 1)"
     page = kept._repr_html_()
     assert "<table>" in page
-    assert "cross-track error" in page
+    assert "total system error" in page
     assert "[bold" not in page
 
 

@@ -284,8 +284,9 @@ def test_the_fences_of_a_mission_are_kept(
 @pytest.mark.parametrize(
     ("acceptance_m", "options", "status", "allowed_m"),
     [
-        (0.0, (), 0, 120.0),
-        (50.0, ("--corner-m", "5"), 0, 50.0),
+        (0.0, (), 0, 90.0),
+        (50.0, (), 0, 50.0),
+        (50.0, ("--corner-m", "5"), 1, 5.0),
         (30.0, (), 1, 30.0),
         (0.0, ("--corner-m", "5"), 1, 5.0),
     ],
@@ -328,7 +329,7 @@ def test_a_polygon_across_a_line_is_a_fence_unless_it_is_told_otherwise(
 def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
     checked = check([(0.0, 0.0), (0.0, 1500.0)])
     assert checked.ok
-    assert repr(checked) == "CheckedPath('yes: flown as drawn, within 12 m')"
+    assert repr(checked) == "CheckedPath('yes: flown as drawn, within 10 m')"
     assert checked.metrics["digest"] == check(straight).metrics["digest"]
     assert not check(np.array([(0.0, 0.0), (0.0, 1000.0), (60.0, 1000.0), (60.0, 0.0)])).ok
     with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):
@@ -342,7 +343,8 @@ def test_errors_have_their_unit_where_those_of_a_flight_have_it(
     _, metrics = flown(straight, tmp_path / "run", capsys=capsys)
     of_a_flight = flight_rows(metrics)
     rows = verdict_rows(metrics | {"deviation_from_given_m": {"p95": 987.4, "max": 1234.5}})
-    for row in ("cross-track error", "altitude error"):
+    for row in ("total system error", "altitude error"):
         assert rows[row] == of_a_flight[row]
-        assert rows[row].count(" m") == 1 + rows[row].count(" max")
+        figures = rows[row].partition(",")[0]
+        assert figures.count(" m") == 1 + figures.count(" max")
     assert rows["off the path given"].startswith("p95 987 / max 1,234 m, allowed ")

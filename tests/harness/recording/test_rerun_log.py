@@ -67,7 +67,7 @@ OBSTACLES = (
     Obstacle(Circle((1000.0, 2500.0), 100.0), velocity_mps=(-2.0, 0.0)),
     Obstacle(Circle((-1000.0, 2500.0), 100.0), active_s=(20.0, 60.0)),
 )
-LIMITS = FlightLimits(300.0, 100.0, 0.78, 110.0, 0.5)
+LIMITS = FlightLimits(300.0, 100.0, 0.78, 110.0)
 SCENE = Scene("straight, none, aerosonde, seed 1", MISSION, (0.0, 0.0), LIMITS, OBSTACLES, "name: straight\n")
 PICTURE = PlanPicture(
     guide_m=np.array([[0.0, 0.0], [0.0, 800.0]]),

@@ -18,7 +18,7 @@ from harness.run_files.run_folder import METRICS, PLANS, TRACK, RunFolder, load_
 
 REPOSITORY = Path(__file__).parents[3]
 REFEREE = REPOSITORY.parent / "shared" / "tools" / "referee.py"
-LIMITS = FlightLimits(300.0, 200.0, 0.78, 110.0, 0.5)
+LIMITS = FlightLimits(300.0, 200.0, 0.78, 110.0)
 SCENARIO = """\
 schema: wayproof/scenario/1
 name: straight

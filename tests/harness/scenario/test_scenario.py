@@ -47,14 +47,24 @@ mission: {start_m: [1000, 1000], goal_m: [31000, 1000]}
 WITH_PLANNER = LEAST + "planner: {kind: rolling_window, clearance_m: 70, candidates: 9}\n"
 
 
-def test_trackability_follows_from_clearance_and_aircraft() -> None:
-    light = parse_scenario(LEAST).trackability
-    assert light.altitude_m == max(10.0, light.cross_track_m)
-    assert (light.airspeed_mps, light.load_factor) == (2.5, 3.8)
-    wide = parse_scenario(LEAST + "planner: {clearance_m: 500}\n").trackability
-    assert (wide.cross_track_m, wide.altitude_m) == (50.0, 50.0)
-    narrow = parse_scenario(LEAST + "planner: {clearance_m: 1}\n")
-    assert narrow.trackability.cross_track_m == 2.0 * performance_of(narrow).tracking_error_m
+def test_limits_follow_from_the_written_clearance_and_from_nobody_who_flies() -> None:
+    light = parse_scenario(LEAST)
+    assert light.planner.clearance_m > 100.0  # a default, which does not count
+    limits = light.trackability
+    assert (limits.cross_track_m, limits.altitude_m) == (10.0, 10.0)
+    assert (limits.airspeed_mps, limits.load_factor) == (2.5, 3.8)
+    for key, value in (
+        ("aircraft.model", "B747"),
+        ("guidance.kind", "npfg"),
+        ("guidance.acceptance_radius_m", 300.0),
+        ("environment.turbulence.intensity", "severe"),
+        ("aircraft.actuators.rate_limit_degps", 60.0),
+    ):
+        other = light.with_({key: value}).trackability
+        assert (other.cross_track_m, other.altitude_m) == (10.0, 10.0), key
+    for clearance_m, limit_m in ((500, 50.0), (1, 0.1), (0, 10.0)):
+        written = parse_scenario(LEAST + f"planner: {{clearance_m: {clearance_m}}}\n").trackability
+        assert (written.cross_track_m, written.altitude_m) == (pytest.approx(limit_m), 10.0)
     # 853 kg are 1880 lb: 2.1 + 24000 / 11880 is more than the 3.8 that suffice.
     assert parse_scenario(LEAST + "aircraft: {model: c172p}\n").trackability.load_factor == 3.8
     own = parse_scenario(LEAST + "trackability: {cross_track_m: 3.0, load_factor: 1.5}\n").trackability
