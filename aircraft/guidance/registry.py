@@ -12,6 +12,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
+from aircraft.guidance.bearing import BearingConfig, BearingLaw
 from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
 from aircraft.guidance.l1 import L1Config, l1_law
 from aircraft.guidance.npfg import NpfgConfig, npfg_law
@@ -85,6 +86,12 @@ BUILT_IN = (
         summary="Coulter: the arc to the point of the path at a look-ahead distance",
         config=PurePursuitConfig,
         make=pure_pursuit_law,
+    ),
+    GuidanceKind(
+        kind="bearing",
+        summary="simple autopilots': bank in proportion to the angle between course and the bearing to a point",
+        config=BearingConfig,
+        make=BearingLaw,
     ),
 )
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -35,12 +35,25 @@ LEAST_LEG_M = 1.0
 BANK_KEPT_RAD = math.radians(15.0)
 """Bank kept back where a law has no rule of its own: it turns at each waypoint as the fillet of a plan would."""
 
+FAR_M = 1e5
+"""Beyond the last waypoint a law that flies to points heads for one so far on."""
+
+
+@runtime_checkable
+class PointLaw(Protocol):
+    """A law that flies to waypoints and not along the legs between them."""
+
+    def fly_to(self, east_m: float, north_m: float) -> None:
+        """Heads for one point (m) until the next call of this or of `follow`."""
+        ...
+
+
 Acceptance = Callable[[float, float], float]
 """(ground speed m/s, turn at the waypoint rad, at least 0) -> distance from which a waypoint counts as reached, m."""
 
 
 def mission_waypoints(route: Route) -> FloatArray:
-    """(k, 2) the waypoints of a route: its start, the corners that its arcs round, its end; k is at least 2.
+    """(k, 2) the waypoints of a route: its start, its corners and those that its arcs round, its end; k is at least 2.
 
     Of a route that closes with a loiter the end is where the circle begins.
     """
@@ -49,7 +62,11 @@ def mission_waypoints(route: Route) -> FloatArray:
         start = route.segments[0]
         return np.array([start[:2] - LEAST_LEG_M * start[2:4], start[:2]])
     points = [rows[0][:2]]
+    along = rows[0][2:4]
     for row in rows:
+        if along[0] * row[2] + along[1] * row[3] < math.cos(LEAST_TURN_RAD):
+            points.append(row[:2])
+        along = arc_point(row, row[5])[2:]
         turn = abs(row[4] * row[5])
         parts = max(1, math.ceil(turn / CORNER_RAD - 1e-9))
         for part in range(parts if turn >= LEAST_TURN_RAD else 0):
@@ -75,10 +92,11 @@ class WaypointLaw:
     Args:
         law: follows the legs.
         acceptance_m: says from where a waypoint counts as reached.
+        by_passing: it counts as reached, too, when the aircraft is past it.
     """
 
-    def __init__(self, law: GuidanceLaw, acceptance_m: Acceptance) -> None:
-        self._law, self._acceptance_m = law, acceptance_m
+    def __init__(self, law: GuidanceLaw, acceptance_m: Acceptance, by_passing: bool = True) -> None:
+        self._law, self._acceptance_m, self._by_passing = law, acceptance_m, by_passing
         self._progress: RouteProgress | None = None
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
@@ -109,17 +127,24 @@ class WaypointLaw:
             self._along = end[0] - start[0], end[1] - start[1]
             self._turn_rad = self._turn_at_end_rad()
             self._law.follow(_line(start, end))
+            if isinstance(self._law, PointLaw):
+                self._law.fly_to(*end)
         elif self._circle is not None:
             self._law.follow(self._circle)
+        elif isinstance(self._law, PointLaw):
+            end, share = self._points[-1], FAR_M / math.hypot(*self._along)
+            self._law.fly_to(end[0] + share * self._along[0], end[1] + share * self._along[1])
 
     def _reached(self, state: AircraftState) -> bool:
         """Whether the leg's end counts as reached: near enough, or passed."""
         end_east, end_north = self._points[self._leg + 1]
         east, north = end_east - state.east_m, end_north - state.north_m
-        if east * self._along[0] + north * self._along[1] <= 0.0:
+        if self._by_passing and east * self._along[0] + north * self._along[1] <= 0.0:
             return True
         turn = self._turn_rad
-        return turn > 0.0 and math.hypot(east, north) <= self._acceptance_m(state.groundspeed_mps, turn)
+        if turn == 0.0 and self._by_passing:
+            return False
+        return math.hypot(east, north) <= self._acceptance_m(state.groundspeed_mps, turn)
 
     def _turn_at_end_rad(self) -> float:
         """By how much the leg after this one is turned from it, at least 0; 0 where there is none."""
@@ -136,6 +161,18 @@ class WaypointLaw:
         )
 
 
+def waypoint_law(
+    law: GuidanceLaw, kind: str, config: Any, limits: GuidanceLimits, radius_m: float | None = None
+) -> WaypointLaw:
+    """A law of its kind that flies the waypoints of routes; arguments as of `acceptance`."""
+    return WaypointLaw(law, acceptance(kind, config, limits, radius_m), by_passing(config))
+
+
+def by_passing(config: Any) -> bool:
+    """Whether a waypoint counts as reached when the aircraft is past it; so it does where a law has no such key."""
+    return bool(getattr(config, "switch_by_passing", True))
+
+
 def _line(start: tuple[float, float], end: tuple[float, float]) -> Route:
     length = math.dist(start, end)
     return Route(
@@ -148,7 +185,8 @@ def acceptance(kind: str, config: Any, limits: GuidanceLimits, radius_m: float |
 
     `l1`: its look-ahead distance, no more than `WP_RADIUS_M`, less for a turn of less than 90 degrees in proportion
     (ArduPilot). `npfg`: its switch distance (PX4), a share of the track error bound. Any other: where a fillet of the
-    turn would begin, R tan(turn / 2), at the bank limit less `BANK_KEPT_RAD`.
+    turn would begin, R tan(turn / 2), at the bank limit less `BANK_KEPT_RAD`. A law that does not switch by passing
+    would circle a point inside its turn for ever: the turn radius at the bank limit.
 
     Args:
         kind: the law.
@@ -166,6 +204,9 @@ def acceptance(kind: str, config: Any, limits: GuidanceLimits, radius_m: float |
     if kind == "npfg":
         share = config.switch_distance_multiplier * config.period_s * config.damping
         return lambda ground_speed_mps, turn_rad: min(MAX_SWITCH_M, share * ground_speed_mps)
+    if not by_passing(config):
+        least_per_speed2 = 1.0 / (GRAVITY_MPS2 * math.tan(limits.bank_limit_rad))
+        return lambda ground_speed_mps, turn_rad: ground_speed_mps * ground_speed_mps * least_per_speed2
     per_speed2 = 1.0 / (GRAVITY_MPS2 * math.tan(max(limits.bank_limit_rad - BANK_KEPT_RAD, 0.1)))
     return lambda ground_speed_mps, turn_rad: (
         ground_speed_mps * ground_speed_mps * per_speed2 * math.tan(0.5 * min(turn_rad, CORNER_RAD))

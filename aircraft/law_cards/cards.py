@@ -20,7 +20,7 @@ from aircraft.envelope import LawCard, WindPoint
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.guidance.preview import PreviewConfig
 from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind, installed_kinds
-from aircraft.guidance.waypoints import WaypointLaw, acceptance
+from aircraft.guidance.waypoints import waypoint_law
 from aircraft.model_files import ModelFiles
 
 
@@ -62,7 +62,7 @@ def law_card(
             law = deepcopy(kind.make(resolved, limits))
             if not waypoints:
                 return law
-            return WaypointLaw(law, acceptance(kind.kind, resolved, limits, acceptance_radius_m))
+            return waypoint_law(law, kind.kind, resolved, limits, acceptance_radius_m)
 
         return LawSurvey(frame, kind.kind, limits.airspeed_mps, made, waypoints).measured()
 

@@ -96,9 +96,9 @@ def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
         law = kind.make(config, limits)
     if spec.follow == "path":
         return law
-    from aircraft.guidance.waypoints import WaypointLaw, acceptance
+    from aircraft.guidance.waypoints import waypoint_law
 
-    return WaypointLaw(law, acceptance(spec.kind, config, limits, spec.acceptance_radius_m))
+    return waypoint_law(law, spec.kind, config, limits, spec.acceptance_radius_m)
 
 
 def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
