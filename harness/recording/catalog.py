@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Final
 from harness.files.errors import RunFolderError
 from harness.recording.blueprint import FRAME, Frame
 from harness.recording.layout import layout_of
+from harness.recording.local_page import LOCALHOST
 from harness.recording.properties import NO_RECORDINGS, RUN, VARIED
 from harness.recording.viewer import (
-    LOCALHOST,
     NO_DRIVER,
     ViewerError,
     address_of,

@@ -16,9 +16,17 @@ from harness.flight.record import FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.blueprint import Colour, Scene
 from harness.recording.layout import THIN_SERIES
-from harness.recording.solids import CIRCLE_POINTS, circle, log_solids, outlines, rims, strips_2d, strips_3d
+from harness.recording.solids import (
+    CIRCLE_POINTS,
+    circle,
+    log_ground,
+    log_solids,
+    outlines,
+    rims,
+    strips_2d,
+    strips_3d,
+)
 from harness.recording.summary import colours, summary
-from harness.recording.terrain import log_ground
 from harness.world.obstacle import Circle, Obstacle
 
 LEAST_CIRCLE_POINTS, POINTS_OF_ALL = 12, 400_000

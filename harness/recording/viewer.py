@@ -1,7 +1,7 @@
 """Looking at recordings: the rerun viewer of the installed wheel, in a window, a browser or without a screen.
 
-The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics. The page that it
-serves to a browser asks rerun.io and others for fonts, examples and versions, and needs none of their answers.
+The viewer runs as a process of its own, listens on 127.0.0.1 only and sends no usage statistics; nor does the page
+that it serves to a browser (`harness.recording.local_page`).
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from urllib.parse import quote
 from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.recording.blueprint import TIMELINE
+from harness.recording.local_page import LOCALHOST, local_page
 from harness.recording.overlay import send_recording, write_overlay
 from harness.recording.thin import write_log_recording
 from harness.run_files.flight_logs import READERS
 from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
-LOCALHOST = "127.0.0.1"
 START_TIMEOUT_S = 30.0
 SETTLE_S = 1.5
 """The viewer draws a new time within a few frames; a software renderer needs about a second for them."""
@@ -104,7 +104,7 @@ def open_viewer(
         command = [_executable(), str(shown), "--bind", LOCALHOST, "--port", str(free_port())]
         with _viewer(command, Path(scratch)) as viewer:
             if viewer.wait() != 0:
-                raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_words(scratch)}")
+                raise ViewerError(f"the viewer ended with status {viewer.returncode}: {_last_line(scratch)}")
 
 
 def _overlay_of(folder: Path) -> Path:
@@ -172,14 +172,15 @@ def web_viewer(scratch: Path) -> Iterator[tuple[subprocess.Popen[str], str, str]
     Raises:
         ViewerError: the server does not start.
     """
-    port, web_port = free_port(), free_port()
+    port, web_port, page_port = free_port(), free_port(), free_port()
     command = [_executable(), "--serve-web", "--bind", LOCALHOST]
     command += ["--port", str(port), "--web-viewer-port", str(web_port)]
     with _viewer(command, scratch) as viewer:
         for each in (port, web_port):
             if not answers(each, viewer):
-                raise ViewerError(f"the viewer does not start: {_last_words(str(scratch))}")
-        yield viewer, f"http://{LOCALHOST}:{web_port}/", f"rerun+http://{LOCALHOST}:{port}/proxy"
+                raise ViewerError(f"the viewer does not start: {_last_line(str(scratch))}")
+        with local_page(page_port, web_port):
+            yield viewer, f"http://{LOCALHOST}:{page_port}/", f"rerun+http://{LOCALHOST}:{port}/proxy"
 
 
 @contextlib.contextmanager
@@ -215,7 +216,7 @@ def address_of(page: str, source: str) -> str:
     return f"{page}?url={quote(source, safe='')}"
 
 
-def _last_words(scratch: str) -> str:
+def _last_line(scratch: str) -> str:
     lines = (Path(scratch) / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
     return lines[-1] if lines else "it gave no reason"
 

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -49,6 +50,7 @@ from harness.recording.viewer import (
 from harness.world.obstacle import Circle, Obstacle, Polygon
 from planner.interface import Mission, MovingEdges, Plan, PlanPicture, PlanStatus
 from planner.interface import Path as PlannedPath
+from tests.page import NoBrowserError, browser
 
 MISSION = Mission(
     goal_m=(0.0, 2500.0),
@@ -730,6 +732,26 @@ def test_a_browser_is_served_on_this_machine_only_until_the_viewer_ends(
         assert command[command.index("--bind") + 1] == "127.0.0.1"
         assert viewer.poll() is None
     assert viewer.poll() is not None
+
+
+@pytest.mark.flights
+def test_the_page_in_a_browser_talks_to_this_machine_only(
+    recording: tuple[Path, Flight], tmp_path: Path
+) -> None:
+    with served(recording[0], tmp_path) as (_, address):
+        try:
+            with browser() as chromium:
+                page = chromium.new_page()
+                asked: list[str] = []
+                page.on("request", lambda request: asked.append(request.url))
+                with page.expect_response("**/*.wasm") as wasm:
+                    page.goto(address)
+                assert wasm.value.ok
+                page.wait_for_timeout(5000)
+        except NoBrowserError as missing:
+            pytest.skip(str(missing))
+    hosts = {urlsplit(url).hostname for url in asked if not url.startswith(("data:", "blob:"))}
+    assert hosts == {"127.0.0.1"}
 
 
 @pytest.mark.flights
