@@ -16,12 +16,12 @@ VERIFIED = ("aerosonde", "c172p", "T38")
 
 
 def test_known_aircraft() -> None:
-    assert aircraft_names()[:2] == ("aerosonde", "c172p")
+    assert aircraft_names()[:2] == ("aerosonde", "ultrastick25e")
     assert airframe("aerosonde").mass_kg == 11.0
 
 
 def test_an_unknown_name_lists_the_known_ones() -> None:
-    with pytest.raises(AircraftError, match=r"unknown aircraft 'nope'; known are: aerosonde, c172p"):
+    with pytest.raises(AircraftError, match=r"unknown aircraft 'nope'; known are: aerosonde, ultrastick25e"):
         airframe("nope")
 
 
