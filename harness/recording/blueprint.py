@@ -211,6 +211,7 @@ class Scene:
         origin_deg: latitude and longitude of the plane's origin, where it was given.
         believes: whether the aircraft does not know its state exactly.
         profile: altitudes to be held at places along the path, above mean sea level; None: one all along.
+        wind: speed (m/s) of the steady wind, and the direction (deg clockwise from north) that it blows from.
     """
 
     name: str
@@ -224,6 +225,7 @@ class Scene:
     origin_deg: tuple[float, float] | None = None
     believes: bool = False
     profile: Callable[[FloatArray], FloatArray] | None = None
+    wind: tuple[float, float] = (0.0, 0.0)
 
     def held_m(self, arc_length_m: FloatArray) -> FloatArray:
         """(n,) altitudes to be held at places along the path, above mean sea level."""

@@ -268,6 +268,7 @@ def _log_area(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
         ),
         static=True,
     )
+    _log_scale_and_wind(rec, scene)
     ground = [np.column_stack((points, np.full(len(points), scene.base_m))) for points in (bounds, goal)]
     rec.log(
         f"{look.WORLD}/area",
@@ -289,6 +290,44 @@ def _log_area(rec: rr.RecordingStream, scene: Scene, thin: bool) -> None:
         ),
         static=True,
     )
+
+
+def _log_scale_and_wind(rec: rr.RecordingStream, scene: Scene) -> None:
+    """A scale bar and an arrow along the wind, in the lower right and the upper left corner of the plan view."""
+    xmin, ymin, xmax, ymax = scene.mission.bounds_m
+    margin_m = 0.04 * scene.frame.span_m
+    bar_m = scale_bar_m(scene.frame.span_m)
+    bar = np.array([(xmax - margin_m - bar_m, ymin + margin_m), (xmax - margin_m, ymin + margin_m)])
+    told = f"{bar_m / 1000:g} km" if bar_m >= 1000 else f"{bar_m:g} m"
+    _log_labelled(rec, "scale", bar, told)
+    speed_mps, from_deg = scene.wind
+    if speed_mps > 0.0:
+        towards = -np.array((math.sin(math.radians(from_deg)), math.cos(math.radians(from_deg))))
+        middle = np.array((xmin + 3.0 * margin_m, ymax - 3.0 * margin_m))
+        left = np.array((-towards[1], towards[0]))
+        head = middle + margin_m * towards
+        arrow = [middle - margin_m * towards, head, head - 0.5 * margin_m * (towards - 0.5 * left)]
+        arrow += [head, head - 0.5 * margin_m * (towards + 0.5 * left)]
+        _log_labelled(rec, "wind", np.array(arrow), f"wind {speed_mps:.1f} m/s from {from_deg:.0f}°")
+
+
+def scale_bar_m(span_m: float) -> float:
+    """Length of a scale bar: the largest of 1, 2, 5, 10, 20 ... m that is at most a quarter of a span."""
+    decade = 10.0 ** math.floor(math.log10(0.25 * span_m))
+    return decade * max(step for step in (1, 2, 5) if step * decade <= 0.25 * span_m)
+
+
+def _log_labelled(rec: rr.RecordingStream, name: str, line: FloatArray, label: str) -> None:
+    """A line (k, 2) of the plan view that never changes, with a label at its middle."""
+    strips = rr.LineStrips2D(
+        [line],
+        colors=[look.START_LIGHT],
+        radii=rr.Radius.ui_points(1.0),
+        labels=[label],
+        show_labels=True,
+        draw_order=47,
+    )
+    rec.log(f"{look.PLAN}/{name}", strips, static=True)
 
 
 def log_shapes(rec: rr.RecordingStream, frame: look.Frame) -> None:

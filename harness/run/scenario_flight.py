@@ -269,6 +269,7 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
     """
     from harness.recording.blueprint import Scene
 
+    wind = scenario.environment.wind
     return Scene(
         f"{scenario.name}, {pilot or scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}",
         loop.mission,
@@ -280,6 +281,7 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
         ground=loop.world.ground.field if loop.world.ground else None,
         origin_deg=_origin_deg(scenario),
         believes=scenario.navigation.kind != "perfect",
+        wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
     )
 
 

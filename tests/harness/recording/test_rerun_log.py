@@ -34,7 +34,7 @@ from harness.recording.blueprint import ERROR_COLOURS, Scene, apart
 from harness.recording.layout import layout_of, series_views
 from harness.recording.log import RerunLog
 from harness.recording.overlay import runs_in, write_overlay
-from harness.recording.scene import quaternions
+from harness.recording.scene import quaternions, scale_bar_m
 from harness.recording.states import mode_of
 from harness.recording.summary import summary
 from harness.recording.thin import ThinLog
@@ -776,6 +776,25 @@ def test_every_line_of_a_plot_is_named(recording: tuple[Path, Flight]) -> None:
     assert titles["series/bank"] == "Bank, deg; blue: command, red: limit 44.7, violet: pitch"
     assert titles["series/cross_track"] == "Cross-track, m; blue: believed"
     assert "believed" not in str(series_views(SCENE.frame, ("",), without=["navigation_error"])[0].name)
+
+
+@pytest.mark.parametrize(
+    ("span_m", "bar_m"), [(400, 100), (399, 50), (5000, 1000), (100_000, 20_000), (81, 20)]
+)
+def test_a_scale_bar_has_a_round_length(span_m: float, bar_m: float) -> None:
+    assert scale_bar_m(span_m) == pytest.approx(bar_m)
+
+
+def test_wind_is_drawn_along_its_way_and_named(tmp_path: Path) -> None:
+    """From 300 deg it blows towards 120 deg: 0.866 east, -0.5 north."""
+    log = RerunLog(tmp_path / "flight.rrd", replace(SCENE, wind=(8.0, 300.0)), "a")
+    log.close()
+    entities = read(tmp_path / "flight.rrd")
+    (arrow,), *_ = column(entities, "/plan/wind", "LineStrips2D:strips")
+    along = np.array(arrow[1]) - arrow[0]
+    assert along / np.hypot(*along) == pytest.approx([0.866, -0.5], abs=1e-3)
+    assert column(entities, "/plan/wind", "LineStrips2D:labels") == [["wind 8.0 m/s from 300°"]]
+    assert "Wind 8.0 m/s from 300°" in summary(replace(SCENE, wind=(8.0, 300.0)), None)
 
 
 def test_no_peak_of_a_curve_is_averaged_away(recording: tuple[Path, Flight]) -> None:

@@ -64,7 +64,7 @@ def test_limits_follow_from_the_written_clearance_and_from_nobody_who_flies() ->
         assert (other.cross_track_m, other.altitude_m) == (10.0, 10.0), key
     for clearance_m, limit_m in ((500, 50.0), (1, 0.1), (0, 10.0)):
         written = parse_scenario(LEAST + f"planner: {{clearance_m: {clearance_m}}}\n").trackability
-        assert (written.cross_track_m, written.altitude_m) == (pytest.approx(limit_m), 10.0)
+        assert (written.cross_track_m, written.altitude_m) == (pytest.approx(limit_m), 10.0)  # type: ignore[comparison-overlap]
     # 853 kg are 1880 lb: 2.1 + 24000 / 11880 is more than the 3.8 that suffice.
     assert parse_scenario(LEAST + "aircraft: {model: c172p}\n").trackability.load_factor == 3.8
     own = parse_scenario(LEAST + "trackability: {cross_track_m: 3.0, load_factor: 1.5}\n").trackability
