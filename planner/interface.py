@@ -121,6 +121,7 @@ class Mission:
         compute_latency_s: a plan takes effect this long after the request.
         sensor_latency_s: a scan is known this long after it was taken.
         wind_mps: the strongest steady wind to expect.
+        least_hold_radius_m: smallest radius of a full turn that ends a plan; None: that of any turn.
     """
 
     goal_m: tuple[float, float]
@@ -135,6 +136,12 @@ class Mission:
     compute_latency_s: float = 0.0
     sensor_latency_s: float = 0.0
     wind_mps: float = 0.0
+    least_hold_radius_m: float | None = None
+
+    @property
+    def hold_radius_m(self) -> float:
+        """Radius of the full turns that plans end in."""
+        return self.turn_radius_m if self.least_hold_radius_m is None else self.least_hold_radius_m
 
     @property
     def off_path_m(self) -> float:

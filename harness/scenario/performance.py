@@ -93,6 +93,7 @@ def mission_with(scenario: ScenarioKeys, performance: Performance) -> Mission:
         compute_latency_s=scenario.planner.compute_latency_s,
         sensor_latency_s=scenario.sensor.latency_s,
         wind_mps=wind_mps_of(scenario),
+        least_hold_radius_m=performance.hold_radius_m,
     )
 
 

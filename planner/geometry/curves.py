@@ -167,6 +167,11 @@ class Limits(NamedTuple):
         """Those of a mission."""
         return cls(mission.turn_radius_m, mission.speed_mps * mission.roll_in_s)
 
+    @classmethod
+    def of_holds(cls, mission: Mission) -> Limits:
+        """Those of the full turns that plans of a mission end in."""
+        return cls(mission.hold_radius_m, mission.speed_mps * mission.roll_in_s)
+
 
 def fillet(
     start: Pose,

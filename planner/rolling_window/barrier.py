@@ -156,8 +156,8 @@ class Proofs:
     """
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, least_keeps_m: float) -> None:
-        turns_keep_m = mission.clearance_m + mission.turn_radius_m
+        turns_keep_m = mission.clearance_m + mission.hold_radius_m
         self.no_way = Proof(mission, memory, least_keeps_m)
-        self.no_room_to_turn = Proof(mission, memory, turns_keep_m, mission.turn_radius_m)
+        self.no_room_to_turn = Proof(mission, memory, turns_keep_m, mission.hold_radius_m)
         self.only_given_up = Proof(mission, memory, least_keeps_m, with_refused=True)
         self.no_way_gap_m, self.turning_gap_m = 2.0 * least_keeps_m, 2.0 * turns_keep_m

@@ -101,7 +101,7 @@ class Commitment:
 
     def _certifier(self, spacing_m: float) -> Certifier:
         mission = self._mission
-        return Certifier(self._local.limits, mission.clearance_m, mission.sensor_range_m, spacing_m)
+        return Certifier(self._local.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
 
 
 def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:

@@ -65,12 +65,12 @@ class RollingWindowConfig:
         """
         reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
         least = least_sensor_range_m(
-            mission.turn_radius_m, mission.clearance_m, mission.ground_speed_mps, reaction_s
+            mission.hold_radius_m, mission.clearance_m, mission.ground_speed_mps, reaction_s
         )
         if mission.sensor_range_m < least:
             raise ValueError(
                 f"sensor.range_m is {mission.sensor_range_m:g}, too short for a turn radius of "
-                f"{mission.turn_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
+                f"{mission.hold_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
                 f"must be at least {math.ceil(least)}, to see room for a safe turn ahead"
             )
         window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m

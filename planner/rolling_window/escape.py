@@ -91,7 +91,7 @@ class Escapes:
 
     def __init__(self, mission: Mission, memory: ObstacleMemory, local: LocalPlanning) -> None:
         self._mission, self._memory, self._local = mission, memory, local
-        self._certifier = Certifier(local.limits, mission.clearance_m, math.inf, step_along_m(mission))
+        self._certifier = Certifier(local.holds, mission.clearance_m, math.inf, step_along_m(mission))
         self._began_m: Point | None = None  # where the aircraft was when it had no plan for the first time
 
     def threats(self, request: PlanRequest) -> Threats | None:
@@ -111,18 +111,18 @@ class Escapes:
         onward_m = self._mission.sensor_range_m
         ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))
         if (
-            divert_to_loiter(ahead, 0.0, onward_m, self._local.limits, self._standing(LOITER_SHARES[-1]))
+            divert_to_loiter(ahead, 0.0, onward_m, self._local.holds, self._standing(LOITER_SHARES[-1]))
             is None
         ):
             raise NoWayToBegin(NO_ROOM)
-        pieces = math.ceil(onward_m / (0.25 * self._local.limits.radius_m))
+        pieces = math.ceil(onward_m / (0.25 * self._local.holds.radius_m))
         if not request.seen.seen_free(places_along(ahead, onward_m, pieces)).any():
             if math.dist(self._began_m, request.position_m) > BLIND * self._mission.clearance_m:
                 raise NoWayToBegin(NOT_SEEN)
             return Escape(Plan(PlanStatus.NO_PATH, NOT_SEEN))
         for share in LOITER_SHARES:
             standing = self._standing(share)
-            turn = divert_to_loiter(ahead, 0.0, lead_m, self._local.limits, standing)
+            turn = divert_to_loiter(ahead, 0.0, lead_m, self._local.holds, standing)
             if turn is not None and self._best([_Option(turn)], standing, None, threats, share)[0]:
                 return self._away(request, turn, "no way on can be seen to be safe; turning away")
         return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
@@ -165,7 +165,7 @@ class Escapes:
             if nearer is not None:
                 yield _Option(nearer.path, None, "", nearer)
             yield _Option(left, committed.left(here), GOES_ON)
-            turn = divert_to_loiter(path, from_m, to_m, self._local.limits, terrain)
+            turn = divert_to_loiter(path, from_m, to_m, self._local.holds, terrain)
             if turn is not None:
                 yield _Option(turn, None, "no way on can be seen to be safe; turning away")
             if threats is not None:

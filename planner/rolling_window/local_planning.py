@@ -115,7 +115,7 @@ class LocalPlanning:
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
         self._hug_m = LEAST_HUG * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
-        self.limits = Limits.of(mission)
+        self.limits, self.holds = Limits.of(mission), Limits.of_holds(mission)
 
     @property
     def path_keeps_m(self) -> float:

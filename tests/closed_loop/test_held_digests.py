@@ -19,8 +19,8 @@ from harness.scenario.shipped import scenario_path
 
 HELD = {
     "aerosonde_forest": "12c81efb3b22c3f2bce31091b45ade3fdb2225d5a193137c0b37315fbbc68950",
-    "polygon_town": "3c2af378564aee9302b36e5ca775c784468fe339f92485cf83193f141c3e9906",
-    "one_of_everything": "cda5509a5bece8ea25b8d169930eb787befe7a988799cc214b9e0c2b939d4334",
+    "polygon_town": "8798be78462d53ee96f5bf2a29641944f5a13f7d6fd64c61172f8612094872c3",
+    "one_of_everything": "a3552cf09c273a3850e18de04f69ea71fe607fdd9653548975940d2b72ef3684",
 }
 """SHA-256 of the first minute of each."""
 

@@ -1,0 +1,54 @@
+"""An ordinary day: wind, light turbulence, satellite navigation. Planning must cost no long ways there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import wayproof
+from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+
+
+class Hold:
+    """Flies into a full turn at the radius of holds, at once."""
+
+    def __init__(self, mission: Mission) -> None:
+        self.radius_m = mission.hold_radius_m
+
+    def plan(self, request: PlanRequest) -> Plan:
+        if request.flown is not None:
+            return Plan(PlanStatus.KEPT, "holding")
+        (east, north), (along_east, along_north) = request.position_m, request.direction
+        straight = (east, north, along_east, along_north, 0.0, 300.0)
+        turn = (
+            *(east + 300.0 * along_east, north + 300.0 * along_north, along_east, along_north),
+            *(1.0 / self.radius_m, math.tau * self.radius_m),
+        )
+        path = Path(np.array([straight, turn]), loiter=True)
+        return Plan(PlanStatus.FOUND, "into the hold", np.array([request.position_m, turn[:2]]), path)
+
+
+@pytest.mark.flights
+@pytest.mark.parametrize("turbulence", [None, {"model": "tustin", "intensity": "moderate"}])
+@pytest.mark.parametrize("wind_mps", [8.0, 12.0])
+def test_a_hold_is_kept_within_a_metre(wind_mps: float, turbulence: dict[str, str] | None) -> None:
+    scenario = wayproof.load_scenario("aerosonde_forest").with_(
+        {
+            "obstacles": [],
+            "environment.wind": {"speed_mps": wind_mps, "from_deg": 300},
+            "environment.turbulence": turbulence,
+            "mission.time_limit_s": 240,
+        }
+    )
+    holds: list[Hold] = []
+
+    def make(mission: Mission) -> Hold:
+        holds.append(Hold(mission))
+        return holds[-1]
+
+    track = wayproof.fly(scenario, planner=make).track.to_pandas()
+    off_m = track.cross_track_m[track.time_s > 30.0].abs()
+    assert 100.0 < holds[0].radius_m < 210.0
+    assert off_m.max() < 1.0
