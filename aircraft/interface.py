@@ -47,6 +47,14 @@ class AircraftState(NamedTuple):
     """Time since the start in which a servo was at its rate limit, each counted."""
     vertical_actuator_limited_s: float = 0.0
     """That of the servos of elevator and throttle alone."""
+    elevator: float = math.nan
+    """Commanded deflection with its trim, from -1 to 1, where the surface is at its stop; NaN where not known."""
+    aileron: float = math.nan
+    """The same of the ailerons."""
+    rudder: float = math.nan
+    """The same of the rudder."""
+    angle_of_attack_rad: float = math.nan
+    """Angle of the air to the body's x axis in its plane of symmetry; NaN where not known."""
 
     @property
     def groundspeed_mps(self) -> float:

@@ -126,7 +126,10 @@ class JsbsimModel:
             airspeed_fps,
             load_factor,
             throttle,
+            *deflections,
+            alpha_rad,
         ) = [read() for read in self._read]
+        elevator, pitch_trim, aileron, roll_trim, rudder, yaw_trim = deflections
         east_m, north_m, convergence_rad = self._plane.project(latitude_rad, longitude_rad)
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
         cosine_m, sine_m = FOOT_M * self._cosine, FOOT_M * self._sine
@@ -146,6 +149,10 @@ class JsbsimModel:
             throttle,
             sum(read() for read in self._limited) / self._step_rate_hz if self._limited else 0.0,
             sum(read() for read in self._vertical_limited) / self._step_rate_hz if self._limited else 0.0,
+            max(-1.0, min(elevator + pitch_trim, 1.0)),
+            max(-1.0, min(aileron + roll_trim, 1.0)),
+            max(-1.0, min(rudder + yaw_trim, 1.0)),
+            alpha_rad,
         )
 
     def command(self, roll_rad: float, altitude_m: float, airspeed_mps: float) -> None:

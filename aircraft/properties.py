@@ -19,6 +19,13 @@ STATE_PROPERTIES = (
     "velocities/vtrue-fps",
     "accelerations/Nz",  # 1 in level flight
     "fcs/throttle-cmd-norm",
+    "fcs/elevator-cmd-norm",
+    "fcs/pitch-trim-cmd-norm",
+    "fcs/aileron-cmd-norm",
+    "fcs/roll-trim-cmd-norm",
+    "fcs/rudder-cmd-norm",
+    "fcs/yaw-trim-cmd-norm",
+    "aero/alpha-rad",
 )
 """Read for `AircraftState`, in this order."""
 

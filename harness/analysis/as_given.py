@@ -23,6 +23,11 @@ class Corner(Protocol):
         ...
 
     @property
+    def turn_deg(self) -> float:
+        """The turn asked for, positive to the left."""
+        ...
+
+    @property
     def cut_m(self) -> float:
         """How far from it the plan passes."""
         ...
@@ -44,7 +49,7 @@ class AsGiven:
         altitude_m: (n,) altitude that the path has there.
         climb_mps: (n,) climb that it asks for there, negative for a descent.
         fastest_mps: (n, 2) fastest climb and descent of the aircraft at its airspeed there.
-        airspeed_mps: (n,) true airspeed that it asks for there.
+        airspeed_mps: (n,) true airspeed that was commanded there.
     """
 
     corners: Sequence[Corner]

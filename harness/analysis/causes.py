@@ -1,22 +1,22 @@
-"""Why what was planned could not be tracked: the limit that the aircraft was at while the error grew.
+"""Why what was planned could not be tracked: what it asked for that was not there, or what was at its limit meanwhile.
 
-`harness.analysis.trackability.Leg` lists the causes. Two that are easily mistaken for one another: in "turn radius too
-tight" the plan has a radius below V^2 / (g tan bank limit), which no guidance could fly; in "bank limit" the radius is
-feasible, and guidance asked for all the bank there is nonetheless.
+A plan that asks for more than is in force (`harness.analysis.in_force`) is the cause, whatever the aircraft did then.
+Otherwise the cause is the limit that the aircraft was at while the error grew. `FINDINGS` has all causes, and
+`harness.analysis.trackability` the order in which the limits are checked.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from harness.analysis.as_given import AsGiven
+from aircraft.interface import GRAVITY_MPS2
+from harness.analysis.as_given import AsGiven, Corner
 from harness.analysis.flight_limits import LOAD_S, FlightLimits
-from harness.analysis.smoothness import planned_profile, turn_onto_first_plan_1pm, window_m
-from harness.flight.record import AcceptedPlan, FloatArray, Track
+from harness.analysis.in_force import InForce, demand
+from harness.flight.record import SURFACES, AcceptedPlan, FloatArray, Track
 
 LEAD_S = 5.0
 """The cause is looked for from this time before the error became too large up to where it is largest."""
@@ -34,29 +34,43 @@ LATE_SHARE = 0.25
 """Share of the largest error there already when the plan took effect that makes the plan too late."""
 
 ROUNDING = 1.001
-"""A radius smaller by no more than this factor is not smaller."""
+"""A demand larger than what is in force by no more than this factor is not larger."""
+
+ROLLED_SHARE = 0.1
+"""If a plan asks for a faster roll than is in force, this share of the lead time at that rate makes it the cause."""
+
+AT_STOP = 0.995
+"""A control surface deflected by this share of its travel is at its stop."""
+
+LEAST_CLIMB_MPS = 0.2
+"""A path that climbs or sinks more slowly is level."""
 
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
 
 FINDINGS: Mapping[str, str] = {
     "planner too late": "the aircraft was off the plan already when the plan took effect",
-    "turn radius too tight": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)), or the "
-    "aircraft was further from the path as given than allowed",
-    "sensor horizon": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)), within "
-    "sensing range of an obstacle, and `sensor.range_m` is too short for a turn before a wall (clearance, turn radius, "
-    "and the way flown while sensing, computing and rolling in)",
-    "bank limit": "the bank command was at its limit, on a radius that the limit allows: the aircraft was late or "
-    "disturbed, not the plan too tight",
-    "wind drift": "the bank command was at its limit, on a radius that only the wind makes too tight; or the aircraft "
-    "was off downwind in a cross-wind",
-    "roll rate": "the aircraft rolled at its largest rate",
+    "turn radius too tight": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)) at the "
+    "commanded airspeed in calm air, or a corner cannot be kept without one",
+    "sensor horizon": "the plan turns on such a radius within sensing range of an obstacle, and `sensor.range_m` is "
+    "too short for a turn before a wall (clearance, turn radius, and the way flown while sensing, computing and "
+    "rolling in)",
+    "wind drift": "the plan turns on a radius, or a corner needs one, that only the wind makes too tight; or the "
+    "aircraft was off downwind in a cross-wind with no limit reached",
+    "bank limit": "the bank command was at its limit, on a radius that the limit allows in that wind: the aircraft was "
+    "late or disturbed",
+    "roll rate": "the plan asks for a faster roll than the roll rate limit, or the aircraft rolled at that limit for "
+    "longer than the bank command was at its own",
+    "control saturation": "elevator, ailerons or rudder were at a stop",
+    "stall": "the wing stalled: the angle of attack or the airspeed was beyond that of the stall",
     "actuator": "a servo was at its rate limit",
     "load factor": "the load factor was larger than allowed",
-    "speed or throttle saturation": "the aircraft was off its airspeed, or off its altitude with the throttle at a "
-    "stop",
-    "climb too steep": "the aircraft was off its altitude, on a path steeper than its fastest climb",
-    "descent too steep": "the aircraft was off its altitude, on a path steeper than its fastest descent",
+    "speed or throttle saturation": "the aircraft was off the commanded airspeed, or off its altitude with the "
+    "throttle at a stop",
+    "climb too steep": "the aircraft was off its altitude, airspeed or load factor, on a path that climbs faster than "
+    "its survey or its specific excess power at that height and speed allows",
+    "descent too steep": "the aircraft was off its altitude, airspeed or load factor, on a path that sinks faster than "
+    "its survey, or idle throttle at that height and speed, allows",
     NAVIGATION_ERROR: "where the true position was furthest off, the believed one was within the limits",
     "lost control": "the flight ended with loss of control",
     "tracking error": "none of the other causes",
@@ -83,90 +97,154 @@ def is_allowed_for(causes: Collection[str], error_m: float | None, margin_m: flo
 FULL_THROTTLE, IDLE_THROTTLE = 0.99, 0.01
 
 
-def cross_track_cause(track: Track, peak: int, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> str:
-    """Why the aircraft is off the plan, at the row where it is most."""
-    return _lateral_cause(track, _before_peak(track, peak, limits.cross_track_threshold_m), plans, limits)
+def cross_track_cause(
+    track: Track, peak: int, plans: Sequence[AcceptedPlan], limits: FlightLimits, force: InForce
+) -> str:
+    """Why the aircraft is off the plan, at the row where it is most: the first cause that applies."""
+    first, stop = _before_peak(track, peak, limits.cross_track_threshold_m), peak + 1
+    lead, force = track.part(first, stop), force.part(first, stop)
+    if _is_late(track, lead, limits):
+        return "planner too late"
+    asked = demand(lead, plans, force)
+    if asked.calm > ROUNDING:
+        seen_late = limits.sensor_range_m < limits.horizon_m
+        near = lead.clearance_m.min() <= limits.sensor_range_m
+        return "sensor horizon" if seen_late and near else "turn radius too tight"
+    if abs(float((lead.airspeed_mps - force.commanded_mps).mean())) > limits.max_airspeed_error_mps:
+        return speed_cause(lead, limits)
+    if asked.windy > ROUNDING:
+        return "wind drift"
+    return _at_a_limit(lead, limits, force, asked.roll_rate > ROUNDING)
+
+
+def corner_cause(corner: Corner, allowed_m: float, track: Track, row: int, force: InForce) -> str:
+    """Why a corner was passed too far off: whether any turn would do in calm air, whether any would in that wind.
+
+    Args:
+        corner: a corner of the path as given.
+        allowed_m: how far from it the aircraft may pass.
+        track: the flown track.
+        row: that belongs to the corner.
+        force: what was in force, row by row.
+    """
+    half_rad = math.radians(abs(corner.turn_deg)) / 2.0
+    outside = 1.0 / max(math.cos(half_rad), 1e-9) - 1.0
+    needed = GRAVITY_MPS2 * math.tan(force.bank_limit_rad) * allowed_m / max(outside, 1e-9)
+    speed, wind = float(force.commanded_mps[row]), float(np.hypot(*force.wind_mps[row]))
+    if speed**2 > needed:
+        return "turn radius too tight"
+    if (speed + wind) ** 2 > needed:
+        return "wind drift"
+    around = track.part(int(np.searchsorted(track.time_s, track.time_s[row] - LEAD_S)), row + 1)
+    banked = float(saturated(around, force.bank_limit_rad).mean())
+    return "bank limit" if banked >= SATURATED_SHARE else "tracking error"
 
 
 def altitude_cause(track: Track, peak: int, limits: FlightLimits, given: AsGiven | None) -> str:
     """Why the altitude is off, at the row where it is most."""
-    if given is not None:
-        # What was asked for since the altitude was last as it should be.
-        kept = np.flatnonzero(
-            np.abs(track.up_m[:peak] - given.altitude_m[:peak]) <= 0.5 * limits.max_altitude_error_m
-        )
-        since = slice(int(kept[-1]) if len(kept) else 0, peak + 1)
-        up = given.climb_mps[since] - given.fastest_mps[since, 0]
-        down = -given.climb_mps[since] - given.fastest_mps[since, 1]
-        if max(up.max(), down.max()) > 0.0:
-            return "climb too steep" if up.max() >= down.max() else "descent too steep"
-    sinking = max(peak, 1)
-    before = track.part(int(np.searchsorted(track.time_s, track.time_s[sinking] - LEAD_S)), sinking)
-    stopped, limited = float(_at_a_stop(before).mean()), _vertical_servo_share(before)
-    if limited >= max(SATURATED_SHARE, stopped):
-        return "actuator"
-    return "speed or throttle saturation" if stopped >= SATURATED_SHARE else "tracking error"
+    wanted_m = given.altitude_m if given else np.full(len(track), limits.altitude_m)
+    good = np.flatnonzero(np.abs(track.up_m[:peak] - wanted_m[:peak]) <= 0.5 * limits.max_altitude_error_m)
+    steep = steepness_cause(track, int(good[-1]) if len(good) else 0, peak + 1, given)
+    if steep is not None:
+        return steep
+    last = max(peak, 1)
+    lead = track.part(int(np.searchsorted(track.time_s, track.time_s[last] - LEAD_S)), last)
+    limit = _vertical_limit(lead, limits)
+    if limit is not None:
+        return limit
+    return "speed or throttle saturation" if _at_a_stop(lead).mean() >= SATURATED_SHARE else "tracking error"
 
 
-def speed_cause(lead: Track) -> str:
+def speed_cause(lead: Track, limits: FlightLimits) -> str:
     """Why the airspeed is off, over the rows of which it is the mean."""
-    limited = _vertical_servo_share(lead)
-    slow_servo = limited >= max(SATURATED_SHARE, float(_at_a_stop(lead).mean()))
-    return "actuator" if slow_servo else "speed or throttle saturation"
+    return _vertical_limit(lead, limits) or "speed or throttle saturation"
 
 
-def _before_peak(track: Track, peak: int, threshold_m: float) -> Track:
-    """The rows up to a peak of the cross-track error, from shortly before it outgrew what it may be."""
+def steepness_cause(track: Track, first: int, stop: int, given: AsGiven | None) -> str | None:
+    """Whether a path climbs or sinks faster than the aircraft can in some rows; None if it does not.
+
+    What the aircraft can is known of its survey, near sea level. Flown with full or idle throttle, the rate of its
+    specific energy, climb + V dV/dt / g, is its specific excess power at that height, weight and speed.
+    """
+    if given is None:
+        return None
+    asked, fastest = given.climb_mps[first:stop], given.fastest_mps[first:stop]
+    excess = {1.0: asked - fastest[:, 0], -1.0: -asked - fastest[:, 1]}
+    lead = track.part(first, stop)
+    if len(lead) > 1:
+        kinetic = lead.airspeed_mps**2 / (2.0 * GRAVITY_MPS2)
+        power = np.gradient(lead.up_m + kinetic, lead.time_s)
+        for side, at_stop in ((1.0, lead.throttle >= FULL_THROTTLE), (-1.0, lead.throttle <= IDLE_THROTTLE)):
+            rows = at_stop & (side * asked > LEAST_CLIMB_MPS)
+            if rows.mean() >= SATURATED_SHARE:
+                excess[side] = np.append(excess[side], side * float((asked - power)[rows].mean()))
+    up, down = float(excess[1.0].max()), float(excess[-1.0].max())
+    if max(up, down) <= 0.0:
+        return None
+    return "climb too steep" if up >= down else "descent too steep"
+
+
+def _before_peak(track: Track, peak: int, threshold_m: float) -> int:
+    """The row shortly before the one at which a cross-track error outgrew what it may be, on the way to its peak."""
     within = np.flatnonzero(np.abs(track.cross_track_m[:peak]) <= threshold_m)
     grows = int(within[-1]) if len(within) else 0
-    return track.part(int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S)), peak + 1)
+    return int(np.searchsorted(track.time_s, track.time_s[grows] - LEAD_S))
 
 
-def _lateral_cause(track: Track, lead: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> str:
-    """Why the cross-track error became large, from the rows before its peak: the first cause that applies."""
-    error = np.abs(lead.cross_track_m)
+def _is_late(track: Track, lead: Track, limits: FlightLimits) -> bool:
+    """Whether the aircraft was off the plan by much of the largest error already when the plan took effect."""
     begins = int(np.searchsorted(track.plan_index, lead.plan_index[-1]))
     at_start = abs(float(track.cross_track_m[begins]))
-    if at_start > limits.cross_track_threshold_m and at_start >= LATE_SHARE * error[-1]:
-        return "planner too late"
-    bend = _tightest_1pm(lead, plans)
-    tightest_m = limits.turn_radius_m if limits.tightest_radius_m is None else limits.tightest_radius_m
-    if bend * tightest_m > ROUNDING:
-        seen_late = limits.sensor_range_m < limits.horizon_m
-        near = lead.clearance_m.min() <= limits.sensor_range_m
-        return "sensor horizon" if seen_late and near else "turn radius too tight"
-    too_slow = abs(float(lead.airspeed_mps.mean()) - limits.airspeed_mps) > limits.max_airspeed_error_mps
-    if too_slow:
-        return speed_cause(lead)
-    banked = float(saturated(lead, limits.bank_limit_rad).mean())
-    rolling = float(_rolling(lead, limits.roll_rate_radps).mean()) if len(lead) > 1 else 0.0
-    if banked >= max(SATURATED_SHARE, rolling):
-        calm_m = limits.turn_radius_m if limits.calm_radius_m is None else limits.calm_radius_m
-        only_in_wind = bend * calm_m <= ROUNDING < bend * limits.turn_radius_m
-        return "wind drift" if only_in_wind else "bank limit"
+    return at_start > limits.cross_track_threshold_m and at_start >= LATE_SHARE * abs(
+        float(lead.cross_track_m[-1])
+    )
+
+
+def _at_a_limit(lead: Track, limits: FlightLimits, force: InForce, rolls_too_fast: bool) -> str:
+    """The limit that the aircraft was at while it came off a plan that asks for no more than is in force."""
+    if _stalled(lead, limits):
+        return "stall"
+    if _surface_share(lead, SURFACES) >= SATURATED_SHARE:
+        return "control saturation"
+    rolling = _rolling(lead, force.roll_rate_radps) if len(lead) > 1 else np.zeros(len(lead), bool)
+    rolled = float(rolling.mean())
+    banked = float((saturated(lead, force.bank_limit_rad) & ~rolling).mean())
+    if rolls_too_fast and rolled >= ROLLED_SHARE:
+        return "roll rate"
+    if banked >= max(SATURATED_SHARE, rolled):
+        return "bank limit"
     drift = _wind_from_left_mps(lead)
     if abs(drift) >= WIND_SHARE * lead.airspeed_mps.mean() and drift * lead.cross_track_m[-1] > 0:
         return "wind drift"
     if _lateral_servo_share(lead) >= SATURATED_SHARE:
         return "actuator"
-    if rolling >= SATURATED_SHARE:
+    if rolled >= SATURATED_SHARE:
         return "roll rate"
     if averaged(lead.load_factor, lead, LOAD_S).max() > limits.max_load_factor:
         return "load factor"
     return "tracking error"
 
 
-def _tightest_1pm(lead: Track, plans: Sequence[AcceptedPlan]) -> float:
-    """Largest curvature of what was planned, up to a window beyond the last station, and of the turn onto it.
+def _vertical_limit(lead: Track, limits: FlightLimits) -> str | None:
+    """The limit of wing, elevator or servo that kept the aircraft from its altitude or airspeed; None without one."""
+    if _stalled(lead, limits):
+        return "stall"
+    if _surface_share(lead, ("elevator",)) >= SATURATED_SHARE:
+        return "control saturation"
+    slow_servo = _vertical_servo_share(lead)
+    return "actuator" if slow_servo >= max(SATURATED_SHARE, float(_at_a_stop(lead).mean())) else None
 
-    An aircraft that overshoots a corner stays at its station.
-    """
-    window = window_m(lead)
-    reach = lead.arc_length_m.copy()
-    reach[-1] += window
-    planned = planned_profile(replace(lead, arc_length_m=reach), plans, window)
-    onto = turn_onto_first_plan_1pm(lead, plans, window)
-    return float(np.abs(planned.curvature_1pm).max(initial=onto))
+
+def _stalled(lead: Track, limits: FlightLimits) -> bool:
+    """Whether the angle of attack was beyond that of the stall; not where it is not known."""
+    assert lead.angle_of_attack_deg is not None
+    return bool((np.abs(lead.angle_of_attack_deg) > limits.stall_angle_deg).any())
+
+
+def _surface_share(lead: Track, names: Sequence[str]) -> float:
+    """Share of the rows in which one of some control surfaces was at its stop; 0 where that is not known."""
+    deflected = np.nan_to_num(np.abs([getattr(lead, name) for name in names])).max(axis=0)
+    return float((deflected >= AT_STOP).mean())
 
 
 def saturated(track: Track, bank_limit_rad: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
@@ -176,10 +254,12 @@ def saturated(track: Track, bank_limit_rad: float) -> np.ndarray[tuple[int], np.
     return at_limit
 
 
-def _rolling(track: Track, roll_rate_radps: float) -> FloatArray:
-    """(n - 1,) 1 where the aircraft rolls about as fast as it may, else 0."""
+def _rolling(track: Track, roll_rate_radps: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """(n,) whether the aircraft rolls about as fast as it may from the row before."""
     rate = np.abs(np.diff(track.roll_deg)) / np.maximum(np.diff(track.time_s), 1e-9)
-    return np.where(rate >= ROLL_RATE_SHARE * math.degrees(roll_rate_radps), 1.0, 0.0)
+    fast: np.ndarray[tuple[int], np.dtype[np.bool_]]
+    fast = np.append(False, rate >= ROLL_RATE_SHARE * math.degrees(roll_rate_radps))
+    return fast
 
 
 def _lateral_servo_share(track: Track) -> float:

@@ -22,10 +22,8 @@ class FlightLimits:
         bank_limit_rad: largest roll command of the guidance.
         turn_radius_m: smallest radius a plan may have, in the flight's wind and turbulence.
         airspeed_mps: true airspeed to be held; NaN where it is not judged.
-        calm_radius_m: what `turn_radius_m` would be in calm air; None: the same.
-        tightest_radius_m: radius that the bank limit gives at that airspeed in calm air, nothing kept back;
-            None: `turn_radius_m`.
         roll_rate_radps: fastest change of the roll command.
+        stall_angle_deg: angle of attack beyond which the wing is stalled.
         sensor_range_m: how far obstacles are seen.
         horizon_m: how far they have to be seen, so that a turn along a wall straight ahead keeps the clearance.
         max_cross_track_m: largest cross-track error, before the navigation margin.
@@ -41,9 +39,8 @@ class FlightLimits:
     bank_limit_rad: float
     turn_radius_m: float
     airspeed_mps: float = math.nan
-    calm_radius_m: float | None = None
-    tightest_radius_m: float | None = None
     roll_rate_radps: float = math.inf
+    stall_angle_deg: float = math.inf
     sensor_range_m: float = math.inf
     horizon_m: float = 0.0
     max_cross_track_m: float = 10.0

@@ -61,8 +61,8 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     nearest_m[-1] = min(nearest_m[-1], flight.contact_m)
     window = window_m(track)
     planned = planned_profile(track, flight.plans, window)
-    lost_control = flight.outcome is Outcome.LOST_CONTROL
-    verdicts = legs(track, flight.plans, limits, lost_control, given)
+    lost = flight.reason if flight.outcome is Outcome.LOST_CONTROL else None
+    verdicts = legs(track, flight.plans, limits, lost, given)
     followed = track.cross_track_m[track.plan_index >= 0]
     planned_m = planned_length_m(flight)
     return {

@@ -14,9 +14,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.analysis.as_given import AsGiven
-from harness.analysis.causes import NAVIGATION_ERROR, altitude_cause, averaged, cross_track_cause, speed_cause
+from harness.analysis.as_given import AsGiven, Corner
+from harness.analysis.causes import (
+    LEAD_S,
+    NAVIGATION_ERROR,
+    altitude_cause,
+    averaged,
+    corner_cause,
+    cross_track_cause,
+    speed_cause,
+    steepness_cause,
+)
 from harness.analysis.flight_limits import LOAD_S, SPEED_S, FlightLimits
+from harness.analysis.in_force import InForce
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
 
 SHORTEST_LEG_S = 5.0
@@ -40,38 +50,10 @@ class Leg:
         corner_cut_m: how far from the corner at its end the plan passes; 0 without one.
         max_deviation_m: largest distance from the path as given; None where a planner made the path.
         trackable: whether all of them stayed within what they may be.
-        cause: why not; None where trackable. Of several limits that were exceeded the first counts: cross-track error,
-            load factor, airspeed, altitude, distance from the path as given.
-
-            "lost control": the flight ended so, before any other.
-
-            Of the cross-track error, the first that applies, as `harness.analysis.causes` tells them:
-            "navigation error": where the error was largest, the aircraft believed to be within the limit (of the
-            altitude too);
-            "planner too late": the aircraft was off the plan already when it took effect;
-            "sensor horizon": a radius below V^2 / (g tan bank limit), near an obstacle that the sensor shows too late
-            for any other;
-            "turn radius too tight": such a radius, elsewhere;
-            "actuator", "speed or throttle saturation": the airspeed is off by more than it may be, as below;
-            "wind drift": the bank was at its limit, on a radius that only the wind makes too tight;
-            "bank limit": the bank command was at its limit on a feasible radius, for longer than the aircraft rolled as
-            fast as it may;
-            "wind drift": the aircraft is off downwind in a cross-wind;
-            "actuator": the servo of aileron or rudder was at its rate limit;
-            "roll rate": the aircraft rolled as fast as it may;
-            "load factor": it is larger than it may be;
-            "tracking error": none of these.
-
-            Of the load factor: "load factor".
-
-            Of the airspeed: "actuator" where the servo of elevator or throttle was at its rate limit for longer than
-            the throttle command at a stop, else "speed or throttle saturation".
-
-            Of the altitude: "climb too steep", "descent too steep": the path asks for more than the fastest climb or
-            descent of the aircraft; "actuator" as for the airspeed; "speed or throttle saturation": the throttle was at
-            a stop; "tracking error": none of these.
-
-            Of the distance from the path as given: "turn radius too tight": it is too large at corners.
+        cause: why not, as `harness.analysis.causes.FINDINGS` tells; None where trackable. Of several limits that were
+            exceeded the first counts: control lost, cross-track error, load factor, airspeed, altitude, distance from
+            the path as given. It is a navigation error where, at the largest true error, the believed one was within
+            the limit.
     """
 
     start_s: float
@@ -92,7 +74,7 @@ def legs(
     track: Track,
     plans: Sequence[AcceptedPlan],
     limits: FlightLimits,
-    lost_control: bool = False,
+    lost: str | None = None,
     given: AsGiven | None = None,
 ) -> tuple[Leg, ...]:
     """Judges a flight leg by leg.
@@ -101,12 +83,13 @@ def legs(
         track: the flown track.
         plans: `plans[i]` is the plan of rows with `plan_index` i.
         limits: what to judge by.
-        lost_control: the flight ended so; its last leg is then not trackable.
+        lost: why control was lost at the end of the flight, whose last leg is then not trackable; None: it was not.
         given: the path as given that the only plan follows.
 
     Returns:
         The legs in order of time; empty where no plan was flown.
     """
+    force = InForce.of(track, limits, given.airspeed_mps if given else None)
     corners = given.corners if given else ()
     ends = np.array([corner.arc_length_m for corner in corners])
     leg = track.plan_index + np.searchsorted(ends, track.arc_length_m) if corners else track.plan_index
@@ -115,8 +98,11 @@ def legs(
     judged, over_m = [], -math.inf
     for first, last in _stretches(track, leg):
         passed = [c for c, row in zip(corners, reached, strict=True) if first <= row <= last]
-        lost = lost_control and last == len(track) - 1
-        verdict = _judge(track, first, last, plans, limits, lost, given)
+        verdict = _judge(track, first, last, plans, limits, force, given)
+        if lost is not None and last == len(track) - 1:
+            verdict = replace(
+                verdict, trackable=False, cause="stall" if "stalled" in lost else "lost control"
+            )
         if given is not None:
             # All of a corner belongs to the leg that it ends.
             verdict = replace(
@@ -125,7 +111,8 @@ def legs(
                 corner_cut_m=max((corner.cut_m for corner in passed), default=0.0),
             )
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if passed else math.inf
-            verdict = _judged_as_given(verdict, given, (along > since_m) & (along <= over_m))
+            rows = np.flatnonzero((along > since_m) & (along <= over_m))
+            verdict = _judged_as_given(verdict, given, passed, track, rows, force)
         judged.append(verdict)
     return tuple(judged)
 
@@ -161,29 +148,29 @@ def _judge(
     last: int,
     plans: Sequence[AcceptedPlan],
     limits: FlightLimits,
-    lost_control: bool,
+    force: InForce,
     given: AsGiven | None,
 ) -> Leg:
     leg, rows = track.part(first, last + 1), slice(first, last + 1)
     off = np.nan_to_num(np.abs(leg.cross_track_m))
     wanted_m = given.altitude_m[rows] if given else limits.altitude_m
     high = np.abs(leg.up_m - wanted_m)
-    asked_mps = given.airspeed_mps[rows] if given else limits.airspeed_mps
-    slow = np.abs(averaged(leg.airspeed_mps - asked_mps, leg, SPEED_S))
-    load = float(averaged(leg.load_factor, leg, LOAD_S).max())
+    commanded_mps = given.airspeed_mps[rows] if given else limits.airspeed_mps
+    slow = np.abs(averaged(leg.airspeed_mps - commanded_mps, leg, SPEED_S))
+    loads = averaged(leg.load_factor, leg, LOAD_S)
+    load = float(loads.max())
     threshold = limits.cross_track_threshold_m
     cause = None
-    if lost_control:
-        cause = "lost control"
-    elif off.max() > threshold and _believed_within(leg.believed_cross_track_m, 0.0, threshold, off.argmax()):
+    if off.max() > threshold and _believed_within(leg.believed_cross_track_m, 0.0, threshold, off.argmax()):
         cause = NAVIGATION_ERROR
     elif off.max() > threshold:
-        cause = cross_track_cause(track, first + int(off.argmax()), plans, limits)
+        cause = cross_track_cause(track, first + int(off.argmax()), plans, limits, force)
     elif load > limits.max_load_factor:
-        cause = "load factor"
+        cause = _steep(track, first + int(loads.argmax()), len(leg) - len(loads) + 1, given) or "load factor"
     elif slow.max() > limits.max_airspeed_error_mps:
         begins, rows_of_mean = int(slow.argmax()), len(leg) - len(slow) + 1
-        cause = speed_cause(leg.part(begins, begins + rows_of_mean))
+        steep = _steep(track, first + begins, rows_of_mean, given)
+        cause = steep or speed_cause(leg.part(begins, begins + rows_of_mean), limits)
     elif high.max() > limits.max_altitude_error_m and _believed_within(
         leg.believed_up_m, wanted_m, limits.max_altitude_error_m, high.argmax()
     ):
@@ -216,9 +203,33 @@ def _believed_within(
     return believed is not None and bool(np.abs(believed - wanted)[row] <= most)
 
 
-def _judged_as_given(leg: Leg, given: AsGiven, rows: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> Leg:
-    """A leg that is not trackable either where it is too far from the path as given, which is at a corner."""
+def _steep(track: Track, first: int, rows: int, given: AsGiven | None) -> str | None:
+    """Whether the path was too steep over the rows of a mean, or shortly before."""
+    since = int(np.searchsorted(track.time_s, track.time_s[first] - LEAD_S))
+    return steepness_cause(track, since, first + rows, given)
+
+
+def _judged_as_given(
+    leg: Leg, given: AsGiven, passed: Sequence[Corner], track: Track, rows: IntArray, force: InForce
+) -> Leg:
+    """A leg that is not trackable either where it is too far from the path as given, which is at a corner.
+
+    Args:
+        leg: as judged by the plan.
+        given: the path as given.
+        passed: the corners that the leg leads to.
+        track: the flown track.
+        rows: those of the leg, its last corner whole.
+        force: what was in force.
+    """
     off = np.nan_to_num(given.deviation_m[rows])
-    kept = bool((off <= given.allowed_m[rows]).all())
-    cause = leg.cause if kept or leg.cause else "turn radius too tight"
+    excess = off - given.allowed_m[rows]
+    cause = leg.cause
+    if cause is None and len(rows) and excess.max() > 0.0:
+        worst = int(rows[excess.argmax()])
+        along = np.array([corner.arc_length_m for corner in passed])
+        nearest = int(np.abs(along - track.arc_length_m[worst]).argmin()) if passed else None
+        cause = "turn radius too tight"
+        if nearest is not None:
+            cause = corner_cause(passed[nearest], float(given.allowed_m[worst]), track, worst, force)
     return replace(leg, max_deviation_m=float(off.max(initial=0.0)), trackable=cause is None, cause=cause)

@@ -98,6 +98,26 @@ class Track:
     vertical_actuator_limited_s: Annotated[
         FloatArray | None, Column("that of the servos of elevator and throttle alone", in_digest=False)
     ] = None
+    elevator: Annotated[
+        FloatArray | None,
+        Column(
+            "commanded deflection of the elevator with its trim, -1 to 1, where it is at its stop; NaN where not known",
+            in_digest=False,
+        ),
+    ] = None
+    aileron: Annotated[
+        FloatArray | None,
+        Column(
+            "that of the ailerons, -1 to 1, where it is at its stop; NaN where not known", in_digest=False
+        ),
+    ] = None
+    rudder: Annotated[
+        FloatArray | None,
+        Column("that of the rudder, -1 to 1, where it is at its stop; NaN where not known", in_digest=False),
+    ] = None
+    angle_of_attack_deg: Annotated[
+        FloatArray | None, Column("angle of attack; NaN where not known", in_digest=False)
+    ] = None
     believed_east_m: Annotated[
         FloatArray | None, Column("where the aircraft believed to be", in_digest=False, believed=True)
     ] = None
@@ -178,7 +198,10 @@ TRACK_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if not colum
 BELIEVED_FIELDS = tuple(name for name, column in TRACK_COLUMNS.items() if column.believed)
 """Names of those that a track has where navigation is not perfect."""
 
-UNKNOWN = ("altitude_above_ground_m", *BELIEVED_FIELDS)
+SURFACES = ("elevator", "aileron", "rudder")
+"""Names of the columns of control surfaces."""
+
+UNKNOWN = ("altitude_above_ground_m", *SURFACES, "angle_of_attack_deg", *BELIEVED_FIELDS)
 """Names of those that are all NaN where they are left out."""
 
 SERVO_FIELDS = ("actuator_limited_s", "vertical_actuator_limited_s")

@@ -12,7 +12,7 @@ import numpy as np
 from aircraft.guidance.interface import GuidanceOutput
 from aircraft.interface import AircraftState
 from harness.flight.observer import Observer, RowObserver
-from harness.flight.record import FloatArray, Track
+from harness.flight.record import SURFACES, FloatArray, Track
 from harness.world.world import World
 
 Clearance = Callable[[FloatArray, FloatArray], FloatArray]
@@ -45,7 +45,7 @@ BELIEVED = np.dtype(
 )
 """What is kept beside that of a tick at which the aircraft did not know its state exactly."""
 
-FINITE = [name for name in AircraftState._fields if name != "throttle"]
+FINITE = [name for name in AircraftState._fields if name not in AircraftState._field_defaults]
 """What is finite of a state while the aircraft is under control."""
 
 
@@ -154,6 +154,8 @@ class TrackLog:
             throttle=of["throttle"],
             actuator_limited_s=of["actuator_limited_s"],
             vertical_actuator_limited_s=of["vertical_actuator_limited_s"],
+            **{name: of[name] for name in SURFACES},
+            angle_of_attack_deg=np.degrees(of["angle_of_attack_rad"]),
             altitude_above_ground_m=(
                 None if self._ground is None else of["up_m"] - self._ground(of["east_m"], of["north_m"])
             ),

@@ -48,6 +48,10 @@ class _Corner:
         return self.corner.arc_length_m
 
     @property
+    def turn_deg(self) -> float:
+        return self.corner.turn_deg
+
+    @property
     def cut_m(self) -> float:
         return self.corner.cut_m
 

@@ -18,7 +18,7 @@ import numpy as np
 from aircraft.frames import LocalPlane
 from aircraft.guidance.altitude import LevelFlight
 from aircraft.guidance.interface import GuidanceLaw
-from aircraft.interface import GRAVITY_MPS2, FlightModel
+from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
 from aircraft.start import Atmosphere, Gust, StartConditions
 from harness.analysis.flight_limits import FlightLimits
@@ -37,7 +37,7 @@ from harness.scenario.guidance_keys import airframe_of, law_of
 from harness.scenario.performance import mission_of, performance_of
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario
-from harness.scenario.sections import Environment, Origin
+from harness.scenario.sections import Origin
 from harness.scenario.start import start_conditions, steady_wind_mps, towards
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
@@ -146,8 +146,8 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
         planned: a planner makes the path, and keeps a margin for navigation errors; else it is given.
     """
     performance, limits = performance_of(scenario), scenario.trackability
-    calm = performance_of(scenario.model_copy(update={"environment": Environment()}))
-    guidance = airframe_of(scenario.aircraft).guidance_limits()
+    frame = airframe_of(scenario.aircraft)
+    guidance = frame.guidance_limits()
     speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
     planned_m = clearance + _given(scenario.navigation.margin_m)
     wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
@@ -159,9 +159,8 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
         bank_limit_rad=guidance.bank_limit_rad,
         turn_radius_m=performance.turn_radius_m,
         airspeed_mps=speed,
-        calm_radius_m=calm.turn_radius_m,
-        tightest_radius_m=speed * speed / (GRAVITY_MPS2 * math.tan(guidance.bank_limit_rad)),
         roll_rate_radps=guidance.roll_rate_radps,
+        stall_angle_deg=frame.stall_angle_deg,
         sensor_range_m=_given(sensor.range_m),
         horizon_m=performance.turn_radius_m + planned_m + (speed + wind) * (blind_s + performance.roll_in_s),
         max_cross_track_m=_given(limits.cross_track_m),

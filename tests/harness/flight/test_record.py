@@ -35,7 +35,7 @@ def none_near(points_m: FloatArray, times_s: FloatArray) -> FloatArray:
 def test_columns_are_those_of_the_contract() -> None:
     assert " ".join(COLUMNS) == CONTRACT
     further = ["arc_length_m", "throttle", "altitude_above_ground_m", "actuator_limited_s"]
-    further += ["vertical_actuator_limited_s"]
+    further += ["vertical_actuator_limited_s", "elevator", "aileron", "rudder", "angle_of_attack_deg"]
     assert list(TRACK_FIELDS) == [*COLUMNS, *further]
 
 

@@ -1,0 +1,129 @@
+"""What was in force while a plan was flown, row by row, and what the plan asked for, in shares of it.
+
+A turn is judged at the airspeed commanded there, in the wind there. In calm air a turn of curvature k at airspeed V
+takes the bank atan(k V^2 / g). In wind the path over the ground has that curvature, and the lift acts across the
+heading: the bank is atan(k Vg^2 / (g cos(drift))), Vg being the groundspeed along the path and drift the angle from
+heading to course.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aircraft.interface import GRAVITY_MPS2
+from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.smoothness import flown_lengths, planned_profile, turn_onto_first_plan_1pm, window_m
+from harness.flight.record import AcceptedPlan, FloatArray, Track
+
+WIND_S = 5.0
+"""The wind is averaged over this time, s, so that it is the wind and not a gust of turbulence."""
+
+
+@dataclass(frozen=True, eq=False)
+class InForce:
+    """What an aircraft was told and flew in, row by row of a track.
+
+    Attributes:
+        commanded_mps: (n,) true airspeed that was commanded.
+        wind_mps: (n, 2) wind towards east and north, averaged over `WIND_S`. Sideslip is taken to be zero.
+        bank_limit_rad: largest bank that guidance may command.
+        roll_rate_radps: fastest change of the bank.
+    """
+
+    commanded_mps: FloatArray
+    wind_mps: FloatArray
+    bank_limit_rad: float
+    roll_rate_radps: float
+
+    @classmethod
+    def of(cls, track: Track, limits: FlightLimits, commanded_mps: FloatArray | None = None) -> InForce:
+        """Of a whole track; without a commanded airspeed that of the limits, or else the one flown."""
+        if commanded_mps is None:
+            known = math.isfinite(limits.airspeed_mps)
+            commanded_mps = np.full(len(track), limits.airspeed_mps) if known else track.airspeed_mps
+        climb = np.gradient(track.up_m, track.time_s) if len(track) > 1 else np.zeros(len(track))
+        level = np.sqrt(np.maximum(track.airspeed_mps**2 - climb**2, 0.0))
+        wind = track.groundspeed_mps * np.exp(1j * np.radians(track.course_deg))
+        wind -= level * np.exp(1j * np.radians(track.heading_deg))
+        rows = 1 if len(track) < 2 else max(round(WIND_S / float(np.median(np.diff(track.time_s)))), 1)
+        rows = min(rows, len(track))
+        around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
+        mean = np.convolve(wind, np.ones(rows), "same") / around
+        return cls(
+            commanded_mps,
+            np.column_stack((mean.imag, mean.real)),
+            limits.bank_limit_rad,
+            limits.roll_rate_radps,
+        )
+
+    def part(self, first: int, stop: int) -> InForce:
+        """Some of its rows."""
+        return replace(self, commanded_mps=self.commanded_mps[first:stop], wind_mps=self.wind_mps[first:stop])
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What turns of a plan ask for, over what was in force there; above 1 the aircraft cannot do it.
+
+    Attributes:
+        calm: largest lateral acceleration, in calm air, over g tan(bank limit).
+        windy: the same in the wind there.
+        roll_rate: largest roll rate over the one in force.
+    """
+
+    calm: float
+    windy: float
+    roll_rate: float
+
+
+def demand(lead: Track, plans: Sequence[AcceptedPlan], force: InForce) -> Demand:
+    """What was planned for some rows of a track, and for the window after them, asks for.
+
+    The curvature is the change of the plan's direction over a window of about one second, as long as it takes to roll:
+    a joint shorter than that is no turn of its own, and a corner is a turn within the window.
+
+    Args:
+        lead: the rows.
+        plans: `plans[i]` is the plan of rows with `plan_index` i.
+        force: what was in force at these rows.
+    """
+    window = window_m(lead)
+    reach = lead.arc_length_m.copy()
+    reach[-1] += window  # an aircraft that overshoots a corner stays at its station
+    length, curvature = planned_profile(replace(lead, arc_length_m=reach), plans, window)
+    joint = np.append(0.0, np.cumsum(length))
+    turned = np.append(0.0, np.cumsum(curvature * length))
+    span = max(min(window, float(joint[-1])), 1e-3)
+    ahead = np.where(np.diff(lead.plan_index) == 0, np.diff(lead.arc_length_m), flown_lengths(lead))
+    passed = np.append(0.0, np.cumsum(np.maximum(np.nan_to_num(ahead), 0.0)))
+    at = np.sort(np.concatenate((joint - 0.5 * span, joint + 0.5 * span, passed)))
+    bend = (np.interp(at + 0.5 * span, joint, turned) - np.interp(at - 0.5 * span, joint, turned)) / span
+    row = np.clip(np.searchsorted(passed, at, side="right") - 1, 0, len(lead) - 1)
+    at = np.append(at, at[-1])
+    bend = np.append(bend, turn_onto_first_plan_1pm(lead, plans, window))
+    return _over(force, bend, at, np.append(row, 0), np.radians(lead.course_deg))
+
+
+def _over(
+    force: InForce, bend: FloatArray, at_m: FloatArray, row: FloatArray, course_rad: FloatArray
+) -> Demand:
+    """The demand of curvatures at places along a plan, each with the row of the track that belongs to it."""
+    speed, wind, course = force.commanded_mps[row], force.wind_mps[row], course_rad[row]
+    along = wind[:, 0] * np.sin(course) + wind[:, 1] * np.cos(course)
+    across = wind[:, 0] * np.cos(course) - wind[:, 1] * np.sin(course)
+    headway = np.sqrt(np.maximum(speed**2 - across**2, 1.0))
+    needs = bend * (along + headway) ** 2 * speed / (GRAVITY_MPS2 * headway)
+    steepest = math.tan(force.bank_limit_rad)
+    calm = np.abs(bend) * speed**2 / (GRAVITY_MPS2 * steepest)
+    bank = np.arctan(bend * speed**2 / GRAVITY_MPS2)[:-1]
+    apart = np.diff(at_m[:-1])
+    rate = np.divide(np.abs(np.diff(bank)), apart, out=np.zeros_like(apart), where=apart > 1e-6) * speed[:-2]
+    return Demand(
+        calm=float(calm.max()),
+        windy=float(np.abs(needs).max() / steepest),
+        roll_rate=float(rate.max(initial=0.0)) / force.roll_rate_radps,
+    )

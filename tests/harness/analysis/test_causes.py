@@ -1,0 +1,226 @@
+"""Flights made so that the cause is known: one limit is exceeded, by formulas that stand here, and nothing else."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.analysis.as_given import AsGiven
+from harness.analysis.causes import FINDINGS
+from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.trackability import legs
+from harness.flight.record import AcceptedPlan, Track
+from tests.harness.conftest import plan, track
+
+G = 9.80665
+ROWS = 301
+OFF = np.where(np.abs(np.arange(ROWS) - 200) < 40, 6.0, 0.0)
+LIMITS = FlightLimits(
+    altitude_m=300.0,
+    clearance_m=50.0,
+    bank_limit_rad=math.radians(45.0),
+    turn_radius_m=110.0,
+    max_cross_track_m=5.0,
+    airspeed_mps=25.0,
+    roll_rate_radps=math.radians(60.0),
+    stall_angle_deg=16.0,
+    max_altitude_error_m=10.0,
+    max_airspeed_error_mps=2.5,
+    max_load_factor=2.5,
+)
+Case = tuple[Track, AcceptedPlan, FlightLimits, AsGiven | None, str | None]
+
+
+def flat(
+    columns: dict[str, Any], given: dict[str, Any] | None = None, lost: str | None = None, **limits: Any
+) -> Case:
+    """A straight flight north at 25 m/s in which some columns are other than they should be."""
+    flown = track(ROWS, **columns)
+    asked = {
+        "corners": (),
+        "deviation_m": np.zeros(ROWS),
+        "allowed_m": np.full(ROWS, 5.0),
+        "altitude_m": np.full(ROWS, 300.0),
+        "climb_mps": np.zeros(ROWS),
+        "fastest_mps": np.tile((8.0, 8.0), (ROWS, 1)),
+        "airspeed_mps": np.full(ROWS, 25.0),
+    }
+    straight = plan([(0, 0, 0, 1, 0.0, 50000.0)])
+    return flown, straight, replace(LIMITS, **limits), AsGiven(**asked | given) if given else None, lost
+
+
+def turning(
+    radius_m: float, speed_mps: float, bank_deg: float, wind_mps: float = 0.0, **columns: Any
+) -> Case:
+    """A left turn of a radius, begun towards east, in a wind towards north, the bank command at its limit.
+
+    The aircraft comes off it where it flies downwind.
+
+    Where the course makes the angle a with the wind, the groundspeed along the circle is
+    W cos(a) + sqrt(V^2 - W^2 sin^2(a)), and the heading is ahead of the course by asin(W sin(a) / V).
+    """
+    course, east, north, along = 0.5 * math.pi, 0.0, 0.0, 0.0
+    rows: list[tuple[float, ...]] = []
+    for _ in range(ROWS):
+        drift = math.asin(wind_mps * math.sin(course) / speed_mps)
+        ground = wind_mps * math.cos(course) + speed_mps * math.cos(drift)
+        rows.append((east, north, math.degrees(course) % 360.0, math.degrees(course + drift), ground, along))
+        east, north = east + 0.1 * ground * math.sin(course), north + 0.1 * ground * math.cos(course)
+        along += 0.1 * ground
+        course -= 0.1 * ground / radius_m
+    names = ("east_m", "north_m", "course_deg", "heading_deg", "groundspeed_mps", "arc_length_m")
+    flown: dict[str, Any] = dict(zip(names, np.array(rows).T, strict=True))
+    downwind = int(np.cos(np.radians(flown["course_deg"])).argmax())
+    away = np.abs(np.arange(ROWS) - downwind)
+    off = np.where(away < 20, 6.0 - 0.01 * away, 0.0)
+    flown |= {"airspeed_mps": speed_mps, "roll_command_deg": -bank_deg, "cross_track_m": off}
+    limits = replace(LIMITS, bank_limit_rad=math.radians(bank_deg), airspeed_mps=speed_mps)
+    circle = plan([(0, 0, 1, 0, 1.0 / radius_m, 9000.0)])
+    return track(ROWS, **flown | columns), circle, limits, None, None
+
+
+def calm_m(speed_mps: float, bank_deg: float) -> float:
+    return speed_mps**2 / (G * math.tan(math.radians(bank_deg)))
+
+
+def weaving(bank_deg: float, limit_dps: float) -> Case:
+    """Rolls from bank to bank without a pause at the largest rate, on arcs that ask for twice that rate."""
+    period_s = 2.0 * bank_deg / limit_dps  # of the aircraft from one side to the other
+    time_s = np.arange(ROWS) / 10.0
+    phase = (time_s / period_s) % 2.0
+    roll = bank_deg * (2.0 * np.abs(phase - 1.0) - 1.0)
+    bend = math.tan(math.radians(bank_deg)) * G / 25.0**2
+    turned, length = 0.0, 25.0 * period_s
+    arcs = []
+    for i in range(60):
+        arcs.append((0, 0, -math.sin(turned), math.cos(turned), bend * (-1) ** i, length))
+        turned += bend * (-1) ** i * length
+    flown = track(ROWS, roll_deg=roll, roll_command_deg=np.sign(roll) * 44.0, cross_track_m=OFF)
+    return flown, plan(arcs), replace(LIMITS, roll_rate_radps=math.radians(limit_dps)), None, None
+
+
+def climbing(asked_mps: float, can_mps: float, speed_mps: float, throttle: float) -> Case:
+    """The path climbs from 5 s on; with the throttle at a stop the aircraft does what it can, and falls behind."""
+    time_s = np.arange(ROWS) / 10.0
+    since = np.maximum(time_s - 5.0, 0.0)
+    columns = {"up_m": 300.0 + can_mps * since, "airspeed_mps": speed_mps, "groundspeed_mps": speed_mps}
+    columns["throttle"] = np.where(since > 0.0, throttle, 0.5)
+    asked = {"altitude_m": 300.0 + asked_mps * since, "climb_mps": np.where(since > 0.0, asked_mps, 0.0)}
+    asked["fastest_mps"] = np.tile((20.0, 20.0), (ROWS, 1))
+    asked["airspeed_mps"] = np.full(ROWS, speed_mps)
+    return flat(columns, asked)
+
+
+def gaining_speed(speed_mps: float) -> Case:
+    """With full throttle, 3 m/s of specific excess power go into 1 m/s of climb and into speed; 2 m/s are asked for."""
+    flown, planned, limits, given, _ = climbing(2.0, 1.0, speed_mps, 1.0)
+    since = np.maximum(flown.time_s - 5.0, 0.0)
+    faster = np.sqrt(speed_mps**2 + 2.0 * G * 2.0 * since)
+    return (
+        replace(flown, airspeed_mps=faster),
+        planned,
+        replace(limits, max_airspeed_error_mps=99.0),
+        given,
+        None,
+    )
+
+
+SPEEDS_AND_BANKS = tuple(product((15.0, 20.0, 25.0, 32.0, 60.0, 80.0), (30.0, 45.0)))
+AT_LIMIT = {"cross_track_m": OFF, "roll_command_deg": 45.0}
+HIGH, LOW, SLOW = {"up_m": 300.0 + 2.0 * OFF}, {"up_m": 300.0 - 2.0 * OFF}, {"airspeed_mps": 20.0}
+
+
+def limited(share: float, columns: dict[str, Any]) -> Case:
+    """A servo is at its rate limit for a share of the time: one of ailerons and rudder, or of elevator and throttle."""
+    seconds = share * np.arange(ROWS) / 10.0
+    vertical = {} if "cross_track_m" in columns else {"vertical_actuator_limited_s": seconds}
+    return flat({"actuator_limited_s": seconds, **vertical, **columns})
+
+
+def unseen(speed_mps: float, bank_deg: float) -> Case:
+    """A turn that is too tight beside an obstacle that was seen too late for another."""
+    flown, planned, limits, *rest = turning(
+        0.9 * calm_m(speed_mps, bank_deg), speed_mps, bank_deg, clearance_m=60.0
+    )
+    return flown, planned, replace(limits, sensor_range_m=100.0, horizon_m=200.0), *rest
+
+
+def believed(off_m: float) -> Case:
+    """The aircraft comes off its plan and believes to be there."""
+    names = ("believed_east_m", "believed_north_m", "believed_course_deg", "believed_cross_track_m")
+    here = {**dict.fromkeys(names, 0.0), "believed_up_m": 300.0}
+    return flat({"cross_track_m": np.linspace(0.0, off_m, ROWS), **here})
+
+
+CASES: dict[str, list[Case]] = {
+    "planner too late": [
+        flat({"cross_track_m": np.linspace(off, 0.0, ROWS)}) for off in np.linspace(6.0, 40.0, 12)
+    ],
+    "turn radius too tight": [turning(0.95 * calm_m(*each), *each) for each in SPEEDS_AND_BANKS],
+    "sensor horizon": [unseen(*each) for each in SPEEDS_AND_BANKS],
+    "wind drift": [
+        turning(1.05 * calm_m(v, b), v, b, share * v)
+        for v, b, share in product((20.0, 25.0, 32.0), (30.0, 45.0), (0.1, 0.4))
+    ],
+    "bank limit": [turning(1.05 * calm_m(*each), *each) for each in SPEEDS_AND_BANKS]
+    + [turning(1.02 * calm_m(1.3 * v, b), v, b, 0.3 * v) for v, b in SPEEDS_AND_BANKS],
+    "roll rate": [weaving(b, p) for b, p in product((15.0, 25.0, 35.0, 40.0), (10.0, 25.0, 60.0))],
+    "control saturation": [
+        flat({surface: stop, **AT_LIMIT})
+        for surface, stop in product(("elevator", "aileron", "rudder"), (1.0, -1.0))
+    ]
+    + [
+        flat({"elevator": stop, "throttle": 1.0, **off})
+        for off, stop in product((HIGH, SLOW, LOW), (1.0, -1.0))
+    ],
+    "stall": [
+        flat({"angle_of_attack_deg": degrees, **off})
+        for off, degrees in product((LOW, SLOW, AT_LIMIT), (17.0, 20.0, -17.0))
+    ]
+    + [flat({}, lost=f"stalled: angle of attack {degrees} deg, limit 16 deg") for degrees in (17, 18, 19)],
+    "actuator": [
+        limited(share, columns)
+        for columns in ({"cross_track_m": OFF}, HIGH, SLOW)
+        for share in (0.25, 0.4, 0.6, 0.9)
+    ],
+    "load factor": [flat({"load_factor": 2.5 + 0.1 * i}) for i in range(1, 13)],
+    "speed or throttle saturation": [
+        flat({"airspeed_mps": v, "groundspeed_mps": v}) for v in (20.0, 22.0, 28.0, 30.0)
+    ]
+    + [flat({"throttle": stop, **off}) for off, stop in product((HIGH, LOW), (0.0, 1.0))]
+    + [gaining_speed(v) for v in (20.0, 25.0, 60.0, 120.0)],
+    "climb too steep": [
+        climbing(asked, asked - less, v, 1.0)
+        for asked, less, v in product((2.0, 5.0, 70.0), (1.5, 0.5), (20.0, 120.0))
+    ],
+    "descent too steep": [
+        climbing(-asked, less - asked, v, 0.0)
+        for asked, less, v in product((2.0, 5.0, 30.0), (1.5, 0.5), (20.0, 120.0))
+    ],
+    "navigation error": [believed(off) for off in np.linspace(6.0, 40.0, 12)],
+    "lost control": [flat({"up_m": 300.0 - i}, lost="rolled over: roll 80 deg") for i in range(12)],
+    "tracking error": [flat({"cross_track_m": share * OFF}) for share in (1.0, -1.0, 2.0, -2.0, 3.0, 4.0)]
+    + [flat({"up_m": up}) for up in (280.0, 289.0, 311.0, 320.0, 330.0, 350.0)],
+}
+
+
+@pytest.mark.parametrize("cause", FINDINGS)
+def test_a_dozen_flights_of_known_cause(cause: str) -> None:
+    found = []
+    for flown, planned, limits, given, lost in CASES[cause]:
+        named = [leg.cause for leg in legs(flown, [planned], limits, lost, given) if leg.cause]
+        found.append(named[0] if named else None)
+    assert len(found) >= 12
+    assert found == [cause] * len(found)
+
+
+def test_every_cause_is_explained_alike_on_pages_and_in_the_readme() -> None:
+    readme = (Path(__file__).parents[3] / "harness" / "run" / "README.md").read_text()
+    assert dict(re.findall(r"^\| `([^`]+)` \| (\D.+) \|$", readme, re.MULTILINE)) == FINDINGS
