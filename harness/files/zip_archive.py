@@ -8,6 +8,7 @@ import zipfile
 import zlib
 from collections.abc import Sequence
 from io import BytesIO
+from pathlib import Path
 from typing import Final, NamedTuple
 
 from harness.files.input_file import InputError
@@ -66,6 +67,27 @@ def unpacked(data: bytes, ending: str, most: int, main: str = "") -> Unpacked:
     if len(inner) > most:
         raise InputError(f"unpacks to more than {most // 10**6} MB; must be one {ending} file")
     return Unpacked(_base(name), inner, others)
+
+
+def member_path(path: Path, endings: tuple[str, ...], most: int) -> str:
+    """The path by which GDAL opens the file with one of some endings in a ZIP archive.
+
+    Args:
+        path: of the archive.
+        endings: in lower case.
+        most: bytes that all of it may unpack to.
+
+    Raises:
+        InputError: there is none or several, it is damaged, or it unpacks to more. The text names no file.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except DAMAGES as error:
+        raise InputError("is a damaged ZIP archive; get it again") from error
+    if sum(each.file_size for each in members) > most:
+        raise InputError(f"unpacks to more than {most // 10**6} MB; cut the area of interest out of it")
+    return f"/vsizip/{path.absolute()}/{chosen([each.filename for each in members], endings)[0]}"
 
 
 DAMAGES: Final = (

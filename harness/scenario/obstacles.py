@@ -92,8 +92,8 @@ def _ring(points: Sequence[Point]) -> tuple[Point, ...]:
 
 
 KindName = Literal[
-    "geotiff", "ascii_grid", "srtm", "numpy_dem", "osm", "osm_pbf", "osm_json", "cityjson", "geojson", "kml", "openair",
-    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai", "gazebo_world", "vector"
+    "geotiff", "ascii_grid", "srtm", "numpy_dem", "osm", "osm_pbf", "cityjson", "geojson", "kml", "openair",
+    "ed269", "ed318", "plan_fence", "ardupilot_fence", "ros_map", "moving_ai", "vector"
 ]  # fmt: skip
 
 

@@ -170,7 +170,7 @@ def _extent(contents: Contents, mapping: Mapping) -> tuple[Box | None, bool]:
         float(east[known].max()),
         float(north[known].max()),
     )
-    return box, contents.kind == "gazebo_world" or any(part.keep_in for part in contents.parts)
+    return box, any(part.keep_in for part in contents.parts)
 
 
 def _common(boxes: Sequence[Box]) -> Box | None:

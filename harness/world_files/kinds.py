@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,85 +13,90 @@ from harness.world_files import bounded
 from harness.world_files.parts import Contents, Reading, WorldFileError
 from harness.world_files.readers import (
     city_json,
-    ed269,
     fences,
-    gazebo,
+    footprints,
     geo_json,
-    geotiff,
-    grids,
-    kml,
+    numpy_dem,
     occupancy,
     open_air,
     osm,
+    raster,
     vector,
+    zones,
 )
 
-Reader = Callable[[Path, Reading], Contents]
-
-KINDS: Final[dict[str, Reader]] = {
-    "geotiff": geotiff.read,
-    "ascii_grid": grids.read_ascii,
-    "srtm": grids.read_srtm,
-    "numpy_dem": grids.read_numpy,
+KINDS: Final[dict[str, Callable[[Path, Reading], Contents]]] = {
+    "geotiff": raster.read,
+    "ascii_grid": raster.read,
+    "srtm": raster.read,
+    "numpy_dem": numpy_dem.read,
     "osm": osm.read_xml,
     "osm_pbf": osm.read_pbf,
-    "osm_json": osm.read_json,
     "cityjson": city_json.read,
     "geojson": geo_json.read,
-    "kml": kml.read,
+    "kml": vector.read_kml,
     "openair": open_air.read,
-    "ed269": ed269.read,
-    "ed318": geo_json.read_ed318,
+    "ed269": zones.read_ed269,
+    "ed318": zones.read_ed318,
     "plan_fence": fences.read_plan,
     "ardupilot_fence": fences.read_ardupilot,
     "ros_map": occupancy.read_ros,
     "moving_ai": occupancy.read_moving_ai,
-    "gazebo_world": gazebo.read,
     "vector": vector.read,
 }
 """Readers by the name of their kind."""
 
-VECTOR_ENDINGS: Final = (".gpkg", ".shp", ".dxf", ".fgb", ".gml", ".tab", ".gdb")
+VECTOR_ENDINGS: Final = (".gpkg", ".shp", ".dxf", ".fgb", ".tab")
 PACKED: Final = {
     ".hgt": "srtm",
-    ".kml": "kml",
     "elevation.npy": "numpy_dem",
+    ".kml": "kml",
     ".shp": "vector",
     ".gpkg": "vector",
 }
-"""What a ZIP archive is by what lies in it."""
-ROOTS: Final = {"osm": "osm", "kml": "kml", "sdf": "gazebo_world", "gazebo": "gazebo_world"}
-"""What an XML file is by its first element."""
-MEANT: Final = {
+"""Kind of a ZIP archive by the ending of a file in it."""
+GIVEN_UP: Final = {
     ".pgm": "an image; give the YAML file of its ROS map",
     ".png": "an image; give the YAML file of its ROS map",
-    ".jpg": "an image; there is nothing in it that could be an obstacle",
     ".scen": "a list of MovingAI problems; give the .map file that it names",
-    ".npy": "a plain array; save it as ESRI ASCII grid or GeoTIFF",
+    ".npy": "a plain array; save it as GeoTIFF or ESRI ASCII grid",
     ".las": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
     ".laz": "a point cloud; make a GeoTIFF of its heights (pdal, gdal_grid)",
     ".igc": "a flight, not a world; `wayproof check` takes flown paths",
     ".gpx": "a track, not a world; `wayproof check` takes paths",
     ".gz": "packed; unpack it and give the file",
     ".bz2": "packed; unpack it and give the file",
-    ".xz": "packed; unpack it and give the file",
     ".7z": "packed; unpack it and give the file",
     ".shx": "part of a Shapefile; give the .shp file",
     ".dbf": "part of a Shapefile; give the .shp file",
-    ".dt2": "DTED; convert it with gdal_translate to GeoTIFF",
+    ".dt2": "DTED; convert it to GeoTIFF with gdal_translate",
     ".obj": "a mesh; give CityJSON or GeoJSON of the footprints",
-    ".stl": "a mesh; give CityJSON or GeoJSON of the footprints",
+    ".world": "a Gazebo world; give its footprints as GeoJSON, or its cells as a MovingAI .map",
+    ".sdf": "a Gazebo model; give its footprints as GeoJSON, or its cells as a MovingAI .map",
 }
-"""What some files are that are no world file."""
+"""Files that are not read, by ending, with what would do."""
 FAMILIES: Final = (
     "terrain (GeoTIFF, ESRI ASCII, SRTM .hgt), buildings (OSM XML or PBF, CityJSON, GeoJSON), airspace (GeoJSON, KML, "
-    "OpenAir, ED-269, ED-318), fences (.plan, ArduPilot), occupancy (ROS map_server, MovingAI, Gazebo .world)"
+    "OpenAir, ED-269, ED-318), fences (.plan, ArduPilot), occupancy (ROS map_server, MovingAI)"
 )
+GRID_KEYS: Final = ("ncols", "nrows", "xllcorner", "yllcorner", "xllcenter", "yllcenter", "cellsize")
+"""Words with which an ESRI ASCII grid may begin."""
 
-_XML_ROOT: Final = re.compile(rb"<([A-Za-z_][\w.-]*:)?([A-Za-z_][\w.-]*)[\s>/]")
+_XML_ROOT: Final = re.compile(rb"<(?:[A-Za-z_][\w.-]*:)?([A-Za-z_][\w.-]*)[\s>/]")
 _OPEN_AIR: Final = re.compile(r"^(AC\s|AN\s(.*\n)+?(DP|DC|DA|DB|DY)\s)", re.IGNORECASE | re.MULTILINE)
-"""An airspace: a class, or a name and something of a shape."""
-_PLACES: Final = re.compile(r"\s*[-+]?\d+\.\d+[\s,]+[-+]?\d+\.\d+\s*$")
+"""An airspace begins with its class, or with its name and something of a shape."""
+_PLACE: Final = re.compile(r"\s*[-+]?\d+\.\d+[\s,]+[-+]?\d+\.\d+\s*$")
+_JSON_KINDS: Final = (
+    ("cityjson", re.compile(rb'"CityObjects"\s*:')),
+    ("plan_fence", re.compile(rb'"geoFence"\s*:|"fileType"\s*:\s*"Plan"')),
+    ("ed269", re.compile(rb'"UASZoneList"\s*:|"horizontalProjection"\s*:')),
+    ("ed318", re.compile(rb'"(?:layer|extent)"\s*:\s*\{')),
+    (
+        "geojson",
+        re.compile(rb'"type"\s*:\s*"(?:Feature(?:Collection)?|(?:Multi)?Polygon|GeometryCollection)"'),
+    ),
+)
+"""Kind of a JSON file by a key that it has somewhere; the first that is found counts."""
 
 
 def read(path: Path, kind: str | None, reading: Reading) -> Contents:
@@ -105,12 +111,12 @@ def read(path: Path, kind: str | None, reading: Reading) -> Contents:
         WorldFileError: it is of none of the kinds, or cannot be used.
     """
     found = kind or kind_of(path)
-    contents = KINDS[found](path, reading)
+    contents = footprints.finished(KINDS[found](path, reading))
     return replace(contents, kind=found, notes=_together(contents.notes))
 
 
 def _together(notes: tuple[str, ...]) -> tuple[str, ...]:
-    """Notes with those that say the same of several parts made one."""
+    """Notes, those that say the same of several parts made one."""
     same: dict[str, list[str]] = {}
     for note in notes:
         name, found, sentence = note.partition(": its ")
@@ -128,15 +134,14 @@ def kind_of(path: Path) -> str:
     Raises:
         WorldFileError: it is of none of them; the message says what would do.
     """
-    first, ending = bounded.head(path), path.suffix.lower()
+    first, ending = bounded.read_bytes(path, first=65_536), path.suffix.lower()
     if not first:
         raise WorldFileError("is empty; get it again")
-    found = _binary(path, first, ending) or _text(path, first, ending)
+    found = _binary(path, first, ending) or _text(path, first)
     if found is not None:
         return found
-    meant = MEANT.get(ending)
-    if meant:
-        raise WorldFileError(f"is {meant}")
+    if ending in GIVEN_UP:
+        raise WorldFileError(f"is {GIVEN_UP[ending]}")
     raise WorldFileError(f"is of no kind that is known; give {FAMILIES}")
 
 
@@ -144,97 +149,63 @@ def _binary(path: Path, first: bytes, ending: str) -> str | None:
     if first[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
         return "geotiff"
     if first[:2] == b"PK":
-        names = _names(path)
-        for end, kind in PACKED.items():
-            if any(name.endswith(end) for name in names):
-                return kind
-        if ending == ".zip":
-            held = next((name.rpartition("/")[2][:40] for name in names if not name.endswith("/")), "nothing")
-            raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
+        try:
+            with zipfile.ZipFile(path) as archive:
+                names = [name.lower() for name in archive.namelist()]
+        except (zipfile.BadZipFile, OSError, ValueError) as error:
+            raise WorldFileError("is a damaged ZIP archive; get it again") from error
+        packed = (kind for end, kind in PACKED.items() if any(name.endswith(end) for name in names))
+        if (kind := next(packed, None)) is not None:
+            return kind
+        held = next((name.rpartition("/")[2][:40] for name in names if not name.endswith("/")), "nothing")
+        raise WorldFileError(f"is a ZIP archive with {held!r}; unpack it and give the file")
     if ending == ".hgt" or path.name.lower().endswith(".hgt.gz"):
         return "srtm"
     if b"OSMHeader" in first[:64]:
         return "osm_pbf"
-    return "vector" if ending in VECTOR_ENDINGS else None
+    return "vector" if ending in VECTOR_ENDINGS and first[:1] != b"<" else None
 
 
-def _names(path: Path) -> list[str]:
-    import zipfile
-
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return [name.lower() for name in archive.namelist()]
-    except (zipfile.BadZipFile, OSError, ValueError) as error:
-        raise WorldFileError("is a damaged ZIP archive; get it again") from error
-
-
-def _text(path: Path, first: bytes, ending: str) -> str | None:
+def _text(path: Path, first: bytes) -> str | None:
     if first.startswith(bounded.UTF_16):
         first = bounded.text_of(first).encode()
     if b"\0" in first:
         return None
     start = first.lstrip(b"\xef\xbb\xbf\x1e \t\r\n")
     if start[:1] == b"<":
-        roots = _XML_ROOT.search(start)
-        return ROOTS.get(roots[2].decode("ascii").lower()) if roots else None
+        root = _XML_ROOT.search(start)
+        return {b"osm": "osm", b"kml": "kml"}.get(root[1].lower()) if root else None
     if start[:1] in b"{[":
         return _json(path)
     text = bounded.text_of(first)
     lines = text.splitlines()[:-1] if len(first) == 65_536 else text.splitlines()
-    lines = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith(("*", "#"))]
-    if not lines:
-        return None
-    words = lines[0].lower().split()
-    if words[0] in GRID_KEYS and any(line.lower().startswith("ncols") for line in lines[:6]):
-        return "ascii_grid"
-    if words[0] == "type" and any(line == "map" for line in lines[:6]):
-        return "moving_ai"
-    if words[0] == "rally":
+    return _of_lines([line.strip() for line in lines if line.strip() and line.lstrip()[0] not in "*#"])
+
+
+def _of_lines(lines: list[str]) -> str | None:
+    """The kind of a text file by its lines, without comments."""
+    word = lines[0].lower().split()[0] if lines else ""
+    if word == "rally":
         raise WorldFileError("is a list of rally points: places to return to, no obstacles; give the fence")
-    if lines[0].startswith("QGC WPL"):
-        return "ardupilot_fence"
-    if any(line.startswith("image:") for line in lines) and any(
-        line.startswith("resolution:") for line in lines
-    ):
+    if word in GRID_KEYS and any(line.lower().startswith("ncols") for line in lines[:6]):
+        return "ascii_grid"
+    if word == "type" and "map" in lines[:6]:
+        return "moving_ai"
+    if all(any(line.startswith(key) for line in lines) for key in ("image:", "resolution:")):
         return "ros_map"
     if _OPEN_AIR.search("\n".join(lines)):
         return "openair"
-    if len(lines) >= 2 and all(_PLACES.match(line) for line in lines[:20]):
-        return "ardupilot_fence"
-    return None
-
-
-GRID_KEYS: Final = (
-    "ncols",
-    "nrows",
-    "xllcorner",
-    "yllcorner",
-    "xllcenter",
-    "yllcenter",
-    "cellsize",
-    "dx",
-    "dy",
-)
-"""Words with which an ESRI ASCII grid may begin."""
-_JSON_KINDS: Final = (
-    (re.compile(rb'"CityObjects"\s*:'), "cityjson"),
-    (re.compile(rb'"geoFence"\s*:|"fileType"\s*:\s*"Plan"'), "plan_fence"),
-    (re.compile(rb'"UASZoneList"\s*:|"horizontalProjection"\s*:'), "ed269"),
-    (re.compile(rb'"(?:layer|extent)"\s*:\s*\{'), "ed318"),
-    (
-        re.compile(rb'"type"\s*:\s*"(?:FeatureCollection|Feature|Polygon|MultiPolygon|GeometryCollection)"'),
-        "geojson",
-    ),
-    (re.compile(rb'"elements"\s*:\s*\['), "osm_json"),
-)
-"""What a JSON file is by what it has somewhere; the first that is found counts."""
+    fence = len(lines) >= 2 and (lines[0].startswith("QGC WPL") or all(map(_PLACE.match, lines[:20])))
+    return "ardupilot_fence" if fence else None
 
 
 def _json(path: Path) -> str | None:
     data = bounded.read_bytes(path, bounded.MAX_TREE_BYTES)
     if data.startswith(bounded.UTF_16):
         data = bounded.text_of(data).encode()
-    found = next((kind for pattern, kind in _JSON_KINDS if pattern.search(data)), None)
+    if b'"elements"' in data and b"Overpass" in data:
+        raise WorldFileError("is JSON of Overpass; ask it for XML ([out:xml]) and give that")
+    found = next((kind for kind, pattern in _JSON_KINDS if pattern.search(data)), None)
     if found is None:
         bounded.json_of(path)  # says so where it is no JSON at all
     return found

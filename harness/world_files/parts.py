@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+Affine = tuple[float, float, float, float, float, float]
 BoolArray = NDArray[np.bool_]
 
 WGS84: Final = "EPSG:4326"
@@ -86,7 +87,7 @@ class Raster:
     """
 
     values: FloatArray
-    affine: tuple[float, float, float, float, float, float]
+    affine: Affine
 
     @property
     def middle_x(self) -> float:

@@ -41,7 +41,7 @@ from harness.world_files.slicing import Box, sliced_cells
 
 ANY_PLACE: Final = Place(47.0, 8.0)
 """Where the plane lies of a file that has no place on earth."""
-SCALABLE: Final = ("ros_map", "moving_ai", "gazebo_world", "ascii_grid")
+SCALABLE: Final = ("ros_map", "moving_ai", "ascii_grid")
 
 
 @dataclass(frozen=True)
@@ -245,19 +245,12 @@ def _cell_that_fits(
     if not any(each.crs is None and each.kind in SCALABLE for each in contents):
         return None
     scale = scale_that_fits(room, craft.turn_radius_m, craft.clearance_m)
-    return None if scale is None else _rounded_up(_cell_m(contents, specs) * scale)
+    return None if scale is None else _rounded_up(_cell_m(contents) * scale)
 
 
-def _cell_m(contents: Sequence[Contents], specs: Sequence[FileSpec]) -> float:
-    from harness.world_files.readers.gazebo import BARN_CELL_M
-
-    for each, spec in zip(contents, specs, strict=True):
-        raster = each.occupied or each.terrain
-        if raster is not None:
-            return math.hypot(raster.affine[0], raster.affine[3])
-        if each.kind == "gazebo_world":
-            return spec.metres_per_cell or BARN_CELL_M
-    return 1.0
+def _cell_m(contents: Sequence[Contents]) -> float:
+    rasters = (each.occupied or each.terrain for each in contents)
+    return next((math.hypot(each.affine[0], each.affine[3]) for each in rasters if each is not None), 1.0)
 
 
 def _rounded_up(value: float) -> float:

@@ -1,7 +1,6 @@
 """Heights and lengths as people write them in attributes: `12`, `12.5 m`, `40 ft`, `7'4"`, `~15`, `15;18`, `3-4`.
 
-The units of OpenStreetMap: https://wiki.openstreetmap.org/wiki/Map_features/Units. Metres need none; feet and inches
-have marks. A missing blank and a decimal comma are mistakes there that leave no doubt, but before three digits.
+The units of OpenStreetMap: https://wiki.openstreetmap.org/wiki/Map_features/Units. Metres need none.
 """
 
 from __future__ import annotations
@@ -22,15 +21,11 @@ _UNITS: Final = {
     "km": 1000.0,
 }
 _WITH_UNIT: Final = re.compile(rf"([-+]?{_NUMBER})\s*([a-z]*)\.?")
-_FEET: Final = re.compile(
-    rf"({_NUMBER})\s*(?:'|ft\.?|foot|feet)\s*(?:({_NUMBER})\s*(?:''|\"|in\.?|inch|inches)?)?"
-)
-_MARKS: Final = str.maketrans({"\N{RIGHT SINGLE QUOTATION MARK}": "'", "\N{PRIME}": "'", "\N{DOUBLE PRIME}": '"',
-                               "\N{RIGHT DOUBLE QUOTATION MARK}": '"', ",": "."})  # fmt: skip
+_FEET: Final = re.compile(rf"({_NUMBER})\s*(?:'|ft)\s*(?:({_NUMBER})\s*(?:''|\"|in)?)?")
 _THOUSANDS: Final = re.compile(r"\b[1-9]\d{0,2},\d{3}\b")
-"""As `1,200`: twelve hundred to some, one and a fifth to others."""
+"""As `1,200`: twelve hundred to some, one and a fifth to others; such a text says nothing."""
 _ABOUT: Final = re.compile(r"(?:~|\u2248|ca\.?(?=[\s\d])|circa|approx(?:\.|imately)?|about)\s*")
-"""What says that a length is approximate."""
+"""Words for an approximate length."""
 _RANGE: Final = re.compile(rf"({_NUMBER})\s*([a-z']*)\s*[-\u2013]\s*({_NUMBER})\s*([a-z']*)")
 
 
@@ -54,9 +49,7 @@ def metres_of(value: Any) -> float | None:
         return float(value) if math.isfinite(value) else None
     if _THOUSANDS.search(str(value)):
         return None
-    text = str(value).strip().lower().translate(_MARKS)
-    if text.isdecimal():
-        return float(text)
+    text = str(value).strip().lower().replace("\N{RIGHT SINGLE QUOTATION MARK}", "'").replace(",", ".")
     if (match := _WITH_UNIT.fullmatch(text)) and match[2] in _UNITS:
         return float(match[1]) * _UNITS[match[2]]
     if match := _FEET.fullmatch(text):
@@ -77,21 +70,14 @@ def lengths_of(value: Any) -> Lengths:
     if not isinstance(value, str) or _THOUSANDS.search(value):
         return Lengths(())
     found: list[float] = []
-    for each in filter(None, (part.strip() for part in value.split(";"))):
-        read = _ends(_ABOUT.sub("", each.lower().translate(_MARKS), count=1))
-        if read is None:
+    for part in filter(None, (part.strip() for part in value.lower().split(";"))):
+        text = _ABOUT.sub("", part, count=1)
+        ends = _RANGE.fullmatch(text)
+        texts = (
+            [text] if ends is None else [f"{ends[1]}{ends[2] or ends[4]}", f"{ends[3]}{ends[4] or ends[2]}"]
+        )
+        read = [metres_of(each) for each in texts]
+        if None in read or (len(read) == 2 and not 0.0 < read[0] < read[1]):  # type: ignore[operator]
             return Lengths(())
-        found += read
+        found += read  # type: ignore[arg-type]
     return Lengths(tuple(found), rough=True)
-
-
-def _ends(text: str) -> tuple[float, ...] | None:
-    """A length, or both ends of a range from less to more; None where it is neither."""
-    one = metres_of(text)
-    if one is not None:
-        return (one,)
-    match = _RANGE.fullmatch(text)
-    if match is None:
-        return None
-    low, high = metres_of(f"{match[1]}{match[2] or match[4]}"), metres_of(f"{match[3]}{match[4] or match[2]}")
-    return (low, high) if low is not None and high is not None and 0.0 < low < high else None

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -207,6 +207,37 @@ def building(
         bottom = (_first(tags, _MIN_LEVEL, doubts, least=True) or 0.0) * LEVEL_M
     begin = NO_BOTTOM if bottom <= 0.0 else Limit(min(bottom, top), Datum.GROUND)
     return Part(footprint, begin, Limit(top, Datum.GROUND), name=name, rigid=True)
+
+
+def parts_of(
+    features: Sequence[tuple[Mapping[str, Any], Any]], reading: Reading, notes: list[str]
+) -> tuple[Part, ...]:
+    """Features as parts: buildings by their heights, all others by their limits.
+
+    Args:
+        features: attributes and footprint of each.
+        reading: has the default height of buildings.
+        notes: are added to.
+    """
+    parts, doubts, bare = [], Doubts(), 0
+    for tags, footprint in features:
+        name = name_of(tags)
+        if is_building(tags):
+            parts.append(building(tags, footprint, reading, doubts, name))
+        else:
+            bare += not has_limits(tags)
+            parts.append(Part(footprint, *limits(tags, notes, name), name=name))
+    notes += doubts.notes(reading)
+    if bare:
+        notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
+    return tuple(parts)
+
+
+def name_of(tags: Mapping[str, Any]) -> str:
+    """The name of a feature for messages."""
+    named = {key.lower(): value for key, value in tags.items()}
+    name = named.get("name") or named.get("identifier") or ""
+    return (name if isinstance(name, str) else str(named.get("identifier") or ""))[:40]
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,23 +10,18 @@ import numpy as np
 
 from harness.files import strict_yaml
 from harness.files.input_file import InputError
-from harness.world_files.bounded import read_bytes, text_of
-from harness.world_files.parts import (
-    BoolArray,
-    Contents,
-    FloatArray,
-    Raster,
-    Reading,
-    WorldFileError,
-)
-from harness.world_files.readers.geotiff import check_cells, strips
+from harness.world_files.bounded import check_file, read_bytes, text_of
+from harness.world_files.parts import Affine, Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.readers import raster
 
 FREE: Final = frozenset(b".GS")
 """Ground, ground and shallow water of the MovingAI format (Sturtevant, Benchmarks for grid-based pathfinding, 2012)."""
 BLOCKED: Final = frozenset(b"@OTW")
 """Out of bounds, trees and deep water."""
 MODES: Final = ("trinary", "scale", "raw")
-"""Of ROS map_server: how a grey becomes occupied, free or unknown."""
+"""Ways of ROS map_server to tell occupied, free and unknown from a grey."""
+IMAGES: Final = {b"P": "PNM", b"\x89": "PNG", b"B": "BMP", b"\xff": "JPEG"}
+"""GDAL's driver of an image by its first byte."""
 
 
 def read_moving_ai(path: Path, reading: Reading) -> Contents:
@@ -43,12 +37,11 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
         begin = next(i for i, line in enumerate(lines[:10]) if line.strip() == "map") + 1
     except (KeyError, ValueError, StopIteration) as error:
         raise WorldFileError("has no height, width and `map`; must be a MovingAI map") from error
-    body = [line.rstrip("\r\n").encode("latin-1", "replace") for line in lines[begin : begin + rows]]
+    body = [line.encode("latin-1", "replace") for line in lines[begin : begin + max(rows, 0)]]
     if len(body) != rows or any(len(line) != columns for line in body) or rows * columns == 0:
         raise WorldFileError(
             f"has {len(body)} rows, not all of {columns} cells; must have {rows}: it may be torn"
         )
-    check_cells(rows, columns)
     cells = np.frombuffer(b"".join(body), dtype=np.uint8).reshape(rows, columns)
     strange = set(np.unique(cells).tolist()) - FREE - BLOCKED
     if strange:
@@ -57,7 +50,7 @@ def read_moving_ai(path: Path, reading: Reading) -> Contents:
     size = reading.metres_per_cell or 1.0
     notes = () if reading.metres_per_cell else ("says not how large a cell is: 1 m (metres_per_cell)",)
     return Contents(
-        "moving_ai", None, occupied=Raster(occupied, _from_corner(0.0, 0.0, size, rows)), notes=notes
+        "moving_ai", None, occupied=Raster(occupied, (size, 0, 0, 0, -size, rows * size)), notes=notes
     )
 
 
@@ -66,7 +59,7 @@ def read_ros(path: Path, reading: Reading) -> Contents:
 
     Occupied and free are told as map_server does: p = (255 - grey) / 255, or grey / 255 if `negate`; above
     `occupied_thresh` a cell is occupied, below `free_thresh` free, else unknown. In mode `raw` p = grey / 100, and
-    above 100 nothing is known; in mode `scale` a cell that is not opaque is unknown.
+    above 100 nothing is known; a cell that is not opaque is unknown.
 
     Raises:
         WorldFileError: it is not such a map, or its image cannot be read.
@@ -75,91 +68,53 @@ def read_ros(path: Path, reading: Reading) -> Contents:
     mode = str(keys.get("mode", "trinary")).lower()
     if mode not in MODES:
         raise WorldFileError(f"has the mode {mode[:20]!r}; must be one of {', '.join(MODES)}")
-    size = _positive(keys, "resolution")
+    size = keys.get("resolution", 0.0)
+    if not _is_number(size) or not 0 < size < 1e6:
+        raise WorldFileError("has no positive resolution; must be a map of ROS map_server")
     origin = keys.get("origin", (0.0, 0.0, 0.0))
-    if not (isinstance(origin, tuple) and len(origin) >= 2 and all(_is_number(each) for each in origin)):
+    if not (isinstance(origin, tuple) and len(origin) >= 2 and all(map(_is_number, origin))):
         raise WorldFileError("has an origin that is not [x, y, yaw]")
-    occupied_from, free_to = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
-    if not (_is_number(occupied_from) and _is_number(free_to)):
-        raise WorldFileError("has thresholds that are no numbers")
-    if not (0.0 <= occupied_from <= 1.0 and 0.0 <= free_to <= 1.0):
-        raise WorldFileError(
-            f"has the thresholds {occupied_from:g} and {free_to:g}; must be shares between 0 and 1"
-        )
-    negate = bool(keys.get("negate", 0))
-
-    def solid_of(grey: FloatArray, opaque: BoolArray) -> FloatArray:
-        known = opaque
-        if mode == "raw":
-            chance, known = grey / 100.0, known & (grey <= 100.0)
-        else:
-            chance = grey / 255.0 if negate else (255.0 - grey) / 255.0
-        occupied, free = known & (chance > occupied_from), known & (chance < free_to)
-        cells: FloatArray = occupied.astype(np.float64)
-        cells[~occupied & ~free] = np.nan
-        return cells
-
-    solid = _image(path.parent / str(keys.get("image", "")), solid_of)
+    over, under = keys.get("occupied_thresh", 0.65), keys.get("free_thresh", 0.25)
+    if not all(_is_number(each) and 0.0 <= each <= 1.0 for each in (over, under)):
+        raise WorldFileError(f"has the thresholds {over} and {under}; must be shares between 0 and 1")
+    grey = _greys(path.parent / keys["image"])
+    share = grey / (100.0 if mode == "raw" else 255.0)
+    if mode == "raw":
+        share[share > 1.0] = np.nan
+    elif not keys.get("negate", 0):
+        share = 1.0 - share
+    solid = np.where(share > over, 1.0, np.where(share < under, 0.0, np.nan))
     scale = (reading.metres_per_cell or size) / size
-    rows = solid.shape[0]
-    affine = _from_corner(origin[0] * scale, origin[1] * scale, size * scale, rows)
     yaw = float(origin[2]) if len(origin) > 2 else 0.0
-    if yaw:
-        affine = _turned(affine, origin[0] * scale, origin[1] * scale, yaw)
-    return Contents("ros_map", None, occupied=Raster(solid, affine))
+    place = _affine(scale * origin[0], scale * origin[1], scale * size, len(solid), yaw)
+    return Contents("ros_map", None, occupied=Raster(solid, place))
 
 
-def _image(path: Path, solid_of: Callable[[FloatArray, BoolArray], FloatArray]) -> FloatArray:
-    """(rows, columns) cells of an image, by strips.
-
-    Args:
-        path: of the image.
-        solid_of: cells from their grey (0 to 255, of colours the mean as map_server has it) and where they are opaque.
-    """
-    from PIL import Image, UnidentifiedImageError
-
+def _greys(path: Path) -> FloatArray:
+    """(rows, columns) greys of an image from 0 to 255, of colours their mean, NaN where it is not opaque."""
     try:
-        data = read_bytes(path)
+        check_file(path)
+        with raster.opened(path, IMAGES.get(read_bytes(path, first=1), "PNM")) as source:
+            greys = np.empty((source.height, source.width))
+            palette = source.colormap(1) if source.colorinterp[0].name == "palette" else None
+            full = 255.0 if source.dtypes[0] == "uint8" else 65_535.0
+            for rows, window in raster.strips(source):
+                bands = source.read(window=window, masked=False).astype(np.float64)
+                if palette is not None:
+                    table = np.array([palette[index] for index in range(len(palette))], dtype=np.float64)
+                    bands = np.moveaxis(table[bands[0].astype(np.int64)], 2, 0)
+                alpha = len(bands) in (2, 4)
+                greys[rows] = bands[: len(bands) - alpha].mean(axis=0) * 255.0 / full
+                if alpha:
+                    greys[rows][bands[-1] < full] = np.nan
+            return greys
     except WorldFileError as error:
+        if "pip install" in str(error):
+            raise
+        said = str(error).partition(";")[0]
         raise WorldFileError(
-            f"names the image {path.name}, which {str(error).partition(';')[0]}; lay it there"
+            f"names the image {path.name}, which {said}; must be PGM, PNG, BMP or JPEG"
         ) from error
-    try:
-        with Image.open(_stream(data), formats=["PPM", "PNG", "BMP", "JPEG"]) as image:
-            columns, rows = image.size
-            check_cells(rows, columns)
-            solid = np.empty((rows, columns))
-            for strip in strips(solid):
-                solid[strip] = solid_of(*_greys(image.crop((0, strip.start, columns, strip.stop))))
-            return solid
-    except WorldFileError:
-        raise
-    except UnidentifiedImageError as error:
-        raise WorldFileError(f"names the image {path.name}, which is no PGM, PNG, BMP or JPEG") from error
-    except Exception as error:  # Pillow raises many kinds for damaged files
-        raise WorldFileError(
-            f"names the image {path.name}, which cannot be read ({str(error)[:80]})"
-        ) from error
-
-
-def _greys(image: Any) -> tuple[FloatArray, BoolArray]:
-    """Grey from 0 to 255 of an image, and where it is opaque."""
-    if image.mode in ("I", "I;16", "F"):
-        grey = np.asarray(image, dtype=np.float64) / 257.0
-    elif image.mode in ("L", "1"):
-        grey = np.asarray(image.convert("L"), dtype=np.float64)
-    else:
-        grey = np.asarray(image.convert("RGB"), dtype=np.float64).mean(axis=2)
-    opaque = np.ones(grey.shape, dtype=np.bool_)
-    if "A" in image.convert("RGBA" if "transparency" in image.info else image.mode).getbands():
-        opaque = np.asarray(image.convert("RGBA").getchannel("A")) == 255
-    return grey, opaque
-
-
-def _stream(data: bytes) -> Any:
-    from io import BytesIO
-
-    return BytesIO(data)
 
 
 def _yaml(path: Path) -> dict[str, Any]:
@@ -172,36 +127,11 @@ def _yaml(path: Path) -> dict[str, Any]:
     return keys
 
 
-def _positive(keys: dict[str, Any], name: str) -> float:
-    value = keys.get(name)
-    if not _is_number(value) or not 0 < float(value) < 1e6:  # type: ignore[arg-type]
-        raise WorldFileError(f"has no positive {name}; must be a map of ROS map_server")
-    return float(value)  # type: ignore[arg-type]
-
-
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _from_corner(
-    west: float, south: float, size: float, rows: int
-) -> tuple[float, float, float, float, float, float]:
-    """Of a raster whose lower left corner is given."""
-    return size, 0.0, west, 0.0, -size, south + rows * size
-
-
-def _turned(
-    affine: tuple[float, float, float, float, float, float], x0: float, y0: float, yaw: float
-) -> tuple[float, float, float, float, float, float]:
-    """The same, turned counter-clockwise about (x0, y0)."""
-    a, b, c, d, e, f = affine
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    c, f = c - x0, f - y0
-    return (
-        cos * a - sin * d,
-        cos * b - sin * e,
-        x0 + cos * c - sin * f,
-        sin * a + cos * d,
-        sin * b + cos * e,
-        y0 + sin * c + cos * f,
-    )
+def _affine(west: float, south: float, size: float, rows: int, yaw: float) -> Affine:
+    """The place of a raster whose lower left corner is given, turned counter-clockwise about that by `yaw` radians."""
+    cos, sin, height = size * math.cos(yaw), size * math.sin(yaw), rows
+    return cos, sin, west - height * sin, sin, -cos, south + height * cos

@@ -1,235 +1,136 @@
-"""Files of OpenStreetMap: XML and the JSON of Overpass by the standard library, PBF by osmium (`wayproof[maps]`)."""
+"""Buildings of OpenStreetMap, XML or PBF, by osmium (`wayproof[maps]`), which puts ways and relations together.
+
+Buildings and their parts (`building:part`), chimneys, towers and tanks (`man_made`) are all taken, each with its own
+height: where they overlap the union is solid, which is never less than the Simple 3D Buildings scheme has it.
+"""
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
-from harness.world_files.bounded import json_of, read_bytes, xml_tags
-from harness.world_files.parts import Contents, Reading, WorldFileError
-from harness.world_files.readers.osm_elements import (
-    AREAS,
-    FIRST_INLINE,
-    POINTS,
-    Collected,
-    Elements,
-    is_building,
-)
-from harness.world_files.readers.osm_relations import BUILDING, HEIGHT, Line, Member, Relations
+from harness.files.wording import counted
+from harness.world_files.bounded import MAX_BYTES, check_file, check_xml, read_bytes
+from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
+from harness.world_files.readers import limits
+from harness.world_files.readers.lengths import lengths_of
 
-MAX_BYTES: Final = 400_000_000
-MOST_NUMBER: Final = 1 << 62
+TALL: Final = frozenset(
+    ("chimney", "communications_tower", "cooling_tower", "gasometer", "mast", "silo", "storage_tank", "tower",
+     "water_tower")
+)  # fmt: skip
+"""Values of `man_made` for what stands up like a building; piers, pipelines and the like do not."""
 
 
 def read_xml(path: Path, reading: Reading) -> Contents:
-    """Reads the buildings of an OpenStreetMap XML file, its elements in any order.
+    """Reads an OpenStreetMap XML file.
 
     Raises:
-        WorldFileError: it is not whole, or has no building.
+        WorldFileError: it is not whole, has no building, or osmium is not installed.
     """
-    document = _Document()
-    xml_tags(read_bytes(path, MAX_BYTES), document.begin)
-    document.finish()
-    return document.elements.contents(reading)
+    data = read_bytes(path, MAX_BYTES)
+    check_xml(data)
+    if re.search(rb"<nd [^>]*\blat=", data):
+        raise WorldFileError(
+            "has places inside its ways (`out geom`); ask Overpass for `out body; >; out skel`"
+        )
+    if re.search(rb"<way id=['\"]-|action=['\"]delete", data):
+        raise WorldFileError(
+            "has ways of JOSM that are new or deleted; upload them, or give a file without them"
+        )
+    if data.rfind(b"<node ") < data.find(b"<way "):
+        return _read(path, reading)
+    with TemporaryDirectory() as folder:
+        return _read(_in_order(path, Path(folder) / "ordered.osm.pbf"), reading)
 
 
-class _Document:
-    """Tags of an OpenStreetMap XML file made into elements; a way ends where the next element begins."""
+def _in_order(path: Path, ordered: Path) -> Path:
+    """Writes a file again with nodes before ways before relations, as osmium needs them and Overpass does not."""
+    import osmium
 
-    def __init__(self) -> None:
-        self.elements = Elements()
-        self._kind, self._number = "", 0
-        self._tags: dict[str, str] = {}
-        self._refs: list[int] = []
-        self._members: list[Member] = []
-        self._inline = FIRST_INLINE
-
-    def begin(self, tag: str, attributes: dict[str, str]) -> None:
-        """An element begins; what stands in a way or relation belongs to that."""
-        if tag == "nd":
-            if "lat" in attributes:
-                self._place_of_way(attributes)
-            else:
-                self._refs.append(_whole(tag, attributes, "ref"))
-        elif tag == "tag":
-            self._tags[attributes.get("k", "")] = attributes.get("v", "")
-        elif tag == "member":
-            self._finish_member()
-            kind = attributes.get("type")
-            if kind in ("way", "relation"):
-                number = _whole(tag, attributes, "ref")
-                self._members.append(Member(number, attributes.get("role", ""), kind == "way"))
-        elif tag in ("node", "way", "relation"):
-            if self._kind:
-                self.finish()
-            deleted = attributes.get("visible") == "false" or attributes.get("action") == "delete"
-            self._number, self._kind = _whole(tag, attributes, "id"), "" if deleted else tag
-            if tag == "node" and not deleted:
-                self.elements.node(self._number, *_place(attributes))
-            self._tags, self._refs, self._members = {}, [], []
-
-    def finish(self) -> None:
-        """The last element ends."""
-        if self._kind == "node":
-            if self._tags:  # most nodes are corners of ways, and have none
-                self.elements.point(self._tags)
-        elif self._kind == "way":
-            self.elements.way(self._number, self._refs, self._tags)
-        elif self._kind == "relation":
-            self._finish_member()
-            self.elements.relation(self._number, self._members, self._tags)
-        self._kind = ""
-
-    def _finish_member(self) -> None:
-        """Overpass's `out geom` gives the line of a way as a member of a relation."""
-        if self._members and self._refs:
-            self.elements.way(self._members[-1].number, self._refs, {})
-        self._refs = []
-
-    def _place_of_way(self, attributes: dict[str, str]) -> None:
-        """A node with its place in a way, as `out geom` has it; in a relation it has no number."""
-        number = _whole("nd", attributes, "ref") if "ref" in attributes else self._inline
-        self._inline -= 1
-        self.elements.node(number, *_place(attributes))
-        self._refs.append(number)
-
-
-def _whole(tag: str, attributes: Mapping[str, str], name: str) -> int:
-    try:
-        number = int(attributes[name])
-        if -MOST_NUMBER < number < MOST_NUMBER:
-            return number
-    except (KeyError, ValueError):
-        pass
-    raise WorldFileError(f"has a {tag} whose {name} is no number; must be OpenStreetMap XML")
-
-
-def _place(attributes: Mapping[str, Any]) -> tuple[float, float]:
-    try:
-        longitude, latitude = float(attributes["lon"]), float(attributes["lat"])
-    except (KeyError, TypeError, ValueError) as error:
-        raise WorldFileError(f"has node {attributes.get('id')} whose lat or lon is no number") from error
-    if -180.0 <= longitude <= 180.0 and -90.0 <= latitude <= 90.0:
-        return longitude, latitude
-    raise WorldFileError(
-        f"has node {attributes.get('id')} at lat {latitude:g}, lon {longitude:g}; must be degrees"
-    )
-
-
-def read_json(path: Path, reading: Reading) -> Contents:
-    """Reads the buildings of what Overpass answers as JSON (`out:json`), with nodes or with `out geom`.
-
-    Raises:
-        WorldFileError: it is not that, or has no building.
-    """
-    content = json_of(path)
-    elements = content.get("elements") if isinstance(content, dict) else None
-    if not isinstance(elements, list) or not all(isinstance(each, dict) for each in elements):
-        raise WorldFileError("has no list of elements; must be an answer of Overpass")
-    found = Elements()
-    inline = FIRST_INLINE
-
-    def refs_of(thing: Mapping[str, Any]) -> list[int]:
-        nonlocal inline
-        refs = []
-        places = [each for each in thing.get("geometry") or () if isinstance(each, dict)]
-        for each in places:
-            inline -= 1
-            found.node(inline, *_place(each))
-            refs.append(inline)
-        # A ring is told by its first node's coming again as its last.
-        return refs or [int(each) for each in thing.get("nodes") or ()]
-
-    try:
-        for each in elements:
-            kind, tags = each.get("type"), {str(k): str(v) for k, v in (each.get("tags") or {}).items()}
-            if kind == "node":
-                found.node(int(each["id"]), *_place(each))
-                if tags:
-                    found.point(tags)
-            elif kind == "way":
-                found.way(int(each["id"]), refs_of(each), tags)
-            elif kind == "relation":
-                members = [m for m in each.get("members") or () if m.get("type") in ("way", "relation")]
-                for member in members:
-                    if member.get("geometry"):
-                        found.way(int(member["ref"]), refs_of(member), {})
-                found.relation(
-                    int(each["id"]),
-                    [Member(int(m["ref"]), str(m.get("role") or ""), m["type"] == "way") for m in members],
-                    tags,
-                )
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        if isinstance(error, WorldFileError):
-            raise
-        raise WorldFileError("has an element that is not whole; must be an answer of Overpass") from error
-    return found.contents(reading)
+    with osmium.SimpleWriter(str(ordered)) as writer:
+        for kind in (osmium.osm.NODE, osmium.osm.WAY, osmium.osm.RELATION):
+            for each in osmium.FileProcessor(str(path), kind):
+                writer.add(each)
+    return ordered
 
 
 def read_pbf(path: Path, reading: Reading) -> Contents:
-    """Reads the buildings of an OpenStreetMap PBF file, with osmium.
+    """Reads an OpenStreetMap PBF file.
 
     Raises:
-        WorldFileError: osmium is not there, or the file is damaged or has no building.
+        WorldFileError: it is damaged, has no building, or osmium is not installed.
     """
+    check_file(path)
+    return _read(path, reading)
+
+
+def _read(path: Path, reading: Reading) -> Contents:
     try:
         import osmium
     except ImportError as error:
-        raise WorldFileError(
-            "is OpenStreetMap PBF, which osmium reads: pip install 'wayproof[maps]'"
-        ) from error
-    if path.stat().st_size > MAX_BYTES:
-        raise WorldFileError(
-            f"is larger than {MAX_BYTES // 10**6} MB; cut the area of interest out of it first"
-        )
-    found = Collected(reading)
+        raise WorldFileError("is OpenStreetMap, which osmium reads: pip install 'wayproof[maps]'") from error
+    import shapely
+
+    tall_keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
+    shape_of = osmium.geom.WKBFactory()
+    parts: list[Part] = []
+    doubts, told = limits.Doubts(), Counter[str]()
+    outlines: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = {}
+    highest_m = 0.0
     try:
-        relations = _pbf_relations(path)
-        needed, taken = relations.ways(), set[int]()
-        ways: dict[int, Line] = {}
-        tags_of: dict[int, Mapping[str, str]] = {}
-        points = osmium.filter.KeyFilter(*POINTS, HEIGHT)
-        for each in osmium.FileProcessor(str(path), osmium.osm.NODE).with_filter(points):
-            found.point({tag.k: tag.v for tag in each.tags})
-        entities = osmium.osm.NODE | osmium.osm.WAY
-        for each in osmium.FileProcessor(str(path), entities).with_locations():
-            if not each.is_way() or not (
-                each.id in needed or any(name in each.tags for name in (*AREAS, HEIGHT))
-            ):
-                continue
-            line = [(node.lon, node.lat) for node in each.nodes if node.location.valid()]
+        for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(tall_keys):
             tags = {tag.k: tag.v for tag in each.tags}
-            if each.id in needed:
-                ways[each.id], tags_of[each.id] = line, tags
-            if is_building(tags):
-                taken.add(each.id)
-                found.way(tags, line, f"way {each.id}")
-            elif each.id not in needed:
-                found.other(tags)
+            if each.is_area():
+                name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
+                if is_building(tags) and each.num_rings()[0]:
+                    shape = shapely.from_wkb(shape_of.create_multipolygon(each))
+                    shape = shape.geoms[0] if len(shape.geoms) == 1 else shape
+                    parts.append(limits.building(tags, shape, reading, doubts, name))
+                    outlines.pop(name, None)
+                continue
+            kind = "point" if each.is_node() else "way" if each.is_way() else "relation"
+            if is_building(tags) and kind != "point":
+                nodes = each.nodes if kind == "way" else ()
+                places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
+                outlines[f"{kind} {each.id}"] = tags, places  # its area comes later, or none
+            elif is_tall(tags) or lengths_of(tags.get("height")).metres:
+                told[kind] += 1
+                highest_m = max(highest_m, *lengths_of(tags.get("height")).metres, 0.0)
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
         raise WorldFileError(
-            f"cannot be read as PBF ({' '.join(str(error).split())[:80]}); it may be torn"
+            f"cannot be read by osmium ({' '.join(str(error).split())[:80]}); it may be torn"
         ) from error
-    found.areas(relations.areas(taken, tags_of), ways, relations)
-    return found.contents()
+    for name, (tags, places) in outlines.items():
+        if len(set(places)) >= 3:
+            parts.append(limits.building(tags, shapely.Polygon(places), reading, doubts, name))
+            told["closed"] += 1
+        else:
+            told["broken"] += 1
+    if not parts:
+        raise WorldFileError("has no building with an outline; must be an extract of OpenStreetMap with some")
+    notes = doubts.notes(reading)
+    if told["closed"]:
+        notes.append(f"{counted(told['closed'], 'building')} with an open outline closed by a straight line")
+    if told["broken"]:
+        notes.append(f"{counted(told['broken'], 'building')} whose outline is not there passed over")
+    plain = [counted(told[kind], kind) for kind in ("point", "way", "relation") if told[kind]]
+    if plain:
+        top = f", the highest {highest_m:g} m" if highest_m else ""
+        notes.append(f"{' and '.join(plain)} with a height, or a mast, without an area passed over{top}")
+    return Contents("osm", WGS84, tuple(parts), notes=tuple(notes))
 
 
-def _pbf_relations(path: Path) -> Relations:
-    """The relations that buildings need, and those with a height, by three passes: most relations are none of them."""
-    import osmium
+def is_building(tags: Mapping[str, Any]) -> bool:
+    """Whether tags are those of a building, of a part of one, or of what stands up like one."""
+    named = any(tags.get(key, "no") not in ("no", "entrance") for key in ("building", "building:part"))
+    return named or tags.get("man_made") in TALL
 
-    relations = Relations()
 
-    def keep(selection: Any) -> None:
-        for each in osmium.FileProcessor(str(path), osmium.osm.RELATION).with_filter(selection):
-            tags = {tag.k: tag.v for tag in each.tags}
-            members = [Member(m.ref, m.role, m.type == "w") for m in each.members if m.type in ("w", "r")]
-            relations.add(each.id, members, tags, is_building(tags))
-
-    keep(osmium.filter.KeyFilter(*AREAS, HEIGHT))
-    # Those of the first pass that are of this type come again, and replace themselves.
-    keep(osmium.filter.TagFilter(("type", BUILDING)))
-    if missing := relations.outlines_missing():
-        keep(osmium.filter.IdFilter(missing))
-    return relations
+def is_tall(tags: Mapping[str, Any]) -> bool:
+    """Whether tags of a node are those of something that stands up: a building, a tower, a wind turbine."""
+    return is_building(tags) or tags.get("power") == "tower" or tags.get("generator:source") == "wind"

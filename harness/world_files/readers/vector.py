@@ -1,138 +1,169 @@
-"""Any vector file that GDAL knows (GeoPackage, Shapefile, FlatGeobuf, DXF ...), with pyogrio (`wayproof[maps]`)."""
+"""Vector files that GDAL reads (KML, GeoPackage, Shapefile, FlatGeobuf, DXF ...), by pyogrio (`wayproof[maps]`)."""
 
 from __future__ import annotations
 
+import re
 import warnings
-import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from harness.files.input_file import InputError
 from harness.files.wording import counted
-from harness.files.zip_archive import chosen
-from harness.world_files.bounded import MAX_BYTES
-from harness.world_files.parts import Contents, Part, Reading, WorldFileError
-from harness.world_files.plane import in_degrees
-from harness.world_files.readers import limits, rings
+from harness.files.zip_archive import Unpacked, member_path, unpacked
+from harness.world_files.bounded import MAX_BYTES, MAX_TREE_BYTES, check_file, check_xml, read_bytes
+from harness.world_files.parts import NO_BOTTOM, NO_TOP, Contents, Datum, Limit, Part, Reading, WorldFileError
+from harness.world_files.readers import limits
 
-MAX_FEATURES = 300_000
-PACKED = (".shp", ".gpkg")
-"""What of an archive is read."""
-DRAWINGS = (".dxf", ".dwg")
-"""Files that never say where on earth they lie."""
+MAX_FEATURES: Final = 300_000
+"""A layer with more features is refused."""
+DRAWINGS: Final = (".dxf", ".dwg")
+"""Endings of drawings, which never say where on earth they lie."""
+COLLECTION: Final = 7
+"""Type number of a geometry collection in shapely."""
+AREAL: Final = 2
+"""Dimension of polygons in shapely."""
+LINKED: Final = (b"<NetworkLink>", b"<GroundOverlay", b"<Model")
+"""Elements of KML that name other files."""
+DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
+"""What an altitude of KML is above, by its altitudeMode; clamped to the ground it means nothing."""
+
+
+class _Feature(NamedTuple):
+    """A feature: its attributes, and its shape, None where it has no area."""
+
+    tags: dict[str, Any]
+    shape: Any
 
 
 def read(path: Path, reading: Reading) -> Contents:
-    """Reads the polygons of a file, as `_read` has it, without the warnings of GDAL: what is left out is counted."""
-    with warnings.catch_warnings():
-        return _read(path, reading)
-
-
-def _read(path: Path, reading: Reading) -> Contents:
-    """Reads the polygons of a file's layers; heights and limits are told from their attributes as in GeoJSON.
+    """Reads the polygons of all layers; heights and limits are told from attributes as in GeoJSON.
 
     Raises:
-        WorldFileError: pyogrio is not there, or GDAL cannot read the file.
+        WorldFileError: pyogrio is not installed, GDAL cannot read the file, or it has no polygon.
     """
+    check_file(path)
+    source: Path | str = path
     try:
-        import pyogrio
-        from pyogrio.errors import DataLayerError, DataSourceError
-    except ImportError as error:
-        raise WorldFileError("is a kind of file that pyogrio reads: pip install 'wayproof[maps]'") from error
-    import shapely
-
-    notes: list[str] = []
-    doubts = limits.Doubts()
-    parts: list[Part] = []
-    crs: str | None = None
-    passed = bare = 0
-    source = _source(path)
-    try:
-        warnings.simplefilter("ignore")
-        for layer in np.atleast_2d(pyogrio.list_layers(source))[:, 0]:
-            if pyogrio.read_info(source, layer=layer)["features"] > MAX_FEATURES:
-                raise WorldFileError(
-                    f"has more than {MAX_FEATURES:,} features; cut the area of interest out of it"
-                )
-            meta, _, geometries, columns = pyogrio.raw.read(source, layer=layer, on_invalid="ignore")
-            if len(geometries) and crs is not None and meta["crs"] != crs:
-                raise WorldFileError(
-                    "has layers in different coordinate reference systems; put them into files of their own"
-                )
-            crs = crs or meta["crs"]
-            shapes = shapely.make_valid(
-                shapely.force_2d(shapely.from_wkb(geometries, on_invalid="ignore")), method="structure",
-                keep_collapsed=False,
-            )  # fmt: skip
-            if in_degrees(reading.crs or crs):
-                shapes = [rings.together(each) for each in shapes]
-            for row, shape in enumerate(shapes):
-                if shape is None or shape.area == 0.0:
-                    passed += 1
-                    continue
-                tags = {str(name): column[row] for name, column in zip(meta["fields"], columns, strict=True)}
-                tags = {name: value for name, value in tags.items() if value is not None and value == value}
-                parts.append(_part(tags, shape, reading, notes, doubts))
-                bare += not (parts[-1].rigid or limits.has_limits(tags))
-    except (DataSourceError, DataLayerError, ValueError, RuntimeError, OSError, MemoryError) as error:
-        if isinstance(error, WorldFileError):
-            raise
-        raise WorldFileError(f"cannot be read by GDAL ({' '.join(str(error).split())[:100]})") from error
-    if not parts:
-        raise WorldFileError("has no polygon; must have some")
-    notes += _told(path, reading.crs or crs, bare)
-    notes += doubts.notes(reading)
-    if passed:
-        notes.append(f"{counted(passed, 'shape')} without an area passed over")
-    return Contents("vector", reading.crs or crs, tuple(parts), notes=tuple(notes))
-
-
-def _part(
-    tags: dict[str, object], shape: object, reading: Reading, notes: list[str], doubts: limits.Doubts
-) -> Part:
-    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in tags.items()}
-    name = str(plain.get("name", ""))[:40]
-    if limits.is_building(plain):
-        return limits.building(plain, shape, reading, doubts, name)
-    return Part(shape, *limits.limits(plain, notes, name), name=name)
-
-
-def _source(path: Path) -> Path | str:
-    """What GDAL opens: the file, or the one in an archive.
-
-    Raises:
-        WorldFileError: it unpacks to too much, or the archive has none or several.
-    """
-    if path.suffix.lower() != ".zip":
-        return path
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-    except (zipfile.BadZipFile, OSError, ValueError) as error:
-        raise WorldFileError("is a damaged ZIP archive; get it again") from error
-    if sum(each.file_size for each in members) > MAX_BYTES:
-        raise WorldFileError(
-            f"unpacks to more than {MAX_BYTES // 10**6} MB; cut the area of interest out of it"
-        )
-    try:
-        inner, _ = chosen([each.filename for each in members], PACKED)
+        if path.suffix.lower() == ".zip":
+            source = member_path(path, (".shp", ".gpkg"), MAX_BYTES)
     except InputError as error:
         raise WorldFileError(str(error)) from error
-    return f"/vsizip/{path.absolute()}/{inner}"
-
-
-def _told(path: Path, crs: str | None, bare: int) -> list[str]:
-    """What is to be said of where a file lies, and of polygons without heights.
-
-    Raises:
-        WorldFileError: nothing says where it lies; a drawing is taken as metres.
-    """
-    notes = []
+    crs, features = _features(source)
+    crs = reading.crs or crs
+    notes: list[str] = []
     if crs is None and path.suffix.lower() not in DRAWINGS:
         raise WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
     if crs is None:
         notes.append("a drawing names no place on earth: taken as metres in a plane of its own")
-    if bare:
-        notes.append(f"{counted(bare, 'polygon')} without height limits taken as solid at every altitude")
-    return notes
+    solid = [each for each in features if each.shape is not None]
+    parts = limits.parts_of([(each.tags, each.shape) for each in solid], reading, notes)
+    if len(features) > len(solid):
+        notes.append(f"{counted(len(features) - len(solid), 'shape')} without an area passed over")
+    return Contents("vector", crs, parts, notes=tuple(notes))
+
+
+def read_kml(path: Path, reading: Reading) -> Contents:
+    """Reads the polygons of a KML file, or of a KMZ archive with one.
+
+    Each is solid from the ground up to its highest corner; on the ground it is solid at every altitude. Limits in its
+    ExtendedData go before altitudes.
+
+    Raises:
+        WorldFileError: pyogrio is not installed, the file is not whole, or it has no polygon.
+    """
+    import shapely
+
+    data = read_bytes(path, MAX_TREE_BYTES)
+    try:
+        packed = (
+            unpacked(data, ".kml", MAX_TREE_BYTES, "doc.kml") if data[:2] == b"PK" else Unpacked("", data, 0)
+        )
+    except InputError as error:
+        raise WorldFileError(str(error)) from error
+    text = packed.data
+    check_xml(text)
+    if b"altitudeOffset" in text:
+        raise WorldFileError(
+            "lifts shapes by gx:altitudeOffset, which is not read; add it to their altitudes"
+        )
+    # GDAL parts positions at blanks, which some programs write after commas, too.
+    text = re.sub(rb"coordinates>[^<]*", lambda found: re.sub(rb"\s*,\s*", b",", found[0]), text)
+    _, features = _features(text)
+    notes = (
+        [f"{counted(packed.others, 'further KML file')} in the archive passed over"] if packed.others else []
+    )
+    solid = [each for each in features if each.shape is not None]
+    parts = list(limits.parts_of([(each.tags, each.shape) for each in solid], reading, []))
+    flat = 0
+    for index, (tags, shape) in enumerate(solid):
+        name, datum = str(tags.get("Name") or "")[:40], DATUMS.get(str(tags.get("altitudeMode")))
+        if limits.has_limits(tags):
+            parts[index] = Part(shape, *limits.limits(tags, notes, name), name=name)
+        elif datum is None:
+            parts[index], flat = Part(shape, NO_BOTTOM, NO_TOP, name=name), flat + 1
+        else:
+            top_m = float(np.nanmax(shapely.get_coordinates(shape, include_z=True)[:, 2]))
+            parts[index] = Part(shape, NO_BOTTOM, Limit(top_m, datum), name=name)
+    if flat:
+        notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
+    if len(parts) > flat:
+        notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
+    if linked := sum(text.count(each) for each in LINKED):
+        notes.append(f"{counted(linked, 'image or link')} to other files passed over")
+    if len(features) > len(solid):
+        notes.append(f"{counted(len(features) - len(solid), 'point, line or wall')} passed over")
+    flat_parts = [replace(part, footprint=shapely.force_2d(part.footprint)) for part in parts]
+    return Contents("kml", reading.crs or "EPSG:4326", tuple(flat_parts), notes=tuple(notes))
+
+
+def _features(source: Path | str | bytes) -> tuple[str | None, list[_Feature]]:
+    """The coordinate reference system and the features of all layers.
+
+    Raises:
+        WorldFileError: pyogrio is not installed, or GDAL cannot read the file.
+    """
+    try:
+        import pyogrio
+    except ImportError as error:
+        raise WorldFileError("is a vector file, which pyogrio reads: pip install 'wayproof[maps]'") from error
+    systems: set[str | None] = set()
+    found: list[_Feature] = []
+    try:
+        with warnings.catch_warnings(action="ignore"):  # what GDAL leaves out is counted
+            for layer in range(len(pyogrio.list_layers(source))):
+                if pyogrio.read_info(source, layer=layer)["features"] > MAX_FEATURES:
+                    raise WorldFileError(
+                        f"has more than {MAX_FEATURES:,} features; cut the area of interest out of it"
+                    )
+                meta, _, shapes, columns = pyogrio.raw.read(source, layer=layer, on_invalid="ignore")
+                found += _rows([str(name) for name in meta["fields"]], shapes, columns)
+                systems |= {meta["crs"]} if len(shapes) else set()
+    except WorldFileError:
+        raise
+    except (pyogrio.errors.DataSourceError, ValueError, RuntimeError, OSError, MemoryError) as error:
+        raise WorldFileError(f"cannot be read by GDAL ({' '.join(str(error).split())[:100]})") from error
+    if len(systems) > 1:
+        raise WorldFileError(
+            "has layers in different coordinate reference systems; put them into files of their own"
+        )
+    return next(iter(systems), None), found
+
+
+def _rows(names: list[str], shapes: Any, columns: Any) -> Iterator[_Feature]:
+    """The features of a layer; attributes without a value are left out."""
+    import shapely
+
+    geometries = shapely.from_wkb(shapes, on_invalid="fix")
+    for row, shape in enumerate(geometries):
+        tags = {
+            name: value.item() if isinstance(value, np.generic) else value
+            for name, column in zip(names, columns, strict=True)
+            if (value := column[row]) is not None and value == value
+        }
+        pieces = shapely.get_parts(shape) if shapely.get_type_id(shape) == COLLECTION else [shape]
+        for piece in pieces:
+            yield _Feature(tags, piece if shapely.get_dimensions(piece) == AREAL else None)

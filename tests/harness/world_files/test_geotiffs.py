@@ -79,29 +79,6 @@ def test_voids_that_are_not_declared(void: float, units: str | None, tmp_path: P
     assert np.isfinite(found[1:]).all()
 
 
-def points(bend_m: float) -> list[Any]:
-    """Ground control points in the corners and in the middle, which is off by so much."""
-    rows, columns = HEIGHTS.shape
-    return [
-        rasterio.control.GroundControlPoint(
-            row, column, WEST_M + CELL_M * column + off, NORTH_M - CELL_M * row
-        )
-        for row, column, off in (
-            (0, 0, 0.0), (0, columns, 0.0), (rows, 0, 0.0), (rows, columns, 0.0), (rows // 2, columns // 2, bend_m),
-        )
-    ]  # fmt: skip
-
-
-def test_ground_control_points_say_where_it_lies(tmp_path: Path) -> None:
-    found = contents(made(tmp_path / "a.tif", gcps=points(0.0)))
-    assert found.crs is not None
-    assert "UTM zone 32N" in found.crs
-    assert found.terrain is not None
-    assert found.terrain.affine == pytest.approx((CELL_M, 0.0, WEST_M, 0.0, -CELL_M, NORTH_M), abs=1e-6)
-    with pytest.raises(WorldFileError, match="ground control points that do not lie on a grid"):
-        contents(made(tmp_path / "b.tif", gcps=points(300.0)))
-
-
 def test_one_without_a_place_is_not_put_at_the_corner_of_its_system(tmp_path: Path) -> None:
     nowhere = made(tmp_path / "a.tif", crs=None, transform=None)
     with pytest.raises(WorldFileError, match="says not where it lies"):

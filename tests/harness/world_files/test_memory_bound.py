@@ -85,20 +85,3 @@ def test_a_raster_is_read_within_a_gibibyte(
     total, peak_mib = map(float, done.stdout.split())
     assert total == cell * ROWS * COLUMNS
     assert peak_mib < MOST_MIB
-
-
-def test_a_grid_of_several_pieces_is_that_of_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from harness.world_files.kinds import read
-    from harness.world_files.parts import Reading
-    from harness.world_files.readers import grids
-
-    heights = np.arange(600.0).reshape(20, 30)
-    text = "ncols 30\nnrows 20\nxllcorner 5\nyllcorner 5\ncellsize 10\n" + " ".join(map(str, heights.ravel()))
-    for encoding in ("utf-8", "utf-8-sig", "utf-16"):
-        path = tmp_path / f"{encoding}.asc"
-        path.write_text(text, encoding=encoding)
-        for size in (1, 7, 100, 16_000_000):
-            monkeypatch.setattr(grids, "PIECE_BYTES", size)
-            found = read(path, None, Reading()).terrain
-            assert found is not None
-            assert found.values.tolist() == heights.tolist()

@@ -1,0 +1,141 @@
+"""Footprints on the ellipsoid: circles, arcs, corridors; and what makes footprints of a file valid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import Any, Final
+
+import numpy as np
+
+from harness.files.wording import counted
+from harness.world_files.parts import Contents, FloatArray, WorldFileError
+from harness.world_files.plane import TURN_DEG, in_degrees
+
+NAUTICAL_MILE_M: Final = 1852.0
+CIRCLE_POINTS: Final = 96
+"""Corners of the polygon round a circle, whose area is 0.04 % larger."""
+LARGEST_M: Final = 2_000_000.0
+"""Largest radius of a circle."""
+
+Place = tuple[float, float]
+"""Longitude and latitude, degrees."""
+
+
+def finished(contents: Contents) -> Contents:
+    """Contents whose footprints are valid, have an area, and go the short way round the earth.
+
+    Footprints without an area are passed over and counted.
+
+    Raises:
+        WorldFileError: a coordinate is not finite or not on earth, or no footprint is left.
+    """
+    import shapely
+
+    if contents.terrain is not None or contents.occupied is not None:
+        return contents
+    if not contents.parts:
+        raise WorldFileError("has no polygon; must have some")
+    shapes = np.array([part.footprint for part in contents.parts], dtype=object)
+    bounds = shapely.bounds(shapes)
+    if in_degrees(contents.crs):
+        off = (np.abs(bounds) > (TURN_DEG, 90.0, TURN_DEG, 90.0)).any(axis=1)
+        if off.any():
+            x, y = np.abs(bounds[off.argmax()]).reshape(2, 2).max(axis=0)
+            raise WorldFileError(
+                f"has {x:g}, {y:g} for a longitude and a latitude; must be degrees, or give crs, as EPSG:32632"
+            )
+        for index in np.flatnonzero(bounds[:, 2] - bounds[:, 0] > TURN_DEG / 2).tolist():
+            shapes[index] = _short_way(shapes[index])
+    if not np.isfinite(bounds[~shapely.is_empty(shapes)]).all():
+        raise WorldFileError("has a position that is not finite")
+    bad = ~shapely.is_valid(shapes)
+    shapes[bad] = shapely.make_valid(shapes[bad], method="structure", keep_collapsed=False)
+    area = shapely.area(shapes)
+    parts = tuple(
+        replace(part, footprint=shape)
+        for part, shape, size in zip(contents.parts, shapes, area.tolist(), strict=True)
+        if size > 0.0
+    )
+    if not parts:
+        raise WorldFileError("has no polygon with an area; must have some")
+    flat = len(area) - len(parts)
+    passed = (f"{counted(flat, 'polygon')} without an area passed over",) if flat else ()
+    return replace(contents, parts=parts, notes=(*contents.notes, *passed))
+
+
+def _short_way(shape: Any) -> Any:
+    """A shape wider than half the earth with longitudes from 0 to 360 degrees, where that makes it narrower."""
+    import shapely
+
+    turned = shapely.transform(shape, lambda p: np.column_stack((p[:, 0] % TURN_DEG, p[:, 1])))
+    west, _, east, _ = shapely.bounds(turned)
+    return turned if east - west < TURN_DEG / 2 and turned.area > 0.0 else shape
+
+
+def circle(center: Place, radius_m: float) -> Any:
+    """A polygon round a circle on the ellipsoid."""
+    import shapely
+
+    if not 0.0 < radius_m <= LARGEST_M:
+        raise WorldFileError(
+            f"has a circle of radius {radius_m:g} m; must be positive and at most {LARGEST_M:g} m"
+        )
+    azimuths = np.arange(0.0, TURN_DEG, TURN_DEG / CIRCLE_POINTS)
+    away = radius_m / math.cos(math.pi / CIRCLE_POINTS)
+    return shapely.Polygon(_around(center, azimuths, np.full(CIRCLE_POINTS, away)))
+
+
+def _around(center: Place, azimuth_deg: FloatArray, distance_m: FloatArray) -> list[Place]:
+    """Places at azimuths and distances from another."""
+    start = (np.full(len(azimuth_deg), each) for each in center)
+    longitude, latitude, _ = _geod().fwd(*start, azimuth_deg, distance_m)
+    return list(zip(longitude.tolist(), latitude.tolist(), strict=True))
+
+
+def arc(
+    center: Place, from_deg: float, to_deg: float, distance_m: tuple[float, float], clockwise: bool
+) -> list[Place]:
+    """Places along an arc between two azimuths, one a degree; the distance goes evenly from first to second."""
+    sweep = (to_deg - from_deg) % TURN_DEG if clockwise else -((from_deg - to_deg) % TURN_DEG)
+    count = max(int(abs(sweep)), 1) + 1
+    return _around(center, from_deg + np.linspace(0.0, sweep, count), np.linspace(*distance_m, count))
+
+
+def polar(center: Place, place: Place) -> tuple[float, float]:
+    """Azimuth (deg) and distance (m) of a place from another."""
+    azimuth, _, distance = _geod().inv(*center, *place)
+    return float(azimuth), float(distance)
+
+
+def corridor(line: Sequence[Place], width_m: float) -> Any:
+    """All that lies within half a width of a line."""
+    import shapely
+
+    (east, north), stretch = line[0], math.cos(math.radians(line[0][1]))
+    # The short way from the first place of the line.
+    plane = [((math.remainder(x - east, TURN_DEG)) * stretch, y - north) for x, y in line]
+    grown = shapely.LineString(plane).buffer(width_m / 2.0 / 111_200.0, quad_segs=16)
+    return shapely.transform(grown, lambda p: np.column_stack((p[:, 0] / stretch + east, p[:, 1] + north)))
+
+
+def on_earth(longitude: float, latitude: float) -> Place:
+    """The place, if it is one.
+
+    Raises:
+        WorldFileError: it is not on earth.
+    """
+    if not (abs(longitude) <= TURN_DEG and abs(latitude) <= 90.0):
+        raise WorldFileError(
+            f"has a place at latitude {latitude:g}, longitude {longitude:g}; must be degrees, WGS84"
+        )
+    return longitude, latitude
+
+
+@cache
+def _geod() -> Any:
+    from pyproj import Geod
+
+    return Geod(ellps="WGS84")

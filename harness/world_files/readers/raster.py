@@ -1,0 +1,201 @@
+"""Terrain from rasters that rasterio reads (`wayproof[maps]`): GeoTIFF, ESRI ASCII grid, SRTM .hgt."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from harness.files.input_file import InputError
+from harness.files.zip_archive import member_path
+from harness.world_files.bounded import check_file, read_bytes
+from harness.world_files.parts import FOOT_M, WGS84, Contents, FloatArray, Raster, Reading, WorldFileError
+from harness.world_files.plane import has_heights, unit_that_is_no_metre, vertical_unit_m
+
+MAX_CELLS: Final = 60_000_000
+"""Most cells of a raster: half a gigabyte of heights."""
+STRIP_CELLS: Final = 2_000_000
+"""Rows are read in strips of at most this many cells."""
+CACHE_MB: Final = 64
+"""Size of GDAL's cache, which is a twentieth of the machine's memory otherwise."""
+MAX_TILE_BYTES: Final = 30_000_000
+"""An archive with an SRTM tile unpacks to at most this."""
+VOIDS: Final = (-9999.0, -32767.0, -32768.0)
+"""Values of cells without a height in files that do not say so."""
+HEIGHTS_M: Final = (-12_000.0, 9_000.0)
+"""Heights of the ground on earth lie between these."""
+UNITS_M: Final = {
+    **dict.fromkeys(("m", "metre", "meter", "metres", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet", "international foot"), FOOT_M),
+    **dict.fromkeys(("us survey foot", "us-ft", "ftus", "us_survey_foot", "foot_us", "sfoot"), 1200 / 3937),
+    **dict.fromkeys(("cm", "centimetre", "centimeter"), 0.01),
+    **dict.fromkeys(("dm", "decimetre", "decimeter"), 0.1),
+}
+"""Lengths in metres of the units of height by the names that GDAL writes."""
+
+
+@contextmanager
+def opened(path: Path | str, driver: str) -> Iterator[Any]:
+    """A raster of rasterio; no other driver of GDAL than the one that is named may open it.
+
+    Raises:
+        WorldFileError: rasterio is not installed, or the file cannot be read, or has too many cells.
+    """
+    try:
+        import rasterio
+        from rasterio.errors import RasterioError
+    except ImportError as error:
+        raise WorldFileError("is a raster, which rasterio reads: pip install 'wayproof[maps]'") from error
+    try:
+        with (
+            warnings.catch_warnings(action="ignore"),
+            rasterio.Env(GDAL_CACHEMAX=CACHE_MB, GDAL_DISABLE_READDIR_ON_OPEN="FALSE"),
+            rasterio.open(path, driver=driver) as source,
+        ):
+            if source.height * source.width > MAX_CELLS:
+                raise WorldFileError(
+                    f"has {source.height} x {source.width} cells; must have at most {MAX_CELLS:,}: cut the area of "
+                    "interest out of it"
+                )
+            yield source
+    except WorldFileError:
+        raise
+    except (RasterioError, ValueError, OSError, MemoryError) as error:
+        said = " ".join(str(error).replace(str(path), "it").split())[:120]
+        raise WorldFileError(f"cannot be read as a raster ({said}); it may be torn: get it again") from error
+
+
+def strips(source: Any) -> Iterator[tuple[slice, Any]]:
+    """Rows of a raster of rasterio, a few million cells at a time, and the window that reads them."""
+    from rasterio.windows import Window
+
+    step = max(STRIP_CELLS // source.width, 1)
+    for start in range(0, source.height, step):
+        stop = min(start + step, source.height)
+        yield slice(start, stop), Window(0, start, source.width, stop - start)
+
+
+def read(path: Path, reading: Reading) -> Contents:
+    """Reads a raster of one band of heights; an SRTM tile may be packed as .zip or .gz.
+
+    Raises:
+        WorldFileError: it cannot be read, has no place on earth where it must have one, or is too large.
+    """
+    check_file(path)
+    notes: list[str] = []
+    with opened(*_inside(path)) as source:
+        _check_bands(source)
+        if source.driver == "AAIGrid":
+            _check_grid(path, source.height * source.width)
+        values = np.empty((source.height, source.width))
+        for rows, window in strips(source):
+            band = source.read(1, window=window, masked=True)
+            values[rows] = band.data
+            values[rows][np.ma.getmaskarray(band) | np.isin(band.data, VOIDS)] = np.nan
+        affine = _placed(source)
+        crs = reading.crs or _crs(source, affine)
+        if crs is None and source.driver != "AAIGrid":
+            raise WorldFileError("names no coordinate reference system; give crs, as EPSG:32632")
+        if crs is None:
+            scale = 1.0 if reading.metres_per_cell is None else reading.metres_per_cell / affine[0]
+            affine = tuple(scale * each for each in affine)  # type: ignore[assignment]
+            notes.append("names no place on earth: its metres are taken as they are (crs, metres_per_cell)")
+        else:
+            notes += _to_metres(values, source, crs)
+    values[(values <= HEIGHTS_M[0]) | (values >= HEIGHTS_M[1])] = np.nan
+    if np.isnan(values).all():
+        raise WorldFileError("has no cell with a height between -12000 and 9000 m; must be terrain")
+    return Contents("raster", crs, terrain=Raster(values, affine), notes=tuple(notes))
+
+
+def _inside(path: Path) -> tuple[Path | str, str]:
+    """What GDAL opens, the file or the tile that is packed in it, and by which driver."""
+    begin = read_bytes(path, first=2)
+    if begin in (b"II", b"MM"):
+        return path, "GTiff"
+    if begin == b"PK":
+        try:
+            return member_path(path, (".hgt",), MAX_TILE_BYTES), "SRTMHGT"
+        except InputError as error:
+            raise WorldFileError(str(error)) from error
+    if begin == b"\x1f\x8b":
+        return f"/vsigzip/{path.absolute()}", "SRTMHGT"
+    if path.suffix.lower() != ".hgt":
+        return path, "AAIGrid"
+    if not re.match(r"[NS]\d{2}[EW]\d{3}", path.name, re.IGNORECASE):
+        raise WorldFileError("is an SRTM tile by its ending; its name must say where it lies, as N46E009.hgt")
+    return path, "SRTMHGT"
+
+
+def _check_grid(path: Path, cells: int) -> None:
+    """Raises WorldFileError if an ESRI ASCII grid has more or fewer numbers than cells: GDAL fills up with zeros."""
+    found = 0
+    with path.open("rb") as file:
+        for line in file:
+            if not line.strip()[:1].isalpha():
+                found += len(line.split())
+                if line.translate(None, b"0123456789+-.eE \t\r\n\x1a"):
+                    raise WorldFileError("has something that is no number among its heights")
+    if found != cells:
+        raise WorldFileError(f"has {found:,} heights; nrows times ncols are {cells:,}: it may be torn")
+
+
+def _check_bands(source: Any) -> None:
+    """Raises WorldFileError if a raster is a picture."""
+    from rasterio.enums import ColorInterp
+
+    others = [each for each in source.colorinterp[1:] if each is not ColorInterp.alpha]
+    if others or source.colorinterp[0] is ColorInterp.palette:
+        raise WorldFileError(
+            f"has {source.count} bands or a palette, an image; must have one band, of heights"
+        )
+
+
+def _crs(source: Any, affine: tuple[float, ...]) -> str | None:
+    """The coordinate reference system that a raster names; degrees where a grid without one can be nothing else."""
+    system = source.crs or source.gcps[1]
+    if system:
+        return str(system.to_wkt())
+    degrees = affine[0] < 0.1 and 0.0 < abs(affine[2]) <= 180.0 and abs(affine[5]) <= 90.0
+    return WGS84 if degrees and source.driver == "AAIGrid" else None
+
+
+def _to_metres(values: FloatArray, source: Any, crs: str) -> list[str]:
+    """Makes a raster's numbers heights in metres, in place, and says what was done."""
+    named = source.units[0]
+    if named and named.strip().lower() not in UNITS_M:
+        raise WorldFileError(
+            f"has heights in {named[:20]!r}, which is no unit that is known; convert it to metres"
+        )
+    unit_m = UNITS_M[named.strip().lower()] if named else vertical_unit_m(crs)
+    factor, offset_m = source.scales[0] * unit_m, source.offsets[0] * unit_m
+    if factor == 0.0 or not math.isfinite(factor + offset_m):
+        raise WorldFileError("has a scale or an offset of its heights that is no number")
+    if (factor, offset_m) == (1.0, 0.0):
+        plane_unit = "" if named or has_heights(crs) else unit_that_is_no_metre(crs)
+        told = f"its heights name no unit: taken as metres, although its plane is in {plane_unit}"
+        return [told] if plane_unit else []
+    values *= factor
+    values += offset_m
+    more = f" plus {offset_m:g} m" if offset_m else ""
+    return [f"its heights are its numbers times {factor:.6g}{more}, as it says"]
+
+
+def _placed(source: Any) -> tuple[float, float, float, float, float, float]:
+    """Where a raster of rasterio lies, by its transformation.
+
+    Raises:
+        WorldFileError: it has none, or one that is singular.
+    """
+    a, b, c, d, e, f = tuple(source.transform)[:6]
+    if source.transform.is_identity:
+        raise WorldFileError("says not where it lies (no transformation); warp it with gdalwarp")
+    if not math.isfinite(a + b + c + d + e + f) or a * e == b * d:
+        raise WorldFileError("has cells of no size; must be terrain")
+    return a, b, c, d, e, f
