@@ -50,6 +50,7 @@ class AsGiven:
         climb_mps: (n,) climb that it asks for there, negative for a descent.
         fastest_mps: (n, 2) fastest climb and descent of the aircraft at its airspeed there.
         airspeed_mps: (n,) true airspeed that was commanded there.
+        believed_off_m: (n,) distance of the believed position from the path; None where navigation is perfect.
     """
 
     corners: Sequence[Corner]
@@ -59,3 +60,4 @@ class AsGiven:
     climb_mps: FloatArray
     fastest_mps: FloatArray
     airspeed_mps: FloatArray
+    believed_off_m: FloatArray | None = None

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.flight.record import FloatArray, Track
 
@@ -24,6 +25,9 @@ MOST_SAMPLES = 400_000
 """A path has no more points measured than this, however long it is."""
 
 LEAST_M = 1e-9
+
+ABOUT = 2.0
+"""A corner's limit holds this many times the limit before and behind it, along the path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,24 +102,33 @@ def deviation(track: Track, given_m: FloatArray, spacing_m: float, window_m: flo
 
 
 def allowed_m(track: Track, tolerance_m: float, corners: Iterable[AllowedCut]) -> FloatArray:
-    """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be cut by.
+    """(n,) what each row may be off the path as given: the tolerance, or about a corner what that may be passed at.
 
     Args:
         track: as in `deviation`.
         tolerance_m: away from corners.
-        corners: those that may be cut by more than that, or less.
+        corners: those that may be passed at more than that, or less; where several are near, the largest counts.
     """
-    allowed = np.full(len(track), tolerance_m)
-    corners = list(corners)
+    of_corners = np.full(len(track), -np.inf)
     for corner in corners:
-        about = np.abs(track.arc_length_m - corner.arc_length_m) <= corner.half_m + tolerance_m
-        allowed[about] = np.maximum(allowed[about], corner.allowed_cut_m)
+        about = at_corner(track, corner)
+        of_corners[about] = np.maximum(of_corners[about], corner.allowed_cut_m)
+    return np.where(np.isfinite(of_corners), of_corners, tolerance_m)
+
+
+def at_corner(track: Track, corner: AllowedCut) -> NDArray[np.bool_]:
+    """(n,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
+
+    They reach as far as the planned path is off the corner's legs, and at least `ABOUT` limits to each side: there an
+    aircraft that turns on the spot, late, has come back to the next leg.
+    """
+    reach_m = max(corner.half_m, ABOUT * corner.allowed_cut_m)
+    about: NDArray[np.bool_] = np.abs(track.arc_length_m - corner.arc_length_m) <= reach_m
     flown = np.flatnonzero(np.isfinite(track.arc_length_m))
     if len(flown):
         along = np.maximum.accumulate(track.arc_length_m[flown])
-        for corner in corners:
-            allowed[flown[_row(along, corner.arc_length_m)]] = corner.allowed_cut_m
-    return allowed
+        about[flown[_row(along, corner.arc_length_m)]] = True
+    return about
 
 
 def distances_m(points: FloatArray, line: FloatArray, window_m: float) -> FloatArray:

@@ -1,9 +1,8 @@
 """Which parts of what was planned could be tracked, and why the others could not.
 
-A plan is trackable where the aircraft stayed as close to it as the planner counted on. Planners put a margin
-between their paths and the wanted clearance, by default the larger of a tenth of the clearance and twice the
-tracking error that the aircraft promises; a larger cross-track error uses up distance from an obstacle that
-was asked for. Altitude, airspeed and load factor have limits of their own.
+A plan is trackable where the true position stayed within `FlightLimits.cross_track_threshold_m` of it. A path that was
+given is judged as it was given, corner by corner, not by the arcs that were made of it. Altitude, airspeed and load
+factor have limits of their own. No limit depends on who flies.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ from harness.analysis.causes import (
     speed_cause,
     steepness_cause,
 )
+from harness.analysis.deviation import ABOUT
 from harness.analysis.flight_limits import LOAD_S, SPEED_S, FlightLimits
 from harness.analysis.in_force import InForce
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
@@ -51,8 +51,8 @@ class Leg:
         max_deviation_m: largest distance from the path as given; None where a planner made the path.
         trackable: whether all of them stayed within what they may be.
         cause: why not, as `harness.analysis.causes.FINDINGS` tells; None where trackable. Of several limits that were
-            exceeded the first counts: control lost, cross-track error, load factor, airspeed, altitude, distance from
-            the path as given. It is a navigation error where, at the largest true error, the believed one was within
+            exceeded the first counts: control lost, cross-track error or distance from the path as given, load factor,
+            airspeed, altitude. It is a navigation error where, at the largest true error, the believed one was within
             the limit.
     """
 
@@ -99,10 +99,6 @@ def legs(
     for first, last in _stretches(track, leg):
         passed = [c for c, row in zip(corners, reached, strict=True) if first <= row <= last]
         verdict = _judge(track, first, last, plans, limits, force, given)
-        if lost is not None and last == len(track) - 1:
-            verdict = replace(
-                verdict, trackable=False, cause="stall" if "stalled" in lost else "lost control"
-            )
         if given is not None:
             # All of a corner belongs to the leg that it ends.
             verdict = replace(
@@ -112,7 +108,10 @@ def legs(
             )
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if passed else math.inf
             rows = np.flatnonzero((along > since_m) & (along <= over_m))
-            verdict = _judged_as_given(verdict, given, passed, track, rows, force)
+            verdict = _judged_as_given(verdict, given, rows, passed, (track, plans, limits, force))
+        if lost is not None and last == len(track) - 1:
+            cause = "stall" if "stalled" in lost else "lost control"
+            verdict = replace(verdict, trackable=False, cause=cause)
         judged.append(verdict)
     return tuple(judged)
 
@@ -161,9 +160,10 @@ def _judge(
     load = float(loads.max())
     threshold = limits.cross_track_threshold_m
     cause = None
-    if off.max() > threshold and _believed_within(leg.believed_cross_track_m, 0.0, threshold, off.argmax()):
+    wide = given is None and off.max() > threshold
+    if wide and _believed_within(leg.believed_cross_track_m, 0.0, threshold, off.argmax()):
         cause = NAVIGATION_ERROR
-    elif off.max() > threshold:
+    elif wide:
         cause = cross_track_cause(track, first + int(off.argmax()), plans, limits, force)
     elif load > limits.max_load_factor:
         cause = _steep(track, first + int(loads.argmax()), len(leg) - len(loads) + 1, given) or "load factor"
@@ -210,26 +210,44 @@ def _steep(track: Track, first: int, rows: int, given: AsGiven | None) -> str | 
 
 
 def _judged_as_given(
-    leg: Leg, given: AsGiven, passed: Sequence[Corner], track: Track, rows: IntArray, force: InForce
+    leg: Leg,
+    given: AsGiven,
+    rows: IntArray,
+    passed: Sequence[Corner],
+    flown: tuple[Track, Sequence[AcceptedPlan], FlightLimits, InForce],
 ) -> Leg:
-    """A leg that is not trackable either where it is too far from the path as given, which is at a corner.
+    """A leg that is not trackable either where it is too far from the path as given.
 
     Args:
-        leg: as judged by the plan.
+        leg: as judged by altitude, airspeed and load factor.
         given: the path as given.
-        passed: the corners that the leg leads to.
-        track: the flown track.
         rows: those of the leg, its last corner whole.
-        force: what was in force.
+        passed: the corners that the leg leads to.
+        flown: track, plans, limits and what was in force.
     """
-    off = np.nan_to_num(given.deviation_m[rows])
+    off, cause = np.nan_to_num(given.deviation_m[rows]), leg.cause
     excess = off - given.allowed_m[rows]
-    cause = leg.cause
-    if cause is None and len(rows) and excess.max() > 0.0:
-        worst = int(rows[excess.argmax()])
-        along = np.array([corner.arc_length_m for corner in passed])
-        nearest = int(np.abs(along - track.arc_length_m[worst]).argmin()) if passed else None
-        cause = "turn radius too tight"
-        if nearest is not None:
-            cause = corner_cause(passed[nearest], float(given.allowed_m[worst]), track, worst, force)
+    if len(rows) and excess.max() > 0.0:
+        cause = _cause_off_given(given, int(rows[excess.argmax()]), passed, *flown)
     return replace(leg, max_deviation_m=float(off.max(initial=0.0)), trackable=cause is None, cause=cause)
+
+
+def _cause_off_given(
+    given: AsGiven,
+    worst: int,
+    passed: Sequence[Corner],
+    track: Track,
+    plans: Sequence[AcceptedPlan],
+    limits: FlightLimits,
+    force: InForce,
+) -> str:
+    """Why the aircraft is too far off the path as given, at the row where that is worst."""
+    allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
+    if _believed_within(given.believed_off_m, 0.0, allowed_m, np.intp(worst)):
+        return NAVIGATION_ERROR
+    for corner in passed:
+        if abs(along_m - corner.arc_length_m) <= max(corner.half_m, ABOUT * allowed_m):
+            cause = corner_cause(corner, allowed_m, track, worst, force)
+            if cause in ("turn radius too tight", "wind drift"):
+                return cause
+    return cross_track_cause(track, worst, plans, limits, force)

@@ -170,6 +170,9 @@ class CheckVerdict(Figures):
         verdict: the answer as a sentence.
         drawn: true for a line, which is to be flown as drawn; false for a mission, whose corners may be cut.
         points: number of points given.
+        worst: where the track is furthest off the path in relation to what is allowed there: time, place, distance.
+        limit_used: largest share of what is allowed that was used, `off_path` and `altitude`; above 1 it is a no.
+        corner_m_that_would_do: the `--corner-m` that would have been kept; None where none would, or no other.
         given: how smooth the path as given is.
         corners: corners that had to be cut, as in `metrics.json`.
     """
@@ -178,6 +181,9 @@ class CheckVerdict(Figures):
     verdict: str
     drawn: bool = True
     points: int
+    worst: dict[str, Any] = {}
+    limit_used: dict[str, float | None] = {}
+    corner_m_that_would_do: float | None = None
     given: PathFigures
     corners: tuple[dict[str, Any], ...] = ()
 

@@ -36,6 +36,11 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     rows["off the path given"] = f"{spread(off, ('p95', 'max'))} m, allowed {tolerance}"
     if legs and any(corner["allowed_cut_m"] != legs[0]["threshold_m"] for corner in check["corners"]):
         rows["off the path given"] += ", at corners as below"
+    worst = check["worst"]
+    rows["  worst place"] = (
+        f"{_metres(worst['off_m'])} off at {worst['time_s']:.0f} s, ({worst['east_m']:.0f}, "
+        f"{worst['north_m']:.0f}) m; allowed {_metres(worst['allowed_m'])}"
+    )
     rows |= error_rows(metrics)
     rows["altitude error"] = f"{spread(metrics['altitude_error_m'])} m"
     if "height_above_ground_m" in metrics:
@@ -48,7 +53,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         to = f" to {point} {leg['waypoint']}" if check["items"] and leg["waypoint"] is not None else ""
         rows[f"  leg {leg['number']}{to}"] = (
             f"{leg['start_s']:.0f} to {leg['end_s']:.0f} s: {leg['cause']}, "
-            f"{_metres(_off_m(leg))} off{_in_altitude(leg)}"
+            f"{_metres(leg['max_deviation_m'])} off{_in_altitude(leg)}"
         )
     corners = sorted(check["corners"], key=lambda corner: corner["kept"])
     for corner in _listed(corners, "corners cut", rows):
@@ -97,15 +102,6 @@ def _add_items(items: Sequence[Mapping[str, str]], rows: dict[str, str]) -> None
         rows[f"  item {item['item']} "] = plain(f"{item['name']}, {item['what']}{why}")
     if len(told) > MOST_ITEMS:
         rows["  more"] = f"{len(told) - MOST_ITEMS}, in metrics.json"
-
-
-def _off_m(leg: Mapping[str, Any]) -> float | None:
-    """How far a leg is off what was given, or off the route that was made of it, if that is more.
-
-    About a corner that may be cut, only the route says how far off it is.
-    """
-    given = [leg[key] for key in ("max_deviation_m", "max_cross_track_m") if leg[key] is not None]
-    return max(given, default=None)
 
 
 def _in_altitude(leg: Mapping[str, Any]) -> str:

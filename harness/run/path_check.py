@@ -15,9 +15,9 @@ from harness.files.input_file import InputError
 from harness.flight.closed_loop import Loop
 from harness.flight.observer import Progress
 from harness.run.path_flight import fly_along
-from harness.run.path_measured import measured
 from harness.run.path_plan import PathPlan, planned
 from harness.run.path_scenario import files_of, has_bounds, scenario_for
+from harness.run.path_verdict import measured
 from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_aircraft, make_loop
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
 from harness.run_files.path_files import PathAsGiven, given_points, read_path

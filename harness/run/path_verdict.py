@@ -1,38 +1,188 @@
-"""The answer of a check as one sentence."""
+"""What came of a path that was flown: the content of its `metrics.json`, and the answer as one sentence."""
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final
 
-from harness.analysis.breaches import Breach, Kept
+import numpy as np
+
+from aircraft.guidance.altitude import slewed
+from harness.analysis.as_given import AsGiven
+from harness.analysis.breaches import CONTACT, Breach, Kept, crossings, inside_m, kept
+from harness.analysis.deviation import allowed_m, at_corner, deviation, distances_m
+from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.metrics import error_figures, metrics
+from harness.analysis.smoothness import polyline_profile, smoothness
 from harness.files.wording import tallied
+from harness.flight.record import Flight, Outcome, Track
+from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray
+from harness.world.world import World
+
+if TYPE_CHECKING:
+    from harness.run.path_check import PathCheck
+    from harness.run.path_plan import PathPlan
+    from harness.scenario.scenario import Scenario
+    from harness.world_files.expansion import FileSpec
+
+SPACING_SHARE: Final = 0.25
+"""Points along the given path are measured so close together, in limits of the cross-track error."""
+
+WINDOW_RADII: Final = 4.0
+"""Track and path are compared where they are no further apart than this along the path, in turn radii."""
+
+LAYER_M: Final = 10.0
+"""Depth of a layer: what of a part reaches into it, and into the vertical clearance about it, is solid all through."""
+
+MOST_LAYERS: Final = 40
+"""A flight through more has deeper ones."""
+
+MOST_TRIES: Final = 50
+"""A corner limit that would be kept is looked for in so many steps; each makes it, and what it holds for, larger."""
 
 
-def verdict(figures: Mapping[str, Any], seen: Kept, drawn: bool, tolerance_m: float) -> tuple[bool, str]:
+@dataclass(frozen=True)
+class JudgedCorner:
+    """A corner, and how far off it may be passed."""
+
+    corner: CutCorner
+    allowed_cut_m: float
+
+    @property
+    def waypoint(self) -> int:
+        """Its number."""
+        return self.corner.waypoint
+
+    @property
+    def arc_length_m(self) -> float:
+        """Where on the plan it is."""
+        return self.corner.arc_length_m
+
+    @property
+    def turn_deg(self) -> float:
+        """The turn asked for, positive to the left."""
+        return self.corner.turn_deg
+
+    @property
+    def cut_m(self) -> float:
+        """How far from it the plan passes."""
+        return self.corner.cut_m
+
+    @property
+    def half_m(self) -> float:
+        """So far before and after it the plan is off its legs."""
+        return self.corner.half_m
+
+
+def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str, Any]:
+    """The content of `metrics.json` of a path that was flown.
+
+    On top of what a flight has: `deviation_from_given_m`, `contact`, `breaches`, and under `check` the verdict, the
+    worst place, the corners, what was given, and what became of the items of a mission.
+
+    Args:
+        check: what was asked.
+        flight: what was flown.
+        limits: what it is measured against.
+    """
+    track, tolerance, way = flight.track, limits.cross_track_threshold_m, check.plan.way
+    corners = [JudgedCorner(corner, check.allowed_cut_m(corner.waypoint)) for corner in way.corners]
+    window_m = WINDOW_RADII * limits.turn_radius_m
+    found = deviation(track, way.given_m, SPACING_SHARE * tolerance, window_m)
+    off_m, allowed = np.nan_to_num(found.by_row_m), allowed_m(track, tolerance, corners)
+    believed_m = _believed_off_m(track, way.given_m, window_m)
+    asked = _as_given(check.plan, track, corners, off_m, allowed)
+    figures = metrics(flight, limits, replace(asked, believed_off_m=believed_m))
+    others = layer_contacts(track, check.scenario, check.files)
+    seen = kept(track, World.from_scenario(check.scenario), check.given.fences, check.bounded, others)
+    if seen.contacts and flight.outcome is not Outcome.COLLISION:
+        first = seen.contacts[0]
+        figures["outcome"] = Outcome.COLLISION.value
+        figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
+    passed = [_passed(corner, track, off_m) for corner in corners]
+    figures["trackable"] = (
+        figures["trackable"]
+        and figures["outcome"] == Outcome.REACHED.value
+        and all(corner["kept"] for corner in passed)
+    )
+    worst = _worst(track, off_m, allowed, corners)
+    high_m = np.abs(track.up_m - asked.altitude_m).max()
+    speed = max(float(track.groundspeed_mps.mean()), 1e-3)
+    told = {
+        "ok": False,
+        "verdict": "",
+        "drawn": check.given.drawn,
+        "points": len(check.given.points_m),
+        "worst": worst,
+        "limit_used": {
+            "off_path": worst["off_m"] / worst["allowed_m"] if worst["allowed_m"] else None,
+            "altitude": float(high_m) / limits.max_altitude_error_m,
+        },
+        "corner_m_that_would_do": _sufficient_m(track, off_m, tolerance, corners),
+        "given": dataclasses.asdict(smoothness(polyline_profile(_line(check.plan), speed), speed)),
+        "corners": passed,
+        "fences": [fence.plain() for fence in check.given.fences.every],
+        "items": [dataclasses.asdict(told) for told in check.given.mission.program.items]
+        if check.given.mission
+        else [],
+        "notes": [*check.given.notes, *check.plan.notes],
+    }
+    told["ok"], told["verdict"] = verdict(figures, told, seen, tolerance)
+    return {
+        **figures,
+        "total_system_error_m": error_figures(found.rows_m),
+        "flight_technical_error_m": error_figures(found.rows_m if believed_m is None else believed_m),
+        **_kept_figures(seen),
+        "deviation_from_given_m": found.figures(),
+        "check": told,
+    }
+
+
+def verdict(
+    figures: Mapping[str, Any], told: Mapping[str, Any], seen: Kept, tolerance_m: float
+) -> tuple[bool, str]:
     """Whether a path can be flown as given, and a sentence that says so or why not.
 
     Args:
         figures: of the flight: outcome, reason, `trackable`, `trackability`.
+        told: the figures under `check`: corners, worst place, how much of the limits was used.
         seen: what was touched and crossed.
-        drawn: the path is to be flown as drawn; else it is a mission, whose corners may be cut.
-        tolerance_m: what the aircraft may be off.
+        tolerance_m: what the aircraft may be off away from corners.
     """
-    bad = [leg for leg in figures["trackability"] if not leg["trackable"]]
+    bad = [leg["cause"] for leg in figures["trackability"] if not leg["trackable"]]
+    off = [corner for corner in told["corners"] if not corner["kept"]]
     faults = [_first(seen.contacts, "touches")] if seen.contacts else []
     for kind, verb in (("exclusion", "enters"), ("inclusion", "leaves"), ("area", "leaves")):
         crossed = [each for each in seen.crossings if each.kind == kind]
         faults += [_first(crossed, verb)] if crossed else []
     if bad:
-        faults.append(tallied([leg["cause"] for leg in bad], "legs"))
+        faults.append(tallied(bad, "legs"))
+    elif off:
+        faults.append("turn radius too tight")
+    worst = told["worst"]
+    if worst["off_m"] > worst["allowed_m"] or off:
+        faults.append(_how_far(worst))
+        enough_m = told["corner_m_that_would_do"]
+        if enough_m is not None:
+            faults.append(f"--corner-m {enough_m:g} would be yes")
     if figures["outcome"] not in ("reached", "collision"):
         faults.append(str(figures["reason"]))
     if not faults and not figures["trackable"]:
         faults.append("no leg was flown")
     if faults:
         return False, "no: " + "; ".join(faults)
-    how = "as drawn" if drawn else "with its corners cut by no more than allowed"
-    return True, f"yes: flown {how}, within {tolerance_m:.3g} m"
+    how = "as drawn" if told["drawn"] else "with its corners cut by no more than allowed"
+    used = max(told["limit_used"]["off_path"] or 0.0, told["limit_used"]["altitude"])
+    return True, f"yes: flown {how}, within {tolerance_m:.3g} m; {used:.0%} of a limit used at most"
+
+
+def _how_far(worst: Mapping[str, Any]) -> str:
+    """How far off the worst place is."""
+    where = "" if worst["waypoint"] is None else f" at {worst['waypoint']}"
+    return f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed"
 
 
 def _first(found: Sequence[Breach], verb: str) -> str:
@@ -40,3 +190,166 @@ def _first(found: Sequence[Breach], verb: str) -> str:
     first = found[0]
     more = f", {len(found) - 1} more" if len(found) > 1 else ""
     return f"{verb} {first.name} at {first.start_s:.0f} s, by {first.depth_m:.3g} m{more}"
+
+
+def _worst(
+    track: Track, off_m: FloatArray, allowed: FloatArray, corners: Sequence[JudgedCorner]
+) -> dict[str, Any]:
+    """The place where the track is furthest off the path in relation to what is allowed there."""
+    row = int((off_m / np.maximum(allowed, 1e-9)).argmax())
+    near = [corner.waypoint for corner in corners if at_corner(track, corner)[row]]
+    return {
+        "time_s": float(track.time_s[row]),
+        "east_m": float(track.east_m[row]),
+        "north_m": float(track.north_m[row]),
+        "off_m": float(off_m[row]),
+        "allowed_m": float(allowed[row]),
+        "waypoint": near[0] if near else None,
+    }
+
+
+def _sufficient_m(
+    track: Track, off_m: FloatArray, tolerance_m: float, corners: Sequence[JudgedCorner]
+) -> float | None:
+    """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
+
+    def off_at_corners(these: Sequence[JudgedCorner]) -> float:
+        return max(float(_passed(corner, track, off_m)["most_off_m"]) for corner in these)
+
+    reached = [_passed(corner, track, off_m) for corner in corners]
+    if all(each["kept"] for each in reached) or any(each["flown_cut_m"] is None for each in reached):
+        return None
+    limit_m = 0.0
+    for _ in range(MOST_TRIES):
+        tried = [replace(corner, allowed_cut_m=limit_m) for corner in corners]
+        needed_m = off_at_corners(tried)
+        if needed_m <= limit_m:
+            within = bool((off_m <= allowed_m(track, tolerance_m, tried)).all())
+            return limit_m if within else None
+        limit_m = float(math.ceil(needed_m))
+    return None
+
+
+def _believed_off_m(track: Track, given_m: FloatArray, window_m: float) -> FloatArray | None:
+    """(n,) how far off the path as given the aircraft believed to be; None where navigation is perfect."""
+    if not track.has_beliefs:
+        return None
+    off = np.full(len(track), math.nan)
+    rows = np.flatnonzero(track.arc_length_m <= given_m[-1, 2])
+    if len(rows):
+        along = np.maximum.accumulate(track.arc_length_m[rows])
+        off[rows] = distances_m(np.column_stack((track.believed_m[rows, :2], along)), given_m, window_m)
+    return off
+
+
+def _line(plan: PathPlan) -> FloatArray:
+    """(k, 2) the line that was given: of a mission with its circles."""
+    if not plan.marks:
+        return plan.way.waypoints_m
+    line = plan.way.given_m[:, :2]
+    apart = np.hypot(*np.diff(line, axis=0).T) > SAME_PLACE_M
+    every: FloatArray = line[np.append(True, apart)]
+    return every
+
+
+def _as_given(
+    plan: PathPlan, track: Track, corners: list[JudgedCorner], off_m: FloatArray, allowed: FloatArray
+) -> AsGiven:
+    """What the path asks for, row by row."""
+    along = np.nan_to_num(track.arc_length_m)
+    profile = plan.profile
+    asked = np.searchsorted(profile.speed_from_m, along, side="right") - 1
+    speeds = slewed(plan.asked_mps[np.maximum(asked, 0)], track.time_s)
+    if profile.level:
+        fastest = np.full((len(track), 2), np.inf)
+    else:
+        rates = {speed: plan.climb_mps(speed) for speed in set(profile.airspeed_mps.tolist())}
+        fastest = np.array([rates[speed] for speed in profile.airspeeds(along).tolist()]).reshape(-1, 2)
+    return AsGiven(
+        _ends(plan, corners),
+        off_m,
+        allowed,
+        altitude_m=profile.altitudes(along),
+        climb_mps=profile.slopes(along) * track.groundspeed_mps,
+        fastest_mps=fastest,
+        airspeed_mps=speeds,
+    )
+
+
+def _ends(plan: PathPlan, corners: list[JudgedCorner]) -> list[JudgedCorner]:
+    """Where legs end: at every item of a mission; at the corners of a drawn line, and where its slope changes."""
+    known = {(corner.waypoint, round(corner.arc_length_m, 3)): corner for corner in corners}
+    ends = [] if plan.marks else corners.copy()
+    for number, along in plan.marks or plan.bends:
+        plain = JudgedCorner(CutCorner(number, 0.0, 0.0, 0.0, 0.0, 0.0, along, 0.0), 0.0)
+        corner = known.get((number, round(along, 3)), plain)
+        ends += [corner] if plan.marks or corner is plain else []
+    return sorted(ends, key=lambda each: each.arc_length_m)
+
+
+def _kept_figures(seen: Kept) -> dict[str, Any]:
+    return {
+        "min_clearance_m": seen.margin_m if np.isfinite(seen.margin_m) else None,
+        "contact": bool(seen.contacts),
+        "contacts": [each.plain() for each in seen.contacts],
+        "breaches": [each.plain() for each in seen.crossings],
+        **({} if seen.height_m is None else {"height_above_ground_m": seen.height_m}),
+    }
+
+
+def _passed(corner: JudgedCorner, track: Track, off_m: FloatArray) -> dict[str, Any]:
+    """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there."""
+    place, about = corner.corner, at_corner(track, corner)
+    flown = None
+    if bool((track.arc_length_m >= corner.arc_length_m).any()):
+        flown = float(np.hypot(track.east_m - place.east_m, track.north_m - place.north_m)[about].min())
+    most = float(off_m[about].max(initial=flown or 0.0))
+    return {
+        **dataclasses.asdict(place),
+        "flown_cut_m": flown,
+        "most_off_m": most,
+        "allowed_cut_m": corner.allowed_cut_m,
+        "kept": flown is not None and most <= corner.allowed_cut_m,
+    }
+
+
+def layer_contacts(
+    track: Track, scenario: Scenario, files: Sequence[FileSpec]
+) -> tuple[tuple[Breach, ...], float]:
+    """Contacts with what is solid at the altitudes of a track, and the least distance from it.
+
+    Terrain is left out: contact with it is told from its true height.
+
+    Args:
+        track: what was flown.
+        scenario: gives the plane, the area and the ground.
+        files: those that are cut.
+    """
+    import shapely
+
+    from harness.world_files.expansion import expanded, loaded_file
+    from harness.world_files.plane import Place
+
+    specs = [each for each in files if loaded_file(each.path, each.kind, each.reading).terrain is None]
+    if not specs or not len(track):
+        return (), math.inf
+    origin = scenario.area.origin
+    place = Place(origin.latitude_deg, origin.longitude_deg)
+    known = None if scenario.ground is None else scenario.ground.field()
+    deep = max(LAYER_M, float(np.ptp(track.up_m)) / MOST_LAYERS)
+    layer = np.floor(track.up_m / deep).astype(np.int64)
+    margins = {spec.path.name: np.full(len(track), np.inf) for spec in specs}
+    found: list[Breach] = []
+    for number in np.unique(layer).tolist():
+        rows = layer == number
+        thick = [replace(spec, vertical_clearance_m=spec.vertical_clearance_m + 0.5 * deep) for spec in specs]
+        sources = expanded(thick, place, scenario.area.bounds_m, (number + 0.5) * deep, ground=known).sources
+        for source in sources:
+            if source.polygons:
+                solid = shapely.union_all(source.polygons)
+                margin: FloatArray = np.where(rows, -inside_m(track, solid), np.inf)
+                name = source.spec.path.name
+                margins[name] = np.minimum(margins[name], margin)
+                found += crossings(track, margin, CONTACT, name, outside_of=solid)
+    least = min(float(margin.min()) for margin in margins.values())
+    return tuple(found), least

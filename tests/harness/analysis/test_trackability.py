@@ -165,6 +165,13 @@ def test_corners_end_legs_and_belong_to_the_leg_that_they_end(
         (40.0, 2, 51.0, 51.0, "tracking error"),
         (60.0, None, 0.0, 3.0, None),
     ]
+    # What lies beyond a corner counts as well, however near the track is to the arcs that were made of the path.
+    beyond = as_given(track, corners, np.where(track.arc_length_m > 1100.0, 51.0, 3.0), 50.0)
+    assert [leg.trackable for leg in legs(track, [straight_plan], LIMITS, given=beyond)] == [
+        True,
+        True,
+        False,
+    ]
 
 
 @pytest.mark.parametrize(

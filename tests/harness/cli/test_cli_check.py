@@ -329,7 +329,7 @@ def test_a_polygon_across_a_line_is_a_fence_unless_it_is_told_otherwise(
 def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
     checked = check([(0.0, 0.0), (0.0, 1500.0)])
     assert checked.ok
-    assert repr(checked) == "CheckedPath('yes: flown as drawn, within 10 m')"
+    assert repr(checked) == "CheckedPath('yes: flown as drawn, within 10 m; 0% of a limit used at most')"
     assert checked.metrics["digest"] == check(straight).metrics["digest"]
     assert not check(np.array([(0.0, 0.0), (0.0, 1000.0), (60.0, 1000.0), (60.0, 0.0)])).ok
     with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):

@@ -80,24 +80,6 @@ def test_a_mission_is_flown_item_by_item(tmp_path: Path, capsys: pytest.CaptureF
     assert "item 7 change altitude, not flown: an aeroplane here cannot" in said
 
 
-def test_a_leg_that_is_all_corner_says_how_far_off_the_route_it_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Its corner may be cut, so it is nowhere off the path given; and yet it is not trackable."""
-    places = ((0, 0, 50), (-579, 91, 100), (-440, 268, 100), (22, 188, 100), (-123, 14, 0))
-    rows = [
-        "\t".join(map(str, (number, 0, 4, 21 if number == 5 else 16, 0, 0, 0, 0, *place, 1)))
-        for number, place in enumerate(places, start=1)
-    ]
-    path = write(tmp_path / "m.waypoints", *rows)
-    given = ["check", str(path), "--aircraft", "aerosonde", "--no-recording", "--out", str(tmp_path / "run")]
-    assert main(given) == 1
-    last = load_run(tmp_path / "run").metrics["trackability"][-1]
-    assert (last["trackable"], last["max_deviation_m"]) == (False, 0.0)
-    said = " ".join(capsys.readouterr().out.split())
-    assert f"{last['cause']}, {last['max_cross_track_m']:.3g} m off" in said
-
-
 def test_an_item_that_is_not_reached_and_keeps_autopilots_from_loading_the_mission_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
