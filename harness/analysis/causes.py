@@ -48,8 +48,12 @@ LEAST_CLIMB_MPS = 0.2
 NAVIGATION_ERROR = "navigation error"
 """Cause where the aircraft did as it believed: neither it nor the plan is at fault."""
 
+PLAN_ENDED = "plan ended"
+"""Cause where the aircraft flew on beyond the end of its plan by more than it may be off it."""
+
 FINDINGS: Mapping[str, str] = {
     "planner too late": "the aircraft was off the plan already when the plan took effect",
+    PLAN_ENDED: "the aircraft flew on beyond the end of its plan, where nothing was planned",
     "turn radius too tight": "the plan turns on a radius below V\N{SUPERSCRIPT TWO} / (g tan(bank limit)) at the "
     "commanded airspeed in calm air, or a corner cannot be kept without one",
     "sensor horizon": "the plan turns on such a radius within sensing range of an obstacle, and `sensor.range_m` is "

@@ -64,7 +64,7 @@ def planned_rows(track: Track, plans: Sequence[AcceptedPlan | PlanRow]) -> Plann
     for accepted in plans:
         rows = np.flatnonzero(track.plan_index == accepted.plan_index)
         if len(rows):
-            place, bend, direction = _along(accepted, track.arc_length_m[rows], corner_m)
+            place, bend, direction = along_plan(accepted, track.arc_length_m[rows], corner_m)
             turn = _asked_for(track, int(rows[0]), float(direction[0])) / corner_m
             taking_up = track.arc_length_m[rows] - track.arc_length_m[rows[0]] < corner_m
             bend[taking_up & (np.abs(bend) < abs(turn))] = turn
@@ -78,7 +78,7 @@ def _asked_for(track: Track, row: int, direction_rad: float) -> float:
     return math.remainder(direction_rad - course, math.tau)
 
 
-def _along(
+def along_plan(
     accepted: AcceptedPlan | PlanRow, arc_length_m: FloatArray, corner_m: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """A plan at stations: (2, k) places, (k,) curvatures, (k,) directions, counter-clockwise from east.

@@ -212,6 +212,9 @@ class Metrics(Figures):
         max_load_factor: largest load factor.
         trackable: whether every leg was tracked.
         trackability: verdict and cause, leg by leg.
+        findings: what the outcome does not say, each with kind, time and text.
+        bank_reversals_per_min: how often a minute the bank command goes from one side to the other.
+        plan_contradictions: plans that lead to the other side of the course than the one before.
         replans: plans accepted after the first.
         plan_delay_s: from the latest scan that a plan could use until the plan took effect.
         lost_returns: share of the returns that the sensor lost.
@@ -246,6 +249,9 @@ class Metrics(Figures):
     max_load_factor: float | None = None
     trackable: bool
     trackability: tuple[LegVerdict, ...]
+    findings: tuple[dict[str, Any], ...] = ()
+    bank_reversals_per_min: float | None = None
+    plan_contradictions: int | None = None
     replans: int
     plan_delay_s: Delays = Delays()
     lost_returns: LostReturns = LostReturns()

@@ -108,6 +108,7 @@ def flight_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
         **error_rows(metrics),
         "altitude error": f"{spread(metrics['altitude_error_m'])} m",
         "trackable": _tracked(metrics),
+        **{each["kind"]: plain(each["text"]) for each in metrics.get("findings", ())},
         "replans": str(metrics["replans"]),
         "planner time": f"p99 {legible(compute['p99'])} / max {legible(compute['max'])} ms a search",
         "wall time": f"{legible(timing['wall_s'])} s, {legible(timing['realtime_factor'])} x real time",

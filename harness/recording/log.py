@@ -18,6 +18,7 @@ import rerun as rr
 
 from aircraft.interface import AircraftState
 from harness.analysis.causes import NAVIGATION_ERROR
+from harness.flight.observer import Caution
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
@@ -202,6 +203,10 @@ class RerunLog:
             run: typed figures of the run (`harness.recording.properties.run_properties`).
             varied: the keys that a campaign varied, and their values.
         """
+        self._events += [
+            (each["time_s"], Caution(f"{each['kind']}: {each['text']}"), look.WARNED)
+            for each in (metrics or {}).get("findings", ())
+        ]
         self._send_happened()
         if self._whole:
             whole = np.concatenate(self._whole)

@@ -13,7 +13,7 @@ from harness.files.whole_file import replace_text
 from harness.files.wording import printable
 from harness.report.chapters import entry, optimum_of, run_chapter
 from harness.report.page import JudgedBy, run_html
-from harness.report.remarks import remarks
+from harness.report.remarks import Remark, remarks
 from harness.run_files.run_folder import REPORT, SCENARIO, WRONG_CONTENT, Run, damaged, load_run
 from harness.scenario.scenario import Scenario, parse_scenario
 
@@ -55,7 +55,8 @@ def _written(run: Run, folder: Path) -> Path:
             run.track, scenario.planner.clearance_m or 0.0, run.metrics["bank_saturation_fraction"] > 0.0
         ),
         judged=_judged_by(scenario),
-        remarks=remarks(
+        remarks=[Remark(each["kind"], each["text"]) for each in run.metrics.get("findings", ())]
+        + remarks(
             flight.row,
             scenario.planner.clearance_m or 0.0,
             scenario.aircraft.airspeed_mps or 0.0,

@@ -43,7 +43,7 @@ def flat(
 ) -> Case:
     """A straight flight north at 25 m/s in which some columns are other than they should be."""
     flown = track(ROWS, **columns)
-    asked = {
+    asked: dict[str, Any] = {
         "corners": (),
         "deviation_m": np.zeros(ROWS),
         "allowed_m": np.full(ROWS, 5.0),
@@ -133,8 +133,10 @@ def gaining_speed(speed_mps: float) -> Case:
 
 
 SPEEDS_AND_BANKS = tuple(product((15.0, 20.0, 25.0, 32.0, 60.0, 80.0), (30.0, 45.0)))
-AT_LIMIT = {"cross_track_m": OFF, "roll_command_deg": 45.0}
-HIGH, LOW, SLOW = {"up_m": 300.0 + 2.0 * OFF}, {"up_m": 300.0 - 2.0 * OFF}, {"airspeed_mps": 20.0}
+AT_LIMIT: dict[str, Any] = {"cross_track_m": OFF, "roll_command_deg": 45.0}
+HIGH: dict[str, Any] = {"up_m": 300.0 + 2.0 * OFF}
+LOW: dict[str, Any] = {"up_m": 300.0 - 2.0 * OFF}
+SLOW: dict[str, Any] = {"airspeed_mps": 20.0}
 
 
 def limited(share: float, columns: dict[str, Any]) -> Case:
@@ -146,10 +148,10 @@ def limited(share: float, columns: dict[str, Any]) -> Case:
 
 def unseen(speed_mps: float, bank_deg: float) -> Case:
     """A turn that is too tight beside an obstacle that was seen too late for another."""
-    flown, planned, limits, *rest = turning(
+    flown, planned, limits, _, _ = turning(
         0.9 * calm_m(speed_mps, bank_deg), speed_mps, bank_deg, clearance_m=60.0
     )
-    return flown, planned, replace(limits, sensor_range_m=100.0, horizon_m=200.0), *rest
+    return flown, planned, replace(limits, sensor_range_m=100.0, horizon_m=200.0), None, None
 
 
 def believed(off_m: float) -> Case:
@@ -159,7 +161,14 @@ def believed(off_m: float) -> Case:
     return flat({"cross_track_m": np.linspace(0.0, off_m, ROWS), **here})
 
 
+def short(length_m: float) -> Case:
+    """A plan that ends on the way, and another that never comes."""
+    flown, _, limits, _, _ = flat({})
+    return flown, plan([(0, 0, 0, 1, 0.0, length_m)]), limits, None, None
+
+
 CASES: dict[str, list[Case]] = {
+    "plan ended": [short(length) for length in np.linspace(100.0, 700.0, 12)],
     "planner too late": [
         flat({"cross_track_m": np.linspace(off, 0.0, ROWS)}) for off in np.linspace(6.0, 40.0, 12)
     ],

@@ -1,0 +1,123 @@
+"""What happened in a flight that its outcome does not say: plans that ended, came late or contradict each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.planned import along_plan
+from harness.flight.record import AcceptedPlan, Flight, FloatArray, Track
+
+AHEAD_S: Final = 5.0
+"""Two plans are compared where they lead to within this time of flight."""
+
+APART_DEG: Final = 15.0
+"""A plan leads to one side of the course if it turns away from it by at least this angle within `AHEAD_S`."""
+
+FEW_CONTRADICTIONS: Final = 2
+"""Up to this many contradictions of plans are no finding: what is sensed for the first time may turn a plan round."""
+
+BANKED_DEG: Final = 10.0
+"""A bank command counts as to one side from this angle on."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding.
+
+    Attributes:
+        kind: `plan ended`, `planner slower than the scans` or `plans contradict each other`.
+        time_s: simulated time at which it was so first.
+        text: a clause with the figures.
+    """
+
+    kind: str
+    time_s: float
+    text: str
+
+
+def findings(flight: Flight, limits: FlightLimits) -> tuple[Finding, ...]:
+    """All findings of a flight, in order of time."""
+    found = (_ended(flight, limits), _slow(flight, limits), _contradicted(flight))
+    return tuple(sorted((each for each in found if each is not None), key=lambda each: each.time_s))
+
+
+def beyond_end_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
+    """(n,) how far beyond the end of the plan in effect the aircraft is; 0 on the plan, and on one that loiters."""
+    length = np.array([math.inf if plan.loiter else float(plan.segments[:, 5].sum()) for plan in plans])
+    flown = track.plan_index >= 0
+    beyond = np.zeros(len(track))
+    beyond[flown] = np.maximum(track.arc_length_m[flown] - length[track.plan_index[flown]], 0.0)
+    return np.nan_to_num(beyond)
+
+
+def bank_reversals_per_min(track: Track) -> float:
+    """How often a minute the bank command goes from `BANKED_DEG` on one side to as much on the other."""
+    side = np.sign(track.roll_command_deg)[np.abs(track.roll_command_deg) >= BANKED_DEG]
+    minutes = float(track.time_s[-1] - track.time_s[0]) / 60.0
+    return float(np.count_nonzero(np.diff(side))) / minutes if minutes > 0.0 else 0.0
+
+
+def contradictions_s(track: Track, plans: Sequence[AcceptedPlan]) -> list[float]:
+    """Simulated times at which a plan took effect that leads to the other side of the course than the one before."""
+    index = track.plan_index
+    times = []
+    for row in (np.flatnonzero(np.diff(index) > 0) + 1).tolist():
+        before, after = int(index[row - 1]), int(index[row])
+        reach = AHEAD_S * float(track.groundspeed_mps[row])
+        course = math.pi / 2.0 - math.radians(float(track.course_deg[row]))
+        turns = [
+            math.remainder(_direction(plans[each], float(track.arc_length_m[at]) + reach) - course, math.tau)
+            for each, at in ((before, row - 1), (after, row))
+            if before >= 0
+        ]
+        if turns and turns[0] * turns[1] < 0.0 and min(map(abs, turns)) >= math.radians(APART_DEG):
+            times.append(float(track.time_s[row]))
+    return times
+
+
+def _direction(plan: AcceptedPlan, arc_length_m: float) -> float:
+    """Direction of a plan at a station, counter-clockwise from east."""
+    _, _, direction = along_plan(plan, np.array([arc_length_m]), 1.0)
+    return float(direction[0])
+
+
+def _ended(flight: Flight, limits: FlightLimits) -> Finding | None:
+    beyond = beyond_end_m(flight.track, flight.plans)
+    rows = np.flatnonzero(beyond > limits.cross_track_threshold_m)
+    if not len(rows):
+        return None
+    text = f"the aircraft flew on up to {beyond.max():,.0f} m beyond the end of its plan, where nothing was planned"
+    return Finding("plan ended", float(flight.track.time_s[rows[0]]), text)
+
+
+def _slow(flight: Flight, limits: FlightLimits) -> Finding | None:
+    allowed_s = max(limits.scan_period_s, limits.compute_latency_s)
+    slow = [each for each in flight.compute_ms if each > 1e3 * allowed_s]
+    if not slow:
+        return None
+    text = (
+        f"{len(slow)} of {len(flight.compute_ms)} searches took longer than the {1e3 * limits.scan_period_s:,.0f} ms "
+        f"from scan to scan, up to {max(slow):,.0f} ms; flown as if they took "
+        f"{1e3 * limits.compute_latency_s:,.0f} ms (planner.compute_latency_s)"
+    )
+    plan = next((plan for plan in flight.plans if plan.compute_ms > 1e3 * allowed_s), None)
+    return Finding(
+        "planner slower than the scans", float(flight.track.time_s[0]) if plan is None else plan.time_s, text
+    )
+
+
+def _contradicted(flight: Flight) -> Finding | None:
+    times = contradictions_s(flight.track, flight.plans)
+    if len(times) <= FEW_CONTRADICTIONS:
+        return None
+    text = (
+        f"{len(times)} of {len(flight.plans)} plans lead to the other side of the course than the one before; "
+        f"{bank_reversals_per_min(flight.track):.1f} bank reversals a minute"
+    )
+    return Finding("plans contradict each other", times[0], text)
