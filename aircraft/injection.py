@@ -13,12 +13,15 @@ from tempfile import TemporaryDirectory
 
 from aircraft.actuators.actuator import NormActuator
 from aircraft.actuators.components import insert
+from aircraft.deviation import AS_MODELLED, Deviation, deviate
 
 THROTTLE = "fcs/throttle-cmd-norm"
 
 
 @contextmanager
-def with_autopilot(model: Path, actuators: tuple[tuple[str, NormActuator], ...] = ()) -> Iterator[Path]:
+def with_autopilot(
+    model: Path, actuators: tuple[tuple[str, NormActuator], ...] = (), deviation: Deviation = AS_MODELLED
+) -> Iterator[Path]:
     """Derives an aircraft folder whose model starts with the autopilot system.
 
     The other files of the model are linked, so that references from the model resolve as before.
@@ -26,6 +29,7 @@ def with_autopilot(model: Path, actuators: tuple[tuple[str, NormActuator], ...] 
     Args:
         model: the model's XML file, <folder>/<name>.xml.
         actuators: controls, and what moves each.
+        deviation: by how much the flown aircraft differs.
 
     Yields:
         A folder that holds <name>/<name>.xml, gone when the context ends.
@@ -34,10 +38,10 @@ def with_autopilot(model: Path, actuators: tuple[tuple[str, NormActuator], ...] 
         ValueError: if the model is not well-formed XML or not a JSBSim model.
     """
     try:
-        with_system = _with_system(model.read_bytes(), actuators)
+        with_system = _with_system(model.read_bytes(), actuators, deviation)
     except ElementTree.ParseError as error:
         raise ValueError(f"{model} is not well-formed XML: {error}") from None
-    except ValueError as error:
+    except _NoModel as error:
         raise ValueError(f"{model} is not a JSBSim model: {error}") from None
     with TemporaryDirectory(prefix="wayproof-") as folder:
         derived = Path(folder, model.stem)
@@ -49,13 +53,21 @@ def with_autopilot(model: Path, actuators: tuple[tuple[str, NormActuator], ...] 
         yield Path(folder)
 
 
+class _NoModel(ValueError):
+    """XML that is no JSBSim model."""
+
+
 @lru_cache(maxsize=8)
-def _with_system(model: bytes, actuators: tuple[tuple[str, NormActuator], ...]) -> bytes:
+def _with_system(
+    model: bytes, actuators: tuple[tuple[str, NormActuator], ...], deviation: Deviation
+) -> bytes:
     """The XML of a model that starts with the autopilot system, writes no files of its own and listens to nobody."""
     root = ElementTree.fromstring(model)
     if root.tag != "fdm_config":
-        raise ValueError(f"its root element is <{root.tag}>, not <fdm_config>")
+        raise _NoModel(f"its root element is <{root.tag}>, not <fdm_config>")
     system = ElementTree.fromstring(files("aircraft").joinpath("systems", "autopilot.xml").read_bytes())
+    if deviation.any:
+        deviate(root, deviation)
     engines = len(root.findall("propulsion/engine"))
     for component in system.iter("fcs_function"):
         if any(output.text == THROTTLE for output in component.findall("output")):

@@ -125,7 +125,7 @@ def _load(files: ModelFiles, step_rate_hz: int) -> Any:
     )  # before the model: its filters and integrators take their step when they are loaded
     with ExitStack() as stack:
         try:
-            derived = stack.enter_context(with_autopilot(files.model, files.actuators))
+            derived = stack.enter_context(with_autopilot(files.model, files.actuators, files.deviation))
             fdm.set_aircraft_path(str(derived))
             fdm.set_engine_path(str(files.engines))
             fdm.set_systems_path(str(files.systems))

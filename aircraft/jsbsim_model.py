@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from aircraft.airframe import Airframe
-from aircraft.frames import LocalPlane
+from aircraft.frames import LocalPlane, PatchedPlane
 from aircraft.interface import STEP_RATE_HZ, AircraftState
 from aircraft.jsbsim_loading import load, node, trim
 from aircraft.model_files import AircraftError
-from aircraft.plane_patch import PatchedPlane
 from aircraft.properties import (
     COMMAND_PROPERTIES,
     CONTROLS,
@@ -21,7 +21,7 @@ from aircraft.properties import (
     TURBULENCE_W20_FPS,
     WIND_PROPERTIES,
 )
-from aircraft.start import Atmosphere, Gust, StartConditions
+from aircraft.start import Atmosphere, Gust, StartConditions, VerticalGusts
 
 GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
@@ -31,6 +31,10 @@ STALL_SPEED_SHARE = 0.8
 """Share of the lowest level-flight airspeed below which the aircraft counts as stalled."""
 
 SETTLING_STEP_S = 1e-9
+TERRAIN_BELOW_FT = 10.0 / FOOT_M
+"""The flight model's ground is at least so far below the aircraft, so that its wheels do not touch it: contact is
+judged by the true world."""
+
 INTEGRATOR_MEMORY = 6
 """Steps that replace every derivative an integrator of JSBSim remembers."""
 
@@ -49,6 +53,7 @@ class JsbsimModel:
         atmosphere: Atmosphere | None = None,
         step_rate_hz: int = STEP_RATE_HZ,
         climb_limit_mps: float | None = None,
+        ground: Callable[[float, float], float] | None = None,
     ) -> None:
         """Loads, trims and starts the aircraft.
 
@@ -60,6 +65,8 @@ class JsbsimModel:
             step_rate_hz: integration steps per second.
             climb_limit_mps: the fastest climb or descent that the altitude loop asks for; None: its own, for flight
                 at one altitude.
+            ground: height of the ground at an east and north (m), NaN where it is not known; None: sea level.
+                Turbulence and the profile of the wind depend on the height over it.
 
         Raises:
             AircraftError: if the airspeed is out of range or too low for the wind, or the model cannot be loaded,
@@ -70,8 +77,10 @@ class JsbsimModel:
         self._step_rate_hz = step_rate_hz
         self._step = 0
         atmosphere = atmosphere or Atmosphere()
+        self._ground, self._terrain_ft = ground, 0.0
+        height_m = start.altitude_m - self._ground_m(start.east_m, start.north_m)
         try:
-            heading_rad = start.heading_rad(atmosphere)
+            heading_rad = start.heading_rad(Atmosphere(*atmosphere.wind_at(0.0, height_m)))
         except ValueError as error:
             raise AircraftError(f"{self.airframe.name}: {error}") from None
         self._stall_rad = math.radians(self.airframe.stall_angle_deg)
@@ -81,14 +90,19 @@ class JsbsimModel:
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
         """Of the meridian convergence where the state was last read."""
         self._gust: Gust | None = None
+        self._vertical_gusts: VerticalGusts | None = None
         self._windy = atmosphere.wind_mps > 0.0
+        self._air = None if atmosphere.steady else atmosphere
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
+        self._place = (start.east_m, start.north_m, start.altitude_m / FOOT_M)
 
         fdm = self._fdm = load(self.airframe.files, step_rate_hz)
         trim(fdm, self.airframe.name, plane, start, heading_rad + convergence_rad)
         self._read = tuple(node(fdm, path).get_double_value for path in STATE_PROPERTIES)
         self._write = tuple(node(fdm, path).set_double_value for path in COMMAND_PROPERTIES)
         self._write_wind = tuple(node(fdm, path).set_double_value for path in WIND_PROPERTIES)
+        self._write_wind_down = node(fdm, "atmosphere/wind-down-fps").set_double_value
+        self._write_terrain = node(fdm, "position/terrain-elevation-asl-ft").set_double_value
         self._enable = node(fdm, "wayproof/enable").set_double_value
         self._read_for_fault = tuple(node(fdm, path).get_double_value for path in FAULT_PROPERTIES)
         servos = [name for name, servo in frame.files.actuators if servo.rate_limit_1ps is not None]
@@ -103,7 +117,7 @@ class JsbsimModel:
         self._settle()
         if atmosphere.turbulence is not None and atmosphere.intensity is not None:
             self._stir(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
-        self._gust = atmosphere.gust
+        self._gust, self._vertical_gusts = atmosphere.gust, atmosphere.vertical_gusts
         self.engage()
 
     @property
@@ -131,6 +145,7 @@ class JsbsimModel:
         ) = [read() for read in self._read]
         elevator, pitch_trim, aileron, roll_trim, rudder, yaw_trim = deflections
         east_m, north_m, convergence_rad = self._plane.project(latitude_rad, longitude_rad)
+        self._place = east_m, north_m, up_ft
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
         cosine_m, sine_m = FOOT_M * self._cosine, FOOT_M * self._sine
         return AircraftState(
@@ -164,13 +179,15 @@ class JsbsimModel:
         roll(roll_rad)
         altitude(altitude_m / FOOT_M)
         airspeed(airspeed_mps / FOOT_M)
+        if self._ground is not None:
+            self._lay_ground()
         if self._windy:
             self._blow()
 
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         run = self._fdm.run
-        if self._gust is not None:
+        if self._gust is not None or self._vertical_gusts is not None:
             for _ in range(steps):
                 self._blow()
                 run()
@@ -252,6 +269,10 @@ class JsbsimModel:
     def _wind_true(self) -> tuple[float, float]:
         """The wind towards true east and north where the aircraft is now, ft/s, the gust included."""
         east, north = self._wind
+        if self._air is not None:
+            height_m = (self._place[2] - self._terrain_ft) * FOOT_M
+            east, north = self._air.wind_at(self._step / self._step_rate_hz, height_m)
+            east, north = east / FOOT_M, north / FOOT_M
         if self._gust is not None:
             share = self._gust.share(self._step / self._step_rate_hz) / FOOT_M
             east, north = east + share * self._gust.east_mps, north + share * self._gust.north_mps
@@ -262,6 +283,20 @@ class JsbsimModel:
         east_fps, north_fps = self._wind_true()
         write_east(east_fps)
         write_north(north_fps)
+        if self._vertical_gusts is not None:
+            up_mps = self._vertical_gusts.up_mps(self._step / self._step_rate_hz)
+            self._write_wind_down(-up_mps / FOOT_M)
+
+    def _ground_m(self, east_m: float, north_m: float) -> float:
+        """Height of the ground; where it is not known, as it was last."""
+        height_m = math.nan if self._ground is None else self._ground(east_m, north_m)
+        return self._terrain_ft * FOOT_M if math.isnan(height_m) else height_m
+
+    def _lay_ground(self) -> None:
+        """Puts the flight model's ground below the aircraft where it was when its state was last read."""
+        east_m, north_m, up_ft = self._place
+        self._terrain_ft = self._ground_m(east_m, north_m) / FOOT_M
+        self._write_terrain(min(self._terrain_ft, up_ft - TERRAIN_BELOW_FT))
 
     def _stir(self, model: str, intensity: str, seed: int) -> None:
         """Starts turbulence after MIL-F-8785C."""

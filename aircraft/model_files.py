@@ -12,6 +12,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from aircraft.actuators.actuator import NormActuator
+from aircraft.deviation import AS_MODELLED, Deviation
 from aircraft.foreign_model import faults
 
 OWN = Path(__file__).parent
@@ -34,12 +35,14 @@ class ModelFiles:
         engines: folder that its engines and propellers are read from.
         systems: folder that its shared systems are read from.
         actuators: controls, and what moves each where it does not do what it is told at once.
+        deviation: by how much the flown aircraft differs; no survey is flown with it.
     """
 
     model: Path
     engines: Path
     systems: Path
     actuators: tuple[tuple[str, NormActuator], ...] = ()
+    deviation: Deviation = AS_MODELLED
 
     @property
     def name(self) -> str:

@@ -47,15 +47,58 @@ class Gust:
 
 
 @dataclass(frozen=True)
-class Atmosphere:
-    """Wind, gust and turbulence.
+class VerticalGusts:
+    """Discrete vertical gusts one after the other, upwards and downwards in turn, each 1 - cosine (CS 25.341).
 
     Attributes:
-        wind_east_mps, wind_north_mps: steady wind in the local plane, the direction it blows towards.
+        speed_mps: of a gust at its strongest.
+        duration_s: of one gust.
+        every_s: from the beginning of one to that of the next.
+        start_s: when the first begins, upwards.
+    """
+
+    speed_mps: float
+    duration_s: float
+    every_s: float
+    start_s: float = 0.0
+
+    def up_mps(self, time_s: float) -> float:
+        """How fast the air rises at a time."""
+        number, since_s = divmod(time_s - self.start_s, self.every_s)
+        if number < 0 or since_s >= self.duration_s:
+            return 0.0
+        sign = -1.0 if number % 2 else 1.0
+        return sign * self.speed_mps * (0.5 - 0.5 * math.cos(math.tau * since_s / self.duration_s))
+
+
+ROUGHNESS_M = 0.15 * 0.3048
+"""Roughness length of the wind profile: 0.15 ft, MIL-F-8785C section 3.7.3.4 for flight near the ground."""
+PROFILE_M = (3 * 0.3048, 1000 * 0.3048)
+"""Heights over ground between which the profile of MIL-F-8785C holds; outside the wind is that of the nearer end."""
+
+
+def profile_share(height_m: float, measured_at_m: float) -> float:
+    """Wind speed at a height over ground over that at another: ln(h / z0) / ln(h_measured / z0), MIL-F-8785C."""
+    low, high = PROFILE_M
+    h, reference = (min(max(each, low), high) for each in (height_m, measured_at_m))
+    return math.log(h / ROUGHNESS_M) / math.log(reference / ROUGHNESS_M)
+
+
+@dataclass(frozen=True)
+class Atmosphere:
+    """Wind, gusts and turbulence.
+
+    Attributes:
+        wind_east_mps, wind_north_mps: wind at time 0 in the local plane, the direction it blows towards.
         turbulence: "tustin", "milspec" or None.
         intensity: "light", "moderate" or "severe"; None exactly if `turbulence` is.
         seed: of the turbulence, 0 to 2^31 - 1.
         gust: a gust front, or None.
+        changes: (time s, east m/s, north m/s) rows, time rising from above 0: the wind goes over linearly from one to
+            the next, and stays as the last has it.
+        measured_at_m: height over ground at which the wind is as told, which has the profile of `profile_share`;
+            None: it is the same at all heights.
+        vertical_gusts: discrete gusts, or None.
     """
 
     wind_east_mps: float = 0.0
@@ -64,6 +107,9 @@ class Atmosphere:
     intensity: str | None = None
     seed: int = 0
     gust: Gust | None = None
+    changes: tuple[tuple[float, float, float], ...] = ()
+    measured_at_m: float | None = None
+    vertical_gusts: VerticalGusts | None = None
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.wind_east_mps) or not math.isfinite(self.wind_north_mps):
@@ -78,9 +124,29 @@ class Atmosphere:
             raise ValueError(f"seed must be in [0, 2^31); got {self.seed}")
 
     @property
+    def steady(self) -> bool:
+        """Whether the wind is the same at all times and heights, gust front and turbulence aside."""
+        return not self.changes and self.measured_at_m is None
+
+    @property
     def wind_mps(self) -> float:
-        """Speed of the steady wind."""
-        return math.hypot(self.wind_east_mps, self.wind_north_mps)
+        """Largest speed of the wind at any time, at the height that it is told for."""
+        winds = [(self.wind_east_mps, self.wind_north_mps), *(row[1:] for row in self.changes)]
+        return max(math.hypot(*wind) for wind in winds)
+
+    def wind_at(self, time_s: float, height_m: float) -> tuple[float, float]:
+        """East and north of the wind (m/s) at a time and a height over ground, gust front and turbulence left out."""
+        east, north, before_s = self.wind_east_mps, self.wind_north_mps, 0.0
+        for after_s, east_after, north_after in self.changes:
+            if time_s < after_s:
+                share = (time_s - before_s) / (after_s - before_s)
+                east, north = east + share * (east_after - east), north + share * (north_after - north)
+                break
+            east, north, before_s = east_after, north_after, after_s
+        if self.measured_at_m is None:
+            return east, north
+        share = profile_share(height_m, self.measured_at_m)
+        return share * east, share * north
 
 
 @dataclass(frozen=True)

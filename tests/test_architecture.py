@@ -127,10 +127,10 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("airframes", "climb", "law_cards"),
         ("card_cache", "survey"),
         ("jsbsim_model", "kinematic_point"),
-        ("envelope", "jsbsim_loading", "plane_patch"),
+        ("envelope", "jsbsim_loading"),
         ("airframe", "injection", "start"),
         ("autopilot", "frames", "guidance", "model_files", "properties"),
-        ("actuators", "foreign_model", "kernels", "route"),
+        ("actuators", "deviation", "foreign_model", "kernels", "route"),
         ("interface",),
     ),
     "harness": (

@@ -10,6 +10,7 @@ import typer
 
 from harness.cli.options import (
     FAILED,
+    ConditionsOption,
     GuidanceOption,
     bad_input,
     chosen,
@@ -37,6 +38,7 @@ def check(
         str, typer.Option(metavar="NAME", help="A name that `wayproof list aircraft` prints.")
     ],
     guidance: GuidanceOption = None,
+    conditions: ConditionsOption = None,
     airspeed_mps: Annotated[
         float | None, typer.Option(metavar="V", help="True airspeed. Default: the aircraft's cruise.")
     ] = None,
@@ -126,7 +128,7 @@ def check(
         "trackability": _given(cross_track_m=tolerance_m, altitude_m=altitude_tolerance_m),
         "environment": _given(wind=_wind(wind), turbulence=_turbulence(turbulence)),
     }
-    overrides = chosen(seed=seed, guidance=guidance)
+    overrides = chosen(seed=seed, guidance=guidance, conditions=conditions)
     replaced = settings_of(settings, [*overrides, *chosen(aircraft=aircraft)])
     check = asked(
         given,
@@ -151,6 +153,7 @@ def check(
     words = {
         "scenario": scenario,
         "guidance": guidance,
+        "conditions": conditions,
         "wind": wind,
         "turbulence": turbulence,
         "polygons": polygons,
@@ -163,10 +166,13 @@ def check(
         print_json(flown.metrics)
     elif not quiet:
         from harness.cli.check_terminal import verdict_rows
-        from harness.cli.terminal import print_table
+        from harness.cli.terminal import plain, print_table
+        from harness.scenario.conditions import told
 
         speed_mps = check.scenario.aircraft.airspeed_mps
-        print_table(f"{path.name}: {aircraft}, {speed_mps:g} m/s", verdict_rows(flown.metrics))
+        verdict, *rows = verdict_rows(flown.metrics).items()
+        day = ("conditions", plain(told(check.scenario)))
+        print_table(f"{path.name}: {aircraft}, {speed_mps:g} m/s", dict([verdict, day, *rows]))
         say(f"run folder: {folder}")
     return 0 if flown.ok else FAILED
 

@@ -12,6 +12,7 @@ import typer
 from harness.cli.options import (
     FAILED,
     AircraftOption,
+    ConditionsOption,
     GuidanceOption,
     JsonOption,
     OptionalScenario,
@@ -55,6 +56,7 @@ def fly(
     planner: PlannerOption = None,
     aircraft: AircraftOption = None,
     guidance: GuidanceOption = None,
+    conditions: ConditionsOption = None,
     seed: SeedOption = None,
     settings: SettingsOption = None,
     results: Annotated[
@@ -94,8 +96,8 @@ def fly(
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
     watch = Watch(live, web, viewer, speed, mavlink, beyond_this_machine)
     watch.check()
-    options = chosen(planner, aircraft, seed, guidance)
-    replaced = [*chosen(guidance=guidance), *settings_of(settings, options)]
+    options = chosen(planner, aircraft, seed, guidance, conditions)
+    replaced = [*chosen(guidance=guidance, conditions=conditions), *settings_of(settings, options)]
     given = [*chosen(planner, aircraft, seed), *replaced]
     loaded, digest = _asked(scenario, results, run, given)
     if results is not None:
@@ -124,13 +126,14 @@ def fly(
 def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_the_campaign: bool) -> None:
     """The table of a flight, and where its files are."""
     from harness.cli.terminal import flight_rows, plain, print_table
+    from harness.scenario.conditions import told
     from harness.world.motion_assumptions import scenario_outside_assumptions
 
     title = f"{scenario.name}: {scenario.planner.kind}, {scenario.aircraft.model}{_law(scenario)}"
     outside = scenario_outside_assumptions(scenario)
     more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
     not_covered = {"not covered": plain(outside[0] + more)} if outside else {}
-    print_table(title, flight_rows(metrics) | not_covered)
+    print_table(title, {"conditions": plain(told(scenario))} | flight_rows(metrics) | not_covered)
     if as_the_campaign:
         say("digest: as the campaign flew it")
     say(f"run folder: {folder}")
@@ -168,6 +171,7 @@ def compare(
     out: Annotated[Path, typer.Option(metavar="DIR", help="The comparison's folder.")] = Path(
         "runs/comparison"
     ),
+    conditions: ConditionsOption = None,
     kinematic: Annotated[
         bool, flag("--kinematic", "Fly a point that follows every plan exactly, not the aircraft.")
     ] = False,
@@ -191,7 +195,7 @@ def compare(
     """
     named = [kind.strip() for kind in planners.split(",")]
     laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
-    replaced = [chosen(kind, guidance=law) for kind in named for law in laws]
+    replaced = [chosen(kind, guidance=law, conditions=conditions) for kind in named for law in laws]
     loaded = [load(scenario, each) for scenario in scenarios for each in replaced]
 
     from aircraft.airframes import AircraftError

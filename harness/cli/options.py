@@ -109,6 +109,12 @@ GuidanceOption = Annotated[
         metavar="KIND", help="Replaces guidance.kind; or FILE.py:NAME, MODULE:NAME.", autocompletion=laws
     ),
 ]
+ConditionsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="DAY", help="Replaces conditions: ideal, typical (an ordinary day), rough (the worst to fly)."
+    ),
+]
 SeedOption = Annotated[int | None, typer.Option(metavar="N", help="Replaces seed.")]
 SettingsOption = Annotated[
     list[str] | None,
@@ -151,8 +157,9 @@ def chosen(
     aircraft: str | None = None,
     seed: int | None = None,
     guidance: str | None = None,
+    conditions: str | None = None,
 ) -> list[tuple[str, str]]:
-    """What --planner, --aircraft, --seed and --guidance replace; a name is text, whatever YAML takes it for."""
+    """What the options replace; a name is text, whatever YAML takes it for."""
     import json
 
     given = {
@@ -160,6 +167,7 @@ def chosen(
         "aircraft.model": aircraft,
         "seed": seed,
         "guidance.kind": guidance and law_kind(guidance),
+        "conditions": conditions,
     }
     return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
 

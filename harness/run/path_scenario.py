@@ -12,8 +12,8 @@ import numpy as np
 from harness.files import strict_yaml
 from harness.files.strict_yaml import Node, node_of
 from harness.run_files.given_path import SAME_PLACE_M, FloatArray
+from harness.scenario.environment import GroundSpec
 from harness.scenario.files_resolved import spec_of
-from harness.scenario.ground import GroundSpec
 from harness.scenario.obstacles import WorldFile
 from harness.scenario.overrides import overridden, with_key
 from harness.scenario.scenario import Scenario, node_of_keys, validated
@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 MARGIN_M, MARGIN_SHARE = 1000.0, 0.25
 """The area of a checked path reaches this far beyond it: so much, and so much of its span."""
 
-OF_THE_WORLD: Final = ("seed", "area", "obstacles", "ground", "sources", "environment")
+OF_THE_WORLD: Final = (
+    *("seed", "area", "obstacles", "ground", "sources"),
+    *("environment", "conditions", "uncertainty"),
+)
 """Sections that a check takes from a scenario that it flies a path in; mission, aircraft and sensor are its own."""
 
 KEYS_OF_THE_WORLD: Final = (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -20,7 +19,7 @@ from aircraft.guidance.altitude import LevelFlight
 from aircraft.guidance.interface import GuidanceLaw
 from aircraft.interface import FlightModel
 from aircraft.kinematic_point import KinematicPoint
-from aircraft.start import Atmosphere, Gust, StartConditions
+from aircraft.start import Atmosphere, StartConditions
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.metrics import metrics
 from harness.files.errors import WriteError
@@ -33,12 +32,13 @@ from harness.flight.termination import MissionEnd
 from harness.mapping.sensed_map import SensedMap
 from harness.recording.properties import run_properties
 from harness.run_files.run_folder import RunFolder
-from harness.scenario.guidance_keys import airframe_of, law_of
-from harness.scenario.performance import mission_of, performance_of
+from harness.scenario.guidance_keys import airframe_of, flown_airframe, law_of
+from harness.scenario.performance import mission_of, performance_of, wind_mps_of
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario
 from harness.scenario.sections import Origin
-from harness.scenario.start import start_conditions, steady_wind_mps, towards
+from harness.scenario.start import air_of, start_conditions
+from harness.world.ground import Ground
 from harness.world.range_sensor import RangeSensor
 from harness.world.world import World
 from planner.interface import FloatArray
@@ -105,37 +105,27 @@ def guidance_law(scenario: Scenario) -> GuidanceLaw:
 
 
 def atmosphere(scenario: Scenario) -> Atmosphere:
-    """The air of a scenario."""
-    air = scenario.environment
-    east, north = steady_wind_mps(scenario)
-    turbulence, front = air.turbulence, air.gust
-    return Atmosphere(
-        wind_east_mps=east,
-        wind_north_mps=north,
-        turbulence=turbulence.model if turbulence else None,
-        intensity=turbulence.intensity if turbulence else None,
-        seed=int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF,
-        gust=Gust(
-            front.shape,
-            *towards(front.speed_mps, front.from_deg),
-            front.start_s,
-            math.inf if front.duration_s is None else front.duration_s,
-        )
-        if front
-        else None,
-    )
+    """The air of a scenario's flight."""
+    seed = int(_stream(scenario.seed, TURBULENCE_STREAM).generate_state(1)[0]) & 0x7FFFFFFF
+    return air_of(scenario, seed)
 
 
 def jsbsim_aircraft(
     scenario: Scenario, start: StartConditions, air: Atmosphere, climb_limit_mps: float | None = None
 ) -> FlightModel:
-    """The scenario's aircraft, trimmed and in the air; see `aircraft.jsbsim_model` for the limit of its climb."""
+    """The scenario's aircraft, deviations included, trimmed and in the air.
+
+    See `aircraft.jsbsim_model` for the limit of its climb.
+    """
     from aircraft.jsbsim_model import JsbsimModel
 
     origin = scenario.area.origin
     plane = LocalPlane(origin.latitude_deg, origin.longitude_deg)
     rate_hz = scenario.simulation.rate_hz
-    return JsbsimModel(airframe_of(scenario.aircraft), start, plane, air, rate_hz, climb_limit_mps)
+    frame = flown_airframe(scenario.aircraft)
+    depends_on_height = air.turbulence is not None or air.measured_at_m is not None
+    ground = Ground(scenario.ground.field()).height_m if scenario.ground and depends_on_height else None
+    return JsbsimModel(frame, start, plane, air, rate_hz, climb_limit_mps, ground)
 
 
 def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
@@ -150,7 +140,7 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
     guidance = frame.guidance_limits()
     speed, clearance = performance.airspeed_mps, _given(scenario.planner.clearance_m)
     planned_m = clearance + _given(scenario.navigation.margin_m)
-    wind = scenario.environment.wind.speed_mps if scenario.environment.wind else 0.0
+    wind = wind_mps_of(scenario)
     sensor = scenario.sensor
     blind_s = scenario.planner.compute_latency_s + sensor.latency_s + 1.0 / sensor.rate_hz
     return FlightLimits(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from harness.scenario.ground import GroundSpec, SourceSpec
+from harness.scenario.environment import GroundSpec, SourceSpec
 from harness.scenario.obstacles import Obstacle, Polygon, WorldFile
 from harness.scenario.sections import Area, Geodetic, Point
 from harness.scenario.validation import KeyFault

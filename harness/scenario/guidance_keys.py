@@ -83,6 +83,23 @@ def airframe_of(spec: AircraftSpec) -> Airframe:
     )
 
 
+def flown_airframe(spec: AircraftSpec) -> Airframe:
+    """The same, with a model that deviates from what figures, limits and gains are of.
+
+    Raises:
+        AircraftError: there is none, or it cannot be flown.
+    """
+    from dataclasses import replace
+
+    from aircraft.deviation import Deviation
+
+    frame = airframe_of(spec)
+    if spec.deviation is None:
+        return frame
+    shares = {name: value or 0.0 for name, value in spec.deviation}
+    return replace(frame, files=replace(frame.files, deviation=Deviation(**shares)))
+
+
 def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
     """What guidance may ask of an aircraft that flies at its airspeed."""
     return airframe_of(aircraft).guidance_limits(aircraft.airspeed_mps)

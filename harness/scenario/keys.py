@@ -6,19 +6,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, FailFast, Strict
 
-from harness.scenario.ground import GroundSpec, SourceSpec
+from harness.scenario.environment import Environment, GroundSpec, SourceSpec
 from harness.scenario.navigation import Navigation
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.sections import (
     AircraftSpec,
     Area,
-    Environment,
     GuidanceSpec,
     MissionSpec,
     PlannerSpec,
     Section,
     Sensor,
     TrackabilitySpec,
+    UncertaintySpec,
     key,
 )
 from harness.scenario.simulation import Simulation
@@ -52,6 +52,15 @@ class ScenarioKeys(Section):
     planner: PlannerSpec = key("What plans.", default_factory=PlannerSpec)
     guidance: GuidanceSpec = key("What steers along the plan.", default_factory=GuidanceSpec)
     navigation: Navigation = key("What it believes of its state.", default_factory=Navigation)
+    conditions: Literal["ideal", "typical", "rough"] = key(
+        "What kind of day it is: fills what is left out of navigation, aircraft.actuators, environment, uncertainty. "
+        "typical: an ordinary day of a small aircraft; rough: the worst on which one would fly.",
+        default="ideal",
+    )
+    uncertainty: UncertaintySpec | None = key(
+        "By how much the flown aircraft differs from its model, 1 sigma. Default: that of the conditions.",
+        default=None,
+    )
     simulation: Simulation = key("How finely it is integrated.", default_factory=Simulation)
     environment: Environment = key("The air.", default_factory=Environment)
     trackability: TrackabilitySpec = key(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from aircraft.start import profile_share
 from harness.scenario import guidance_keys
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.sections import Bounds
@@ -40,20 +41,23 @@ def performance_of(scenario: ScenarioKeys) -> Performance:
             f"is {wind_mps:g}; must be below {MAX_WIND_FRACTION:g} of the airspeed {spec.airspeed_mps:g} m/s",
         )
     try:
-        gusts = air.turbulence.intensity if air.turbulence else None
         front_mps = air.gust.speed_mps if air.gust else 0.0
         frame = guidance_keys.airframe_of(spec)
         frame.check_airspeed(spec.airspeed_mps)
         law = guidance_keys.card_of(scenario.guidance, spec)
-        return performance(frame, spec.airspeed_mps, wind_mps, gusts, front_mps, law)
+        return performance(frame, spec.airspeed_mps, wind_mps, air.gusts, front_mps, law)
     except AircraftError as error:
         raise KeyFault(("aircraft", "airspeed_mps"), str(error)) from error
 
 
 def wind_mps_of(scenario: ScenarioKeys) -> float:
-    """Speed of the steady wind (m/s)."""
+    """Largest speed of the wind at the mission's altitude at any time (m/s); the ground is taken to be at sea level."""
     wind = scenario.environment.wind
-    return wind.speed_mps if wind else 0.0
+    if wind is None:
+        return 0.0
+    if wind.measured_at_m is None:
+        return wind.fastest_mps
+    return wind.fastest_mps * profile_share(scenario.mission.altitude_m, wind.measured_at_m)
 
 
 def mission_of(scenario: ScenarioKeys) -> Mission:

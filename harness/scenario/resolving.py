@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from harness.scenario import guidance_keys, planner_keys
 from harness.scenario.checks import check_local_plane, check_start_and_goal
+from harness.scenario.conditions import with_day, with_servos
 from harness.scenario.files_resolved import plane_point
 from harness.scenario.files_resolved import resolved as files_expanded
 from harness.scenario.keys import ScenarioKeys
@@ -23,6 +24,9 @@ from harness.scenario.simulation import step_rate_hz
 from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
 from planner.geometry.margin import TOLERATED_SHARE
+
+if TYPE_CHECKING:
+    from aircraft.airframe import Airframe
 
 POUND_KG: Final = 0.45359237
 
@@ -50,9 +54,13 @@ def resolve(
     simulation = _filled(keys.simulation, rate_hz=step_rate_hz(keys.simulation.rate_hz, sensor))
     mission = _ends_in_plane(keys.mission, keys.area)
     aircraft = keys.aircraft.model_copy(update={"model": model_or_folder(keys.aircraft.model, folder)})
-    aircraft = _filled(aircraft, airspeed_mps=_cruise_mps(aircraft))
+    nominal = _nominal_airframe(aircraft)
+    keys = with_servos(keys.updated(simulation=simulation, mission=mission, aircraft=aircraft), nominal)
+    aircraft = _filled(keys.aircraft, airspeed_mps=_cruise_mps(keys.aircraft))
     guidance = guidance_keys.resolved(keys.guidance, aircraft, as_flown)
-    scenario = keys.updated(simulation=simulation, mission=mission, aircraft=aircraft, guidance=guidance)
+    keys = with_day(keys.updated(aircraft=aircraft), nominal)
+    aircraft = keys.aircraft
+    scenario = keys.updated(guidance=guidance)
     if as_flown and not guidance_keys.is_here(guidance):
         return scenario  # what follows from how the law tracks stands there
 
@@ -149,13 +157,19 @@ def _aircraft_names() -> tuple[str, ...]:
     return aircraft_names()
 
 
-def _cruise_mps(spec: AircraftSpec) -> float:
+def _nominal_airframe(spec: AircraftSpec) -> Airframe:
+    """The airframe as its card has it, without servos of the scenario's."""
     from aircraft.airframes import AircraftError
 
     try:
-        guidance_keys.airframe_of(spec.model_copy(update={"actuators": None}))
+        return guidance_keys.airframe_of(spec.model_copy(update={"actuators": None}))
     except AircraftError as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
+
+
+def _cruise_mps(spec: AircraftSpec) -> float:
+    from aircraft.airframes import AircraftError
+
     try:
         return guidance_keys.airframe_of(spec).cruise_mps
     except AircraftError as error:

@@ -160,6 +160,60 @@ class ActuatorsSpec(Section):
     )
 
 
+SHARES: Final = {
+    "mass": "Mass and inertias, as a share of the empty weight",
+    "thrust": "Thrust, as a share",
+    "drag": "Drag, as a share",
+    "lift_slope": "Change of the lift with the angle of attack, as a share",
+    "elevator": "Effect of the elevator, as a share",
+    "aileron": "Effect of the ailerons, as a share",
+    "rudder": "Effect of the rudder, as a share",
+}
+"""What of an aircraft may be other than its model has it; beside it the centre of gravity, in m."""
+
+
+def _share(name: str, what: str, derived: str, least: float) -> Any:
+    return key(f"{SHARES[name]}{what}.", unit="1", derived=derived, ge=least, le=0.5)
+
+
+class DeviationSpec(Section):
+    """By how much the flown aircraft is other than its model; guidance and autopilot stay tuned for the model."""
+
+    mass: float = _share("mass", "", "drawn", -0.5)
+    thrust: float = _share("thrust", "", "drawn", -0.5)
+    drag: float = _share("drag", "", "drawn", -0.5)
+    lift_slope: float = _share("lift_slope", "", "drawn", -0.5)
+    elevator: float = _share("elevator", "", "drawn", -0.5)
+    aileron: float = _share("aileron", "", "drawn", -0.5)
+    rudder: float = _share("rudder", "", "drawn", -0.5)
+    centre_of_gravity_m: float = key(
+        "How far the centre of gravity lies behind that of the model.",
+        unit="m",
+        derived="drawn",
+        ge=-10,
+        le=10,
+    )
+
+
+class UncertaintySpec(Section):
+    """1 sigma of each deviation of the flown aircraft, which is drawn from the seed; see aircraft.deviation."""
+
+    mass: float = _share("mass", ", 1 sigma", "that of the conditions, 0 for ideal", 0)
+    thrust: float = _share("thrust", ", 1 sigma", "that of the conditions, 0 for ideal", 0)
+    drag: float = _share("drag", ", 1 sigma", "that of the conditions, 0 for ideal", 0)
+    lift_slope: float = _share("lift_slope", ", 1 sigma", "that of the conditions, 0 for ideal", 0)
+    elevator: float = _share("elevator", ", 1 sigma", "that of the conditions, 0 for ideal", 0)
+    aileron: float = _share("aileron", ", 1 sigma", "that of the conditions, 0 for ideal", 0)
+    rudder: float = _share("rudder", ", 1 sigma", "that of the conditions, 0 for ideal", 0)
+    centre_of_gravity_m: float = key(
+        "Place of the centre of gravity, fore and aft, 1 sigma.",
+        unit="m",
+        derived="that of the conditions, 0 for ideal",
+        ge=0,
+        le=3,
+    )
+
+
 class AircraftSpec(Section):
     """What flies, and how fast."""
 
@@ -177,7 +231,12 @@ class AircraftSpec(Section):
         le=1000,
     )
     actuators: ActuatorsSpec | None = key(
-        "Servos behind the autopilot. Default: those of the aircraft, or none.", default=None
+        "Servos behind the autopilot. Default: those of the aircraft, else of the conditions, or none.",
+        default=None,
+    )
+    deviation: DeviationSpec | None = key(
+        "How the flown aircraft differs from its model. Default: drawn with the uncertainty, else not at all.",
+        default=None,
     )
 
 
@@ -314,54 +373,3 @@ class TrackabilitySpec(Section):
         gt=1,
         le=20,
     )
-
-
-class Wind(Section):
-    """Steady wind, the same everywhere."""
-
-    speed_mps: float = key(
-        "Wind speed; must be below 0.9 of the airspeed.", unit="m/s", default=0.0, ge=0, le=200
-    )
-    from_deg: float = key("Direction it blows from.", unit="deg", default=270.0, ge=0, le=360)
-
-
-class Gust(Section):
-    """One gust front, on top of the wind; it reaches the whole area at one time."""
-
-    shape: Literal["step", "one_minus_cosine"] = key(
-        "step: all of it at once, until its end; one_minus_cosine: speed / 2 (1 - cos(2 pi t / duration)).",
-        default="one_minus_cosine",
-    )
-    speed_mps: float = key("Speed of the gust at its strongest.", unit="m/s", gt=0, le=200)
-    from_deg: float = key("Direction it blows from.", unit="deg", default=270.0, ge=0, le=360)
-    start_s: float = key("When it begins.", unit="s", default=60.0, ge=0, le=1e7)
-    duration_s: float | None = key(
-        "How long it lasts (its length over the airspeed). Default: a step stays; the other shape needs it.",
-        unit="s",
-        default=None,
-        gt=0,
-        le=1e7,
-    )
-
-    @model_validator(mode="after")
-    def _ends_unless_a_step(self) -> Gust:
-        if self.duration_s is None and self.shape != "step":
-            raise ValueError(f"has no duration_s; a {self.shape} gust must have one")
-        return self
-
-
-class Turbulence(Section):
-    """Continuous gusts on top of the wind."""
-
-    model: Literal["tustin", "milspec"] = key(
-        "Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it.", default="tustin"
-    )
-    intensity: Literal["light", "moderate", "severe"] = key("How strong.", default="moderate")
-
-
-class Environment(Section):
-    """The air."""
-
-    wind: Wind | None = key("Steady wind. Default: calm.", default=None)
-    gust: Gust | None = key("A gust front. Default: none.", default=None)
-    turbulence: Turbulence | None = key("Gusts. Default: smooth air.", default=None)

@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from aircraft.frames import LocalPlane
-from aircraft.start import Atmosphere, StartConditions
+from aircraft.start import Atmosphere, Gust, StartConditions, VerticalGusts
 from harness.scenario import guidance_keys
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.validation import KeyFault
@@ -50,9 +50,36 @@ def start_conditions(scenario: ScenarioKeys) -> StartConditions:
 
 
 def steady_wind_mps(scenario: ScenarioKeys) -> tuple[float, float]:
-    """East and north of the steady wind."""
+    """East and north of the wind at time 0, at the height at which it is measured."""
     wind = scenario.environment.wind
     return towards(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0)
+
+
+def air_of(scenario: ScenarioKeys, seed: int = 0) -> Atmosphere:
+    """The air of a scenario.
+
+    Args:
+        scenario: its environment filled in.
+        seed: of the turbulence.
+    """
+    air = scenario.environment
+    wind, front, vertical = air.wind, air.gust, air.vertical_gusts
+    gust = None
+    if front:
+        duration_s = math.inf if front.duration_s is None else front.duration_s
+        gust = Gust(front.shape, *towards(front.speed_mps, front.from_deg), front.start_s, duration_s)
+    return Atmosphere(
+        *steady_wind_mps(scenario),
+        turbulence=air.turbulence.model if air.turbulence and air.gusts else None,
+        intensity=air.gusts,
+        seed=seed,
+        gust=gust,
+        changes=tuple(
+            (time_s, *towards(speed, degrees)) for time_s, speed, degrees in (wind.changes if wind else ())
+        ),
+        measured_at_m=wind.measured_at_m if wind else None,
+        vertical_gusts=VerticalGusts(**dict(vertical)) if vertical else None,
+    )
 
 
 def towards(speed_mps: float, from_deg: float) -> tuple[float, float]:
@@ -75,8 +102,9 @@ def check_level_flight(scenario: ScenarioKeys) -> None:
     start, origin = start_conditions(scenario), scenario.area.origin
     place = origin.latitude_deg, origin.longitude_deg
     try:
-        heading_rad = start.heading_rad(Atmosphere(*steady_wind_mps(scenario)))
-        frame = guidance_keys.airframe_of(scenario.aircraft)
+        wind = air_of(scenario).wind_at(0.0, scenario.mission.altitude_m)
+        heading_rad = start.heading_rad(Atmosphere(*wind))
+        frame = guidance_keys.flown_airframe(scenario.aircraft)
         slowest, fastest = frame.airspeed_range_mps
         if (
             NEAR_M[0] <= start.altitude_m <= NEAR_M[1]

@@ -397,7 +397,10 @@ def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[
         (["bench", "tracking", "--aircraft", "kite"], "unknown aircraft 'kite'"),
         (["bench", "worlds", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
         (["bench", "paper_circles", "--guidance", "l1"], "--guidance goes with `bench tracking`"),
-        (["bench", "tracking", "--guidance", "kite"], "there is no guidance law 'kite'; known are: l1, npfg"),
+        (
+            ["bench", "tracking", "--guidance", "kite"],
+            "there is no guidance law 'kite'; known are: bearing, l1, npfg",
+        ),
         (["bench", "paper_circles", "--most", "100"], "--most goes with `bench worlds`"),
     ],
 )

@@ -434,6 +434,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
     keys = described_keys(schema, schema["$defs"])
     holders = {"area", "origin", "obstacles", "circle", "polygon", "mission", "aircraft", "sensor", "planner"}
     holders |= {"guidance", "navigation", "file", "ground", "sources", "start", "goal"}
+    holders |= {"uncertainty", "deviation", "vertical_gusts"}
     values = [
         (name, key)
         for name, key in keys
@@ -454,6 +455,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         "speed_mps",
         *("path", "corner_m", "spacing_m", "rows", "columns", "lowest_m", "heights", "sha256", "polygons"),
         *("latitude_deg", "longitude_deg"),
+        *("duration_s", "every_s"),
     }
     words = {
         "schema",
@@ -469,7 +471,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         "nodata",
         "unknown",
     }
-    words |= {"heights", "sha256", "notes", "follow"}
+    words |= {"conditions", "changes", "heights", "sha256", "notes", "follow"}
     assert len(values) > 40
     for name, key in values:
         switch = key.get("type") == "boolean"

@@ -1,0 +1,280 @@
+"""`conditions: ideal | typical | rough`: what kind of day it is, and the figures that are drawn for it from the seed.
+
+A day fills in what a scenario leaves out of its navigation, its servos, its air and the deviations of its aircraft.
+Where every figure comes from stands in `aircraft/README.md`. Nothing is drawn anew in a run folder's scenario, where
+all keys stand.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeVar
+
+import numpy as np
+
+from aircraft.start import profile_share
+from harness.scenario.environment import Environment, Turbulence, VerticalGustsSpec, Wind
+from harness.scenario.keys import ScenarioKeys
+from harness.scenario.sections import (
+    ActuatorsSpec,
+    AircraftSpec,
+    DeviationSpec,
+    Section,
+    UncertaintySpec,
+)
+
+if TYPE_CHECKING:
+    from aircraft.airframe import Airframe
+
+CONDITIONS_STREAM: Final = 4
+"""Number of the stream, of those that derive from the scenario's seed, that a day is drawn from."""
+DEVIATION_STREAM: Final = 5
+"""Number of the stream that the deviations of the aircraft are drawn from."""
+
+MOST_SIGMAS: Final = 3.0
+"""What is drawn from a normal distribution is at most so many sigma from its mean."""
+WIND_FROM_M: Final = 10.0
+"""Height over ground at which winds are measured (WMO)."""
+CHANGE_EVERY_S: Final = 300.0
+CHANGING_FOR_S: Final = 7200.0
+"""The wind has another speed and direction every five minutes, for two hours; then it stays."""
+GUST_LENGTH_M: Final = 100.0
+"""Length of a discrete vertical gust: twice a gradient distance of 50 m, amid the 9 to 107 m of CS 25.341."""
+
+
+@dataclass(frozen=True)
+class Day:
+    """The figures of one kind of day; their sources stand in `aircraft/README.md`.
+
+    Attributes:
+        wind_mps: mean of the wind speed 10 m over ground, Rayleigh distributed, or the ends of a uniform one.
+        most_wind: the wind at the mission's altitude is at most this share of the airspeed.
+        speed_change, direction_change_deg: 1 sigma of the wind's changes, of its speed as a share.
+        turbulence: intensity.
+        vertical_gust_mps, vertical_gust_every_s: of the discrete vertical gusts.
+        navigation: keys of a satellite receiver with a barometer.
+        latency_s: age of the state that guidance and autopilot work with.
+        servos: of all surfaces and the throttle.
+        uncertainty: 1 sigma of each deviation; that of the centre of gravity over the cube root of the mass (m/kg^1/3).
+    """
+
+    wind_mps: float | tuple[float, float]
+    most_wind: float
+    speed_change: float
+    direction_change_deg: float
+    turbulence: Literal["light", "moderate"]
+    vertical_gust_mps: float
+    vertical_gust_every_s: float
+    navigation: dict[str, Any]
+    latency_s: float
+    servos: dict[str, float]
+    uncertainty: dict[str, float]
+
+
+DAYS: Final = {
+    "typical": Day(
+        wind_mps=3.28,
+        most_wind=0.35,
+        speed_change=0.15,
+        direction_change_deg=15.0,
+        turbulence="light",
+        vertical_gust_mps=2.3,
+        vertical_gust_every_s=120.0,
+        navigation={
+            "kind": "gnss",
+            "position_sigma_m": 1.3,
+            "velocity_sigma_mps": 0.05,
+            "heading_sigma_deg": 1.0,
+            "airspeed_sigma_mps": 0.65,
+            "altitude_sigma_m": 2.1,
+        },
+        latency_s=0.12,
+        servos={"lag_s": 0.03, "rate_limit_degps": 300.0, "deadband_deg": 0.0},
+        uncertainty={
+            "mass": 0.02,
+            "thrust": 0.05,
+            "drag": 0.1,
+            "lift_slope": 0.05,
+            "elevator": 0.1,
+            "aileron": 0.1,
+            "rudder": 0.1,
+            "centre_of_gravity_m": 0.002,
+        },
+    ),
+    "rough": Day(
+        wind_mps=(8.0, 10.7),
+        most_wind=0.5,
+        speed_change=0.15,
+        direction_change_deg=10.0,
+        turbulence="moderate",
+        vertical_gust_mps=4.6,
+        vertical_gust_every_s=60.0,
+        navigation={
+            "kind": "gnss",
+            "position_sigma_m": 3.3,
+            "velocity_sigma_mps": 0.1,
+            "heading_sigma_deg": 2.0,
+            "airspeed_sigma_mps": 1.3,
+            "altitude_sigma_m": 4.2,
+        },
+        latency_s=0.22,
+        servos={"lag_s": 0.06, "rate_limit_degps": 150.0, "deadband_deg": 1.0},
+        uncertainty={
+            "mass": 0.05,
+            "thrust": 0.1,
+            "drag": 0.2,
+            "lift_slope": 0.1,
+            "elevator": 0.2,
+            "aileron": 0.2,
+            "rudder": 0.2,
+            "centre_of_gravity_m": 0.004,
+        },
+    ),
+}
+
+
+Part = TypeVar("Part", bound=Section)
+
+
+def with_servos(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
+    """The scenario with the servos of its day, where neither it nor the aircraft's card names any.
+
+    Args:
+        keys: its aircraft's model resolved.
+        frame: the aircraft without servos of the scenario.
+    """
+    day = DAYS.get(keys.conditions)
+    if day is None or keys.aircraft.actuators is not None or frame.files.actuators:
+        return keys
+    servos = ActuatorsSpec(**day.servos)
+    return keys.updated(aircraft=keys.aircraft.model_copy(update={"actuators": servos}))
+
+
+def with_day(keys: ScenarioKeys, frame: Airframe) -> ScenarioKeys:
+    """The scenario with navigation, air and deviations of its day, as far as it leaves them out.
+
+    Args:
+        keys: its aircraft with servos and airspeed.
+        frame: the aircraft.
+    """
+    day = DAYS.get(keys.conditions)
+    if day is not None:
+        keys = keys.updated(
+            environment=_air(keys, day, _stream(keys.seed, CONDITIONS_STREAM)),
+            navigation=_navigation(keys, day),
+        )
+    uncertainty = _uncertainty(keys.uncertainty, day, frame.mass_kg)
+    deviation = _deviation(keys.aircraft, uncertainty, _stream(keys.seed, DEVIATION_STREAM))
+    aircraft = keys.aircraft.model_copy(update={"deviation": deviation})
+    return keys.updated(aircraft=aircraft, uncertainty=uncertainty)
+
+
+def _air(keys: ScenarioKeys, day: Day, rng: np.random.Generator) -> Environment:
+    """The air: what is drawn is drawn whether or not the file has it, so that one key changes nothing else."""
+    air, airspeed_mps = keys.environment, keys.aircraft.airspeed_mps
+    share = profile_share(keys.mission.altitude_m, WIND_FROM_M)
+    most_mps = day.most_wind * airspeed_mps / share
+    low_high = day.wind_mps
+    if isinstance(low_high, tuple):
+        mean_mps = float(rng.uniform(*low_high))
+    else:
+        mean_mps = float(rng.rayleigh(low_high / math.sqrt(math.pi / 2.0)))
+    mean_mps, from_deg = min(mean_mps, most_mps), float(rng.uniform(0.0, 360.0))
+    count = round(CHANGING_FOR_S / CHANGE_EVERY_S)
+    swings = rng.standard_normal((count, 2)).clip(-MOST_SIGMAS, MOST_SIGMAS)
+    changes = tuple(
+        (
+            CHANGE_EVERY_S * (number + 1),
+            round(min(mean_mps * (1.0 + day.speed_change * speed), most_mps), 3),
+            round((from_deg + day.direction_change_deg * turn) % 360.0, 2),
+        )
+        for number, (speed, turn) in enumerate(swings.tolist())
+    )
+    every_s = day.vertical_gust_every_s
+    first_s = float(rng.uniform(0.0, every_s))
+    wind = Wind(
+        speed_mps=round(mean_mps, 3),
+        from_deg=round(from_deg, 2),
+        measured_at_m=WIND_FROM_M,
+        changes=changes,
+    )
+    gusts = VerticalGustsSpec(
+        speed_mps=day.vertical_gust_mps,
+        duration_s=round(min(GUST_LENGTH_M / airspeed_mps, every_s), 3),
+        every_s=every_s,
+        start_s=round(first_s, 2),
+    )
+    return _filled(air, wind=wind, turbulence=Turbulence(intensity=day.turbulence), vertical_gusts=gusts)
+
+
+def _navigation(keys: ScenarioKeys, day: Day) -> Any:
+    """The navigation: all of it where the file names no kind, else its latency alone."""
+    given = keys.navigation
+    named = given.model_fields_set
+    figures = {} if "kind" in named else day.navigation
+    if given.kind == "perfect" and "kind" in named:
+        return given
+    if "latency_s" in type(given).model_fields:
+        figures = {**figures, "latency_s": day.latency_s}
+    own = {name: getattr(given, name) for name in named}
+    return type(given)(**{**figures, **own})
+
+
+def _uncertainty(given: UncertaintySpec | None, day: Day | None, mass_kg: float) -> UncertaintySpec | None:
+    if day is None:
+        return given and _filled(given, **dict.fromkeys(UncertaintySpec.model_fields, 0.0))
+    figures = dict(day.uncertainty)
+    figures["centre_of_gravity_m"] = round(figures["centre_of_gravity_m"] * mass_kg ** (1.0 / 3.0), 5)
+    return _filled(given or UncertaintySpec(), **figures)
+
+
+def _deviation(
+    aircraft: AircraftSpec, uncertainty: UncertaintySpec | None, rng: np.random.Generator
+) -> DeviationSpec | None:
+    """What is drawn for one flight, on top of nothing that the scenario names itself."""
+    names = list(DeviationSpec.model_fields)
+    if uncertainty is None:
+        return aircraft.deviation and _filled(aircraft.deviation, **dict.fromkeys(names, 0.0))
+    drawn = rng.standard_normal(len(names)).clip(-MOST_SIGMAS, MOST_SIGMAS).tolist()
+    values = {
+        name: round((getattr(uncertainty, name) or 0.0) * each, 6)
+        for name, each in zip(names, drawn, strict=True)
+    }
+    return _filled(aircraft.deviation or DeviationSpec(), **values)
+
+
+def _filled(section: Part, **values: Any) -> Part:
+    """A section with those of its keys filled in that the file leaves out."""
+    missing = {name: value for name, value in values.items() if getattr(section, name) is None}
+    return section.model_copy(update=missing)
+
+
+def _stream(seed: int, number: int) -> np.random.Generator:
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+
+
+def told(scenario: ScenarioKeys) -> str:
+    """What kind of day a scenario is flown on, with its air and navigation, for the first lines of a summary."""
+    air, navigation = scenario.environment, scenario.navigation
+    said = [_wind_told(air.wind) if air.wind and air.wind.fastest_mps else "calm"]
+    if air.turbulence and air.turbulence.intensity != "none":
+        said.append(f"{air.turbulence.intensity} turbulence")
+    if air.gust or air.vertical_gusts:
+        said.append("gusts")
+    latency_s = getattr(navigation, "latency_s", None) or 0.0
+    said.append(
+        "state known exactly"
+        if navigation.kind == "perfect" and not latency_s
+        else f"{navigation.kind} navigation"
+    )
+    if latency_s:
+        said.append(f"state {latency_s:g} s old")
+    if scenario.aircraft.deviation and any(scenario.aircraft.deviation.model_dump().values()):
+        said.append("aircraft other than its model")
+    return f"{scenario.conditions}: {', '.join(said)}"
+
+
+def _wind_told(wind: Wind) -> str:
+    at = f" at {wind.measured_at_m:g} m" if wind.measured_at_m else ""
+    return f"wind {wind.speed_mps:.3g} m/s from {wind.from_deg:.0f} deg{at}{', changing' if wind.changes else ''}"

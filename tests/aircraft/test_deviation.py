@@ -1,0 +1,103 @@
+"""Aircraft that deviate from their model, and air that depends on the height over ground, held against physics."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import pytest
+
+from aircraft.airframes import airframe
+from aircraft.deviation import Deviation, deviate
+from aircraft.frames import LocalPlane
+from aircraft.jsbsim_loading import load, trim
+from aircraft.jsbsim_model import JsbsimModel
+from aircraft.model_files import model_files
+from aircraft.start import Atmosphere, StartConditions, VerticalGusts
+
+READ = ("inertia/weight-lbs", "fcs/elevator-pos-rad", "aero/alpha-deg", "forces/fwx-aero-lbs")
+PLANE = LocalPlane(45.0, 0.0)
+
+
+def trimmed(name: str, airspeed_mps: float, **shares: float) -> dict[str, float]:
+    files = replace(model_files(name), deviation=Deviation(**shares))
+    fdm = load(files)
+    trim(fdm, name, PLANE, StartConditions(0.0, 0.0, 300.0, 0.0, airspeed_mps), heading_rad=0.0)
+    thrust = ("forces/fbx-prop-lbs", "forces/fbx-external-lbs")
+    return {each: fdm[each] for each in (*READ, "inertia/cg-x-in")} | {
+        "thrust": sum(fdm[each] for each in thrust),
+        "throttle": fdm["fcs/throttle-cmd-norm"],
+    }
+
+
+@pytest.mark.parametrize(("name", "airspeed_mps"), [("aerosonde", 25.0), ("f16", 150.0)])
+def test_a_trim_moves_as_physics_has_it(name: str, airspeed_mps: float) -> None:
+    nominal = trimmed(name, airspeed_mps)
+    # The same moment with a tenth more effect takes the elevator a tenth less far.
+    stronger = trimmed(name, airspeed_mps, elevator=0.1)
+    assert stronger["fcs/elevator-pos-rad"] == pytest.approx(nominal["fcs/elevator-pos-rad"] / 1.1, rel=1e-3)
+    # Thrust is as large as drag, whatever the engine's effect; it takes less throttle.
+    more = trimmed(name, airspeed_mps, thrust=0.1)
+    assert more["thrust"] == pytest.approx(nominal["thrust"], rel=1e-3)
+    assert more["throttle"] < nominal["throttle"]
+    draggy = trimmed(name, airspeed_mps, drag=0.1)
+    assert draggy["forces/fwx-aero-lbs"] == pytest.approx(1.1 * nominal["forces/fwx-aero-lbs"], rel=2e-3)
+    assert draggy["thrust"] == pytest.approx(1.1 * nominal["thrust"], rel=2e-3)
+    aft = trimmed(name, airspeed_mps, centre_of_gravity_m=0.01)
+    assert 0.3 < aft["inertia/cg-x-in"] - nominal["inertia/cg-x-in"] <= 0.3938
+
+
+def test_mass_and_lift_slope_of_the_book_set_the_angle_of_attack() -> None:
+    # CL = 0.23 + 5.61 alpha (Beard and McLain): alpha + 0.23 / 5.61 goes with the weight and against the slope.
+    def lift_angle(**shares: float) -> float:
+        values = trimmed("aerosonde", 25.0, **shares)
+        elevator = 0.13 * values["fcs/elevator-pos-rad"]
+        slope = 5.61 * (1.0 + shares.get("lift_slope", 0.0))
+        return 0.23 + slope * math.radians(values["aero/alpha-deg"]) + elevator
+
+    assert lift_angle(mass=0.1) == pytest.approx(1.1 * lift_angle(), rel=5e-3)
+    assert lift_angle(lift_slope=0.1) == pytest.approx(lift_angle(), rel=5e-3)
+
+
+def test_a_model_that_does_not_show_what_differs_is_refused() -> None:
+    bare = ElementTree.fromstring("<fdm_config><mass_balance/><aerodynamics/></fdm_config>")
+    with pytest.raises(ValueError, match="effect of its rudder"):
+        deviate(bare, Deviation(rudder=0.1))
+    with pytest.raises(ValueError, match="place of the centre of gravity"):
+        deviate(bare, Deviation(centre_of_gravity_m=0.1))
+
+
+def test_wind_and_turbulence_are_those_of_the_height_over_the_true_ground() -> None:
+    def start(ground_m: float) -> JsbsimModel:
+        air = Atmosphere(5.0, 0.0, measured_at_m=10.0)
+        begin = StartConditions(0.0, 0.0, 400.0, 0.0, 25.0)
+        return JsbsimModel(airframe("aerosonde"), begin, PLANE, air, ground=lambda _e, _n: ground_m)
+
+    for ground_m in (300.0, 380.0):
+        model = start(ground_m)
+        height_m = 400.0 - ground_m
+        expected = 5.0 * math.log(height_m / 0.04572) / math.log(10.0 / 0.04572)
+        model.state()
+        model.command(0.0, 400.0, 25.0)
+        model.advance(1)
+        state = model.state()
+        drift = state.velocity_east_mps - state.airspeed_mps * math.sin(state.heading_rad)
+        assert drift == pytest.approx(expected, abs=0.05)
+        assert model._fdm["position/h-agl-ft"] * 0.3048 == pytest.approx(height_m, abs=0.5)
+
+
+def test_vertical_gusts_rise_and_sink_in_turn_as_one_minus_cosine() -> None:
+    gusts = VerticalGusts(speed_mps=3.0, duration_s=4.0, every_s=10.0, start_s=5.0)
+    assert [gusts.up_mps(time_s) for time_s in (0.0, 5.0, 9.0, 19.5)] == pytest.approx([0.0] * 4)
+    assert gusts.up_mps(7.0) == pytest.approx(3.0)
+    assert gusts.up_mps(6.0) == pytest.approx(1.5)
+    assert gusts.up_mps(17.0) == pytest.approx(-3.0)
+    air = Atmosphere(vertical_gusts=VerticalGusts(2.0, 0.5, 100.0))
+    model = JsbsimModel(airframe("aerosonde"), StartConditions(0.0, 0.0, 300.0, 0.0, 25.0), PLANE, air)
+    loads = []
+    for _ in range(30):
+        model.advance(2)
+        loads.append(model.state().load_factor)
+    # At most rho V CLa S w / 2 m g, less what the aircraft gives way, nose down and upwards.
+    assert 1.2 < max(loads) < 1.0 + 1.19 * 25.0 * 5.61 * 0.55 * 2.0 / (2 * 11.0 * 9.81)

@@ -1,0 +1,116 @@
+"""`conditions`, `uncertainty` and the winds that they fill in, held against formulas and against what was flown."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import wayproof
+from harness.scenario.scenario import parse_scenario
+
+BASE = """
+schema: wayproof/scenario/1
+name: day
+area: {bounds_m: [0, 0, 20000, 20000]}
+mission: {start_m: [5000, 5000], goal_m: [7000, 5000], altitude_m: 200}
+planner: {clearance_m: 50}
+"""
+
+
+def section(scenario: wayproof.Scenario, path: str) -> Any:
+    """What stands at a key path of a complete scenario."""
+    found: Any = scenario
+    for name in path.split("."):
+        found = getattr(found, name)
+    return found
+
+
+def drawn(day: str, count: int, more: str = "") -> list[wayproof.Scenario]:
+    return [parse_scenario(f"{BASE}conditions: {day}\nseed: {seed}\n{more}") for seed in range(count)]
+
+
+def test_typical_winds_have_the_mean_of_the_land_and_deviations_their_sigma() -> None:
+    days = drawn("typical", 150, "uncertainty: {mass: 0.1}")
+    speeds = np.array([section(day, "environment.wind.speed_mps") for day in days])
+    # Rayleigh of mean 3.28: standard deviation 0.5227 of it; a few draws are cut off at 0.35 of 25 m/s.
+    assert abs(speeds.mean() - 3.28) < 3 * 0.5227 * 3.28 / math.sqrt(len(days))
+    turned = np.radians([section(day, "environment.wind.from_deg") for day in days])
+    assert np.hypot(np.cos(turned).mean(), np.sin(turned).mean()) < 0.25  # from everywhere
+    for name, sigma in (("mass", 0.1), ("drag", 0.1), ("lift_slope", 0.05)):  # the given and the day's
+        values = np.array([getattr(day.aircraft.deviation, name) for day in days])
+        assert abs(values.mean()) < 3.5 * sigma / math.sqrt(len(days))
+        assert values.std() == pytest.approx(sigma, rel=0.25)
+
+
+@pytest.mark.parametrize(("day", "most"), [("typical", 0.35), ("rough", 0.5)])
+def test_no_wind_at_the_mission_is_stronger_than_its_share_of_the_airspeed(day: str, most: float) -> None:
+    profile = math.log(200 / 0.04572) / math.log(10 / 0.04572)  # MIL-F-8785C
+    for scenario in drawn(day, 20):
+        wind = section(scenario, "environment.wind")
+        fastest = max(wind.speed_mps, *(speed for _, speed, _ in wind.changes))
+        assert fastest * profile <= most * 25.0 + 0.01
+        assert wind.measured_at_m == 10.0
+
+
+def test_what_the_file_says_stays_and_ideal_adds_nothing() -> None:
+    ideal = parse_scenario(BASE)
+    assert ideal.environment.wind is None
+    assert ideal.aircraft.deviation is None
+    assert ideal.navigation.kind == "perfect"
+    more = (
+        "environment: {wind: {speed_mps: 2, from_deg: 10}, turbulence: {intensity: none}}\n"
+        "navigation: {kind: rtk}\nuncertainty: {mass: 0}\n"
+        "aircraft: {actuators: {lag_s: 0.2}, deviation: {drag: 0.3}}\n"
+    )
+    (given,) = drawn("rough", 1, more)
+    wind, deviation = section(given, "environment.wind"), section(given, "aircraft.deviation")
+    assert (wind.speed_mps, wind.changes) == (2.0, ())
+    assert given.environment.gusts is None
+    assert given.environment.vertical_gusts is not None
+    assert given.navigation.position_sigma_m == 0.017
+    assert section(given, "aircraft.actuators.lag_s") == 0.2
+    assert (deviation.mass, deviation.drag) == (0.0, 0.3)
+
+
+def test_a_run_folders_scenario_has_the_day_resolved_and_flies_again_alike(tmp_path: Path) -> None:
+    (day,) = drawn("typical", 1, "uncertainty: {thrust: 0.2}")
+    first = wayproof.fly(day, out=tmp_path / "first")
+    again = wayproof.fly(str(tmp_path / "first" / "scenario.yaml"))
+    assert again.digest == first.digest
+    assert wayproof.fly(day.with_({"conditions": "ideal"})).digest != first.digest
+    kept = (tmp_path / "first" / "scenario.yaml").read_text("utf-8")
+    for drawn_key in ("measured_at_m", "vertical_gusts", "deviation", "rate_limit_degps"):
+        assert drawn_key in kept
+
+
+def test_the_wind_changes_in_time_as_told() -> None:
+    wind = "wind: {speed_mps: 4, from_deg: 270, changes: [[20, 8, 270], [40, 8, 180]]}"
+    flown = wayproof.fly(parse_scenario(f"{BASE}environment: {{{wind}}}"))
+    track = {name: flown.track[name].to_numpy() for name in flown.track.column_names}
+    heading, course = np.radians(track["heading_deg"]), np.radians(track["course_deg"])
+    level = np.cos(np.radians(track["pitch_deg"]))  # of the airspeed; the rest is sideslip and climb
+    air = track["airspeed_mps"] * level * np.array([np.sin(heading), np.cos(heading)])
+    ground = track["groundspeed_mps"] * np.array([np.sin(course), np.cos(course)])
+    wind_mps = ground - air
+    for time_s, expected in ((5.0, (5.0, 0.0)), (15.0, (7.0, 0.0)), (30.0, (4.0, 4.0)), (60.0, (0.0, 8.0))):
+        near = np.abs(track["time_s"] - time_s) < 1.0
+        assert wind_mps[:, near].mean(axis=1) == pytest.approx(expected, abs=0.4), time_s
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ("conditions: mild", "conditions: is the text 'mild'; must be"),
+        ("uncertainty: {mass: -0.1}", "uncertainty.mass: is -0.1; must be at least 0"),
+        ("uncertainty: {weight: 0.1}", "uncertainty.weight"),
+        ("environment: {wind: {changes: [[9, 1, 0], [9, 2, 0]]}}", "environment.wind.changes[1]: is at 9 s"),
+    ],
+)
+def test_wrong_keys_are_told_with_their_path(more: str, told: str) -> None:
+    with pytest.raises(wayproof.InputError, match=r"line \d|:\d") as caught:
+        parse_scenario(BASE + more, "day.yaml")
+    assert told in str(caught.value)
