@@ -16,6 +16,8 @@ from typing import Any
 
 from planner.baselines import bug1, bug2, dubins_tree, tangent_bug, vfh_plus
 from planner.interface import Mission, Planner
+from planner.paper import config as paper_config
+from planner.paper import rolling as paper
 from planner.rolling_window import config as rolling_window_config
 from planner.rolling_window import planner as rolling_window
 
@@ -53,6 +55,12 @@ BUILT_IN = (
         summary="improved BUG: rolling window, fan sectors, n-best multi-step search, route optimisation",
         config=rolling_window_config.RollingWindowConfig,
         make=rolling_window.RollingWindow,
+    ),
+    PlannerKind(
+        kind="improved_bug",
+        summary="the paper's improved BUG, literally: it sees its window only, and can be caught",
+        config=paper_config.ImprovedBugConfig,
+        make=paper.ImprovedBug,
     ),
     PlannerKind(
         kind="bug1",

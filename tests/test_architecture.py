@@ -155,6 +155,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("registry",),
         ("baselines",),
         ("rolling_window",),
+        ("paper",),
         ("memory", "world_stability"),
         ("obstacle_labels",),
         ("geometry",),

@@ -21,9 +21,9 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from planner.baselines.joining import branch_off, stuck
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, along
+from planner.geometry.joining import branch_off, stuck
 from planner.geometry.margin import MARGIN_KEY, margin_of
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.kernels.fans import too_near

@@ -23,9 +23,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from planner.baselines.joining import branch_off, stuck
 from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import SHORTEST_M, Limits, Point, Pose, Segment, turn_onto
+from planner.geometry.joining import branch_off, stuck
 from planner.geometry.margin import MARGIN_KEY, margin_of
 from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory

@@ -51,6 +51,13 @@ def inside_bounds(path: Path, bounds_m: tuple[float, float, float, float]) -> bo
     return segments.inside_bounds(path.segments, *bounds_m)
 
 
+def admits(
+    path: Path, points_m: FloatArray, keep_m: float, bounds_m: tuple[float, float, float, float]
+) -> bool:
+    """Whether a path keeps its distance from (m, 2) points, and stays inside a rectangle."""
+    return inside_bounds(path, bounds_m) and math.isinf(first_breach(path, points_m, keep_m))
+
+
 def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | FloatArray) -> tuple[float, int]:
     """Where the line from a to b first enters one of the discs about some points.
 

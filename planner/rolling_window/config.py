@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 
+from planner.geometry.joining import LEAD_S as LEAD_S
 from planner.geometry.margin import MARGIN_KEY, margin_of
 from planner.interface import Mission
 from planner.rolling_window.certificate import least_sensor_range_m
-
-LEAD_S = 1.0
-"""A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.geometry.curves import Point
-from planner.geometry.step_model import distance_left_m
+from planner.paper.sectors import distance_left_m
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.window import SectorEdge, Window, guide_vector
 

@@ -14,8 +14,8 @@ from collections.abc import Callable, Generator
 import numpy as np
 
 from planner.geometry.curves import Limits, Point, Pose, Segment, turns_onto
-from planner.geometry.step_model import largest_course_change_rad, step
 from planner.interface import Path
+from planner.paper.step_model import step
 from planner.rolling_window.route_optimisation import FlyableRoute, Terrain
 
 EXPANSIONS = 1000
@@ -53,7 +53,7 @@ def search_poses(
         its count.
     """
     step_m = limits.radius_m
-    largest = largest_course_change_rad(step_m, limits.radius_m)
+    largest = 2.0 * math.asin(step_m / (2.0 * limits.radius_m))
     course = math.atan2(start.tangent_north, start.tangent_east)
     enough_m = to_go(start[:2]) - AWAY * limits.radius_m
     queue: list[tuple[float, int, float, float, float, float, tuple[Segment, ...]]]
@@ -78,7 +78,7 @@ def search_poses(
             if change * turning < 0.0:
                 continue
             # theta_k is the course of chords: half-way between the tangents at the ends of an arc.
-            nx, ny, _ = step(x, y, course, 0.5 * change, step_m)
+            nx, ny, _ = step(x, y, course, 0.5 * change, 1.0, step_m)
             curvature = 2.0 * math.sin(0.5 * change) / step_m
             arc: Segment = (*pose, curvature, change / curvature if change else step_m)
             left = to_go((nx, ny))

@@ -1,0 +1,118 @@
+"""Joints of paths that bend: how a new path leaves the one in effect, and the turn to hold in where there is none."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+
+from planner.geometry.clearance import admits, first_breach
+from planner.geometry.curves import (
+    Limits,
+    Pose,
+    Segment,
+    along,
+    between,
+    full_turn,
+    place_on,
+    pose_at,
+    sample,
+)
+from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
+
+LEAD_S = 1.0
+"""A new plan leaves the old one this much flying time ahead, so that guidance has seen the joint coming."""
+
+SHARES = (1.0, 0.5, 0.1)
+"""Shares of the clearance that a holding turn keeps, tried in this order: a turn too near is better than none. Turns in
+space that has been seen to be free come first."""
+
+AHEAD_RADII = 4.0
+"""The holding turn begins within so many turn radii ahead of the aircraft."""
+
+APART_RADII = 0.25
+"""Places for the holding turn are this many turn radii apart."""
+
+
+def stuck(why: str, request: PlanRequest, mission: Mission, points_m: FloatArray) -> Plan:
+    """The answer where there is no way on: a turn to hold in, or the one that is being flown.
+
+    Args:
+        why: the beginning of the sentence.
+        request: the question to the planner.
+        mission: what stays the same for the flight.
+        points_m: (m, 2) edge points.
+    """
+    path = request.flown.path if request.flown else None
+    if path is not None and path.loiter:
+        turn = Path(path.segments[-1:])
+        if math.isinf(first_breach(turn, points_m, SHARES[-1] * mission.clearance_m)):
+            return Plan(PlanStatus.NO_PATH, f"{why}; holding")
+    limits = Limits.of(mission)
+    arc_length_m = request.arc_length_m
+    if path is None or path.loiter or path.length_m - arc_length_m < limits.roll_m:
+        path = Path(np.array([(*request.position_m, *request.direction, 0.0, max(limits.roll_m, 1.0))]))
+        arc_length_m = 0.0
+    for seen, share in product((request.seen, None), SHARES):
+        hold = holding_turn(path, arc_length_m, mission, points_m, share * mission.clearance_m, seen)
+        if hold is not None:
+            waypoints = np.array([request.position_m, *hold.segments[1:, :2].tolist()])
+            return Plan(PlanStatus.FOUND, f"{why}; holding", waypoints, hold)
+    return Plan(PlanStatus.NO_PATH, f"{why} and there is no room to hold")
+
+
+def holding_turn(
+    path: Path,
+    from_m: float,
+    mission: Mission,
+    points_m: FloatArray,
+    keep_m: float,
+    seen: MapView | None = None,
+) -> Path | None:
+    """The path in effect, left as late as may be for a full turn at the turn radius; None: there is no room.
+
+    Args:
+        path: the path in effect.
+        from_m: arc length of the aircraft on it.
+        mission: turn radius and area.
+        points_m: (m, 2) edge points.
+        keep_m: distance to be kept from each.
+        seen: the turn lies in space that was seen to be free; None: anywhere.
+    """
+    limits = Limits.of(mission)
+    to_m = min(path.length_m, from_m + AHEAD_RADII * limits.radius_m)
+    way = between(path, from_m, to_m)
+    breach = first_breach(Path(np.array(way)), points_m, keep_m) if way else math.inf
+    if breach < math.inf:
+        to_m = max(from_m, from_m + breach - keep_m)
+    step_m = APART_RADII * limits.radius_m
+    for i in range(int((to_m - from_m) / step_m), -1, -1):
+        pose, curvature = place_on(path, from_m + i * step_m)
+        for side in (1.0, -1.0) if curvature >= 0.0 else (-1.0, 1.0):
+            roll: list[Segment] = [(*pose, 0.0, limits.roll_m)] if side * curvature < 0.0 else []
+            start = along(roll[0], limits.roll_m) if roll else pose
+            rows = Path(np.array([*roll, full_turn(start, limits.radius_m, side)]))
+            if seen is not None and not seen.seen_free(sample(rows, step_m)).all():
+                continue
+            if admits(rows, points_m, keep_m, mission.bounds_m):
+                return Path(
+                    np.array([*between(path, from_m, from_m + i * step_m), *rows.segments.tolist()]),
+                    loiter=True,
+                )
+    return None
+
+
+def branch_off(request: PlanRequest, mission: Mission) -> tuple[Pose, list[Segment]]:
+    """Where a new path leaves the one in effect, and the stretch up to there; the aircraft where it is off it.
+
+    From a holding turn a new path leaves at once.
+    """
+    path, arc_length_m = request.flown.path if request.flown else None, request.arc_length_m
+    here = Pose(*request.position_m, *request.direction)
+    if path is None or path.loiter or arc_length_m >= path.length_m:
+        return here, []
+    if math.dist(pose_at(path, arc_length_m)[:2], here[:2]) > mission.off_path_m:
+        return here, []
+    leave = arc_length_m + mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
+    return pose_at(path, leave), between(path, arc_length_m, leave)

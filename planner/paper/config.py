@@ -1,0 +1,107 @@
+"""The paper's symbols as keys of a scenario; where the paper gives no value, the default is ours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.interface import Mission
+from planner.paper.step_model import most_units
+
+
+@dataclass(frozen=True)
+class ImprovedBugConfig:
+    """Keys of `planner.kind: improved_bug`."""
+
+    planning_window_m: float | None = field(
+        default=None,
+        metadata={
+            "doc": "radius r1 of the planning window; no track point lies further from where the plan begins; at "
+            "most the sensor range, which is the default",
+            "unit": "m",
+            "above": 0.0,
+        },
+    )
+    steps: int = field(
+        default=8,
+        metadata={"doc": "N, steps of a search", "unit": "1", "minimum": 1, "maximum": 100},
+    )
+    candidates: int = field(
+        default=8,
+        metadata={"doc": "n, candidates kept at every step", "unit": "1", "minimum": 1, "maximum": 100},
+    )
+    step_m: float | None = field(
+        default=None,
+        metadata={
+            "doc": "S0, length of a step; default: r1 / N, at least half of the turn radius",
+            "unit": "m",
+            "above": 0.0,
+        },
+    )
+    course_unit_deg: float = field(
+        default=1.0,
+        metadata={
+            "doc": "theta0, smallest change of course",
+            "unit": "deg",
+            "above": 0.0,
+            "maximum": 45.0,
+        },
+    )
+    sectors: int = field(
+        default=4,
+        metadata={"doc": "sectors planned in at every step", "unit": "1", "minimum": 1, "maximum": 100},
+    )
+    refinement_deg: float = field(
+        default=0.25,
+        metadata={
+            "doc": "a sector is refined down to this angle; 360 takes its middle",
+            "unit": "deg",
+            "above": 0.0,
+            "maximum": 360.0,
+        },
+    )
+    route_optimisation: bool = field(
+        default=True,
+        metadata={"doc": "whether track points between which the way is free are cancelled", "unit": "1"},
+    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+
+    def resolved(self, mission: Mission) -> ImprovedBugConfig:
+        """This config with every None replaced by its default for the mission.
+
+        Raises:
+            ValueError: the window is larger than the sensing range, or a step too long or too short for it.
+        """
+        window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
+        if window > mission.sensor_range_m:
+            raise ValueError(
+                f"planning_window_m is {window:g}, more than sensor.range_m {mission.sensor_range_m:g}; "
+                "must be at most that: nothing is sensed beyond"
+            )
+        radius = mission.turn_radius_m
+        step = max(window / self.steps, 0.5 * radius) if self.step_m is None else self.step_m
+        if 1.5 * step > window:
+            raise ValueError(
+                f"planning_window_m is {window:g}, less than one and a half steps of {step:g} m; "
+                f"must be at least {math.ceil(1.5 * step)}"
+            )
+        if not most_units(step, radius, self.unit_rad):
+            least = 2.0 * radius * math.tan(0.5 * self.unit_rad)
+            raise ValueError(
+                f"step_m is {step:g}, too short to turn by course_unit_deg {self.course_unit_deg:g} at a radius of "
+                f"{radius:.0f} m; must be at least {math.ceil(least)}"
+            )
+        margin = margin_of(mission) if self.margin_m is None else self.margin_m
+        return replace(self, planning_window_m=window, step_m=step, margin_m=margin)
+
+    @property
+    def unit_rad(self) -> float:
+        """theta_0 in rad."""
+        return math.radians(self.course_unit_deg)
+
+    @property
+    def resolved_step_m(self) -> float:
+        """S_0 of a resolved config."""
+        assert self.step_m is not None
+        return self.step_m

@@ -1,0 +1,37 @@
+"""Section 2.2, the cost of a track, and section 2.3, Definitions 1 and 2."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from planner.geometry.curves import Point
+from planner.interface import FloatArray
+
+
+def track_cost_m(nodes: Sequence[Point]) -> float:
+    """Section 2.2: c, the sum of the costs c_k from w_k to w_{k+1}. The cost is the length; threats cost nothing."""
+    return sum(math.dist(a, b) for a, b in pairwise(nodes))
+
+
+def within(points_m: FloatArray, center_m: Point, radius_m: float) -> FloatArray:
+    """Definition 1: those of (m, 2) points x with |x - w_k| <= r; with r_1 in place of r, the window of section 3.3."""
+    return points_m[np.hypot(points_m[:, 0] - center_m[0], points_m[:, 1] - center_m[1]) <= radius_m]
+
+
+def guide_vector(position_m: Point, goal_m: Point) -> tuple[float, float]:
+    """Definition 2: alpha, from w_k to the goal w_n, as its length a (m) and its angle from east (rad)."""
+    east, north = goal_m[0] - position_m[0], goal_m[1] - position_m[1]
+    return math.hypot(east, north), math.atan2(north, east)
+
+
+def crosses(a: Point, b: Point, points_m: FloatArray, keep_m: float) -> bool:
+    """Whether the line from a to b comes nearer than `keep_m` to a point, and does not only lead away from it."""
+    ux, uy = b[0] - a[0], b[1] - a[1]
+    dx, dy = points_m[:, 0] - a[0], points_m[:, 1] - a[1]
+    share = np.clip((dx * ux + dy * uy) / max(ux * ux + uy * uy, 1e-12), 0.0, 1.0)
+    near = np.square(dx - share * ux) + np.square(dy - share * uy) < keep_m * keep_m
+    return bool((near & (share > 0.0)).any())

@@ -1,0 +1,169 @@
+"""Section 3.2, multi-step search: N steps inside the planning window, the n best kept at every step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from planner.geometry.curves import Point
+from planner.interface import FloatArray, Mission
+from planner.paper.config import ImprovedBugConfig
+from planner.paper.definitions import crosses, guide_vector
+from planner.paper.sectors import (
+    Sector,
+    clip,
+    distance_left_m,
+    fan_shaped_sectors,
+    refine,
+    select,
+    signed,
+    whole_units,
+)
+from planner.paper.step_model import most_units, step
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Section 3.3: the planning window U_1 = {x : |x - w_k| <= r_1}, and what was sensed in it.
+
+    Attributes:
+        center_m: w_k, where the aircraft is.
+        radius_m: r_1. No track point lies beyond it.
+        points_m: (m, 2) sensed edge points whose grown discs meet the window.
+        keep_m: distance to be kept from each.
+        mission: goal, area and turn radius.
+        config: the symbols of the paper.
+    """
+
+    center_m: Point
+    radius_m: float
+    points_m: FloatArray
+    keep_m: float
+    mission: Mission
+    config: ImprovedBugConfig
+
+    def holds(self, place_m: Point) -> bool:
+        """Whether a track point may lie at a place: in U_1."""
+        return math.dist(place_m, self.center_m) <= self.radius_m
+
+    def free(self, a: Point, b: Point) -> bool:
+        """Whether the line between two track points crosses no obstacle, nor the known boundary (section 2.2)."""
+        xmin, ymin, xmax, ymax = self.mission.bounds_m
+        inside = xmin <= b[0] <= xmax and ymin <= b[1] <= ymax
+        return inside and not crosses(a, b, self.points_m, self.keep_m)
+
+
+@dataclass(frozen=True)
+class Track:
+    """Sub-segments w_s1 ... w_sn of a candidate.
+
+    Attributes:
+        nodes: the track points.
+        course_rad: theta on arrival at the last.
+        flown_m: length of the sub-segments.
+        left_m: x, distance from the last track point to the goal.
+        ended: it leads to the goal, or to the rim of the window.
+    """
+
+    nodes: tuple[Point, ...]
+    course_rad: float
+    flown_m: float
+    left_m: float
+    ended: bool = False
+
+    @property
+    def cost_m(self) -> float:
+        """Length and distance left: what the n best are told by."""
+        return self.flown_m + self.left_m
+
+
+def multi_step_search(window: Window, start_m: Point, course_rad: float) -> list[Track]:
+    """Section 3.2: the process of one step, N times; n candidates of N sub-segments, best first.
+
+    Where no candidate gets on for N steps, the depth is halved until one does; the paper is silent on that.
+
+    Args:
+        window: the planning window.
+        start_m: the first track point.
+        course_rad: theta on arrival there.
+    """
+    left_m, _ = guide_vector(start_m, window.mission.goal_m)
+    best = [[Track((start_m,), course_rad, 0.0, left_m)]]
+    for _ in range(window.config.steps):
+        longer = [new for track in best[-1] for new in next_steps(window, track)]
+        best.append(sorted(longer, key=lambda track: track.cost_m)[: window.config.candidates])
+    depth = window.config.steps
+    while depth and not best[depth]:
+        depth //= 2
+    return best[depth] if depth else []
+
+
+def next_steps(window: Window, track: Track) -> Iterator[Track]:
+    """The step along the guide vector if nothing is in the way, else a step in each of the selected sectors."""
+    if track.ended:
+        yield track
+        return
+    here, config = track.nodes[-1], window.config
+    unit_rad, step_m = config.unit_rad, config.resolved_step_m
+    guide_m, guide_rad = guide_vector(here, window.mission.goal_m)
+    most_rad = unit_rad * most_units(step_m, window.mission.turn_radius_m, unit_rad)
+    if guide_m <= step_m and abs(signed(guide_rad - track.course_rad)) <= most_rad:
+        goal = window.mission.goal_m
+        if window.holds(goal) and window.free(here, goal):
+            yield Track((*track.nodes, goal), guide_rad, track.flown_m + guide_m, 0.0, ended=True)
+            return
+    at_rim = False
+    for units in directions(window, track, guide_m, guide_rad, most_rad):
+        x, y, course = step(*here, track.course_rad, units, unit_rad, step_m)
+        if not window.holds((x, y)):
+            at_rim = True
+        elif window.free(here, (x, y)):
+            left_m = distance_left_m(guide_m, step_m, course - guide_rad)
+            yield Track((*track.nodes, (x, y)), course, track.flown_m + step_m, left_m)
+    if at_rim and len(track.nodes) > 1:
+        yield replace(track, ended=True)
+
+
+def directions(
+    window: Window, track: Track, guide_m: float, guide_rad: float, most_rad: float
+) -> Iterator[int]:
+    """The Delta of each step to be tried from the end of a track.
+
+    Args:
+        window: the planning window.
+        track: the track so far.
+        guide_m: length of the guide vector at its end.
+        guide_rad: direction of the guide vector.
+        most_rad: largest change of course.
+    """
+    here, config, course = track.nodes[-1], window.config, track.course_rad
+    unit_rad, step_m = config.unit_rad, config.resolved_step_m
+    if not crosses(here, along_guide(window, here, guide_m, guide_rad), window.points_m, window.keep_m):
+        whole = Sector(course - most_rad, course + most_rad)
+        units = whole_units(whole, course + signed(guide_rad - course), course, unit_rad)
+        assert units is not None
+        x, y, _ = step(*here, course, units, unit_rad, step_m)
+        if window.free(here, (x, y)):
+            yield units
+            return
+    free = fan_shaped_sectors(window.points_m, window.keep_m, here)
+    parts = [part for sector in free for part in clip(sector, course, most_rad)]
+    for part in select(parts, guide_rad, config.sectors):
+        direction = refine(part, guide_m, guide_rad, step_m, math.radians(config.refinement_deg))
+        units_in = whole_units(part, direction, course, unit_rad)
+        if units_in is not None:
+            yield units_in
+
+
+def along_guide(window: Window, here: Point, guide_m: float, guide_rad: float) -> Point:
+    """Figure 1: how far the guide vector is looked along, to the goal or to the rim of the window.
+
+    The rim is the far intersection of the ray p + t u with the circle |x - w_k| = r_1.
+    """
+    ux, uy = math.cos(guide_rad), math.sin(guide_rad)
+    px, py = here[0] - window.center_m[0], here[1] - window.center_m[1]
+    ahead = px * ux + py * uy
+    rim_m = -ahead + math.sqrt(max(ahead * ahead + window.radius_m**2 - px * px - py * py, 0.0))
+    reach = min(guide_m, rim_m)
+    return here[0] + reach * ux, here[1] + reach * uy

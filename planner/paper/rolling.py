@@ -1,0 +1,131 @@
+"""Section 3.3, the rolling window: the first part of a plan is flown, then it is planned anew in a new window.
+
+What the paper does not say is done in the plainest way:
+
+* The window rolls when a step S_0 of the plan is flown, or when something sensed since cuts the plan.
+* A plan begins on the path in effect, a second ahead, at the end of an arc. The first track point w_s1 lies half a
+  step straight ahead of there, so that the corner there can be rounded as any other.
+* Where no candidate is found, the plan in effect is flown on; where that ends or is cut, the aircraft circles and
+  searches again after every scan. Nothing leads it out of a trap.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+
+from planner.geometry.clearance import first_breach
+from planner.geometry.curves import Pose, Segment, along, between, place_on
+from planner.geometry.joining import LEAD_S, branch_off, stuck
+from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.paper.config import ImprovedBugConfig
+from planner.paper.definitions import within
+from planner.paper.multi_step_search import Window, multi_step_search
+from planner.paper.route_optimisation import Route, optimise, shortest
+from planner.paper.sectors import ALL, fan_shaped_sectors
+
+
+class ImprovedBug:
+    """The planner for one flight."""
+
+    def __init__(self, config: ImprovedBugConfig, mission: Mission) -> None:
+        self._config, self._mission = config.resolved(mission), mission
+        self._sensed_m: FloatArray = np.zeros((0, 2))
+        self._revision = -1
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """Section 3.3: one step of the rolling window, where one is due."""
+        step_m = self._config.resolved_step_m
+        window = self.planning_window(request)
+        path = request.flown.path if request.flown else None
+        flying = path is not None and not path.loiter
+        cut = path is not None and math.isfinite(
+            first_breach(path, window.points_m, self._mission.clearance_m, request.arc_length_m)
+        )
+        if path is not None and not request.scanned:
+            return Plan(PlanStatus.KEPT, "nothing new is sensed")
+        if flying and not cut and request.arc_length_m < step_m:
+            return Plan(PlanStatus.KEPT, "the first step of the plan is being flown")
+        start, before = self._start(request, cut)
+        left_m = path.length_m - request.arc_length_m if path is not None else 0.0
+        routes = self.local_planning(window, start)
+        if routes:
+            return self._found(request, window, routes, before)
+        if flying and not cut and left_m > step_m:
+            return Plan(PlanStatus.NO_PATH, "no candidate in the window; the plan in effect is flown on")
+        return stuck("no candidate in the window", request, self._mission, window.points_m)
+
+    def planning_window(self, request: PlanRequest) -> Window:
+        """Section 3.3: U_1 about the aircraft, with the sensed edge points that are not too far to matter in it."""
+        config, mission = self._config, self._mission
+        assert config.planning_window_m is not None
+        assert config.margin_m is not None
+        keep_m = mission.clearance_m + config.margin_m
+        sensed = np.concatenate(
+            (self._sensed(request.seen), *(each.points_m for each in request.seen.moving))
+        )
+        near = within(sensed, request.position_m, config.planning_window_m + keep_m)
+        return Window(request.position_m, config.planning_window_m, near, keep_m, mission, config)
+
+    def _sensed(self, seen: MapView) -> FloatArray:
+        """(m, 2) the edge points of all scans so far, without those that later scans took back."""
+        taken_back = seen.last_removal_revision > self._revision
+        fresh = seen.edges_since(-1 if taken_back else self._revision)
+        self._sensed_m = np.concatenate((self._sensed_m[: 0 if taken_back else None], fresh))
+        self._revision = seen.revision
+        return self._sensed_m
+
+    def local_planning(self, window: Window, start: Pose) -> list[Route]:
+        """Section 3.2: multi-step search, then route optimisation of each candidate; the shortest first."""
+        ahead = along((*start, 0.0, 0.0), 0.5 * self._config.resolved_step_m)
+        course = math.atan2(start.tangent_north, start.tangent_east)
+        if not window.free(start[:2], ahead[:2]):
+            return []
+        tracks = multi_step_search(window, ahead[:2], course)
+        routes = (optimise(track, start, window) for track in tracks)
+        return shortest((route for route in routes if route is not None), self._mission.goal_m)
+
+    def _start(self, request: PlanRequest, cut: bool) -> tuple[Pose, list[Segment]]:
+        """Where the new plan leaves the one in effect, and the stretch up to there."""
+        start, before = branch_off(request, self._mission)
+        if not before or cut:
+            return start, before
+        assert request.flown is not None
+        assert request.flown.path is not None
+        leave = request.arc_length_m + self._mission.ground_speed_mps * (
+            LEAD_S + self._mission.compute_latency_s
+        )
+        path = request.flown.path
+        for end_m in np.cumsum(path.segments[:, 5]).tolist():
+            if end_m > leave and place_on(path, leave)[1]:
+                return place_on(path, end_m)[0], between(path, request.arc_length_m, end_m)
+            if end_m > leave:
+                break
+        return start, before
+
+    def _found(
+        self, request: PlanRequest, window: Window, routes: list[Route], before: list[Segment]
+    ) -> Plan:
+        """The shortest route as a plan."""
+        best = routes[0]
+        return Plan(
+            PlanStatus.FOUND,
+            f"{len(routes)} candidates of up to {self._config.steps} steps",
+            np.array([request.position_m, *best.nodes]),
+            Path(np.array([*before, *best.path.segments.tolist()])),
+            partial(_picture, request.position_m, window, routes),
+        )
+
+
+def _picture(position_m: tuple[float, float], window: Window, routes: list[Route]) -> PlanPicture:
+    """What was searched: guide vector, window, the sectors at the first track point, the optimised candidates."""
+    sectors = fan_shaped_sectors(window.points_m, window.keep_m, routes[0].nodes[0])
+    edges = np.array([each for each in sectors if each != ALL]).reshape(-1, 2)
+    return PlanPicture(
+        np.array([position_m, window.mission.goal_m]),
+        window.radius_m,
+        np.column_stack((np.cos(edges), np.sin(edges)))[:, [0, 2, 1, 3]],
+        tuple(np.array([position_m, *route.nodes]) for route in routes),
+    )
