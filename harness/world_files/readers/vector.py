@@ -158,6 +158,11 @@ def _rows(names: list[str], shapes: Any, columns: Any) -> Iterator[_Feature]:
     import shapely
 
     geometries = shapely.from_wkb(shapes, on_invalid="fix")
+    broken = sum(each is None and wkb is not None for each, wkb in zip(geometries, shapes, strict=True))
+    if broken:
+        raise WorldFileError(
+            f"has {counted(broken, 'shape')} that cannot be read; repair it, as with ogr2ogr -makevalid"
+        )
     for row, shape in enumerate(geometries):
         tags = {
             name: value.item() if isinstance(value, np.generic) else value

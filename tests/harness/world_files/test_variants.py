@@ -710,19 +710,22 @@ def test_airspace_is_the_same_in_every_encoding_and_with_tabs(data: bytes, tmp_p
     assert same(part.top, Limit(3500 * FOOT_M))
 
 
-def test_kml_with_blanks_after_commas_and_rings_of_their_own(tmp_path: Path) -> None:
+def test_kml_with_blanks_after_commas_and_lines_beside_its_polygon(tmp_path: Path) -> None:
     ring = " ".join(f"{x}, {y}, 120" for x, y in [*CORNERS, CORNERS[0]])
     inner = f"<outerBoundaryIs><LinearRing><coordinates>{ring}</coordinates></LinearRing></outerBoundaryIs>"
     mode = "<altitudeMode>relativeToGround</altitudeMode>"
-    lone = f"<LinearRing><coordinates>{ring}</coordinates></LinearRing>"
+    line = f"<LineString><coordinates>{ring}</coordinates></LineString>"
     text = (
-        '<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>zone</name><MultiGeometry>'
-        f"<Polygon>{mode}{inner}</Polygon>{lone}</MultiGeometry></Placemark></kml>"
+        '<kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><name>zone</name><MultiGeometry>'
+        f"<Polygon>{mode}{inner}</Polygon>{line}</MultiGeometry></Placemark></kml>"
     )
     found = read_any(written(tmp_path / "a.kml", text))
     (part,) = found.parts
     assert (part.bottom, part.top) == (NO_BOTTOM, Limit(120.0, Datum.GROUND))
     assert "1 point, line or wall passed over" in found.notes
+    lone = text.replace("LineString", "LinearRing")
+    with pytest.raises(WorldFileError, match="has 1 shape that cannot be read"):
+        read_any(written(tmp_path / "b.kml", lone))
 
 
 def test_chimneys_and_towers_stand_like_buildings_and_piers_do_not(tmp_path: Path) -> None:
