@@ -15,10 +15,8 @@ from harness.cli.standard_output import say, to_nowhere
 def export(
     run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="A run folder.")],
     form: Annotated[
-        Literal["plan", "waypoints", "geojson", "kml", "gpx", "csv", "acmi", "mcap"],
-        typer.Option(
-            "--format", metavar="FORMAT", help="plan, waypoints, geojson, kml, gpx, csv, acmi or mcap."
-        ),
+        Literal["plan", "waypoints", "geojson", "kml", "gpx", "csv", "mcap"],
+        typer.Option("--format", metavar="FORMAT", help="plan, waypoints, geojson, kml, gpx, csv or mcap."),
     ],
     what: Annotated[
         Literal["flown", "planned"],
@@ -39,7 +37,7 @@ def export(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Default: standard output.")] = None,
 ) -> int:
-    """Writes a run for QGroundControl, MAVLink, maps, GPS tools, spreadsheets, Tacview (acmi) or Foxglove (mcap).
+    """Writes a run for QGroundControl, MAVLink, maps, GPS tools, spreadsheets or Foxglove (mcap).
 
     For example: wayproof export runs/my_run --format plan --out way.plan
     """

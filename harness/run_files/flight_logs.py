@@ -8,6 +8,7 @@ import io
 import math
 import mmap
 import os
+import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,9 +21,9 @@ from aircraft.frames import LocalPlane
 from harness.files.input_file import InputError
 from harness.files.wording import counted
 from harness.flight.record import FloatArray
-from harness.run_files.csv_path import altitude_column
+from harness.run_files.csv_path import ABOVE_GROUND, ALTITUDES, DEGREES, LOCAL
+from harness.run_files.igc_path import NEEDS_LOGS, igc_fixes
 
-NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
 MAX_BYTES: Final = 1_000_000_000
 MAX_TEXT_BYTES: Final = 200_000_000
 """Of a log that is read line by line: some millions of rows."""
@@ -42,7 +43,6 @@ LAST_PAGE: Final = 528
 """Bytes at the end of a DataFlash log that may hold anything: it is written in pages."""
 DAMAGED: Final = "damaged: what cannot be read of it is passed over"
 TORN: Final = "damaged, or torn: read as far as it goes"
-UNINDEXED: Final = "its index is damaged, or missing: read without it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,26 +236,20 @@ def _silent() -> Iterator[None]:
 
 def _igc(path: Path, notes: list[str]) -> Rows:
     """Gliders: fixes with the receiver's altitude, or the pressure altitude where that is 0."""
-    from aerofiles.igc import Reader
-
-    with path.open(encoding="latin-1") as file:
-        parsed = Reader(skip_duplicates=True).read(file)
-    broken, fixes = parsed["fix_records"]
+    fixes, broken = igc_fixes(path.read_text(encoding="latin-1"), str(path))
     if broken:
-        notes.append(f"{counted(len(broken), 'B record')} that cannot be read passed over")
-    satellites = any(fix["gps_alt"] for fix in fixes)
-    if satellites and not all(fix["gps_alt"] for fix in fixes):
+        notes.append(f"{counted(broken, 'B record')} that cannot be read passed over")
+    if any(fix["gps_alt"] for fix in fixes) and not all(fix["gps_alt"] for fix in fixes):
         notes.append("where its receiver has no altitude, that of its barometer is shown, if there is one")
-    rows: Rows = []
-    days = 0.0
-    for fix in fixes:
-        clock = fix["time"]
-        time_s = days + 3600.0 * clock.hour + 60.0 * clock.minute + clock.second
-        if rows and time_s < rows[-1][0] - 43_200.0:
-            days += 86_400.0
-            time_s += 86_400.0
-        rows.append((time_s, fix["lat"], fix["lon"], float(fix["gps_alt"] or fix["pressure_alt"] or 0.0)))
-    return rows
+    return [
+        (
+            fix["datetime"].timestamp(),
+            fix["lat"],
+            fix["lon"],
+            float(fix["gps_alt"] or fix["pressure_alt"] or 0),
+        )
+        for fix in fixes
+    ]
 
 
 def _mcap(path: Path, notes: list[str]) -> Rows:
@@ -263,51 +257,37 @@ def _mcap(path: Path, notes: list[str]) -> Rows:
 
     A file that is torn or damaged is read as far as it goes, which is noted.
     """
-    from mcap.reader import NonSeekingReader, make_reader
-
-    damage: list[str] = []
-    with path.open("rb") as file:
-        topics = _fixes(_readable(make_reader(file, validate_crcs=True).iter_messages(), damage), notes)
-        if damage:
-            del notes[:], damage[1:]
-            file.seek(0)
-            reader = NonSeekingReader(file, validate_crcs=True)
-            topics = _fixes(_readable(reader.iter_messages(log_time_order=False), damage), notes)
-            if not topics:
-                raise InputError(f"{path}: cannot be read as .mcap ({damage[0]})")
-            notes.append(TORN if len(damage) > 1 else UNINDEXED)
-    return max(topics.values(), key=len, default=[])
-
-
-def _readable(messages: Iterator[Any], damage: list[str]) -> Iterator[Any]:
-    """Messages up to where a file is damaged; what its reader says of that goes into `damage`."""
-    try:
-        yield from messages
-    except ImportError:  # of what it is compressed with
-        raise
-    except Exception as error:  # whatever a library says of a damaged file
-        damage.append(" ".join(str(error).split())[:200] or type(error).__name__)
-
-
-def _fixes(messages: Iterator[Any], notes: list[str]) -> dict[str, Rows]:
-    """Rows by topic; how many messages hold no position goes into the notes."""
+    from mcap.exceptions import McapError
+    from mcap.reader import NonSeekingReader
     from mcap_protobuf.decoder import DecoderFactory
 
     factory, topics, broken = DecoderFactory(), dict[str, Rows](), 0
-    for schema, channel, message in messages:
-        if schema is None or schema.name != "foxglove.LocationFix":
-            continue
-        decode = factory.decoder_for(channel.message_encoding, schema) or _plain
+    with path.open("rb") as file:
+        messages = NonSeekingReader(file, validate_crcs=True).iter_messages(log_time_order=False)
         try:
-            fix = decode(message.data)
-            row = (message.log_time / 1e9, *map(float, (fix.latitude, fix.longitude, fix.altitude)))
-        except Exception:  # whatever a library says of a damaged message
-            broken += 1
-            continue
-        topics.setdefault(channel.topic, []).append(row)
+            for schema, channel, message in messages:
+                if schema is None or schema.name != "foxglove.LocationFix":
+                    continue
+                decode = factory.decoder_for(channel.message_encoding, schema) or _plain
+                try:
+                    fix = decode(message.data)
+                    row = (
+                        message.log_time / 1e9,
+                        float(fix.latitude),
+                        float(fix.longitude),
+                        float(fix.altitude),
+                    )
+                except Exception:  # whatever a library says of a damaged message
+                    broken += 1
+                    continue
+                topics.setdefault(channel.topic, []).append(row)
+        except (McapError, ValueError, EOFError, struct.error) as error:
+            if not topics:
+                raise InputError(f"{path}: cannot be read as .mcap ({error})") from error
+            notes.append(TORN)
     if broken:
         notes.append(f"{counted(broken, 'message')} of foxglove.LocationFix without a position passed over")
-    return topics
+    return max(topics.values(), key=len, default=[])
 
 
 def _plain(data: bytes) -> SimpleNamespace:
@@ -318,36 +298,30 @@ def _plain(data: bytes) -> SimpleNamespace:
 
 
 def _csv(path: Path, notes: list[str]) -> Rows | LogTrack:
-    """A table with a header: time_s, a position, and altitude_m where there is one."""
-    rows: Rows = []
+    """A table with the column time_s and those of a path in CSV; a number may be nan."""
     with path.open(encoding="utf-8-sig", newline="") as file:
-        table = csv.reader(file, skipinitialspace=True)
-        names = [name.strip() for name in next(table, [])]
-        column = altitude_column([name.lower() for name in names])
-        local = {"x_m", "y_m"} <= set(names)
-        if "time_s" not in names or not (local or {"latitude_deg", "longitude_deg"} <= set(names)):
+        table = csv.DictReader(file, skipinitialspace=True)
+        header = set(table.fieldnames or ())
+        place = next((pair for pair in (*LOCAL, *DEGREES) if header.issuperset(pair)), None)
+        if "time_s" not in header or place is None:
             raise InputError(
                 f"{path}:1: must have the columns time_s and x_m,y_m or latitude_deg,longitude_deg"
             )
-        wanted = ["time_s", *(("x_m", "y_m") if local else ("latitude_deg", "longitude_deg"))]
-        height = None if column is None else [name.lower() for name in names].index(column.name)
-        if column is None:
+        height = next((name for name in (*ALTITUDES, ABOVE_GROUND) if name in header), None)
+        if height is None:
             notes.append("has no altitudes: shown at 0 m")
-        elif column.above_ground:
-            notes.append(f"{names[height or 0]}: altitudes above the ground, shown as if above the sea")
-        elif column.noted:
-            notes.append(column.note)
-        places = [names.index(name) for name in wanted]
-        for row in filter(None, table):
+        elif height == ABOVE_GROUND:
+            notes.append("altitudes above the ground, shown as if above the sea")
+        wanted = ["time_s", *place, *([height] if height else [])]
+        rows: Rows = []
+        for row in table:
             try:
-                up_m = column.unit_m * float(row[height] or 0) if column and height is not None else 0.0
-                time_s, first, second = (float(row[place]) for place in places)
-            except (IndexError, ValueError) as error:
-                wanted += [names[height]] if height is not None else []
+                time_s, first, second, *up_m = (float(row[name]) for name in wanted)
+            except (TypeError, ValueError) as error:
                 told = f"{', '.join(wanted[:-1])} or {wanted[-1]}"
                 raise InputError(f"{path}:{table.line_num}: has no number in {told}") from error
-            rows.append((time_s, first, second, up_m))
-    return LogTrack(*np.array(rows, dtype=np.float64).reshape(-1, 4).T) if local else rows
+            rows.append((time_s, first, second, up_m[0] if up_m else 0.0))
+    return LogTrack(*np.array(rows, dtype=np.float64).reshape(-1, 4).T) if place in LOCAL else rows
 
 
 READERS: Final[dict[str, Callable[[Path, list[str]], Rows | LogTrack]]] = {

@@ -1,7 +1,4 @@
-"""Paths in GeoJSON files (RFC 7946): one LineString, and polygons as areas to stay out of or inside of.
-
-A MultiLineString whose parts meet at 180 degrees is one line.
-"""
+"""Paths in GeoJSON files (RFC 7946): one LineString, and polygons as areas to stay out of or inside of."""
 
 from __future__ import annotations
 
@@ -80,31 +77,8 @@ def _shapes(node: Any, source: str, key: str, meaning: str | None) -> Iterator[S
         return
     if not isinstance(coordinates, list):
         raise InputError(f"{source}: {key}: must be a list")
-    joined = _joined(coordinates) if kind == "MultiLineString" else dict(enumerate(coordinates))
-    for number, part in joined.items():
+    for number, part in enumerate(coordinates):
         yield f"{key}[{number}]", PARTS[kind], part, meaning
-
-
-def _joined(lines: list[Any]) -> dict[int, Any]:
-    """Lines by number; one that goes on where the line before it was cut at 180 degrees is a part of that line."""
-    joined: dict[int, Any] = {}
-    for number, line in enumerate(lines):
-        before = next(reversed(joined.values())) if joined else None
-        if _goes_on(before, line):
-            before += line[1:]
-        else:
-            joined[number] = list(line) if isinstance(line, list) else line
-    return joined
-
-
-def _goes_on(line: Any, other: Any) -> bool:
-    """A line ends at 180 degrees, and another begins there with the other sign."""
-    if not (isinstance(line, list) and line and isinstance(other, list) and other):
-        return False
-    end, begin = line[-1], other[0]
-    if not (isinstance(end, list) and isinstance(begin, list) and end and begin):
-        return False
-    return end[0] in (180, -180) and begin[0] == -end[0] and begin[1:] == end[1:]
 
 
 def _meaning(feature: dict[str, Any], source: str, key: str) -> str | None:

@@ -12,17 +12,18 @@ from harness.run_files.path_as_read import PathAsRead
 
 FLYING_MPS: Final = 12.0
 """Before the first fix and after the last at this ground speed the aircraft rolls, or stands."""
-
 FASTEST_MPS: Final = 150.0
 STEEPEST_MPS: Final = 80.0
-"""Faster than these over the ground, and up or down, no glider flies: a fix that is so far from both its neighbours is
+"""No glider flies faster than these over the ground, and up or down: a fix that is so far from both its neighbours is
 an error of the receiver."""
-
 MOST_BROKEN: Final = 0.05
 """A file of which a larger share of fixes cannot be read is refused."""
-
 DATE: Final = re.compile(r"^H[FOP]DTE", re.MULTILINE)
 EARTH_M: Final = 6_371_000.0
+NEEDS_LOGS: Final = "needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
+
+Fix = dict[str, Any]
+"""A fix as aerofiles has it."""
 
 
 def read_igc(text: str, source: str) -> PathAsRead:
@@ -35,24 +36,30 @@ def read_igc(text: str, source: str) -> PathAsRead:
         source: its name, for faults.
 
     Raises:
-        InputError: it is no IGC file, or has no flight in it.
+        InputError: it is no IGC file, has no flight in it, or aerofiles is not installed.
     """
-    fixes, broken = _fixes(text, source)
+    fixes, broken = igc_fixes(text, source)
     valid = [fix for fix in fixes if abs(fix["lat"]) > 1e-9 or abs(fix["lon"]) > 1e-9]
     right = _without_leaps(valid)
-    flown = _in_flight(right)
+    moving = [k for k in range(1, len(right)) if _speed_mps(right[k - 1], right[k]) >= FLYING_MPS]
+    flown = right[moving[0] - 1 : moving[-1] + 1] if moving else []
     if len(flown) < 2:
         raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
-    known, kind, notes = _with_altitudes(flown)
-    if broken:
-        notes.append(f"{broken} B records that cannot be read passed over")
-    if len(valid) > len(right):
-        leaps = len(valid) - len(right)
-        notes.append(f"{leaps} {'fix' if leaps == 1 else 'fixes'} too far from both neighbours passed over")
-    if len(right) > len(flown):
-        notes.append(f"{len(right) - len(flown)} fixes on the ground not flown")
-    if len(fixes) > len(valid):
-        notes.append(f"{len(fixes) - len(valid)} fixes without a position passed over")
+    known = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
+    kind, notes = "gps_alt", ["GNSS altitudes of the logger taken as above the sea"]
+    if len(known) < len(flown) and any(fix["pressure_alt"] for fix in flown):
+        known, kind = flown, "pressure_alt"
+        notes = ["pressure altitudes of the logger taken as above the sea"]
+    elif len(known) < 2:
+        known, kind, notes = flown, "", ["its logger has no altitudes"]
+    counts = {
+        "fixes without an altitude passed over: the logger has no barometer": len(flown) - len(known),
+        "B records that cannot be read passed over": broken,
+        "fixes too far from both neighbours passed over": len(valid) - len(right),
+        "fixes on the ground not flown": len(right) - len(flown),
+        "fixes without a position passed over": len(fixes) - len(valid),
+    }
+    notes += [f"{count} {what}" for what, count in counts.items() if count]
     return PathAsRead(
         False,
         tuple((float(fix["lat"]), float(fix["lon"])) for fix in known),
@@ -61,29 +68,16 @@ def read_igc(text: str, source: str) -> PathAsRead:
     )
 
 
-def _with_altitudes(flown: list[dict[str, Any]]) -> tuple[list[dict[str, Any]], str, list[str]]:
-    """Fixes that have an altitude, the name of the one that they have, and what to say of it.
+def igc_fixes(text: str, source: str) -> tuple[list[Fix], int]:
+    """The fixes of a file, and how many more cannot be read.
 
-    Where the logger has none, all fixes and no name.
+    Raises:
+        InputError: it is no IGC file, most of it cannot be read, or aerofiles is not installed.
     """
-    by_satellites = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
-    if len(by_satellites) == len(flown):
-        return flown, "gps_alt", ["GNSS altitudes of the logger taken as above the sea"]
-    if any(fix["pressure_alt"] for fix in flown):
-        return flown, "pressure_alt", ["pressure altitudes of the logger taken as above the sea"]
-    if len(by_satellites) < 2:
-        return flown, "", ["its logger has no altitudes"]
-    notes = [
-        "GNSS altitudes of the logger taken as above the sea",
-        f"{len(flown) - len(by_satellites)} fixes without an altitude passed over: the logger has no barometer",
-    ]
-    return by_satellites, "gps_alt", notes
-
-
-def _fixes(text: str, source: str) -> tuple[list[dict[str, Any]], int]:
-    """The fixes of a file, and how many more cannot be read."""
-    from aerofiles.igc import Reader
-
+    try:
+        from aerofiles.igc import Reader
+    except ImportError as error:
+        raise InputError(f"{source}: {NEEDS_LOGS} ({error.name})") from error
     if not text.lstrip("\ufeff").startswith("A"):
         raise InputError(f"{source}:1: must begin with an A record, the logger's number; is no IGC file")
     if not DATE.search(text):
@@ -102,41 +96,29 @@ def _fixes(text: str, source: str) -> tuple[list[dict[str, Any]], int]:
     return list(fixes), len(broken)
 
 
-def _in_flight(fixes: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The fixes from the first to the last that is flown."""
-    flying = [
-        place for place in range(1, len(fixes)) if _speed_mps(fixes[place - 1], fixes[place]) >= FLYING_MPS
-    ]
-    return fixes[flying[0] - 1 : flying[-1] + 1] if flying else []
-
-
-def _without_leaps(fixes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _without_leaps(fixes: list[Fix]) -> list[Fix]:
     """The fixes without those that are too far from both their neighbours, which are not too far from each other."""
     kept = fixes[:1]
-    for place in range(1, len(fixes)):
-        fix, after = fixes[place], fixes[place + 1] if place + 1 < len(fixes) else None
-        if after is None or not (
-            _leaps(kept[-1], fix) and _leaps(fix, after) and not _leaps(kept[-1], after)
-        ):
+    for fix, after in zip(fixes[1:], [*fixes[2:], None], strict=True) if fixes else ():
+        out = after is not None and _leaps(fix, after) and not _leaps(kept[-1], after)
+        if not (out and _leaps(kept[-1], fix)):
             kept.append(fix)
     return kept
 
 
-def _leaps(before: dict[str, Any], after: dict[str, Any]) -> bool:
+def _leaps(before: Fix, after: Fix) -> bool:
     """Whether no glider gets from one fix to another in the time between them."""
     elapsed_s = (after["datetime"] - before["datetime"]).total_seconds()
     ends = before["gps_alt"], after["gps_alt"]
     rise_m = ends[1] - ends[0] if all(ends) else 0.0  # 0: the logger has none
-    return elapsed_s > 0 and (
-        _speed_mps(before, after) > FASTEST_MPS or abs(rise_m) > STEEPEST_MPS * elapsed_s
-    )
+    steep = abs(rise_m) > STEEPEST_MPS * elapsed_s
+    return elapsed_s > 0 and (_speed_mps(before, after) > FASTEST_MPS or steep)
 
 
-def _speed_mps(before: dict[str, Any], after: dict[str, Any]) -> float:
+def _speed_mps(before: Fix, after: Fix) -> float:
     """Ground speed between two fixes."""
     north = math.radians(after["lat"] - before["lat"])
-    east = math.radians(math.remainder(after["lon"] - before["lon"], 360.0)) * math.cos(
-        math.radians(after["lat"])
-    )
+    east = math.radians(math.remainder(after["lon"] - before["lon"], 360.0))
     elapsed_s = (after["datetime"] - before["datetime"]).total_seconds()
-    return EARTH_M * math.hypot(north, east) / elapsed_s if elapsed_s > 0 else 0.0
+    away_m = EARTH_M * math.hypot(north, east * math.cos(math.radians(after["lat"])))
+    return away_m / elapsed_s if elapsed_s > 0 else 0.0

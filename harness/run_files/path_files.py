@@ -130,6 +130,8 @@ def read_path(
 def _text_of(path: Path, suffix: str) -> tuple[str, str, tuple[str, ...]]:
     """The text of a path's file, what it is called in faults, and notes on what was packed with it."""
     data = read_data(path, MAX_BYTES, "a path")
+    if suffix == ".igc":  # loggers write names in Latin-1
+        return data.decode("latin-1"), str(path), ()
     if suffix not in PACKED:
         return decoded(data, str(path), "a path", utf_16=True), str(path), ()
     data, name, notes = kml_of(data, str(path), MAX_BYTES)

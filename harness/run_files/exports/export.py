@@ -11,7 +11,7 @@ from harness.files.wording import counted
 from harness.run_files.exports.exported_path import ExportedPath, path_of, plane_of, scenario_of_run
 from harness.run_files.exports.maps import geojson_text, gpx_text, kml_text
 from harness.run_files.exports.missions import plan_text, waypoints_text
-from harness.run_files.exports.recordings import acmi_text, mcap_bytes
+from harness.run_files.exports.recordings import mcap_bytes
 from harness.run_files.exports.tables import csv_text
 from harness.run_files.run_folder import Run
 from harness.scenario.scenario import Scenario
@@ -29,9 +29,9 @@ PATHS: Final[dict[str, Callable[[ExportedPath], str]]] = {
     "csv": csv_text,
 }
 """Formats of paths."""
-RECORDINGS: Final[dict[str, Callable[[Run], str | bytes]]] = {"acmi": acmi_text, "mcap": mcap_bytes}
-"""Formats of whole flights: every row of the track."""
-FORMATS: Final = (*MISSIONS, *PATHS, *RECORDINGS)
+RECORDING: Final = "mcap"
+"""Format of whole flights: every row of the track."""
+FORMATS: Final = (*MISSIONS, *PATHS, RECORDING)
 
 
 @dataclass(frozen=True)
@@ -67,12 +67,10 @@ def exported(
         raise RunFolderError(
             f"--ground-m adds takeoff and landing to a mission ({', '.join(MISSIONS)}), not to {form}"
         )
-    if form in RECORDINGS:
+    if form == RECORDING:
         if what != "flown":
             raise RunFolderError(f"a file of the format {form} holds the whole flight; leave --what out")
-        content = RECORDINGS[form](run)
-        encoded = content.encode() if isinstance(content, str) else content
-        return Exported(encoded, _place_note(scenario_of_run(run)))
+        return Exported(mcap_bytes(run), _place_note(scenario_of_run(run)))
     path = path_of(run, what, tolerance_m)
     if len(path.latitude_deg) < 2:
         raise RunFolderError(f"the run in {run.folder} has no {what} path: it is too short")

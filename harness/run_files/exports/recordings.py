@@ -1,10 +1,9 @@
-"""Recordings of other viewers: ACMI for Tacview, MCAP for Foxglove and rerun."""
+"""Recordings of other viewers: MCAP for Foxglove and rerun."""
 
 from __future__ import annotations
 
 import io
 import math
-import re
 from collections.abc import Iterator
 from datetime import datetime
 from typing import Any, Final
@@ -16,50 +15,9 @@ from harness.flight.record import FloatArray
 from harness.run_files.exports.exported_path import geodetic, plane_of, scenario_of_run
 from harness.run_files.run_folder import Run
 
-DIGITS: Final = 9
-"""Decimal places of degrees: a tenth of a millimetre."""
 MAP_FRAME: Final = "map"
 """Frame of the local plane in an MCAP file: x east, y north, z up, metres; ROS calls it so (REP 105)."""
 NEEDS_LOGS: Final = "MCAP needs the extra wayproof[logs]: pip install 'wayproof[logs]'"
-
-
-def acmi_text(run: Run) -> str:
-    """A recording for Tacview, https://www.tacview.net/documentation/acmi: every row of the track.
-
-    Angles are degrees; yaw is from true north.
-    """
-    scenario = scenario_of_run(run)
-    plane, track = plane_of(scenario), run.track
-    places = geodetic(plane, np.column_stack((track.east_m, track.north_m))).tolist()
-    aircraft = re.sub(r"[,\\]", " ", scenario.aircraft.model.rpartition("/")[2])
-    lines = [
-        "\ufeffFileType=text/acmi/tacview",
-        "FileVersion=2.2",
-        f"0,ReferenceTime={str(run.manifest['started_utc']).replace('+00:00', 'Z')}",
-        f"0,Title={scenario.name}",
-        "0,DataSource=wayproof",
-        f"1,Name={aircraft},Type=Air+FixedWing",
-    ]
-    rows = zip(
-        track.time_s.tolist(),
-        places,
-        track.up_m.tolist(),
-        track.roll_deg.tolist(),
-        track.pitch_deg.tolist(),
-        track.heading_deg.tolist(),
-        track.airspeed_mps.tolist(),
-        track.east_m.tolist(),
-        track.north_m.tolist(),
-        strict=True,
-    )
-    for time, (latitude, longitude), up, roll, pitch, heading, airspeed, east, north in rows:
-        yaw = (heading + math.degrees(plane.convergence_rad(east, north))) % 360.0
-        lines += (
-            f"#{time:.3f}",
-            f"1,T={longitude:.{DIGITS}f}|{latitude:.{DIGITS}f}|{up:.3f}|{roll:.3f}|{pitch:.3f}|{yaw:.3f},"
-            f"TAS={airspeed:.3f}",
-        )
-    return "\n".join(lines) + "\n"
 
 
 def mcap_bytes(run: Run) -> bytes:

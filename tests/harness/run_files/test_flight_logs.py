@@ -264,7 +264,6 @@ def test_a_damaged_mcap_is_not_taken_for_whole(tmp_path: Path) -> None:
     for name, data, most, note in (
         ("digit", whole[:inside] + whole[inside:].replace(b"8.0", b"9.0", 1), 38, "damaged, or torn"),
         ("key", whole[:inside] + b'"longitudo"' + whole[inside + 11 :], 38, "damaged, or torn"),
-        ("index", whole[:-28] + struct.pack("<Q", 3) + whole[-20:], 39, "its index is damaged"),
     ):
         (tmp_path / f"{name}.mcap").write_bytes(data)
         found = read_log(tmp_path / f"{name}.mcap", PLANE)
@@ -310,26 +309,6 @@ def test_of_a_damaged_log_it_is_said_that_it_is(
     if ending == ".ulg":
         (tmp_path / "torn.ulg").write_bytes(whole[:-9])
         assert len(read_log(tmp_path / "torn.ulg", PLANE).notes) == 1
-
-
-@pytest.mark.parametrize(
-    ("column", "up_m", "notes"),
-    [
-        ("altitude_m", 500.0, ()),
-        ("alt", 500.0, ("alt: taken as metres above the sea",)),
-        ("Altitude(ft)", 152.4, ("altitude(ft): taken as feet above the sea",)),
-        ("agl_m", 500.0, ("agl_m: altitudes above the ground, shown as if above the sea",)),
-        ("what", 0.0, ("has no altitudes: shown at 0 m",)),
-    ],
-)
-def test_altitudes_of_a_table_by_other_names(
-    column: str, up_m: float, notes: tuple[str, ...], tmp_path: Path
-) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text(f"time_s,latitude_deg,longitude_deg,{column}\n0,47,8,500\n1,47.0001,8,500\n")
-    found = read_log(path, PLANE)
-    assert found.up_m == pytest.approx([up_m] * 2)
-    assert found.notes == notes
 
 
 def test_view_tells_what_of_a_log_is_not_there(tmp_path: Path, run: Path) -> None:

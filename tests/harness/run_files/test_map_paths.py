@@ -218,6 +218,12 @@ def test_a_recorded_flight_begins_and_ends_in_the_air(tmp_path: Path) -> None:
     assert read_path(path).altitudes_m.tolist() == [130.0, 135.0, 140.0]
 
 
+def test_a_name_in_latin_1_refuses_no_flight(tmp_path: Path) -> None:
+    path = tmp_path / "a.igc"
+    path.write_bytes((igc(*FLIGHT) + "LXXXpilot M\u00fcller\n").encode("latin-1"))
+    assert read_path(path).altitudes_m.tolist() == [195.0, 200.0, 205.0]
+
+
 def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_path: Path) -> None:
     path = tmp_path / "a.igc"
     lost = [fix[:25] + "00000" + fix[30:] for fix in FLIGHT]  # no pressure altitude, as of a telephone

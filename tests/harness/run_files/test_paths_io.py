@@ -52,54 +52,6 @@ def wpl_items(frame: int = 3, command: int = 16, hold: float = 0.0, altitude: fl
     ]
 
 
-@pytest.mark.parametrize(
-    ("column", "altitude_m", "above_ground", "noted"),
-    [
-        ("alt", 500.0, False, "alt: taken as metres above the sea"),
-        ("Altitude", 500.0, False, "altitude: taken as metres above the sea"),
-        ("altitude(m)", 500.0, False, "altitude(m): taken as metres above the sea"),
-        ("Elevation (ft)", 152.4, False, "elevation (ft): taken as feet above the sea"),
-        ("alt_msl_m", 500.0, False, ""),
-        ("altitude_ft_amsl", 152.4, False, ""),
-        ("agl_m", 500.0, True, ""),
-        ("alt_agl", 500.0, True, "alt_agl: taken as metres above the ground"),
-        ("altitudemode", None, False, "columns passed over: altitudemode"),
-        ("relative_altitude", None, False, "columns passed over: relative_altitude"),
-    ],
-)
-def test_altitudes_of_a_csv_by_other_names(
-    column: str, altitude_m: float | None, above_ground: bool, noted: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text(f"lat,lng,{column}\n47.0,8.0,500\n47.1,8.0,500\n")
-    given = read_path(path)
-    assert given.altitudes_m.tolist() == pytest.approx([] if altitude_m is None else [altitude_m] * 2)
-    assert given.above_ground is above_ground
-    assert given.notes == ((noted,) if noted else ())
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "lat;lon;altitude_m\n47,0;8,0;500,5\n47,1;8,0;500,5\n",
-        "lat\tlon\taltitude_m\n47.0\t8.0\t500.5\n47.1\t8.0\t500.5\n",
-        "\n# made by hand\nlat,lon,altitude_m\n47.0,8.0,500.5\n# half way\n\n47.1,8.0,500.5\n",
-    ],
-)
-def test_other_ways_to_write_a_table(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "path.csv"
-    path.write_text(text)
-    given = read_path(path)
-    assert given.altitudes_m.tolist() == [500.5, 500.5]
-    assert given.points_m[1].tolist() == pytest.approx([0.0, 11_117.0], abs=5.0)
-    path.write_text(text.replace("8", "x"))
-    with pytest.raises(
-        InputError,
-        match=rf":{text.splitlines().index(next(t for t in text.splitlines() if '8' in t)) + 1}: lon",
-    ):
-        read_path(path)
-
-
 @pytest.mark.parametrize("ending", ["mission", "plan", "json", "txt"])
 def test_missions_in_the_json_of_mission_planner(ending: str, tmp_path: Path) -> None:
     """Its items say not what they are, and are all of number 0."""
