@@ -10,6 +10,7 @@ from types import MappingProxyType
 from aircraft.actuators.actuator import Actuators
 from aircraft.autopilot import Gains
 from aircraft.guidance.interface import GuidanceLimits
+from aircraft.interface import GRAVITY_MPS2
 from aircraft.model_files import AircraftError, ModelFiles
 
 
@@ -106,6 +107,11 @@ class Airframe:
             bandwidth_radps=self.guidance_bandwidth_radps,
             turn_rate_share=self.turn_rate_share,
         )
+
+    def least_radius_m(self, airspeed_mps: float) -> float:
+        """Radius of a steady turn at the bank limit at a true airspeed, in calm air."""
+        lateral_mps2 = GRAVITY_MPS2 * math.tan(math.radians(self.bank_limit_deg))
+        return airspeed_mps * airspeed_mps / (lateral_mps2 * self.turn_rate_share)
 
     def level_bank_deg(self, airspeed_mps: float) -> float:
         """Steepest bank at which an airspeed and the altitude are kept, between the speeds flown linear."""

@@ -26,7 +26,7 @@ MOST_SAMPLES = 400_000
 
 LEAST_M = 1e-9
 
-ABOUT = 2.0
+ABOUT = 3.0
 """A corner's limit holds this many times the limit before and behind it, along the path."""
 
 
@@ -119,8 +119,8 @@ def allowed_m(track: Track, tolerance_m: float, corners: Iterable[AllowedCut]) -
 def at_corner(track: Track, corner: AllowedCut) -> NDArray[np.bool_]:
     """(n,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
 
-    They reach as far as the planned path is off the corner's legs, and at least `ABOUT` limits to each side: there an
-    aircraft that turns on the spot, late, has come back to the next leg.
+    They reach as far as the planned path is off the corner's legs, and at least `ABOUT` limits to each side: within
+    three times the distance by which it overshoots a corner an aircraft has come back to the next leg.
     """
     reach_m = max(corner.half_m, ABOUT * corner.allowed_cut_m)
     about: NDArray[np.bool_] = np.abs(track.arc_length_m - corner.arc_length_m) <= reach_m

@@ -22,6 +22,9 @@ from harness.flight.record import AcceptedPlan, FloatArray, Track
 WIND_S = 5.0
 """The wind is averaged over this time, s, so that it is the wind and not a gust of turbulence."""
 
+LEAST_WIND_MPS = 1.0
+"""A wind that seems to be less is taken for the sideslip of a turn in calm air."""
+
 
 @dataclass(frozen=True, eq=False)
 class InForce:
@@ -53,6 +56,7 @@ class InForce:
         rows = min(rows, len(track))
         around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
         mean = np.convolve(wind, np.ones(rows), "same") / around
+        mean[np.abs(mean) < LEAST_WIND_MPS] = 0.0
         return cls(
             commanded_mps,
             np.column_stack((mean.imag, mean.real)),

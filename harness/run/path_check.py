@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,14 +20,12 @@ from harness.run.path_scenario import files_of, has_bounds, scenario_for
 from harness.run.path_verdict import measured
 from harness.run.scenario_flight import flight_limits, fly_to_folder, jsbsim_aircraft, make_loop
 from harness.run_files.given_path import GIVEN, SAME_PLACE_M, FloatArray
+from harness.run_files.mission.flying import corner_limit_m
 from harness.run_files.path_files import PathAsGiven, given_points, read_path
 from harness.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     from harness.world_files.expansion import FileSpec
-
-CORNER_M: Final = 90.0
-"""How far off a waypoint of a mission may be passed that says nothing itself: ArduPilot Plane's default WP_RADIUS."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +65,7 @@ class PathCheck:
             return self.corner_m
         if self.given.drawn:
             return self.scenario.trackability.cross_track_m
-        return self._accepted_m.get(waypoint) or CORNER_M
+        return corner_limit_m(self._accepted_m.get(waypoint, 0.0), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,7 +200,7 @@ def asked(
         own["area"] = {"origin": {"latitude_deg": latitude, "longitude_deg": longitude}}
     scenario = scenario_for(name, about(given.points_m), own, settings, world)
     field = None if scenario.ground is None else scenario.ground.field()
-    plan = planned(given, scenario, altitude_m, None if field is None else field.at)
+    plan = planned(given, scenario, altitude_m, None if field is None else field.at, corner_m)
     files: tuple[FileSpec, ...] = ()
     if not given.drawn or given.above_ground or not plan.profile.level:
         # Now it is known where and how high it begins, and how high the obstacles matter.

@@ -13,7 +13,7 @@ from aircraft.airframe import Airframe
 from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import VerticalProfile, flat
 from harness.files.input_file import InputError
-from harness.run_files.given_path import FloatArray, FlyBy, fly_by
+from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.flying import Flying, Ground
 from harness.run_files.mission.route import mission_route
 from harness.run_files.path_files import PathAsGiven
@@ -21,6 +21,7 @@ from harness.scenario.guidance_keys import airframe_of
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.sections import ALTITUDES_M
+from harness.scenario.start import steady_wind_mps
 from harness.scenario.validation import KeyFault
 
 BEND_SHARE = 0.25
@@ -77,7 +78,11 @@ class PathPlan:
 
 
 def planned(
-    given: PathAsGiven, scenario: Scenario, altitude_m: float | None, ground: Ground | None
+    given: PathAsGiven,
+    scenario: Scenario,
+    altitude_m: float | None,
+    ground: Ground | None,
+    corner_m: float | None = None,
 ) -> PathPlan:
     """Makes of a path what is flown.
 
@@ -86,16 +91,20 @@ def planned(
         scenario: aircraft, air and thresholds, and the altitude of a path without one.
         altitude_m: all of it is flown at this altitude; None: as the path says.
         ground: height of the ground; None where it is not known.
+        corner_m: how far off corners may be passed; None: as the path says.
 
     Raises:
         InputError: it cannot be made into a path: altitudes above a ground that is not known, an airspeed at which
             the wind is too strong.
     """
     frame = airframe_of(scenario.aircraft)
+    wind_mps = complex(*steady_wind_mps(scenario))
     free_m = FREE_SHARE * scenario.trackability.cross_track_m
     speed = scenario.aircraft.airspeed_mps
     if given.mission is None:
-        way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m)
+        limit_m = scenario.trackability.cross_track_m if corner_m is None else corner_m
+        tightest = Tightest(frame.least_radius_m(speed), limit_m, wind_mps / speed)
+        way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest=tightest)
         profile = _drawn_profile(given, way, scenario, altitude_m, ground)
         bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
         return PathPlan(way, profile, profile.airspeed_mps, frame, bends=bends)
@@ -106,6 +115,9 @@ def planned(
         climb_mps=_climb_of(frame),
         free_cut_m=free_m,
         ground=ground,
+        least_radius_m=frame.least_radius_m,
+        corner_m=corner_m,
+        wind_mps=wind_mps,
     )
     route = mission_route(given.mission, flying, given.source)
     profile, notes = route.profile, route.notes

@@ -37,6 +37,32 @@ FLATTEST = 1e-12
 """Distance of the flattest corner from its arc, in radii."""
 
 
+LIMIT_SHARE = 0.9
+"""Share of what a corner may be passed at by which it is cut at most, if the aircraft turns so tightly."""
+
+WIND_SAMPLES = 9
+"""The ground speed is looked up in so many directions of a turn."""
+
+
+@dataclass(frozen=True)
+class Tightest:
+    """How tightly corners are rounded at the most, one value each or (m,) point by point.
+
+    Attributes:
+        radius_m: least radius of the aircraft in calm air.
+        limit_m: how far off a corner may be passed.
+        wind: over the airspeed, east + i north where it blows to.
+    """
+
+    radius_m: float | FloatArray
+    limit_m: float | FloatArray
+    wind: complex | NDArray[np.complex128] = 0j
+
+    def of(self, kept: NDArray[np.int64], count: int) -> Tightest:
+        """Those of some of the points, the ends left out."""
+        return Tightest(*(np.broadcast_to(each, count)[kept][1:-1] for each in vars(self).values()))
+
+
 @dataclass(frozen=True)
 class CutCorner:
     """A corner that the turn radius does not let an aircraft fly through.
@@ -95,6 +121,7 @@ def fly_by(
     radius_m: float | FloatArray,
     free_cut_m: float | FloatArray,
     overshoot: bool = False,
+    tightest: Tightest | None = None,
 ) -> FlyBy:
     """Rounds the corners of a polyline.
 
@@ -108,7 +135,9 @@ def fly_by(
         radius_m: smallest radius that the aircraft should fly, > 0; (m,) if it differs from point to point.
         free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0; likewise.
         overshoot: corners sharper than a right angle are flown as autopilots do, which begin to turn no earlier than
-            one radius before: past the next leg and back onto it.
+            one radius before: past the next leg and back onto it. Every corner is then among the corners.
+        tightest: corners that would be cut by more than `LIMIT_SHARE` of what they may be passed at are flown more
+            tightly, down to this; None: they are not.
     """
     kept = _needed(points_m)
     least, free = (np.broadcast_to(each, len(points_m))[kept][1:-1] for each in (radius_m, free_cut_m))
@@ -119,6 +148,8 @@ def fly_by(
     turn = np.angle(ahead[1:] / ahead[:-1])
     shape = _shapes(turn, overshoot)
     wanted = np.where(shape.past, least, np.maximum(least, free / np.maximum(shape.cut, FLATTEST)))
+    if tightest is not None:
+        wanted = _tightened(wanted, shape, ahead, turn, tightest.of(kept, len(points_m)))
     radius = np.minimum(_fitting(length, least, shape), wanted)
     radius[shape.back] = 0.0
 
@@ -154,7 +185,7 @@ def fly_by(
             arc_length_m=float(middles[i]),
             half_m=float(max(middles[i] - begun[i], begun[i] + spans[i] - middles[i])),
         )
-        for i in np.flatnonzero(shape.back | (cut > free * (1.0 + 1e-9))).tolist()
+        for i in np.flatnonzero(overshoot | shape.back | (cut > free * (1.0 + 1e-9))).tolist()
     )
     stations = np.concatenate(([0.0], middles, [station]))
     along = np.stack((begun, middles, begun + spans), axis=1)
@@ -173,6 +204,7 @@ class _Shapes:
         before: where the turn begins before the corner.
         after: where it ends after it.
         cut: how far it passes the corner.
+        furthest: how far it is off the two legs at the most.
         corner: where along it the place is that belongs to the corner.
         back_turn: angle (rad) by which it turns too far, and back.
     """
@@ -182,6 +214,7 @@ class _Shapes:
     before: FloatArray
     after: FloatArray
     cut: FloatArray
+    furthest: FloatArray
     corner: FloatArray
     back_turn: FloatArray
 
@@ -200,15 +233,35 @@ def _shapes(turn: FloatArray, overshoot: bool) -> _Shapes:
     along, beside = np.sin(angle) - np.cos(angle), np.sin(angle) + np.cos(angle)
     share = np.clip(0.5 * (1.0 + beside), -1.0, 1.0)
     tangent = np.tan(half)
+    cut = np.where(past, np.sqrt(2.0) - 1.0, 1.0 / np.cos(half) - 1.0)
     return _Shapes(
         back=back,
         past=past,
         before=np.where(past, 1.0, tangent),
         after=np.where(past, along + 2.0 * np.sqrt(1.0 - share * share), tangent),
-        cut=np.where(past, np.sqrt(2.0) - 1.0, 1.0 / np.cos(half) - 1.0),
+        cut=cut,
+        furthest=np.where(past, np.maximum(cut, 1.0 - beside), cut),
         corner=np.where(past, 0.25 * np.pi, half),
         back_turn=np.where(past, np.arccos(share), 0.0),
     )
+
+
+def _tightened(
+    wanted_m: FloatArray, shape: _Shapes, ahead: NDArray[Any], turn: FloatArray, tightest: Tightest
+) -> FloatArray:
+    """(k,) radii of which none passes its corner too far off, as far as the aircraft turns so tightly in the wind.
+
+    A steady turn at one bank has the radius of calm air times the square of ground speed over airspeed, where that is
+    largest along the turn.
+    """
+    along = np.linspace(0.0, 1.0, WIND_SAMPLES)
+    course = ahead[:-1, None] * np.exp(1j * turn[:, None] * along)
+    seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
+    ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
+    least_m = tightest.radius_m * np.square(ground_speed).max(axis=1)
+    most_m = LIMIT_SHARE * tightest.limit_m / np.maximum(shape.furthest, FLATTEST)
+    tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), least_m)
+    return tight
 
 
 def _arcs(

@@ -16,7 +16,7 @@ import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
 from harness.files.input_file import InputError
-from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy, fly_by
+from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.circle import (
     Pose,
     Row,
@@ -28,7 +28,7 @@ from harness.run_files.mission.circle import (
     onto,
     towards,
 )
-from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute
+from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute, corner_limit_m
 from harness.run_files.mission.items import GROUND, HOME, SEA
 from harness.run_files.mission.steps import MissionStep
 
@@ -296,7 +296,7 @@ class _Build:
             radii = np.array([self._flying.turn_radius_m(flown) for _, flown in speeds])
             free = self._flying.free_cut_m
             frees = np.array([min(free, vertex.acceptance_m or free) for vertex in run])
-            way = fly_by(points, radii, frees, overshoot=True)
+            way = fly_by(points, radii, frees, overshoot=True, tightest=self._tightest(run, speeds))
             stations = way.stations_of(points)
             self._given.append(way.given_m + np.array((0.0, 0.0, self._length_m)))
             for corner in way.corners:
@@ -308,6 +308,16 @@ class _Build:
             self._pose, length_m = end_of(self.rows[-1]), float(way.segments[:, 5].sum())
         self._note(run, speeds, stations + self._length_m)
         self._length_m += length_m
+
+    def _tightest(self, run: Sequence[_Vertex], speeds: Sequence[tuple[float, float]]) -> Tightest | None:
+        """How tightly the corners of a run are rounded at the most."""
+        flying = self._flying
+        if flying.least_radius_m is None:
+            return None
+        flown = np.array([speed for _, speed in speeds])
+        least = np.array([flying.least_radius_m(speed) for speed in flown.tolist()])
+        limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
+        return Tightest(least, limits, flying.wind_mps / flown)
 
     def _note(
         self, run: Sequence[_Vertex], speeds: Sequence[tuple[float, float]], stations: FloatArray

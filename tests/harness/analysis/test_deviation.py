@@ -68,10 +68,10 @@ class Corner:
 
 def test_a_corner_may_be_cut_by_its_own_figure(make_track: MakeTrack) -> None:
     track = make_track(401)
-    corners = [Corner(250.0, 80.0, 60.0), Corner(600.0, 80.0, 20.0), Corner(750.0, 1.0, 1.0)]
+    corners = [Corner(250.0, 80.0, 60.0), Corner(600.0, 80.0, 20.0), Corner(750.0, 0.5, 0.5)]
     allowed = allowed_m(track, 10.0, corners)
-    assert sorted(set(allowed.tolist())) == [1.0, 10.0, 20.0, 60.0]
-    # Twice the limit to each side, or as far as the arc is off the legs.
-    assert track.north_m[allowed == 60.0] == pytest.approx(np.arange(130.0, 372.0, 2.5))
+    assert sorted(set(allowed.tolist())) == [0.5, 10.0, 20.0, 60.0]
+    # Three times the limit to each side, or as far as the arc is off the legs.
+    assert track.north_m[allowed == 60.0] == pytest.approx(np.arange(70.0, 432.0, 2.5))
     assert track.north_m[allowed == 20.0] == pytest.approx(np.arange(520.0, 682.0, 2.5))
-    assert track.north_m[allowed == 1.0] == pytest.approx([750.0])
+    assert track.north_m[allowed == 0.5] == pytest.approx([750.0])

@@ -13,6 +13,8 @@ import wayproof
 from tests.harness.run.given import off_polyline_m, waypoints_file
 
 SQUARE = [(0.0, 0.0), (0.0, 600.0), (600.0, 600.0), (600.0, 0.0), (0.0, 0.0)]
+SQUARE_CORNER = [(0.0, 0.0), (0.0, 1200.0), (1200.0, 1200.0)]
+LEAST_M = 25.0**2 / (9.80665 * math.tan(math.radians(45.0)))
 BY_WAYPOINTS = {"guidance.follow": "waypoints"}
 
 
@@ -40,11 +42,43 @@ def test_a_missions_corners_have_one_limit_whoever_flies(law: str, tmp_path: Pat
         worst = max(away.min(), off_polyline_m(track[near], SQUARE).max())
         assert corner["most_off_m"] == pytest.approx(worst, abs=2.6)  # rows are 2.5 m apart
         assert corner["kept"] == (worst <= 90.0)
-    legs = np.min([np.hypot(*(track - place).T) for place in SQUARE[1:4]], axis=0) > 190.0
+    legs = np.min([np.hypot(*(track - place).T) for place in SQUARE[1:4]], axis=0) > 280.0
     assert metrics["check"]["ok"] is bool(off_polyline_m(track[legs], SQUARE).max() <= 10.0)
     assert metrics["total_system_error_m"]["max"] == pytest.approx(
         off_polyline_m(track, SQUARE).max(), abs=1.5
     )
+
+
+@pytest.mark.parametrize(
+    ("tolerance_m", "radius_m", "ok"),
+    [(35.0, 0.9 * 35.0 / (math.sqrt(2.0) - 1.0), True), (27.0, LEAST_M, True), (10.0, LEAST_M, False)],
+)
+def test_a_corner_is_rounded_as_the_aircraft_can_turn(tolerance_m: float, radius_m: float, ok: bool) -> None:
+    """An arc of R cuts a right angle by (sqrt 2 - 1) R: by 0.9 of the limit, or by 26 m at the bank limit of 45 deg."""
+    metrics, track = flown(SQUARE_CORNER, settings={"trackability.cross_track_m": str(tolerance_m)})
+    (corner,) = metrics["check"]["corners"]
+    assert corner["radius_m"] == pytest.approx(radius_m, rel=0.005)
+    assert corner["cut_m"] == pytest.approx((math.sqrt(2.0) - 1.0) * corner["radius_m"])
+    nearest = float(np.hypot(*(track - SQUARE_CORNER[1]).T).min())
+    assert corner["most_off_m"] == pytest.approx(nearest, abs=0.1)
+    assert metrics["check"]["ok"] is ok
+
+
+def test_a_circle_tighter_than_the_bank_limit_gives_is_no_and_a_near_yes_can_be_seen() -> None:
+    """60 m at 25 m/s, where the bank limit of 45 deg gives 63.7 m."""
+    angle = np.linspace(0.0, math.tau, 200)
+    circle = 60.0 * np.column_stack((np.cos(angle), np.sin(angle)))
+    path = np.concatenate(([(60.0, -1000.0)], circle, [(60.0, 1000.0)]))
+    metrics, track = flown(path, settings={"trackability.cross_track_m": "5"})
+    row = np.abs(track[:, 1]) < 70.0
+    wide = float(np.abs(np.hypot(*track[row & (track[:, 0] < 0.0)].T) - 60.0).max())
+    assert 5.0 < wide < 12.0
+    assert (metrics["check"]["ok"], metrics["trackability"][0]["cause"]) == (False, "turn radius too tight")
+    most = metrics["check"]["worst"]["off_m"]
+    assert most >= wide - 0.5
+    near, _ = flown(path, settings={"trackability.cross_track_m": str(most * 1.02)})
+    assert near["check"]["limit_used"]["off_path"] == pytest.approx(1.0 / 1.02, abs=0.01)
+    assert f"; {near['check']['limit_used']['off_path']:.0%} of a limit used" in near["check"]["verdict"]
 
 
 def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_be_a_yes(
