@@ -42,10 +42,10 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
     are there unless navigation is perfect. `plan_delay_s` is from the latest scan that a plan could know of until it
     took effect, `lost_returns` how much of what beams met the sensor lost. `clearance_violation_s` counts the
     intervals at whose end, or at a contact in them, the distance to an obstacle edge was below the wanted clearance.
-    `replans` counts the plans accepted after the first. `compute_ms` is over all calls in which the planner searched,
-    `smoothness` is defined in `harness.analysis.smoothness`, `trackability` in `harness.analysis.trackability`;
-    `error` is the traceback
-    of what the planner raised.
+    `replans` counts the plans accepted after the first. `compute_ms` is processor time of all calls in which the
+    planner searched, `timing.planner_wall_ms` the wall-clock time of the same. `smoothness` is defined in
+    `harness.analysis.smoothness`, `trackability` in `harness.analysis.trackability`; `error` is the traceback of what
+    the planner raised.
 
     Args:
         flight: the flight; its track has at least one row.
@@ -99,6 +99,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
             "sim_s": flight.sim_s,
             "wall_s": flight.wall_s,
             "realtime_factor": flight.sim_s / flight.wall_s if flight.wall_s > 0 else None,
+            "planner_wall_ms": percentiles(flight.compute_wall_ms),
         },
         "digest": digest(track),
         "error": flight.error,

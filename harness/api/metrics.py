@@ -41,7 +41,7 @@ class Spread(Figures):
 
 
 class Percentiles(Figures):
-    """Times of the planner's calls in which it searched, ms of wall clock.
+    """Times of the planner's calls in which it searched, ms.
 
     Attributes:
         p50: median.
@@ -155,11 +155,13 @@ class Timing(Figures):
         sim_s: simulated time.
         wall_s: wall-clock time.
         realtime_factor: simulated over wall-clock time.
+        planner_wall_ms: wall-clock times of the planner's searches.
     """
 
     sim_s: float
     wall_s: float
     realtime_factor: float | None = None
+    planner_wall_ms: Percentiles = Percentiles()
 
 
 class CheckVerdict(Figures):
@@ -218,7 +220,7 @@ class Metrics(Figures):
         replans: plans accepted after the first.
         plan_delay_s: from the latest scan that a plan could use until the plan took effect.
         lost_returns: share of the returns that the sensor lost.
-        compute_ms: times of the planner's searches.
+        compute_ms: processor times of the planner's searches.
         timing: simulated and wall-clock time.
         digest: SHA-256 of the track.
         error: traceback of the planner's exception; None if there was none.

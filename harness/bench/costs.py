@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from aircraft.guidance.interface import UPDATE_RATE_HZ
 from aircraft.interface import AircraftState, FlightModel
 from harness.bench.stopwatch import Stopwatch
 from harness.flight.closed_loop import Loop, fly
@@ -29,14 +30,10 @@ from harness.run.scenario_flight import (
     make_loop,
 )
 from harness.scenario.scenario import Scenario
-from harness.scenario.simulation import Simulation
 from harness.scenario.start import start_conditions
 
 FEWEST_ROUNDS, MOST_ROUNDS = 3, 10
 """Each round is one flight without and one with the recording, both in turns with the bare model."""
-BARE_RATE_HZ = 120
-"""Steps a second of the bare model: JSBSim's own default. It is the same whatever the flight's step rate is, so that
-ratios of flights at different rates can be compared."""
 TURN_S = 30.0
 """The bare model follows the flight in turns of so long, simulated."""
 ALIKE = 0.01
@@ -57,19 +54,21 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
     - the same with the recording.
 
     Either takes turns with `run()` of the scenario's aircraft, autopilot on, commands set once, from the same trimmed
-    start in the same air, for as long as the flight takes, at `BARE_RATE_HZ`; its loading and trimming are not counted.
+    start in the same air, for as long as the flight takes, at the flight's own step rate; its loading and trimming are
+    not counted.
 
     Args:
         scenario: a complete scenario.
         progress: told of the first flight as it goes on, and of each round.
 
     Returns:
-        `scenario`, `outcome`; `sim_s` and `step_rate_hz` of the flight; `steps` and `bare_rate_hz` of the bare run;
-        `rounds`, how many there were, and whether both
-        ratios are `steady`; `cpu_s`, for `closed_loop` and `closed_loop_recording` the seconds of `bare` and `flight`;
-        `bare_step_us` in the first of them; the ratios `closed_loop_ratio` and `closed_loop_recording_ratio`;
-        `planner_ms`, `p50`, `p99` and `max` of all searches of a flight, the least of all flights; `blocks`, the share
-        of each block in the flight with the recording.
+        `scenario`, `outcome`; `sim_s` and `step_rate_hz` of the flight; `steps` and `bare_rate_hz` (the same rate) of
+        the bare run; `rounds`, how many there were, and whether both ratios are `steady`; `cpu_s`, for `closed_loop`
+        and `closed_loop_recording` the seconds of `bare` and `flight`; their ratios `closed_loop_ratio` and
+        `closed_loop_recording_ratio`; `outside_us`, the time of a guidance interval that the flight without the
+        recording spends outside JSBSim; `bare_step_us`; `planner_ms`, `p50`, `p99` and `max` of the processor time of
+        all searches of a flight, the least of all flights; `blocks`, the share of each block in the flight with the
+        recording.
 
     Raises:
         AircraftError: the aircraft cannot be loaded or trimmed.
@@ -99,13 +98,14 @@ def bench(scenario: Scenario, progress: Progress | None = None) -> dict[str, Any
         "sim_s": flight.sim_s,
         "step_rate_hz": scenario.simulation.rate_hz,
         "steps": bare.steps,
-        "bare_rate_hz": BARE_RATE_HZ,
+        "bare_rate_hz": scenario.simulation.rate_hz,
         "rounds": number,
         "steady": steady,
         "cpu_s": {
             name: {"bare": each.bare_s, "flight": each.flight_s}
             for name, each in (("closed_loop", closed), ("closed_loop_recording", recorded))
         },
+        "outside_us": 1e6 * (closed.flight_s - closed.bare_s) / (flight.sim_s * UPDATE_RATE_HZ),
         "bare_step_us": 1e6 * closed.bare_s / bare.steps,
         "closed_loop_ratio": closed.ratio,
         "closed_loop_recording_ratio": recorded.ratio,
@@ -152,8 +152,7 @@ def block_shares(in_loop: Mapping[str, float], closed: float, recorded: float) -
 
 def bare_model(scenario: Scenario) -> FlightModel:
     """The aircraft of a scenario at its start, to be flown with nothing around it."""
-    bare = scenario.model_copy(update={"simulation": Simulation(rate_hz=BARE_RATE_HZ)})
-    return jsbsim_aircraft(bare, start_conditions(scenario), atmosphere(scenario))
+    return jsbsim_aircraft(scenario, start_conditions(scenario), atmosphere(scenario))
 
 
 class _Bare:

@@ -240,54 +240,40 @@ def bench(
         str,
         typer.Argument(
             metavar="SCENARIO",
-            help="A file or shipped name; or the word tracking, rates or worlds.",
+            help="A file or shipped name; or the word tracking.",
             show_default=True,
         ),
     ] = "paper_circles",
     aircraft: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="With tracking and rates: the aircraft. Default: aerosonde."),
+        typer.Option(metavar="NAME", help="With tracking: the aircraft. Default: aerosonde."),
     ] = None,
     seeds: Annotated[
         int | None,
         typer.Option(
             metavar="N",
             min=1,
-            help="Number of courses: with tracking in each air, default 20; with rates default 3.",
+            help="With tracking: number of courses in each air. Default: 20.",
         ),
     ] = None,
     guidance: Annotated[
         str | None, typer.Option(metavar="KIND", help="With tracking: the guidance law. Default: preview.")
     ] = None,
-    most: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=10, help="With worlds: largest number of obstacles. Default: 100000."),
-    ] = None,
     as_json: JsonOption = False,
 ) -> int:
     """Measures the time of the closed loop on this machine over that of bare JSBSim, block by block.
 
+    It flies the scenario up to 21 times, which takes some minutes for a long one.
+
     `bench tracking` measures the largest errors of an aircraft on random courses of 14 turns in calm air, wind and
     turbulence; its exit status is 1 if one is above its limit.
 
-    `bench rates` flies courses at several step rates: distance from the track of the finest rate, and computing time.
-
-    `bench worlds` measures the same flight in worlds of 10 to 100,000 obstacles at one density.
-
     For example: wayproof bench aerosonde_forest --json
     """
-    if most and scenario != "worlds":
-        raise typer.BadParameter("--most goes with `bench worlds`")
     if scenario == "tracking":
         return bench_tracking(aircraft or "aerosonde", seeds or 20, as_json, guidance or "preview")
-    if guidance:
-        raise typer.BadParameter("--guidance goes with `bench tracking`")
-    if scenario == "rates":
-        return bench_rates(aircraft or "aerosonde", seeds or 3, as_json)
-    if aircraft or seeds:
-        raise typer.BadParameter("--aircraft and --seeds go with `bench tracking` and `bench rates`")
-    if scenario == "worlds":
-        return bench_worlds(most, as_json)
+    if guidance or aircraft or seeds:
+        raise typer.BadParameter("--aircraft, --seeds and --guidance go with `bench tracking`")
     loaded = load(scenario)
 
     from aircraft.airframes import AircraftError
@@ -329,39 +315,6 @@ def bench_tracking(name: str, seeds: int, as_json: bool, guidance: str = "previe
         title = f"{flown}, worst of {seeds} courses a case"
         print_grid(title, *tracking_rows(result))
     return FAILED if any(row["kept"] is False for row in result["cases"]) else 0
-
-
-def bench_rates(name: str, seeds: int, as_json: bool) -> int:
-    """The table of what the step rate changes."""
-    from aircraft.airframes import AircraftError
-    from harness.bench import rates
-    from harness.cli.terminal import print_grid, rate_rows, step_bar
-
-    try:
-        with step_bar() as report:
-            result = rates.bench_rates(name, seeds, report)
-    except AircraftError as error:
-        raise bad_input(error) from error
-    if as_json:
-        print_json(result)
-    else:
-        title = f"{name}: largest distance in m from the flight at {result['finest_hz']} Hz"
-        print_grid(title, *rate_rows(result))
-    return 0
-
-
-def bench_worlds(most: int | None, as_json: bool) -> int:
-    """The table of what the number of obstacles costs."""
-    from harness.bench import worlds
-    from harness.cli.terminal import print_grid, step_bar, world_rows
-
-    with step_bar() as report:
-        result = worlds.bench_worlds(most or worlds.COUNTS[-1], report)
-    if as_json:
-        print_json({"worlds": result})
-    else:
-        print_grid("the same flight in worlds of one density", *world_rows(result))
-    return 0
 
 
 def _default_folder(scenario: Scenario, apart: str = "") -> Path:

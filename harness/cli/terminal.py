@@ -142,10 +142,13 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
     """The rows of the table of `wayproof bench`."""
     planner = result["planner_ms"]
     rows = {
-        "closed loop": f"{result['closed_loop_ratio']:.3f} of bare JSBSim",
-        "with recording": f"{result['closed_loop_recording_ratio']:.3f} of bare JSBSim",
-        "step rate": f"{result['step_rate_hz']} Hz, of bare JSBSim {result['bare_rate_hz']} Hz",
-        "planner": ", ".join(f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")),
+        "closed loop": f"{result['closed_loop_ratio']:.3f} x bare JSBSim at the same step rate",
+        "with recording": f"{result['closed_loop_recording_ratio']:.3f} x bare JSBSim at the same step rate",
+        "outside JSBSim": f"{result['outside_us']:.1f} us a guidance interval",
+        "step rate": f"{result['step_rate_hz']} Hz, a bare step {result['bare_step_us']:.2f} us",
+        "planner, processor time": ", ".join(
+            f"{name} {planner[name]:.2f} ms" for name in ("p50", "p99", "max")
+        ),
         "rounds": f"{result['rounds']}, {'steady' if result['steady'] else 'not steady: the machine is busy'}",
     }
     return rows | {f"  {name}": f"{share:.1%}" for name, share in result["blocks"].items()}
@@ -215,40 +218,6 @@ def tracking_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequen
         verdict = {True: "kept", False: "[bold red]not kept[/]", None: "-"}[case["kept"]]
         rows.append((case["case"], *cells, f"{case['bank_saturation']:.1%}", verdict))
     return ("air", "cross-track p95", "max m", "altitude p95", "saturated", "limits"), rows
-
-
-def rate_rows(result: Mapping[str, Any]) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """Headings and rows of the table of `wayproof bench rates`."""
-    rows: list[Sequence[str]] = [
-        (
-            f"{row['rate_hz']} Hz",
-            *(
-                f"{row[loop][off]:.3f}"
-                for loop in ("open_loop", "closed_loop")
-                for off in ("track_m", "position_m")
-            ),
-            f"{row['cpu_ms']:.2f}",
-        )
-        for row in result["rates"]
-    ]
-    return ("rate", "open loop: track", "position", "closed loop: track", "position", "ms for 1 s"), rows
-
-
-def world_rows(result: Sequence[Mapping[str, Any]]) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """Headings and rows of the table of `wayproof bench worlds`."""
-    rows: list[Sequence[str]] = [
-        (
-            f"{row['obstacles']:,}",
-            f"{row['load_s']:.2f}",
-            f"{row['write_s']:.2f}",
-            f"{row['loop_ms']:.2f}",
-            f"{row['closed_loop_ratio']:.2f}",
-            f"{row['planner_p99_ms']:.1f}",
-            f"{row['peak_mib']:,.0f}",
-        )
-        for row in result
-    ]
-    return ("obstacles", "load s", "write s", "loop ms/s", "of bare", "planner p99 ms", "peak MiB"), rows
 
 
 def plain(text: str) -> str:

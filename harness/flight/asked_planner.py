@@ -49,7 +49,9 @@ class AskedPlanner:
     def __init__(self, planner: Planner, mission: Mission, seen: MapView) -> None:
         self._planner, self._mission, self._seen = planner, mission, ReadOnlyMap(seen)
         self.compute_ms = math.nan
-        """Wall-clock time that the last answer took the planner."""
+        """Processor time of the planner's thread for the last answer: what else the machine does is not in it."""
+        self.wall_ms = math.nan
+        """Wall-clock time for the same."""
 
     def plan(self, request: PlanRequest) -> Answer:
         """The answer to a request; its `flown` is the `own` of the answer in effect.
@@ -59,11 +61,12 @@ class AskedPlanner:
             KeyboardInterrupt: as ever.
         """
         request = request._replace(seen=self._seen)
-        begun = time.perf_counter()
+        begun, began = time.thread_time(), time.perf_counter()
         try:
             with PrintingAside():
                 own = self._planner.plan(request)
-                self.compute_ms = 1e3 * (time.perf_counter() - begun)
+                self.compute_ms = 1e3 * (time.thread_time() - begun)
+                self.wall_ms = 1e3 * (time.perf_counter() - began)
                 return Answer(checked_plan(own, request.position_m, self._mission), own)
         except KeyboardInterrupt:
             raise

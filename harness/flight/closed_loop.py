@@ -291,5 +291,6 @@ class ClosedLoop:
             wall_s=time.perf_counter() - self._begun_s,
             error=self.plans.error or self._law_error,
             contact_m=self._loop.termination.contact_m,
+            compute_wall_ms=tuple(self.plans.compute_wall_ms),
             lost_returns=self._loop.sensor.lost_returns() if self._loop.sensor else None,
         )

@@ -45,6 +45,7 @@ class Plans:
         """The planner is to be asked again before the next scan."""
         self.accepted: list[AcceptedPlan] = []
         self.compute_ms: list[float] = []
+        self.compute_wall_ms: list[float] = []
         self.error: str | None = None
         """The traceback of what the planner raised, or the guidance law when it was given a plan."""
         self._told, self._scanned = "", False
@@ -86,6 +87,7 @@ class Plans:
         if plan.status is PlanStatus.KEPT:
             return None
         self.compute_ms.append(self._planner.compute_ms)
+        self.compute_wall_ms.append(self._planner.wall_ms)
         if plan.status is PlanStatus.UNREACHABLE and state.time_s > 0.0:  # a track begins before it ends
             return Ending(Outcome.UNREACHABLE, in_a_line(plan.reason))
         if plan.status is PlanStatus.NO_PATH:

@@ -229,7 +229,7 @@ class AcceptedPlan:
     Attributes:
         plan_index: 0 for the first; row of `plans.parquet`.
         time_s: in effect from this simulated time on.
-        compute_ms: wall-clock time of the call that found it.
+        compute_ms: processor time of the call that found it.
         plan: the planner's answer; its `path` is not None.
         scan_s: simulated time of the latest scan that the planner knew of; NaN where nothing had been sensed.
     """
@@ -270,9 +270,10 @@ class Flight:
         plans: the plans flown, in order; `plans[i].plan_index == i`.
         outcome: how it ended.
         reason: the same as one sentence.
-        compute_ms: wall-clock time of every call in which the planner searched, also where it found nothing new.
+        compute_ms: processor time of every call in which the planner searched, also where it found nothing new.
         sim_s: simulated time flown.
         wall_s: wall-clock time that took.
+        compute_wall_ms: wall-clock time of the same calls as `compute_ms`.
         error: the traceback of what the planner or the guidance law raised; None where neither did.
         contact_m: clearance at a contact between the last two rows; +inf without.
         lost_returns: (k, 2) of each scan of a sensor that has imperfections, how many beams met something, and how many
@@ -288,4 +289,5 @@ class Flight:
     wall_s: float
     error: str | None = None
     contact_m: float = math.inf
+    compute_wall_ms: tuple[float, ...] = ()
     lost_returns: IntArray | None = None

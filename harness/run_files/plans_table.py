@@ -24,7 +24,7 @@ class PlanRow:
         plan_index: 0 for the first plan.
         time_s: in effect from this simulated time on.
         status: how the planner's call ended, a value of `planner.interface.PlanStatus`.
-        compute_ms: wall-clock time of the call that found it.
+        compute_ms: processor time of the call that found it.
         waypoints_m: (k, 2) east, north.
         path_m: (m, 2) dense polyline, east, north.
         segments: (n, 6) the same path exactly, as in `planner.interface.Path`.

@@ -87,7 +87,8 @@ def test_figures_of_a_straight_flight(make_track: Callable[..., Track], straight
     assert figures["trackable"] is True
     assert figures["replans"] == 0
     assert figures["compute_ms"] == {"p50": 2.0, "p99": pytest.approx(2.98), "max": 3.0}
-    assert figures["timing"] == {"sim_s": 10.0, "wall_s": 0.5, "realtime_factor": 20.0}
+    assert figures["timing"]["planner_wall_ms"] == {"p50": None, "p99": None, "max": None}
+    assert (figures["timing"]["sim_s"], figures["timing"]["realtime_factor"]) == (10.0, 20.0)
     assert figures["digest"] == digest(track)
 
 

@@ -20,11 +20,11 @@ from aircraft.guidance.waypoints import WaypointLaw, acceptance
 from aircraft.interface import AircraftState, Route
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.start import StartConditions
-from harness.bench.costs import BARE_RATE_HZ
 from harness.bench.tracking import ALTITUDE_M, COURSE_RAD, course
 from tests.closed_loop.laws_table import FLOWN
 
 MOST: Final = 0.03
+BARE_RATE_HZ = 120
 FLIGHT_S, ROUNDS = 60, 40
 """Simulated seconds of a turn, and how many turns."""
 

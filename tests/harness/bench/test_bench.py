@@ -54,21 +54,23 @@ def test_ratios_are_of_the_costs_that_it_gives(result: dict[str, Any]) -> None:
     for name in ("closed_loop", "closed_loop_recording"):
         assert result[f"{name}_ratio"] == pytest.approx(cpu[name]["flight"] / cpu[name]["bare"])
     assert result["bare_step_us"] == pytest.approx(1e6 * cpu["closed_loop"]["bare"] / result["steps"])
+    outside_s = cpu["closed_loop"]["flight"] - cpu["closed_loop"]["bare"]
+    assert result["outside_us"] == pytest.approx(1e6 * outside_s / (result["sim_s"] * 10.0))
 
 
 @pytest.mark.flights
-def test_the_bare_run_takes_as_long_as_the_flight_at_120_steps_a_second(result: dict[str, Any]) -> None:
+def test_the_bare_run_takes_as_long_as_the_flight_at_its_step_rate(result: dict[str, Any]) -> None:
     assert result["outcome"] == "reached"
-    assert (result["step_rate_hz"], result["bare_rate_hz"]) == (60, 120)
-    assert result["steps"] == round(120 * result["sim_s"])
+    assert (result["step_rate_hz"], result["bare_rate_hz"]) == (60, 60)
+    assert result["steps"] == round(60 * result["sim_s"])
     assert 2600 < 25 * result["sim_s"] < 4000
 
 
 @pytest.mark.flights
-def test_the_loop_costs_more_than_half_as_many_steps_and_the_recording_more_than_none(
+def test_the_loop_costs_more_than_bare_steps_and_the_recording_more_than_none(
     result: dict[str, Any],
 ) -> None:
-    assert 0.5 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
+    assert 1.0 < result["closed_loop_ratio"] < result["closed_loop_recording_ratio"]
 
 
 @pytest.mark.flights
@@ -115,9 +117,9 @@ def test_the_bare_model_follows_the_flight_in_turns(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(bare._model, "advance", advance)
     bare._turn_s = 10.0
     flight = fly(make_loop(scenario()), [bare])
-    assert sum(flown) == bare.steps == round(120 * flight.sim_s)
-    assert set(flown[:-1]) == {1200}
-    assert 0 < flown[-1] <= 1260
+    assert sum(flown) == bare.steps == round(60 * flight.sim_s)
+    assert set(flown[:-1]) == {600}
+    assert 0 < flown[-1] <= 630
     assert bare.cpu_s > 0.0
 
 

@@ -393,15 +393,19 @@ def test_bench_tracking_prints_figures_and_limits(capsys: pytest.CaptureFixture[
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["bench", "paper_circles", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
+        (
+            ["bench", "paper_circles", "--seeds", "3"],
+            "--aircraft, --seeds and --guidance go with `bench tracking`",
+        ),
         (["bench", "tracking", "--aircraft", "kite"], "unknown aircraft 'kite'"),
-        (["bench", "worlds", "--seeds", "3"], "--aircraft and --seeds go with `bench tracking`"),
-        (["bench", "paper_circles", "--guidance", "l1"], "--guidance goes with `bench tracking`"),
+        (
+            ["bench", "paper_circles", "--guidance", "l1"],
+            "--aircraft, --seeds and --guidance go with `bench tracking`",
+        ),
         (
             ["bench", "tracking", "--guidance", "kite"],
-            "there is no guidance law 'kite'; known are: bearing, l1, npfg",
+            "there is no guidance law 'kite'; known are: bearing, l1",
         ),
-        (["bench", "paper_circles", "--most", "100"], "--most goes with `bench worlds`"),
     ],
 )
 def test_bench_refuses_what_makes_no_sense(
@@ -409,15 +413,6 @@ def test_bench_refuses_what_makes_no_sense(
 ) -> None:
     assert main(arguments) == 2
     assert said in capsys.readouterr().err
-
-
-@pytest.mark.flights
-def test_bench_worlds_prints_a_row_a_world(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "worlds", "--most", "10"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[2].startswith(" obstacles   load s")
-    assert lines[4].split()[0] == "10"
-    assert len(lines[4].split()) == 7
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
