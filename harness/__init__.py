@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from aircraft.airframes import AircraftError
     from aircraft.guidance.interface import GuidanceLimits, GuidanceOutput
     from aircraft.interface import AircraftState, Route
-    from harness.api.campaigns import compare, load_campaign, sweep
+    from harness.api.campaigns import certify, compare, load_campaign, sweep
     from harness.api.flights import fly, load_run
     from harness.api.metrics import Metrics
     from harness.api.paths import check
@@ -52,6 +52,7 @@ __all__ = [
     "Status",
     "SteppedFlight",
     "WriteError",
+    "certify",
     "check",
     "compare",
     "dump_scenario",
@@ -67,7 +68,7 @@ _HOMES = {
     "aircraft.airframes": ("AircraftError",),
     "aircraft.guidance.interface": ("GuidanceLimits", "GuidanceOutput"),
     "aircraft.interface": ("AircraftState", "Route"),
-    "harness.api.campaigns": ("compare", "load_campaign", "sweep"),
+    "harness.api.campaigns": ("certify", "compare", "load_campaign", "sweep"),
     "harness.api.flights": ("fly", "load_run"),
     "harness.api.metrics": ("Metrics",),
     "harness.api.paths": ("check",),

@@ -1,12 +1,13 @@
-"""Many flights from Python: `compare`, `sweep`, and reading a campaign's folder."""
+"""Many flights from Python: `compare`, `sweep`, `certify`, and reading a campaign's folder."""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from harness.api.errors import as_input_errors
 from harness.api.flights import in_python
@@ -15,7 +16,10 @@ from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario, load_scenario
 
 if TYPE_CHECKING:
+    from harness.analysis.claims import Claim
     from harness.campaign.flight import Answer
+    from harness.certification.certificate import Certificate
+    from harness.certification.certification import Tally
     from harness.scenario.given import LoopPart
 
 
@@ -154,3 +158,80 @@ def load_campaign(folder: str | Path) -> CampaignResult:
     result = CampaignResult(path)
     len(result.table)
     return result
+
+
+def certify(
+    subject: Scenario | str | Path | Sequence[Sequence[float]],
+    claim: Claim | None = None,
+    *,
+    probability: float | None = None,
+    confidence: float = 0.95,
+    runs: int = 1000,
+    vary: Mapping[str, Any] | Sequence[str] = (),
+    conditions: str | None = None,
+    aircraft: str | None = None,
+    scenario: str | Path | None = None,
+    settings: Mapping[str, str] | None = None,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    resume: bool = False,
+    progress: Callable[[Tally], None] | None = None,
+) -> Certificate:
+    """Flies a scenario or a given path on many days, and says how often a claim holds.
+
+        found = wayproof.certify("aerosonde_forest", probability=0.9, vary={"environment.wind.speed_mps": (0, 8)})
+        found.verdict, found.held, found.runs, found.probability_lower
+
+    Args:
+        subject: a scenario, its file, or the name of one that comes with wayproof; or a path: a file that `check`
+            takes, or points (n, 2), east and north in metres.
+        claim: `reached`, `no-contact`, `trackable`, or of a path `as-given`. Default: `reached`, of a path `as-given`.
+        probability: the claim is to hold on at least this share of the days; the flights end once that is shown or
+            refuted. None: all `runs` days are flown, and nothing is to be shown.
+        confidence: of each bound.
+        runs: number of days, at most.
+        vary: what is drawn anew every day: texts as `KEY=LO:HI`, `KEY=MEAN~SIGMA`, `KEY=A,B`; or by key path
+            `(low, high)`, such a text without its key, or a distribution as a campaign file has it.
+        conditions: replaces the scenario's `conditions`.
+        aircraft: replaces the scenario's `aircraft.model`; of a path the aircraft, by default `aerosonde`.
+        scenario: of a path: the world with obstacles, bounds and air.
+        settings: further keys to replace, by key path; values as YAML.
+        out: the folder; default: `runs/NAME/certify-CLAIM`.
+        workers: flights at a time; default: one a processor. They do not change the answer.
+        resume: fly only the days missing in the folder.
+        progress: told of the days that count, after every day that is over.
+
+    Raises:
+        InputError: subject, claim or folder cannot be used; nothing was flown.
+        OSError: the folder cannot be written any more; `resume=True` goes on.
+    """
+    from harness.campaign.workers import local_workers
+    from harness.certification.certification import Terms
+    from harness.certification.certification import certify as fly_days
+    from harness.certification.subject import Asked, days_of, distributions
+    from harness.scenario.shipped import scenario_path
+
+    given = {"aircraft.model": aircraft, "conditions": conditions}
+    keys = [(key, json.dumps(value)) for key, value in given.items() if value is not None]
+    try:
+        drawn = distributions(vary)
+    except ValueError as error:
+        raise InputError(f"wayproof: vary: {error}") from error
+    with as_input_errors():
+        terms = Terms(probability, confidence)
+        days = days_of(
+            Asked(subject, [*keys, *(settings or {}).items()], drawn, claim, runs),
+            None if scenario is None else scenario_path(str(scenario)),
+        )
+        days.check()
+        folder = Path(out) if out is not None else Path("runs") / days.campaign.name / f"certify-{days.claim}"
+        with local_workers(workers or os.cpu_count() or 1) as flyers:
+            return fly_days(
+                days,
+                folder,
+                flyers,
+                terms,
+                resume=resume,
+                progress=progress,
+                command=in_python(f"wayproof.certify({days.campaign.name!r}, {days.claim!r})"),
+            )

@@ -217,8 +217,7 @@ def load_campaign(path: Path) -> CampaignFile:
     for index, entry in enumerate(campaign.scenarios):
         loc: Loc = ("scenarios", index)
         for file in _files(entry, path.parent, partial(_fault, source, root, loc)):
-            found = _with_world_files(_mapping(file), file.parent)
-            found = _with_folder(found, ("aircraft", "model"), file.parent)
+            found = absolute_paths(_mapping(file), file.parent)
             base = Base(file.name, str(file), found)
             if base.name in bases:
                 raise _fault(source, root, loc, f"is a second scenario called {base.name}; rename one")
@@ -298,6 +297,16 @@ def _with_folders(root: Node, folder: Path) -> Node:
         inside = ("model",) if isinstance(entry.value, dict) else ()
         root = _with_folder(root, ("aircraft", index, *inside), folder)
     return root
+
+
+def absolute_paths(root: Node, folder: Path) -> Node:
+    """A scenario's keys with what lies beside its file given from the root of the file system on.
+
+    Args:
+        root: the keys.
+        folder: of the file.
+    """
+    return _with_folder(_with_world_files(root, folder), ("aircraft", "model"), folder)
 
 
 def _with_folder(root: Node, loc: Loc, folder: Path) -> Node:

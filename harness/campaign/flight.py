@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import ctypes
 import errno
-from collections.abc import Mapping
+import pickle
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
+from harness.analysis.claims import Claim, holds
 from harness.campaign.results import ERROR, metric_cells, time_cells
 from harness.files.crash import PlannerError, sentence, trace
 from harness.files.errors import RunFolderError, WriteError
+from harness.scenario.given import GUIDANCE, PLANNER, LoopPart, registered_source
 from harness.scenario.scenario import Scenario, unpacked
+
+if TYPE_CHECKING:
+    from harness.run.path_check import PathCheck
 
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """What a disk that takes no more says, a temporary file's too: that is no fault of the run."""
@@ -31,6 +37,10 @@ class Job:
         optimum: whether to compute the shortest path of the world.
         again: the command line that flies it again.
         varied: the keys that the campaign varies and their values in this run, for the recording's properties.
+        claim: a run is a failure where this does not hold of it.
+        path: a pickled `PathCheck`, if a given path is flown in place of what a planner finds; `packed` is empty then.
+        planners: planners that the process has to import, as FILE.py:NAME or MODULE:NAME.
+        laws: guidance laws that it has to import, likewise.
     """
 
     run: int
@@ -40,6 +50,10 @@ class Job:
     optimum: bool
     again: str = ""
     varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
+    claim: Claim = "reached"
+    path: bytes | None = None
+    planners: tuple[str, ...] = ()
+    laws: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -50,11 +64,13 @@ class Answer:
         run: its number.
         row: cells of `results.parquet`, by column; those of the job itself are left out.
         times: cells of `timings.parquet`.
+        held: whether the job's claim holds of it.
     """
 
     run: int
     row: dict[str, Any]
     times: dict[str, Any]
+    held: bool = False
 
 
 def fly_job(job: Job) -> Answer:
@@ -65,8 +81,13 @@ def fly_job(job: Job) -> Answer:
         RunFolderError: it cannot be made.
     """
     try:
-        scenario = unpacked(job.packed)
-        metrics = _flown(job, scenario)
+        for source in job.planners:
+            _imported(source, PLANNER)
+        for source in job.laws:
+            _imported(source, GUIDANCE)
+        check = None if job.path is None else pickle.loads(job.path)
+        scenario = unpacked(job.packed) if check is None else check.scenario
+        metrics = _flown(job, scenario, check)
         optimum_m = _optimum_m(scenario) if job.optimum else None
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
     except (WriteError, RunFolderError):
@@ -77,7 +98,13 @@ def fly_job(job: Job) -> Answer:
         if (full := _full(error)) is not None:
             raise full from None
         return failed(job.run, sentence(error), trace(error))
-    return Answer(job.run, cells, time_cells(metrics))
+    return Answer(job.run, cells, time_cells(metrics), holds(job.claim, metrics))
+
+
+@cache
+def _imported(source: str, part: LoopPart) -> str:
+    """Imports a planner or a law once in this process."""
+    return registered_source(source, part)
 
 
 def _full(error: Exception) -> OSError | None:
@@ -91,12 +118,38 @@ def failed(run: int, reason: str, error: str) -> Answer:
     return Answer(run, {"outcome": ERROR, "reason": reason, "error": error}, {})
 
 
-def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
+def _flown(job: Job, scenario: Scenario, check: PathCheck | None) -> dict[str, Any]:
+    kept = _kept(job, scenario) if check is None else _kept_path(job, check)
+    if job.recordings in ("all", "thin"):
+        try:
+            return kept(thin=job.recordings == "thin")
+        finally:
+            _give_memory_back()
+    found = _measured(scenario, check)
+    if job.recordings == "failures" and not holds(job.claim, found):
+        # Failures are few: to fly them again costs less than to record every flight.
+        kept()
+    return found
+
+
+def _measured(scenario: Scenario, check: PathCheck | None) -> dict[str, Any]:
+    """The metrics of a flight that leaves no run folder."""
+    if check is not None:
+        from harness.run.path_check import fly_check
+
+        return fly_check(check).metrics
     from harness.analysis.metrics import metrics
     from harness.flight.closed_loop import fly
-    from harness.run.scenario_flight import flight_limits, fly_to_folder, make_loop
+    from harness.run.scenario_flight import flight_limits, make_loop
 
-    recorded = partial(
+    return metrics(fly(make_loop(scenario)), flight_limits(scenario))
+
+
+def _kept(job: Job, scenario: Scenario) -> Callable[..., dict[str, Any]]:
+    """Flies a scenario into the job's run folder."""
+    from harness.run.scenario_flight import fly_to_folder
+
+    return partial(
         fly_to_folder,
         scenario,
         job.folder,
@@ -105,16 +158,16 @@ def _flown(job: Job, scenario: Scenario) -> dict[str, Any]:
         varied=job.varied,
         command=job.again or None,
     )
-    if job.recordings in ("all", "thin"):
-        try:
-            return recorded(thin=job.recordings == "thin")
-        finally:
-            _give_memory_back()
-    found = metrics(fly(make_loop(scenario)), flight_limits(scenario))
-    if job.recordings == "failures" and found["outcome"] != "reached":
-        # Failures are few: to fly them again costs less than to record every flight.
-        recorded()
-    return found
+
+
+def _kept_path(job: Job, check: PathCheck) -> Callable[..., dict[str, Any]]:
+    """Flies a given path into the job's run folder."""
+    from harness.run.path_check import fly_check
+
+    def flown(thin: bool = False) -> dict[str, Any]:
+        return fly_check(check, job.folder, True, command=job.again or None).metrics
+
+    return flown
 
 
 def _give_memory_back() -> None:

@@ -72,18 +72,24 @@ class CampaignFolder:
             self._stack.close()
             raise
 
-    def append(self, run: int, row: Mapping[str, Any], times: Mapping[str, Any]) -> None:
+    def append(self, run: int, row: Mapping[str, Any], times: Mapping[str, Any], held: bool = False) -> None:
         """Puts a run that is over on the disk."""
-        line = json.dumps({"run": run, "row": row, "times": times}, allow_nan=False)
+        line = json.dumps({"run": run, "row": row, "times": times, "held": held}, allow_nan=False)
         self._journal.write(line.encode() + b"\n")
         self._journal.flush()
         os.fsync(self._journal.fileno())
         self.done.add(run)
 
-    def write_tables(self) -> None:
-        """Makes `results.parquet` and `timings.parquet` from the journal."""
+    def write_tables(self, first: int | None = None) -> None:
+        """Makes `results.parquet` and `timings.parquet` from the journal.
+
+        Args:
+            first: of so many runs, by their number; default: of all that are over.
+        """
         over = read_journal(self.path).runs
-        about = {"schema": SCHEMA, "runs": len(self._runs), **self._runs.file.plain()}
+        if first is not None:
+            over = {run: each for run, each in over.items() if run < first}
+        about = {"schema": SCHEMA, "runs": len(self._runs), **self._runs.plain()}
         metadata = json.dumps(about, allow_nan=False)
         self._write_table(RESULTS, table(rows(over), columns(self._runs), metadata))
         self._write_table(TIMINGS, table(time_rows(over), TIMES, metadata))
@@ -147,7 +153,7 @@ class CampaignFolder:
             "versions": versions(),
             "planners": {kind: distribution_of(kind) for kind in self._runs.planners},
             "aircraft": {model: airframe(model).files.digest() for model in self._runs.aircraft},
-            **self._runs.file.plain(),
+            **self._runs.plain(),
         }
         read: dict[str, Any] = json.loads(json.dumps(about))
         return read

@@ -28,10 +28,12 @@ class Over:
     Attributes:
         row: its cells in `results.parquet`.
         times: those in `timings.parquet`.
+        held: whether the claim of the campaign holds of it.
     """
 
     row: Mapping[str, Any]
     times: Mapping[str, Any]
+    held: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ def read_journal(folder: Path) -> Journal:
             break
         if line is None or not _is_over(line):
             raise _damaged(path, number, "no run")
-        run, over = line["run"], Over(line["row"], line["times"])
+        run, over = line["run"], Over(line["row"], line["times"], line.get("held") is True)
         if runs.setdefault(run, over) != over:
             raise _damaged(path, number, f"run {run} otherwise than line {lines[run]}")
         lines.setdefault(run, number)

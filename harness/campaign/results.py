@@ -68,10 +68,14 @@ METRICS: Final = {
     "length_ratio": "number",
     "digest": "text",
     "error": "text",
+    "deviation_from_given_m.p95": "number",
+    "deviation_from_given_m.max": "number",
+    "check.ok": "bool",
+    "check.verdict": "text",
 }
 """Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
 
-Of what is there only with terrain or with navigation errors the other runs have nothing.
+Of what is there only with terrain, with navigation errors or of a given path the other runs have nothing.
 Of the legs of `trackability` there are their number, that of those not trackable, and their causes, each once;
 `wanted_clearance_m` is the planner's `clearance_m`; `optimum_m` is the shortest path of a point that knows the
 world and keeps the clearance, `length_ratio` the flown length over it where the goal was reached; `error` is a
@@ -104,7 +108,7 @@ def metric_cells(
     reached = metrics["outcome"] == "reached"
     flat = dict(_flat({name: value for name, value in metrics.items() if name not in _NOT_FLAT}))
     return {
-        **flat,
+        **{name: value for name, value in flat.items() if name in METRICS},
         "trackability.legs": len(legs),
         "trackability.not_trackable": sum(not leg["trackable"] for leg in legs),
         "trackability.causes": "; ".join(causes),

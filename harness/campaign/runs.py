@@ -12,13 +12,16 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from harness.campaign.campaign_file import MAX_RUNS, CampaignFile
 from harness.campaign.cells import PlannedRun, cell_of, entry_columns, kind_of
+from harness.campaign.flight import Job
 from harness.campaign.key_types import takes_whole_numbers
+from harness.campaign.results import RESULTS, RUNS, fly_again
 from harness.campaign.sampling import FloatArray, design
 from harness.files.strict_yaml import (
     InputError,
@@ -204,6 +207,31 @@ class CampaignRuns:
     def packed(self, number: int) -> bytes:
         """The same as `harness.scenario.scenario.packed` has it."""
         return self._made.get(number) or packed(self.scenario(number))
+
+    def job(self, number: int, folder: Path) -> Job:
+        """Run `number` as it is handed to who flies it.
+
+        Args:
+            number: from 0.
+            folder: of the campaign.
+        """
+        return Job(
+            number,
+            self.packed(number),
+            (folder / RUNS / str(number)).resolve(),
+            self.campaign.recordings,
+            self.campaign.optimum,
+            self.again(number, folder),
+            {name: value for name, value in self.run(number).varied.items() if value is not None},
+        )
+
+    def again(self, number: int, folder: Path) -> str:
+        """The command that flies run `number` again."""
+        return fly_again(folder / RESULTS, number)
+
+    def plain(self) -> dict[str, Any]:
+        """All that says what is flown, as JSON has it."""
+        return self.file.plain()
 
     def check(self, progress: Callable[[int], None] | None = None) -> None:
         """Makes every scenario of the campaign once; the first ones are kept for when they are flown.

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from harness.campaign.flight import Answer, Job, failed
 from harness.campaign.folder import CampaignFolder
-from harness.campaign.results import ERROR, RESULTS, RUNS, fly_again
+from harness.campaign.results import ERROR, RUNS
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import WorkerDiedError, Workers
 from harness.files.errors import RunFolderError
@@ -30,7 +30,11 @@ Progress = Callable[[Answer], None]
 
 
 def fly_missing(
-    runs: CampaignRuns, folder: CampaignFolder, workers: Workers, progress: Progress | None = None
+    runs: CampaignRuns,
+    folder: CampaignFolder,
+    workers: Workers,
+    progress: Progress | None = None,
+    enough: Callable[[], bool] = lambda: False,
 ) -> None:
     """Flies what is missing; whatever ends it, what is done is in the folder's tables.
 
@@ -39,6 +43,7 @@ def fly_missing(
         folder: its folder, claimed.
         workers: who flies.
         progress: told of every run that is over.
+        enough: asked before every look whether what is over answers the question; what still flies is given up then.
 
     Raises:
         OSError: the folder, or a run folder in it, cannot be written; or who flies has gone.
@@ -51,7 +56,7 @@ def fly_missing(
     # it without end.
     with held_back() as let_interrupt_through:
         try:
-            while ahead is not None or flying:
+            while (ahead is not None or flying) and not enough():
                 let_interrupt_through()
                 while ahead is not None and workers.free() > 0:
                     flying[workers.start(ahead)] = ahead.run
@@ -63,7 +68,7 @@ def fly_missing(
                     if answer.row["outcome"] == ERROR:
                         # What a crash has left is no whole run folder.
                         shutil.rmtree(folder.path / RUNS / str(answer.run), ignore_errors=True)
-                    folder.append(answer.run, _row(runs, answer), answer.times)
+                    folder.append(answer.run, _row(runs, answer), answer.times, answer.held)
                     if progress is not None:
                         progress(answer)
                 if time.monotonic() >= tables_due:
@@ -85,18 +90,9 @@ def _sleep(seconds: float, let_interrupt_through: Callable[[], None]) -> None:
 
 def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:
     """What is missing, made when it is its turn."""
-    campaign = runs.campaign
     for number in range(len(runs)):
         if number not in folder.done:
-            yield Job(
-                number,
-                runs.packed(number),
-                (folder.path / RUNS / str(number)).resolve(),
-                campaign.recordings,
-                campaign.optimum,
-                fly_again(folder.path / RESULTS, number),
-                {name: value for name, value in runs.run(number).varied.items() if value is not None},
-            )
+            yield runs.job(number, folder.path)
 
 
 def _answer(future: Future[Answer], run: int) -> Answer:

@@ -15,6 +15,7 @@ from typing import Annotated, Final
 
 import typer
 
+from harness.cli.certify import certify
 from harness.cli.check import check
 from harness.cli.envelope import envelope
 from harness.cli.export import export
@@ -42,6 +43,7 @@ for command in (
     compare,
     sweep,
     falsify,
+    certify,
     validate,
     schema,
     view,

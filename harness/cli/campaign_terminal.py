@@ -1,23 +1,176 @@
-"""The answers of a campaign on a terminal, never wider than 80 columns."""
+"""What a person sees of a campaign on a terminal: what would be flown, progress, and the answers in 80 columns."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Final
+
 from rich import box
-from rich.console import Console
-from rich.table import Table as Grid
+from rich.cells import cell_len
+from rich.console import Console, JustifyMethod
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+from rich.text import Text
 
 from harness.analysis.rows import number
+from harness.campaign.flight import Answer
 from harness.campaign.questions import QUESTIONS, difference, ratio
-from harness.campaign.summary import Cell, Summary, Table
+from harness.campaign.runs import CampaignRuns
+from harness.campaign.summary import Cell, Summary
+from harness.campaign.summary import Table as Answers
 from harness.cli.terminal import plain
-from harness.files.wording import counted
+from harness.files.strict_yaml import Scalar
+from harness.files.wording import counted, printable
 
-WIDTH = 80
+FIRST, LAST = 15, 5
+"""Of more runs than both, so many are shown."""
+
+WIDTH: Final = 400
+"""A table of runs may be this wide where it does not go to a terminal."""
+
+NAMES: Final = ("scenario", "world", "planner", "aircraft")
+"""Columns that begin at the left."""
+
+CELL: Final = 28
+"""A longer value is cut short."""
+
+SUMMARY_WIDTH: Final = 80
+"""The answers are never wider."""
+
 NAME_WIDTH = 16
 """A longer label goes on in the next line."""
 
 SHOWN_WORST = 5
 LEGEND = "length: median/p95; clear: least, runs below the wanted; planner: p50/p99/max"
+
+_STYLE: Final = {"reached": "bold green", "unreachable": "bold yellow"}
+
+
+class _Rate(ProgressColumn):
+    """Steps a second."""
+
+    def render(self, task: Task) -> Text:
+        return Text(f"{task.speed:.2f}/s" if task.speed else "")
+
+
+@contextmanager
+def check_bar(number: int) -> Iterator[Callable[[int], None] | None]:
+    """A bar of scenarios that have been checked, on standard error; None where that is not a terminal."""
+    with _bar("checked") as bar:
+        if bar is None:
+            yield None
+            return
+        task = bar.add_task("", total=number)
+        yield lambda done: bar.update(task, completed=done)
+
+
+@contextmanager
+def sweep_bar(number: int, done: int) -> Iterator[Callable[[Answer], None] | None]:
+    """A bar of runs that are over, with rate and time left, on standard error; None without a terminal.
+
+    Args:
+        number: all runs.
+        done: how many of them are over already.
+    """
+    with _bar("flights") as bar:
+        if bar is None:
+            yield None
+            return
+        task = bar.add_task("", total=number, completed=done)
+        not_reached = 0
+
+        def report(answer: Answer) -> None:
+            nonlocal not_reached
+            not_reached += answer.row["outcome"] != "reached"
+            bar.update(task, advance=1, description=f"{not_reached} not at the goal" if not_reached else "")
+
+        yield report
+
+
+@contextmanager
+def _bar(unit: str) -> Iterator[Progress | None]:
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield None
+        return
+    columns = (
+        BarColumn(bar_width=20),
+        MofNCompleteColumn(),
+        TextColumn(unit),
+        _Rate(),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
+    with Progress(*columns, console=console, transient=True, speed_estimate_period=120.0) as bar:
+        yield bar
+
+
+def print_runs(runs: CampaignRuns) -> None:
+    """What would be flown, a line a run, those in the middle left out where there are many.
+
+    Where the terminal is too narrow, columns that do not fit go on below, the number of the run before them.
+    """
+    campaign, console = runs.campaign, Console()
+    if not console.is_terminal:
+        console.width = WIDTH
+    console.print(
+        f"{printable(campaign.name)}: {counted(len(runs), 'run')} of {counted(runs.cases, 'case')}, "
+        f"root seed {campaign.seed}, recordings: {campaign.recordings}",
+        highlight=False,
+        markup=False,
+    )
+    number, columns = _columns(runs)
+    room = console.width - _wide(number) - 1
+    while columns:
+        widths = itertools.accumulate(map(_wide, columns))
+        fit = max(sum(wide <= room for wide in widths), 1)
+        table = Table(box=box.SIMPLE, padding=(0, 1, 0, 0), pad_edge=False)
+        for head, _ in (number, *columns[:fit]):
+            justify: JustifyMethod = "left" if head in NAMES else "right"
+            table.add_column(plain(head), justify=justify, no_wrap=True)
+        for row in zip(number[1], *(cells for _, cells in columns[:fit]), strict=True):
+            table.add_row(*map(plain, row))
+        console.print(table)
+        columns = columns[fit:]
+
+
+Column = tuple[str, list[str]]
+"""Head, and a cell a line."""
+
+
+def _columns(runs: CampaignRuns) -> tuple[Column, list[Column]]:
+    """The numbers of the runs to be shown, and the other columns."""
+    many = len(runs) > FIRST + LAST
+    numbers = [*range(FIRST), *range(len(runs) - LAST, len(runs))] if many else range(len(runs))
+    told = [runs.run(number) for number in numbers]
+    lines = [{name: _shown(value) for name, value in each.cells().items()} for each in told]
+    for cells in lines:
+        cells["seed"] = cells.pop("seed")  # last
+    if many:
+        lines.insert(FIRST, dict.fromkeys(lines[0], "..."))
+    number, *others = ((name.replace(".", ".\n"), [cells[name] for cells in lines]) for name in lines[0])
+    return number, others
+
+
+def _wide(column: Column) -> int:
+    """Characters of a column and the two spaces after it."""
+    head, cells = column
+    return max(map(cell_len, (*head.split("\n"), *cells))) + 2
+
+
+def _shown(value: Scalar) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else "none" if value is None else str(value)
+    return text if len(text) <= CELL else f"{text[: CELL - 3]}..."
 
 
 def print_summary(summary: Summary, all_tables: bool = False) -> None:
@@ -28,7 +181,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         all_tables: every table, not the first alone.
     """
     console = Console()
-    width = min(WIDTH, console.width)
+    width = min(SUMMARY_WIDTH, console.width)
     ended = ", ".join(f"{plain(outcome)} {count}" for outcome, count in summary.outcomes.items())
     runs = (
         f"{summary.total.runs} of {counted(summary.planned or 0, 'run')}"
@@ -45,7 +198,7 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
     for table in shown:
         console.print(_grid(table, summary.total), width=width)
     if not shown:
-        grid = _columns("")
+        grid = _heads("")
         grid.add_row("all runs", *_cells(summary.total))
         console.print(grid, width=width)
     console.print(f" {LEGEND}", style="dim", highlight=False, width=width)
@@ -73,8 +226,8 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         console.print(plain(f"view: {kept.view}"), highlight=False, soft_wrap=True)
 
 
-def _columns(title: str) -> Grid:
-    grid = Grid(title=plain(title), box=box.SIMPLE, title_justify="left", padding=0, pad_edge=False)
+def _heads(title: str) -> Table:
+    grid = Table(title=plain(title), box=box.SIMPLE, title_justify="left", padding=0, pad_edge=False)
     grid.add_column("", min_width=NAME_WIDTH, max_width=NAME_WIDTH, overflow="fold")
     for name in ("runs", *(question.short for question in QUESTIONS)):
         grid.add_column(name, justify="right", no_wrap=True)
@@ -85,10 +238,10 @@ def _cells(cell: Cell) -> list[str]:
     return [str(cell.runs), *(question.brief(cell) if cell.runs else "" for question in QUESTIONS)]
 
 
-def _grid(table: Table, total: Cell) -> Grid:
+def _grid(table: Answers, total: Cell) -> Table:
     """A line a cell; with two keys, the first one's value stands above the lines of the second."""
     keys = [table.rows.key] + ([table.columns.key] if table.columns else [])
-    grid = _columns(" x ".join(keys))
+    grid = _heads(" x ".join(keys))
     for label, cells in zip(table.rows.labels, table.cells, strict=True):
         if table.columns is None:
             grid.add_row(plain(label), *_cells(cells[0]))

@@ -120,6 +120,21 @@ SettingsOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
 ]
+ConditionsOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="DAY", help="ideal, typical or rough: wind, turbulence, navigation and servos of such a day."
+    ),
+]
+WindOption = Annotated[
+    str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, degrees it blows from.")
+]
+TurbulenceOption = Annotated[
+    str | None, typer.Option(metavar="INTENSITY", help="light, moderate or severe; or milspec:light, ...")
+]
+WorkersOption = Annotated[
+    int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
+]
 JsonOption = Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")]
 
 
@@ -170,6 +185,35 @@ def chosen(
         "conditions": conditions,
     }
     return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
+
+
+def air(wind: str | None, turbulence: str | None, conditions: str | None = None) -> list[tuple[str, str]]:
+    """What --wind, --turbulence and --conditions replace."""
+    import json
+
+    given = {
+        "environment.wind": _wind(wind),
+        "environment.turbulence": _turbulence(turbulence),
+        "conditions": conditions,
+    }
+    return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
+
+
+def _wind(text: str | None) -> dict[str, float] | None:
+    if text is None:
+        return None
+    try:
+        speed, direction = (float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not SPEED,FROM such as 8,270", param_hint="--wind") from None
+    return {"speed_mps": speed, "from_deg": direction}
+
+
+def _turbulence(text: str | None) -> dict[str, str] | None:
+    if text is None:
+        return None
+    model, colon, intensity = text.rpartition(":")
+    return {"model": model if colon else "tustin", "intensity": intensity}
 
 
 def planner_kind(text: str) -> str:

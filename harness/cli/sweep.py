@@ -103,7 +103,7 @@ def checked(path: Path) -> CampaignRuns:
     """The runs of a campaign file, every scenario of them made once."""
     from harness.campaign.campaign_file import is_scenario, load_campaign
     from harness.campaign.runs import CampaignRuns
-    from harness.cli.sweep_terminal import check_bar
+    from harness.cli.campaign_terminal import check_bar
     from harness.files.strict_yaml import InputError
 
     try:
@@ -127,7 +127,7 @@ def _fly(
     from harness.campaign.folder import CampaignFolder
     from harness.campaign.results import INDEX
     from harness.campaign.sweep import fly_missing
-    from harness.cli.sweep_terminal import sweep_bar
+    from harness.cli.campaign_terminal import sweep_bar
     from harness.files.errors import RunFolderError
 
     try:
@@ -156,6 +156,6 @@ def _print_runs(runs: CampaignRuns, as_json: bool) -> None:
 
         print_json([asdict(runs.run(number)) for number in range(len(runs))])
     else:
-        from harness.cli.sweep_terminal import print_runs
+        from harness.cli.campaign_terminal import print_runs
 
         print_runs(runs)

@@ -22,13 +22,11 @@ FLYING = 3000
 class Runs:
     """A campaign of so many runs."""
 
-    campaign = SimpleNamespace(recordings="none", optimum=False)
-
     def __len__(self) -> int:
         return FLYING
 
-    def packed(self, number: int) -> bytes:
-        return b""
+    def job(self, number: int, folder: Path) -> SimpleNamespace:
+        return SimpleNamespace(run=number)
 
     def run(self, number: int) -> SimpleNamespace:
         return SimpleNamespace(varied={}, cells=dict)

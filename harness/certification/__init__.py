@@ -1,0 +1,1 @@
+"""How often a claim holds over the days that a scenario describes, with confidence bounds."""

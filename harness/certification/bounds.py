@@ -1,0 +1,111 @@
+"""One-sided confidence bounds of a probability, from how often something held.
+
+For a number of trials that is fixed before the first, the bounds are those of Clopper and Pearson (Biometrika 26,
+1934). Where the number depends on what came out, they would cover too seldom. There the bounds come from a mixture
+test (Robbins, Annals of Mathematical Statistics 41, 1970): the likelihood of what was seen, averaged over all failure
+rates on one side of a rate f, over its likelihood at f, is a nonnegative supermartingale if the true rate lies on the
+other side of f. By Ville's inequality it ever exceeds 1 / (1 - confidence) with a probability of at most
+1 - confidence. So each bound is valid at every look at once, and a test may stop at any time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Literal, TypeAlias
+
+PRIOR: Final = 0.5
+"""Both parameters of the beta distribution over failure rates (Jeffreys' prior): much of it lies near 0 and 1."""
+
+Verdict: TypeAlias = Literal["shown", "refuted", "undecided"]
+
+
+def clopper_pearson(held: int, runs: int, confidence: float) -> tuple[float, float]:
+    """Lower and upper bound of the probability that something holds, each at `confidence`.
+
+    Args:
+        held: how often it held.
+        runs: how often it was tried, a number fixed beforehand; at least 1.
+        confidence: of each bound, between 0 and 1.
+    """
+    from scipy import special
+
+    doubt = 1.0 - confidence
+    low = special.betaincinv(held, runs - held + 1, doubt) if held else 0.0
+    high = special.betaincinv(held + 1, runs - held, confidence) if held < runs else 1.0
+    return float(low), float(high)
+
+
+def sequential_bounds(held: int, runs: int, confidence: float) -> tuple[float, float]:
+    """The same, valid at every number of runs at once.
+
+    Args:
+        held: how often it held.
+        runs: how often it was tried so far.
+        confidence: of each bound, between 0 and 1.
+    """
+    failed, wanted = runs - held, math.log(1.0 / (1.0 - confidence))
+    if not runs:
+        return 0.0, 1.0
+    rate = failed / runs
+    most = 1.0 if not held else _crossing(lambda f: _fewer(f, failed, runs) - wanted, rate, 1.0)
+    least = 0.0 if not failed else _crossing(lambda f: _more(f, failed, runs) - wanted, rate, 0.0)
+    return 1.0 - most, 1.0 - least
+
+
+def verdict(held: int, runs: int, probability: float, confidence: float) -> Verdict:
+    """What the runs so far say of the claim that something holds with at least `probability`.
+
+    Args:
+        held: how often it held.
+        runs: how often it was tried so far.
+        probability: what is claimed, between 0 and 1.
+        confidence: with which a claim is shown or refuted, over all looks together.
+    """
+    wanted = math.log(1.0 / (1.0 - confidence))
+    if _fewer(1.0 - probability, runs - held, runs) >= wanted:
+        return "shown"
+    if _more(1.0 - probability, runs - held, runs) >= wanted:
+        return "refuted"
+    return "undecided"
+
+
+def _fewer(rate: float, failed: int, runs: int) -> float:
+    """Logarithm of the evidence that failures are rarer than `rate`."""
+    return _evidence(rate, failed, runs, above=False)
+
+
+def _more(rate: float, failed: int, runs: int) -> float:
+    """Logarithm of the evidence that failures are more frequent than `rate`."""
+    return _evidence(rate, failed, runs, above=True)
+
+
+def _evidence(rate: float, failed: int, runs: int, *, above: bool) -> float:
+    """Logarithm of the likelihood averaged over the rates on one side of `rate`, over the likelihood at `rate`."""
+    from scipy import special
+
+    share = special.betaincc if above else special.betainc
+    a, b = PRIOR + failed, PRIOR + runs - failed
+    posterior = float(share(a, b, rate))
+    if posterior <= 0.0:
+        return -math.inf
+    averaged = math.log(posterior) + special.betaln(a, b)
+    prior = math.log(float(share(PRIOR, PRIOR, rate))) + special.betaln(PRIOR, PRIOR)
+    likelihood = special.xlogy(failed, rate) + special.xlog1py(runs - failed, -rate)
+    return float(averaged - prior - likelihood)
+
+
+def _crossing(excess: object, inner: float, outer: float) -> float:
+    """Where a function that is negative at `inner` and positive towards `outer` is zero, or the end it stays below.
+
+    The result is rounded outwards, so that a bound is never tighter than the test allows.
+    """
+    assert callable(excess)
+    for _ in range(200):
+        middle = 0.5 * (inner + outer)
+        if middle in (inner, outer):
+            break
+        if excess(middle) >= 0.0:
+            outer = middle
+        else:
+            inner = middle
+    return outer

@@ -1,0 +1,251 @@
+"""The command `certify`: how often a claim holds, and how sure that is."""
+
+from __future__ import annotations
+
+import math
+import os
+import shlex
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from harness.cli.options import (
+    FAILED,
+    AircraftOption,
+    ConditionsOption,
+    GuidanceOption,
+    JsonOption,
+    PlannerOption,
+    SeedOption,
+    SettingsOption,
+    TurbulenceOption,
+    WindOption,
+    WorkersOption,
+    air,
+    bad_input,
+    chosen,
+    flag,
+    print_json,
+    settings_of,
+    told_apart,
+)
+from harness.cli.standard_output import say
+
+if TYPE_CHECKING:
+    from harness.certification.certificate import Certificate
+    from harness.certification.certification import Tally, Terms
+    from harness.certification.days import Days
+
+SHOWN: Final = 5
+"""Ways to fail, and quantities that explain failures, that are printed; the file has all."""
+
+LEAST_SHARE: Final = 0.01
+"""A quantity that explains less is not printed."""
+
+STYLE: Final = {"shown": "bold green", "refuted": "bold red", "undecided": "bold yellow"}
+
+
+def certify(
+    subject: Annotated[
+        str,
+        typer.Argument(metavar="SCENARIO|PATH", help="A scenario, or a path that `wayproof check` takes."),
+    ],
+    planner: PlannerOption = None,
+    aircraft: AircraftOption = None,
+    guidance: GuidanceOption = None,
+    claim: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CLAIM", help="reached (default), no-contact, trackable; as-given (default of a path)."
+        ),
+    ] = None,
+    probability: Annotated[
+        float | None,
+        typer.Option(
+            metavar="P", help="Claim that it holds on this share of the days; stops once that is decided."
+        ),
+    ] = None,
+    confidence: Annotated[float, typer.Option(metavar="C", help="Of each bound.")] = 0.95,
+    runs: Annotated[
+        int | None, typer.Option(metavar="N", min=1, help="Days to fly, at most. Default: 1000.")
+    ] = None,
+    conditions: ConditionsOption = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=DRAW", help="LO:HI, MEAN~SIGMA or A,B,...: drawn anew every day; can be repeated."
+        ),
+    ] = None,
+    wind: WindOption = None,
+    turbulence: TurbulenceOption = None,
+    seed: SeedOption = None,
+    settings: SettingsOption = None,
+    world: Annotated[
+        str | None, typer.Option("--scenario", metavar="WORLD", help="Of a path: obstacles, bounds, air.")
+    ] = None,
+    workers: WorkersOption = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="The folder. Default: its own in runs/NAME.")
+    ] = None,
+    resume: Annotated[bool, flag("--resume", "Fly only the days missing in DIR.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
+    as_json: JsonOption = False,
+) -> int:
+    """Flies a scenario or a path on many days, and says how often a claim holds, with confidence bounds.
+
+    Every day has its own seed and its own draw of what varies. Without --probability all N days are flown, and the
+    bounds are those of Clopper and Pearson. With it the flights end as soon as the claim is shown or refuted; the
+    bounds then hold at every look.
+
+    For example: wayproof certify aerosonde_forest --vary environment.wind.speed_mps=0:8 --probability 0.9
+
+    Exit status:
+
+    0 shown
+
+    1 refuted or undecided
+
+    2 bad input or usage, nothing flown
+    """
+    from harness.analysis.claims import CLAIMS
+    from harness.certification.certification import MOST_RUNS, Terms
+    from harness.certification.certification import certify as fly_days
+    from harness.certification.subject import Asked, days_of, distributions
+    from harness.cli.terminal import print_table
+    from harness.scenario.shipped import scenario_path
+
+    terms = Terms(probability, confidence)
+    options = [*chosen(planner, aircraft, seed, guidance), *air(wind, turbulence, conditions)]
+    replaced = settings_of(settings, options)
+    try:
+        drawn = distributions(vary or ())
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--vary") from error
+    if claim is not None and claim not in CLAIMS:
+        raise typer.BadParameter(f"{claim[:60]!r} is not {', '.join(CLAIMS)}", param_hint="--claim")
+    asked = Asked(subject, [*options, *replaced], drawn, claim, runs or MOST_RUNS)
+    days = days_of(asked, None if world is None else scenario_path(world))
+    days.sources = _sources(planner), _sources(guidance)
+    days.check()
+    apart = told_apart([*asked.settings, *((key, str(each)) for key, each in drawn.items())], named=())
+    folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{apart}"
+    certificate = _fly(
+        fly_days,
+        days,
+        folder,
+        workers or os.cpu_count() or 1,
+        terms,
+        resume=resume,
+        bar=days_bar,
+        silent=quiet,
+    )
+    if as_json:
+        print_json(certificate.plain())
+    elif not quiet:
+        print_table(
+            f"{certificate.subject}: {certificate.planner}, {certificate.aircraft}",
+            certificate_rows(certificate),
+        )
+        say(f"certificate: {folder / 'certificate.json'}")
+        if certificate.failing_runs:
+            first = folder / "runs" / str(certificate.failing_runs[0])
+            say(f"view: {shlex.join(['wayproof', 'view', str(first)])}")
+    return 0 if certificate.verdict == "shown" else FAILED
+
+
+def _sources(name: str | None) -> tuple[str, ...]:
+    from harness.scenario.given import is_source
+
+    return (name,) if name is not None and is_source(name) else ()
+
+
+def _fly(
+    fly_days: Any,
+    days: Days,
+    folder: Path,
+    workers: int,
+    terms: Terms,
+    *,
+    resume: bool,
+    bar: Any,
+    silent: bool,
+) -> Certificate:
+    from contextlib import nullcontext
+
+    from harness.campaign.results import INDEX
+    from harness.campaign.workers import local_workers
+    from harness.files.errors import RunFolderError
+
+    try:
+        with local_workers(workers) as flyers, nullcontext() if silent else bar(len(days)) as report:
+            found: Certificate = fly_days(days, folder, flyers, terms, resume=resume, progress=report)
+            return found
+    except RunFolderError as error:
+        raise bad_input(error) from error
+    except OSError as error:
+        say(f"wayproof: {error}; what is done is in {folder}, --resume goes on", err=True)
+        raise typer.Exit(FAILED) from error
+    except KeyboardInterrupt:
+        begun = (folder / INDEX).exists()
+        left = f"what is done is in {folder}, --resume goes on" if begun else "nothing was written"
+        say(f"wayproof: interrupted; {left}", err=True)
+        raise
+
+
+@contextmanager
+def days_bar(most: int) -> Iterator[Callable[[Tally], None] | None]:
+    """A bar of days that count, on standard error; None where that is not a terminal.
+
+    Args:
+        most: number of days that may be flown.
+    """
+    from harness.cli.terminal import step_bar
+
+    with step_bar() as bar:
+        if bar is None:
+            yield None
+            return
+        yield lambda tally: bar(tally.runs, most, f"held on {tally.held} of {tally.runs} days")
+
+
+def certificate_rows(certificate: Certificate) -> dict[str, str]:
+    """Name and value of each row."""
+    from harness.cli.terminal import plain
+
+    sure = f"{certificate.confidence:.4g}"
+    rows: dict[str, str] = {"claim": certificate.claim}
+    if certificate.conditions:
+        rows["conditions"] = plain(certificate.conditions)
+    rows |= {
+        "held": f"on {certificate.held} of {certificate.runs} days",
+        "probability": f"at least {share(certificate.probability_lower)}, at most "
+        f"{share(certificate.probability_upper, up=True)} (each bound at confidence {sure})",
+        "bounds": certificate.method,
+    }
+    asked = (
+        ""
+        if certificate.probability is None
+        else f": holds on at least {certificate.probability:.6g} of the days"
+    )
+    rows["verdict"] = f"[{STYLE[certificate.verdict]}]{certificate.verdict}[/]{asked}"
+    for number, each in enumerate(certificate.failures[:SHOWN]):
+        cause = f", {plain(each.cause)}" if each.cause else ""
+        runs = ", ".join(map(str, each.runs)) + (", ..." if each.count > len(each.runs) else "")
+        rows["failed" if not number else f"failed {number + 1}"] = (
+            f"{each.outcome}{cause}: {each.count} (run {runs})"
+        )
+    told = [each for each in certificate.explained if each.share >= LEAST_SHARE]
+    for quantity in told[:SHOWN]:
+        worst = f"most at {plain(quantity.worst)}: {quantity.failed} of {quantity.runs}"
+        rows[plain(quantity.key)] = f"explains {100 * quantity.share:.0f} % of the failures; {worst}"
+    return rows
+
+
+def share(value: float, up: bool = False) -> str:
+    """A probability, rounded outwards: never more than is known."""
+    digits = 5
+    scaled = value * 10**digits
+    return f"{(math.ceil(scaled) if up else math.floor(scaled)) / 10**digits:.{digits}f}"

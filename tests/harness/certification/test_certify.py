@@ -1,0 +1,134 @@
+"""`wayproof certify`: days of a planted failure rate, flown, counted and kept; the same for any number of workers."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+import wayproof
+from harness.cli.app import main
+from tests.faults.command import CAMPAIGN_FILES
+
+LIMITS_S = "mission.time_limit_s=40:70"
+"""The flight of the short scenario takes some 50 to 60 s: on a part of the days it does not arrive in time."""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("certify")
+    (folder / "short.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
+    return folder
+
+
+def certify(place: Path, *words: str, out: str = "out") -> tuple[int, dict[str, Any]]:
+    status = main(["certify", str(place / "short.yaml"), *words, "--out", str(place / out), "--quiet"])
+    file = place / out / "certificate.json"
+    return status, json.loads(file.read_text()) if file.exists() else {}
+
+
+@pytest.fixture(scope="module")
+def flown(place: Path) -> dict[str, Any]:
+    """Ten days with drawn time limits."""
+    status, certificate = certify(place, "--vary", LIMITS_S, "--runs", "10", "--workers", "2")
+    assert status == 1
+    return certificate
+
+
+def test_days_are_counted_as_a_separate_flight_without_limit_says(flown: dict[str, Any], place: Path) -> None:
+    arrival_s = wayproof.fly(place / "short.yaml").metrics.flight_time_s
+    limits_s = pq.read_table(place / "out" / "results.parquet")["mission.time_limit_s"].to_pylist()
+    failing = [run for run, limit_s in enumerate(limits_s) if limit_s < arrival_s]
+    assert flown["claim"] == "reached"
+    assert flown["runs"] == 10
+    assert 0 < flown["held"] == 10 - len(failing) < 10
+    assert flown["failing_runs"] == failing
+    assert (flown["verdict"], flown["confidence"]) == ("undecided", 0.95)
+    assert flown["probability_lower"] < flown["held"] / 10 < flown["probability_upper"]
+    assert [(each["outcome"], each["count"]) for each in flown["failures"]] == [("timeout", len(failing))]
+    assert [each["key"] for each in flown["explained"]] == ["mission.time_limit_s"]
+    assert flown["explained"][0]["share"] > 0.5
+
+
+def test_failing_days_are_kept_and_fly_again(flown: dict[str, Any], place: Path) -> None:
+    kept = sorted(int(each.name) for each in (place / "out" / "runs").iterdir())
+    assert kept == flown["failing_runs"]
+    run = wayproof.load_run(place / "out" / "runs" / str(kept[0]))
+    row = pq.read_table(place / "out" / "results.parquet").to_pylist()[kept[0]]
+    assert (run.outcome, run.digest) == ("timeout", row["digest"])
+    assert (place / "out" / "runs" / str(kept[0]) / "flight.rrd").stat().st_size > 0
+
+
+def test_a_claim_is_refuted_early_and_alike_at_any_number_of_workers(place: Path) -> None:
+    words = ("--vary", LIMITS_S, "--probability", "0.95", "--runs", "40")
+    found = [certify(place, *words, "--workers", str(number), out=f"w{number}") for number in (1, 3)]
+    (status, one), (_, three) = found
+    assert status == 1
+    assert one["verdict"] == "refuted"
+    assert one["runs"] < 40
+    assert one["probability_upper"] < 0.95
+    assert {**one, "command": ""} == {**three, "command": ""}
+    tables = [(place / out / "results.parquet").read_bytes() for out in ("w1", "w3")]
+    assert tables[0] == tables[1]
+    assert pq.read_table(place / "w1" / "results.parquet").num_rows == one["runs"]
+
+
+def test_a_claim_is_shown_and_a_second_certificate_needs_resume(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("--claim", "no-contact", "--probability", "0.4", "--runs", "20", "--workers", "1")
+    status, first = certify(place, *words, out="shown")
+    assert (status, first["verdict"]) == (0, "shown")
+    assert first["runs"] == first["held"] < 20
+    assert first["probability_lower"] >= 0.4
+    assert certify(place, *words, out="shown")[0] == 2
+    assert "--resume" in capsys.readouterr().err
+    status, again = certify(place, *words, "--resume", out="shown")
+    assert status == 0
+    assert {**again, "command": ""} == {**first, "command": ""}
+
+
+def test_a_given_path_is_certified_as_given(tmp_path: Path) -> None:
+    found = wayproof.certify(
+        [(0, 0), (2000, 0), (2000, 1500)],
+        runs=4,
+        vary={"trackability.cross_track_m": "0.001,50"},
+        settings={"seed": "5"},
+        out=tmp_path / "out",
+        workers=1,
+    )
+    limits_m = pq.read_table(tmp_path / "out" / "results.parquet")["trackability.cross_track_m"].to_pylist()
+    strict = [run for run, limit_m in enumerate(limits_m) if limit_m == 0.001]
+    assert found.claim == "as-given"
+    assert list(found.failing_runs) == strict
+    assert 0 < len(strict) < 4
+    assert [(each.key, each.share) for each in found.explained] == [("trackability.cross_track_m", 1.0)]
+    kept = wayproof.load_run(tmp_path / "out" / "runs" / str(strict[0]))
+    assert kept.metrics.check is not None
+    assert not kept.metrics.check.ok
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--probability", "1"], "probability"),
+        (["--confidence", "0"], "confidence"),
+        (["--claim", "safe"], "as-given"),
+        (["--claim", "as-given"], "as-given is of a given path"),
+        (["--vary", "planner.clearance_m"], "KEY=LO:HI"),
+        (["--vary", "planner.clearance_m=9:1"], "least < most"),
+        (["--vary", "no.such=0:1"], "no"),
+        (["--vary", "seed=0:1"], "seed"),
+        (["--runs", "0"], "--runs"),
+    ],
+)
+def test_bad_input_is_told_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], told: str
+) -> None:
+    (tmp_path / "short.yaml").write_text(CAMPAIGN_FILES["short.yaml"])
+    assert main(["certify", str(tmp_path / "short.yaml"), *words, "--out", str(tmp_path / "out")]) == 2
+    assert told in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
