@@ -118,7 +118,7 @@ def certify(
     from harness.scenario.shipped import scenario_path
 
     terms = Terms(probability, confidence)
-    options = [*chosen(planner, aircraft, seed, guidance), *air(wind, turbulence, conditions)]
+    options = [*chosen(planner, aircraft, seed, guidance, conditions), *air(wind, turbulence)]
     replaced = settings_of(settings, options)
     try:
         drawn = distributions(vary or ())

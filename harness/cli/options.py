@@ -120,12 +120,6 @@ SettingsOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY.PATH=VALUE", help="Replaces any key; can be repeated."),
 ]
-ConditionsOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="DAY", help="ideal, typical or rough: wind, turbulence, navigation and servos of such a day."
-    ),
-]
 WindOption = Annotated[
     str | None, typer.Option(metavar="SPEED,FROM", help="Steady wind: m/s, degrees it blows from.")
 ]
@@ -194,7 +188,6 @@ def air(wind: str | None, turbulence: str | None, conditions: str | None = None)
     given = {
         "environment.wind": _wind(wind),
         "environment.turbulence": _turbulence(turbulence),
-        "conditions": conditions,
     }
     return [(key, json.dumps(value)) for key, value in given.items() if value is not None]
 
