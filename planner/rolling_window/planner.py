@@ -116,7 +116,7 @@ class RollingWindow:
         assert config.planning_window_m is not None
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
-        self._mission = mission
+        self._mission, self._rolling_step_m = mission, config.rolling_step_m
         self._memory = memory = ObstacleMemory(mission.clearance_m)
         self._local = LocalPlanning(
             mission,
@@ -165,6 +165,7 @@ class RollingWindow:
         if plan.holds(request.arc_length_m):
             now = Situation(request, plan, on_loiter(plan.path, request.arc_length_m))
             self._loiter(now, plan)
+        self._search.anew |= self._free_again(now)
         newly_cut = self._monitor.look(plan, now.here_m, request.position_m, fresh_m)
         if not self._due(now, plan, newly_cut) and self._search.running is None:
             return KEPT
@@ -194,7 +195,12 @@ class RollingWindow:
         since_m = now.request.arc_length_m - self._monitor.searched_at_m
         if self._giving_up.out_of_effort and self._search.up_to_date:
             return self._giving_up.whole_turn(since_m)
-        return self._monitor.due(plan, now.here_m, since_m, newly_cut) or meets
+        return self._monitor.due(plan, now.here_m, since_m, newly_cut) or meets or self._search.anew
+
+    def _free_again(self, now: Situation) -> bool:
+        """Whether edge points have gone, and a rolling step has been flown, since the last search."""
+        since_m = now.request.arc_length_m - self._monitor.searched_at_m
+        return self._search.freed and since_m >= self._rolling_step_m
 
     def _left_behind(self, now: Situation) -> bool:
         """Whether the plan in effect is so far off that none can go on from it, as after a jump of the position."""
@@ -213,7 +219,7 @@ class RollingWindow:
         start, ahead = self._start(now), None if self._left_behind(now) else now.ahead
         serving = ahead if math.isinf(self._monitor.cut_m) and not self._monitor.broken else None
         self._search.nearer = None
-        if serving is not None and (serving.shortest or self._search.up_to_date):
+        if serving is not None and (serving.shortest or self._search.up_to_date) and not self._search.anew:
             self._search.stop()
             return self._prolong(now, start, serving)
         work = self._work(now, serving is not None)

@@ -81,6 +81,7 @@ class RollingSearch:
         last: the last search that was at work.
         known: how many edge points the last search that ended began with.
         gone: how many edge points had been let go of when the last search began.
+        anew: a search is to be made though the course in effect serves: a way may have become free.
         nearer: a certified plan that the last search found but that would come too near to what moves.
     """
 
@@ -101,12 +102,18 @@ class RollingSearch:
         self.last: AnytimeSearch | None = None
         self.known = 0
         self.gone = 0
+        self.anew = False
         self.nearer: CommittedPlan | None = None
 
     @property
     def up_to_date(self) -> bool:
         """Whether no edge point has come in since the last search."""
         return self.known == self._memory.known
+
+    @property
+    def freed(self) -> bool:
+        """Whether edge points have been let go of since the last search began: a way may have become free."""
+        return self._memory.cleared != self.gone
 
     def stop(self) -> None:
         """Drops a search that is not done: the plan in effect is as good as any."""
@@ -140,7 +147,7 @@ class RollingSearch:
                     nearest_m, self.nearer = keeps_m, found
             search.stuck = search.stuck or course
         if search.done:
-            self.running, self.known = None, search.known
+            self.running, self.known, self.anew = None, search.known, False
         return None
 
     def _begun(self, position: Point) -> AnytimeSearch:
@@ -156,7 +163,7 @@ class RollingSearch:
 
     def _end(self, search: AnytimeSearch, ahead: Course | None, course: Course) -> None:
         """Ends a search that has found a course."""
-        self.running, self.known = None, search.known
+        self.running, self.known, self.anew = None, search.known, False
         self._giving_up.effort = 0
         before_m = -math.inf if ahead is None else ahead.path.length_m
         self._monitor.lengthened_m = course.path.length_m - before_m
