@@ -12,6 +12,7 @@ share of the clearance, for beside what is seen to its edge the hidden flank of 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -20,6 +21,7 @@ import numpy as np
 from planner.geometry.clearance import inside_bounds
 from planner.geometry.curves import (
     Limits,
+    Point,
     Segment,
     along,
     between,
@@ -160,6 +162,11 @@ class Certifier:
             return [full_turn(pose, self._limits.radius_m, side)]
         roll: Segment = (*pose, 0.0, self._limits.roll_m)
         return [roll, full_turn(along(roll, self._limits.roll_m), self._limits.radius_m, side)]
+
+
+def hold_centre(turn: Sequence[float]) -> Point:
+    """Centre of a full turn, a row of `Path.segments`."""
+    return turn[0] - turn[3] / turn[4], turn[1] + turn[2] / turn[4]
 
 
 @lru_cache(maxsize=8)

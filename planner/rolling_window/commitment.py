@@ -10,13 +10,20 @@ import numpy as np
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, place_on
-from planner.interface import FloatArray, MapView, Mission, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
-from planner.rolling_window.certificate import Certified, Certifier
+from planner.rolling_window.certificate import Certified, Certifier, hold_centre
 from planner.rolling_window.committed_plan import CommittedPlan
 from planner.rolling_window.local_planning import LocalPlanning, Start
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.window import free_sectors, guide_vector
+
+PROGRESS = 0.25
+"""A new plan leads on if it gains at least this share of the hold radius along its course, and ends in a hold at least
+as far from that of the plan in effect."""
+
+CONCENTRIC = 0.05
+"""An arc whose centre lies within this share of the hold radius from that of a hold is part of the hold."""
 
 
 class Commitment:
@@ -75,9 +82,38 @@ class Commitment:
         )
         return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
 
-    def leads_on(self, found: CommittedPlan) -> bool:
-        """Whether a certified plan gets anywhere: past its first turn, or to the goal."""
-        return self._leads_on(found.loiter_entry_m, found.course)
+    def leads_on(self, found: CommittedPlan, start: Start, effective: CommittedPlan | None) -> bool:
+        """Whether a certified plan gets anywhere: to the goal, or along its course to a hold elsewhere.
+
+        Flying on round the hold that the plan in effect ends in is no progress along the course.
+
+        Args:
+            found: the certified plan.
+            start: where it leaves the plan in effect.
+            effective: the plan in effect; None without one.
+        """
+        if not found.path.loiter:
+            return True
+        hold_m = PROGRESS * self._mission.hold_radius_m
+        before_m = sum(segment[5] for segment in start.prefix)
+        if effective is not None and effective.path.loiter:
+            circle = hold_centre(effective.path.segments[-1])
+            if math.dist(hold_centre(found.path.segments[-1]), circle) < hold_m:
+                return False
+            before_m = max(before_m, self._circled_m(found.path, circle))
+        return found.loiter_entry_m - before_m >= hold_m
+
+    def _circled_m(self, path: Path, circle: Point) -> float:
+        """How far a path leads along a hold at its beginning."""
+        circled_m = 0.0
+        for segment in path.segments.tolist():
+            if (
+                not segment[4]
+                or math.dist(hold_centre(segment), circle) > CONCENTRIC * self._mission.hold_radius_m
+            ):
+                break
+            circled_m += segment[5]
+        return circled_m
 
     def unseen(self, course: Course, seen: MapView) -> Pose:
         """The first place of a course that has not been seen to be free."""

@@ -138,7 +138,7 @@ class RollingSearch:
             found = self._commitment.commit(
                 step.request, step.start, course, search.candidates, self.cut_m(course)
             )
-            if found is not None and self._commitment.leads_on(found):
+            if found is not None and self._commitment.leads_on(found, step.start, self._monitor.plan):
                 keeps_m = room_m(found.path, step.threats)
                 if keeps_m >= self._mission.clearance_m:
                     self._end(search, step.ahead, course)

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path as FilePath
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 import wayproof
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
+
+CAMPAIGNS = FilePath(__file__).parents[2] / "scenarios" / "campaigns"
 
 
 class Hold:
@@ -52,3 +56,22 @@ def test_a_hold_is_kept_within_a_metre(wind_mps: float, turbulence: dict[str, st
     off_m = track.cross_track_m[track.time_s > 30.0].abs()
     assert 100.0 < holds[0].radius_m < 210.0
     assert off_m.max() < 1.0
+
+
+@pytest.mark.flights
+def test_a_dozen_of_its_windiest_flights_are_hardly_longer_than_the_shortest_way(tmp_path: FilePath) -> None:
+    shipped = (CAMPAIGNS / "ordinary_day.yaml").read_text()
+    for old, new in (
+        ("planners: [rolling_window, vfh_plus, tangent_bug]", "planners: [rolling_window]"),
+        ("{uniform: [0, 8]}", "{uniform: [6, 8]}"),
+        ("draws: 100", "draws: 12"),
+    ):
+        assert old in shipped
+        shipped = shipped.replace(old, new)
+    (tmp_path / "windy.yaml").write_text(shipped)
+    wayproof.sweep(tmp_path / "windy.yaml", out=tmp_path / "out")
+    runs = pq.read_table(tmp_path / "out" / "results.parquet").to_pandas()
+    assert list(runs.outcome) == ["reached"] * 12
+    assert runs.min_clearance_m.min() >= 50.0
+    assert runs.length_ratio.mean() <= 1.05
+    assert runs.length_ratio.max() <= 1.3

@@ -11,7 +11,7 @@ import pytest
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose
-from planner.interface import FloatArray, MapView, Mission, Path, PlanRequest
+from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.commitment import Commitment
 from planner.rolling_window.committed_plan import CommittedPlan
@@ -36,6 +36,35 @@ OVER_M = 1000.0 - (50.0 - 3.0)
 """Station of the course at which an aircraft that is off it by the tracking error is at the goal all the same."""
 NARROW = replace(MISSION, bounds_m=(-500.0, -150.0, 1500.0, 150.0))
 """No room to turn in it."""
+
+AT_ORIGIN = Start((0.0, 0.0), Pose(0.0, 0.0, 1.0, 0.0))
+
+
+def held(*segments: tuple[float, ...], entry_m: float) -> CommittedPlan:
+    """A plan whose last segment is a full turn to the left."""
+    path = Path(np.array(segments), loiter=True)
+    plan = Plan(PlanStatus.FOUND, "", path.segments[:, :2], path)
+    return CommittedPlan(plan, path, to_goal(), entry_m)
+
+
+def test_a_new_plan_has_to_gain_a_quarter_of_a_hold_and_to_end_in_another(known: Known) -> None:
+    commitment, _ = committed(known(np.zeros((0, 2))), MISSION, to_goal())
+    round_100 = (1.0, 0.0, 1.0 / 100.0, math.tau * 100.0)
+    flown = held((0.0, 0.0, *round_100), entry_m=0.0)
+
+    def leads_on(length_m: float, effective: CommittedPlan | None) -> bool:
+        line = (0.0, 0.0, 1.0, 0.0, 0.0, length_m)
+        return commitment.leads_on(
+            held(line, (length_m, 0.0, *round_100), entry_m=length_m), AT_ORIGIN, effective
+        )
+
+    assert [leads_on(length_m, None) for length_m in (24.0, 26.0)] == [False, True]
+    assert [leads_on(length_m, flown) for length_m in (24.0, 26.0)] == [False, True]
+    whole_turn = (0.0, 0.0, 1.0, 0.0, 1.0 / 100.0, math.tau * 100.0)
+    for line_m, gets_on in ((20.0, False), (30.0, True)):  # a turn in the hold before the line is no progress
+        line = (0.0, 0.0, 1.0, 0.0, 0.0, line_m)
+        found = held(whole_turn, line, (line_m, 0.0, *round_100), entry_m=math.tau * 100.0 + line_m)
+        assert commitment.leads_on(found, AT_ORIGIN, flown) is gets_on
 
 
 def to_goal(length_m: float = 1000.0) -> Course:
@@ -75,7 +104,7 @@ def test_a_turn_keeps_the_clearance_and_the_tracking_error(
 def test_where_no_turn_leads_on_the_goal_is_flown_to(known: Known) -> None:
     commitment, found = committed(known(np.zeros((0, 2))), NARROW, to_goal())
     assert found is not None
-    assert commitment.leads_on(found)
+    assert commitment.leads_on(found, AT_ORIGIN, None)
     assert not found.path.loiter
     assert found.loiter_entry_m == pytest.approx(OVER_M)
     assert found.plan.wants_more_time is False
@@ -84,7 +113,7 @@ def test_where_no_turn_leads_on_the_goal_is_flown_to(known: Known) -> None:
 def test_near_the_goal_a_turn_is_kept_in_reserve_where_there_is_room(known: Known) -> None:
     commitment, found = committed(known(np.zeros((0, 2))), MISSION, to_goal(0.5 * LEAST_M))
     assert found is not None
-    assert commitment.leads_on(found)
+    assert commitment.leads_on(found, AT_ORIGIN, None)
     assert found.path.loiter
 
 
