@@ -241,15 +241,15 @@ class PlanPicture:
 
     Attributes:
         guide_m: (2, 2) guide vector, from the aircraft to the point it aims at.
-        window_m: radius of the planning window (the paper's r1).
+        window_m: radius of the planning window (the paper's r1); 0: nothing bounds the search.
         sectors: (k, 4) free sectors at the aircraft: unit vectors of the right and the left edge.
         candidates: polylines (m, 2) that were compared, the chosen one first.
         met_m: (j, 2) edge points of moving obstacles, at the places where the plan expects to meet them.
     """
 
     guide_m: FloatArray
-    window_m: float
-    sectors: FloatArray
+    window_m: float = 0.0
+    sectors: FloatArray = field(default_factory=lambda: np.zeros((0, 4)))
     candidates: tuple[FloatArray, ...] = ()
     met_m: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
 

@@ -82,7 +82,7 @@ def send_plans(
     guides = np.array([p.guide_m for p in pictures if p]).reshape(-1, 2, 2)
     strips: dict[str, list[list[FloatArray]]] = {
         "chosen": [[path] for path in paths],
-        "window": [[circle(p.guide_m[0], p.window_m)] if p else [] for p in pictures],
+        "window": [[circle(p.guide_m[0], p.window_m)] if p and p.window_m else [] for p in pictures],
         "sectors": [
             [fan(p.guide_m[0], edges, p.window_m) for edges in p.sectors] if p else [] for p in pictures
         ],

@@ -17,8 +17,8 @@ class ImprovedBugConfig:
     planning_window_m: float | None = field(
         default=None,
         metadata={
-            "doc": "radius r1 of the planning window; no track point lies further from where the plan begins; at "
-            "most the sensor range, which is the default",
+            "doc": "radius r1 of the planning window; no track point lies further from where the plan begins; "
+            "default: the sensor range, which is the most",
             "unit": "m",
             "above": 0.0,
         },

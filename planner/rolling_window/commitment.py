@@ -16,7 +16,7 @@ from planner.rolling_window.certificate import Certified, Certifier, hold_centre
 from planner.rolling_window.committed_plan import CommittedPlan
 from planner.rolling_window.local_planning import LocalPlanning, Start
 from planner.rolling_window.multi_step_search import Candidate
-from planner.rolling_window.window import free_sectors, guide_vector
+from planner.rolling_window.window import guide_vector
 
 PROGRESS = 0.25
 """A new plan leads on if it gains at least this share of the hold radius along its course, and ends in a hold at least
@@ -68,16 +68,13 @@ class Commitment:
             certified = self._to_goal(certifier, course, request.seen, cut_m) or certified
         if certified is None:
             return None
-        goal, nodes, keep_m = self._mission.goal_m, course.nodes, self._mission.clearance_m
-        points, met = self._memory.points_m, self._memory.met_m
+        goal, nodes, met = self._mission.goal_m, course.nodes, self._memory.met_m
         plan = Plan(
             PlanStatus.FOUND,
             explanation(request.position_m, goal, nodes),
             waypoints_m=np.array([start.position, *nodes]),
             path=certified.path,
-            picture=partial(
-                picture_of, start.position, goal, nodes, candidates, self._local.window_m, points, keep_m, met
-            ),
+            picture=partial(picture_of, start.position, goal, nodes, candidates, met),
             wants_more_time=wants_more_time,
         )
         return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
@@ -161,16 +158,11 @@ def picture_of(
     goal: Point,
     nodes: Sequence[Point],
     candidates: Iterable[Candidate],
-    window_m: float,
-    points_m: FloatArray,
-    keep_m: float,
     met_m: FloatArray,
 ) -> PlanPicture:
-    """Guide vector, planning window with its free sectors, what was compared (the chosen course first), what is met."""
+    """Guide vector, what was compared (the chosen course first), what is met."""
     return PlanPicture(
         guide_m=np.array([position, goal]),
-        window_m=window_m,
-        sectors=free_sectors(points_m, keep_m, position),
         candidates=(np.array([position, *nodes]), *(np.array(candidate.nodes) for candidate in candidates)),
         met_m=met_m,
     )

@@ -15,16 +15,6 @@ from planner.rolling_window.certificate import least_sensor_range_m
 class RollingWindowConfig:
     """Keys of `planner.kind: rolling_window`."""
 
-    planning_window_m: float | None = field(
-        default=None,
-        metadata={
-            "doc": "radius r1 of the planning window, at most the sensor range; default: the sensor range. The "
-            "recording shows it, and the rolling step is a share of it; the search goes through all that is "
-            "remembered",
-            "unit": "m",
-            "above": 0.0,
-        },
-    )
     steps: int = field(
         default=16,
         metadata={
@@ -48,7 +38,7 @@ class RollingWindowConfig:
         default=None,
         metadata={
             "doc": "distance flown before the window rolls, unless the plan is cut near by; "
-            "default: 1/16 of the planning window",
+            "default: 1/16 of the sensor range",
             "unit": "m",
             "above": 0.0,
         },
@@ -58,8 +48,7 @@ class RollingWindowConfig:
         """This config with every None replaced by its default for the mission.
 
         Raises:
-            ValueError: the planning window is larger than the sensing range, or that is too short for the turn
-                radius.
+            ValueError: the sensing range is too short for the turn radius.
         """
         reaction_s = LEAD_S + mission.sensor_latency_s + mission.compute_latency_s + mission.roll_in_s
         least = least_sensor_range_m(
@@ -71,15 +60,10 @@ class RollingWindowConfig:
                 f"{mission.hold_radius_m:.0f} m with a clearance of {mission.clearance_m:g} m; "
                 f"must be at least {math.ceil(least)}, to see room for a safe turn ahead"
             )
-        window = mission.sensor_range_m if self.planning_window_m is None else self.planning_window_m
-        if window > mission.sensor_range_m:
-            raise ValueError(
-                f"planning_window_m is {window:g}, more than sensor.range_m {mission.sensor_range_m:g}; "
-                "the planner cannot plan beyond what is sensed"
-            )
         return replace(
             self,
-            planning_window_m=window,
             margin_m=margin_of(mission) if self.margin_m is None else self.margin_m,
-            rolling_step_m=window / 16.0 if self.rolling_step_m is None else self.rolling_step_m,
+            rolling_step_m=mission.sensor_range_m / 16.0
+            if self.rolling_step_m is None
+            else self.rolling_step_m,
         )

@@ -92,7 +92,6 @@ class LocalPlanning:
     Args:
         mission: goal and limits.
         memory: the edge points.
-        window_m: r_1.
         margin_m: planned distance beyond the clearance.
         steps: N.
         candidates: n.
@@ -103,13 +102,12 @@ class LocalPlanning:
         mission: Mission,
         memory: ObstacleMemory,
         *,
-        window_m: float,
         margin_m: float,
         steps: int,
         candidates: int,
     ) -> None:
         self._mission, self._memory = mission, memory
-        self.window_m, self._margin_m = window_m, margin_m
+        self._margin_m = margin_m
         self._steps, self._candidates = steps, candidates
         self.tally = Tally()
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)

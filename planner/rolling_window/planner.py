@@ -113,7 +113,6 @@ class RollingWindow:
 
     def __init__(self, config: RollingWindowConfig, mission: Mission) -> None:
         config = config.resolved(mission)
-        assert config.planning_window_m is not None
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
         self._mission, self._rolling_step_m = mission, config.rolling_step_m
@@ -121,7 +120,6 @@ class RollingWindow:
         self._local = LocalPlanning(
             mission,
             memory,
-            window_m=config.planning_window_m,
             margin_m=config.margin_m,
             steps=config.steps,
             candidates=config.candidates,

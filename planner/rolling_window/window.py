@@ -160,33 +160,3 @@ class Window:
                     looked_at.add(other)
                     pending.append(other)
         return edges
-
-
-def free_sectors(points_m: FloatArray, keep_m: float | FloatArray, origin: Point) -> FloatArray:
-    """(k, 4) free sectors at a track point: unit vectors of the right and the left edge of each.
-
-    Fans that overlap or hide each other are merged. With nothing in the window all is free and there is no
-    row.
-
-    Args:
-        points_m: (m, 2) sensed edge points.
-        keep_m: distance to be kept, one for all or one for each of them.
-        origin: the track point.
-    """
-    if not len(points_m):
-        return np.zeros((0, 4))
-    dx, dy = points_m[:, 0] - origin[0], points_m[:, 1] - origin[1]
-    half = np.arcsin(np.minimum(keep_m / np.maximum(np.hypot(dx, dy), 1e-9), 1.0))
-    low = np.arctan2(dy, dx) - half
-    high = low + 2.0 * half
-    start = low[0]
-    begin = (low - start) % math.tau
-    order = np.argsort(begin)
-    begin, furthest = begin[order], np.maximum.accumulate((begin + high - low)[order])
-    # What reaches beyond a full turn covers the beginning again.
-    covered = np.maximum(np.append(0.0, furthest[:-1]), furthest[-1] - math.tau)
-    gap = begin > covered
-    right, left = start + covered[gap], start + begin[gap]
-    if furthest[-1] < math.tau:
-        right, left = np.append(right, start + furthest[-1]), np.append(left, start + math.tau)
-    return np.column_stack((np.cos(right), np.sin(right), np.cos(left), np.sin(left)))

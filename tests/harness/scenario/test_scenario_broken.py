@@ -175,8 +175,8 @@ BROKEN = {
     "planner's key out of range": ("steps: 8", "steps: 0", "22: planner.steps", "at least 1"),
     "planner's key of a wrong type": ("steps: 8", "steps: eight", "22: planner.steps", "a whole number"),
     "planner's keys contradict": (
-        "steps: 8",
-        "planning_window_m: 9000",
+        "rolling_window\n  clearance_m: 200\n  steps: 8",
+        "improved_bug\n  clearance_m: 200\n  planning_window_m: 9000",
         "22: planner.planning_window_m",
         "3000",
     ),

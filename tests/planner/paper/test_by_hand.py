@@ -8,6 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from planner.contract import MISSION
 from planner.geometry.curves import Pose, sample
@@ -121,6 +124,21 @@ def test_fan_shaped_sectors() -> None:
     near(fan_shaped_sectors(at(0.0, 50.0), 100.0, (0.0, 0.0)), (80.0, 330.0))
     assert fan_shaped_sectors(at(0.0, 59.0, 118.0, 177.0, 236.0, 295.0, 340.0), 100.0, (0.0, 0.0)) == []
     near(fan_shaped_sectors(np.array([[30.0, 0.0]]), 100.0, (0.0, 0.0)), (90.0, 270.0))
+
+
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(1, 12))
+def test_a_direction_is_in_a_free_sector_where_a_ray_meets_nothing(seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    points, origin = rng.uniform(-2000.0, 2000.0, (count, 2)), rng.uniform(-500.0, 500.0, 2)
+    assume(np.hypot(*(points - origin).T).min() > 301.0)
+    sectors = fan_shaped_sectors(points, 300.0, (float(origin[0]), float(origin[1])))
+    angles = rng.uniform(-math.pi, math.pi, 180)
+    rays = origin + 9e3 * np.column_stack((np.cos(angles), np.sin(angles)))
+    lines = shapely.linestrings(np.stack((np.broadcast_to(origin, (180, 2)), rays), axis=1))
+    room = shapely.distance(lines[:, None], shapely.points(points)) - 300.0
+    free = np.array([any((a - s.right) % math.tau <= s.left - s.right for s in sectors) for a in angles])
+    surely = (np.abs(room) > 1e-3).all(axis=1)
+    np.testing.assert_array_equal(free[surely], (room > 0.0).all(axis=1)[surely])
 
 
 def test_a_sector_is_cut_to_what_a_step_can_turn_to() -> None:

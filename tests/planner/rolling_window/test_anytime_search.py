@@ -50,7 +50,7 @@ def planning(
 ) -> tuple[LocalPlanning, AnytimeSearch]:
     memory = ObstacleMemory(MISSION.clearance_m)
     memory.take_in(seen)
-    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
     return local, AnytimeSearch(local, len(memory.points_m), 0, closed)
 
 
@@ -141,7 +141,7 @@ def test_what_comes_into_view_meanwhile_does_not_turn_the_search_the_other_way(w
     behind = wall((3000.0, -700.0), (6000.0, -700.0), 50.0)
     seen, memory = Growing(across, behind), ObstacleMemory(MISSION.clearance_m)
     memory.take_in(seen)
-    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
     thinking = AnytimeSearch(local, len(memory.points_m), 0, lambda: False)
     assert not list(thinking.courses(START, None, 2))
     seen.revision = 2
@@ -168,7 +168,7 @@ def test_of_two_ways_nearly_alike_the_one_is_taken_that_does_not_lead_back(
 ) -> None:
     memory = ObstacleMemory(MISSION.clearance_m)
     memory.take_in(known(wall((6000.0, -2000.0), (6000.0, 2100.0), 50.0)))
-    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
     if flown_before:
         for share in np.linspace(0.3, 1.0, 60).tolist():
             local.trail.add((6000.0 * share, -2200.0 * share))
@@ -182,7 +182,7 @@ def test_no_other_way_round_is_taken_while_a_narrower_one_leads_on(wall: MakePoi
     # Too narrow for all of the margin.
     gap = [wall((6000.0, side * 3000.0), (6000.0, side * 207.0), 50.0) for side in (-1.0, 1.0)]
     memory.take_in(known(np.concatenate(gap)))
-    local = LocalPlanning(MISSION, memory, window_m=8000.0, margin_m=20.0, steps=16, candidates=12)
+    local = LocalPlanning(MISSION, memory, margin_m=20.0, steps=16, candidates=12)
     straight = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 12_000.0)]))
     through = Course(straight, (MISSION.goal_m,), memory.known, shortest=True)
 

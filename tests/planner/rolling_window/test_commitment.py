@@ -80,7 +80,7 @@ def committed(
 ) -> tuple[Commitment, CommittedPlan | None]:
     memory = ObstacleMemory(mission.clearance_m)
     memory.take_in(seen)
-    local = LocalPlanning(mission, memory, window_m=1000.0, margin_m=10.0, steps=3, candidates=3)
+    local = LocalPlanning(mission, memory, margin_m=10.0, steps=3, candidates=3)
     commitment = Commitment(mission, memory, local, LEAST_M)
     east, north = course.path.segments[0, :2].tolist()
     start = Start((east, north), Pose(east, north, 1.0, 0.0))

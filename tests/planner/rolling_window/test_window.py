@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from planner.interface import FloatArray
-from planner.rolling_window.window import SectorEdge, Window, free_sectors, guide_vector
+from planner.rolling_window.window import SectorEdge, Window, guide_vector
 from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]
@@ -58,41 +58,6 @@ def test_the_guide_vector_leads_to_the_goal(x: float, y: float, gx: float, gy: f
 
 def test_at_the_goal_the_guide_vector_has_no_length() -> None:
     assert guide_vector((3.0, 4.0), (3.0, 4.0))[2] == 0.0
-
-
-@given(seed=SEEDS, count=st.integers(1, 12))
-def test_free_sectors_are_the_bearings_on_which_a_ray_meets_nothing(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    points, keep = rng.uniform(-2000.0, 2000.0, (count, 2)), rng.uniform(20.0, 400.0, count)
-    origin = rng.uniform(-500.0, 500.0, 2)
-    assume((np.hypot(*(points - origin).T) - keep).min() > 1.0)
-    sectors = free_sectors(points, keep, (float(origin[0]), float(origin[1])))
-    angles = rng.uniform(-math.pi, math.pi, 180)
-    rays = np.column_stack((np.cos(angles), np.sin(angles)))
-    lines = shapely.linestrings(np.stack((np.broadcast_to(origin, (180, 2)), origin + 9e3 * rays), axis=1))
-    room = shapely.distance(lines[:, None], shapely.points(points)) - keep
-    surely: NDArray[np.bool_] = (np.abs(room) > 1e-3).all(axis=1)
-    right = np.arctan2(sectors[:, 1], sectors[:, 0])
-    width = (np.arctan2(sectors[:, 3], sectors[:, 2]) - right) % math.tau
-    inside: NDArray[np.bool_] = np.any((angles[:, None] - right) % math.tau <= width, axis=1)
-    np.testing.assert_array_equal(inside[surely], np.all(room > 0.0, axis=1)[surely])
-    # Sectors do not overlap and are parted by obstacles.
-    assert width.sum() < math.tau
-
-
-def test_nothing_in_the_window_cuts_no_sector() -> None:
-    assert free_sectors(np.zeros((0, 2)), KEEP, (0.0, 0.0)).shape == (0, 4)
-
-
-def test_fans_that_overlap_leave_one_sector(ring: MakePoints) -> None:
-    ahead, behind_it = ring(3000.0, 0.0, 400.0, SPACING), ring(6000.0, 500.0, 900.0, SPACING)
-    beside = ring(0.0, 3000.0, 400.0, SPACING)
-    assert len(free_sectors(np.concatenate((ahead, behind_it)), KEEP, (0.0, 0.0))) == 1
-    assert len(free_sectors(np.concatenate((ahead, beside)), KEEP, (0.0, 0.0))) == 2
-
-
-def test_within_a_closed_ring_there_is_no_free_sector(ring: MakePoints) -> None:
-    assert len(free_sectors(ring(0.0, 0.0, 900.0, SPACING), KEEP, (100.0, 50.0))) == 0
 
 
 @pytest.mark.parametrize("east", [-3000.0, 3000.0])
