@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,9 @@ AIRSPEED_CORRELATION_S: Final = 300.0
 
 _POSITION, _VELOCITY, _HEADING, _AIRSPEED, _ALTITUDE = slice(0, 2), slice(2, 5), 5, 6, 7
 
+
+GROWS_OLD: Final = AircraftState._fields[1 : AircraftState._fields.index("load_factor") + 1]
+"""What of a state is as old as the latency: all from position to load factor."""
 
 LOOKS_APART_S: Final = 5.0
 """What moves is told from looks at it that are about so far apart in time."""
@@ -59,7 +63,8 @@ class Navigator:
     a share of the distance flown; the believed velocity has the error that this drift is the integral of. At the end
     of the outage the error is again that of a fix: the believed position jumps.
 
-    Roll, pitch, load factor, throttle and time are true.
+    All of it is as old as the latency, between two calls linear; roll, pitch and load factor are old but true, time and
+    controls are those of now.
 
     Args:
         navigation: sizes and outages.
@@ -87,6 +92,7 @@ class Navigator:
             ]
         )
         self._perfect = navigation.kind == "perfect"
+        self._past: deque[AircraftState] = deque()
         self.jumps = 0
         """How often a fix has come back after an outage, and the believed position has jumped."""
         self._unit = np.zeros(8)  # the processes, over their sigmas
@@ -114,6 +120,10 @@ class Navigator:
         """
         if self._perfect:
             return state
+        return self._erroneous(_as_it_was(self._past, state, self._navigation.latency_s))
+
+    def _erroneous(self, state: AircraftState) -> AircraftState:
+        """A state with the errors of its time."""
         if state.time_s < self._time_s:
             raise ValueError(f"time goes back from {self._time_s:g} s to {state.time_s:g} s")
         place = np.array([state.east_m, state.north_m])
@@ -165,6 +175,34 @@ class Navigator:
             if begin_s <= time_s < end_s:
                 return index
         return -1
+
+
+def _as_it_was(past: deque[AircraftState], state: AircraftState, latency_s: float) -> AircraftState:
+    """The state some time ago, but for its time; before the first one it moves evenly.
+
+    Args:
+        past: states of earlier calls, the oldest first; this one is added, and those that are too old go.
+        state: the state now.
+        latency_s: how long ago.
+    """
+    if latency_s == 0.0:
+        return state
+    if not past or state.time_s > past[-1].time_s:
+        past.append(state)
+    then_s = state.time_s - latency_s
+    while len(past) > 1 and past[1].time_s <= then_s:
+        past.popleft()
+    old = past[0]
+    new = past[1] if len(past) > 1 else old
+    share = (then_s - old.time_s) / (new.time_s - old.time_s) if then_s > old.time_s else 0.0
+    lead_s = min(then_s - old.time_s, 0.0)
+    values = {name: (1.0 - share) * a + share * b for name, a, b in zip(old._fields, old, new, strict=True)}
+    values["heading_rad"] = old.heading_rad + share * math.remainder(
+        new.heading_rad - old.heading_rad, math.tau
+    )
+    values |= {"east_m": values["east_m"] + lead_s * old.velocity_east_mps}
+    values |= {"north_m": values["north_m"] + lead_s * old.velocity_north_mps}
+    return state._replace(**{name: values[name] for name in GROWS_OLD})
 
 
 def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:

@@ -215,8 +215,7 @@ def _navigation(keys: ScenarioKeys, day: Day) -> Any:
     figures = {} if "kind" in named else day.navigation
     if given.kind == "perfect" and "kind" in named:
         return given
-    if "latency_s" in type(given).model_fields:
-        figures = {**figures, "latency_s": day.latency_s}
+    figures = {**figures, "latency_s": day.latency_s}
     own = {name: getattr(given, name) for name in named}
     return type(given)(**{**figures, **own})
 
@@ -262,7 +261,7 @@ def told(scenario: ScenarioKeys) -> str:
         said.append(f"{air.turbulence.intensity} turbulence")
     if air.gust or air.vertical_gusts:
         said.append("gusts")
-    latency_s = getattr(navigation, "latency_s", None) or 0.0
+    latency_s = navigation.latency_s
     said.append(
         "state known exactly"
         if navigation.kind == "perfect" and not latency_s

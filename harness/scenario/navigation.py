@@ -87,6 +87,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "altitude_sigma_m": 0.0,
         "drift_share": 0.0,
         "outages_s": (),
+        "latency_s": 0.0,
     },
     "gnss": {
         "position_sigma_m": GPS_SIGMA_M,
@@ -97,6 +98,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "altitude_sigma_m": GPS_ALTITUDE_SIGMA_M,
         "drift_share": AIR_DATA_DRIFT,
         "outages_s": (),
+        "latency_s": 0.0,
     },
     "rtk": {
         "position_sigma_m": RTK_SIGMA_M,
@@ -107,6 +109,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "altitude_sigma_m": RTK_ALTITUDE_SIGMA_M,
         "drift_share": AIR_DATA_DRIFT,
         "outages_s": (),
+        "latency_s": 0.0,
     },
     "dead_reckoning": {
         "position_sigma_m": 0.0,
@@ -117,6 +120,7 @@ PRESETS: Final[Mapping[str, Mapping[str, Any]]] = {
         "altitude_sigma_m": BAROMETER_SIGMA_M,
         "drift_share": VISUAL_DRIFT,
         "outages_s": ((0.0, 1e7),),
+        "latency_s": 0.0,
     },
 }
 """What each kind fills in. `dead_reckoning` knows its start and never has a fix after it."""
@@ -169,11 +173,20 @@ class Navigation(Section):
         max_length=1000,
     )
 
+    latency_s: float = key(
+        "Age of the state that guidance and autopilot work with: position, velocity, attitude and airspeed.",
+        unit="s",
+        derived="that of the conditions, 0 for ideal",
+        ge=0,
+        le=5,
+    )
+
     margin_m: float = key(
         "What the planner keeps from obstacles beyond planner.clearance_m.",
         unit="m",
-        derived="3 sigma, the bias, the drift of the longest outage, or of half a turn where that is less, and what 3 "
-        "sigma of the heading misplace an edge by that is one clearance away, or as far as it takes to turn aside",
+        derived="3 sigma, the bias, what is flown in latency_s, the drift of the longest outage, or of half a turn "
+        "where that is less, and what 3 sigma of the heading misplace an edge by that is one clearance away, or as far "
+        "as it takes to turn aside",
         ge=0,
         le=MAX_ERROR_M,
     )
@@ -214,11 +227,10 @@ def planning_margin_m(
 ) -> float:
     """What clearance must have on top, so that the true aircraft keeps it where the believed one does.
 
-    `k` sigma of the position error, its bias, and the drift of the longest outage: drift_share x speed x duration. The
-    map drifts as the aircraft does, and is forgotten when a fix comes back: what stands in it is off only by what has
-    been drifted since it was last seen. For
-    an error whose two components are normal with the same sigma, 1 - exp(-k^2 / 2) of all errors are within k sigma:
-    98.9 % for 3.
+    `k` sigma of the position error, its bias, what is flown while the state grows old, and the drift of the longest
+    outage: drift_share x speed x duration. The map drifts as the aircraft does, and is forgotten when a fix comes back:
+    what stands in it is off only by what has been drifted since it was last seen. For an error whose two components are
+    normal with the same sigma, 1 - exp(-k^2 / 2) of all errors are within k sigma: 98.9 % for 3.
 
     A heading error turns the scan about the aircraft: an edge at distance d is misplaced by d times the error, square
     to where it is seen. An edge that is passed at the clearance c is beside the aircraft then, and its error lies along
@@ -247,4 +259,5 @@ def planning_margin_m(
     drift_m = navigation.drift_share * min(speed_mps * longest_s, unseen_m)
     turned_rad = k * math.radians(navigation.heading_sigma_deg)
     turned_m = turned_rad * max(clearance_m, 4.0 * turn_radius_m * turned_rad)
-    return k * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m) + drift_m + turned_m
+    known_m = k * navigation.position_sigma_m + math.hypot(*navigation.position_bias_m)
+    return known_m + navigation.latency_s * speed_mps + drift_m + turned_m

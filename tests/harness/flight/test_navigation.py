@@ -141,3 +141,43 @@ def test_dead_reckoning_knows_its_start_and_drifts_ever_after() -> None:
     blind = navigator(kind="dead_reckoning")
     assert position_error(blind, 0.0) == (0.0, 0.0)
     assert math.hypot(*position_error(blind, 1000.0)) == pytest.approx(0.01 * SPEED_MPS * 1000.0)
+
+
+def test_a_state_is_as_old_as_its_latency() -> None:
+    navigation = Navigation(
+        kind="gnss",
+        latency_s=0.25,
+        position_sigma_m=0.0,
+        velocity_sigma_mps=0.0,
+        heading_sigma_deg=0.0,
+        airspeed_sigma_mps=0.0,
+        altitude_sigma_m=0.0,
+    )
+    navigator = Navigator(navigation, np.random.SeedSequence(1))
+    # A circle flown at 20 m/s with a rate of 0.3 rad/s, as seen ten times a second.
+    for step in range(60):
+        time_s = 0.1 * step
+
+        def place(at_s: float) -> tuple[float, float]:
+            return 20 / 0.3 * (1 - math.cos(0.3 * at_s)), 20 / 0.3 * math.sin(0.3 * at_s)
+
+        turn = 0.3 * time_s
+        true = AircraftState(
+            time_s,
+            *place(time_s),
+            300.0 + time_s,
+            20 * math.sin(turn),
+            20 * math.cos(turn),
+            1.0,
+            turn % math.tau,
+            0.1,
+            0.0,
+            20.0,
+            1.0,
+        )
+        seen = navigator.believed(true)
+        assert (seen.time_s, seen.roll_rad) == pytest.approx((time_s, 0.1))
+        assert (seen.east_m, seen.north_m) == pytest.approx(place(time_s - 0.25), abs=0.2)
+        if step >= 3:
+            assert seen.up_m == pytest.approx(300.0 + time_s - 0.25)
+            assert seen.heading_rad == pytest.approx((turn - 0.075) % math.tau)
