@@ -70,7 +70,6 @@ ONLY_IN = {
         "harness/campaign/summary.py",
         "harness/falsify/search.py",
         "harness/certification/bounds.py",
-        "harness/world_files/cells.py",
         "harness/world_files/free_room.py",
     ),
     "pyproj": (
