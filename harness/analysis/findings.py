@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.planned import along_plan
 from harness.flight.record import AcceptedPlan, Flight, FloatArray, Track
+
+SLACK_S: Final = 1.0
+"""A flight that is over, or a plan that comes, within this time of the end of a plan is in time."""
 
 AHEAD_S: Final = 5.0
 """Two plans are compared where they lead to within this time of flight."""
@@ -56,6 +60,13 @@ def beyond_end_m(track: Track, plans: Sequence[AcceptedPlan]) -> FloatArray:
     return np.nan_to_num(beyond)
 
 
+def is_past_end(track: Track, plans: Sequence[AcceptedPlan], limits: FlightLimits) -> NDArray[np.bool_]:
+    """(n,) whether the aircraft is further beyond the end of its plan than it may be off it and flies in a second."""
+    past: NDArray[np.bool_]
+    past = beyond_end_m(track, plans) > limits.cross_track_threshold_m + SLACK_S * track.groundspeed_mps
+    return past
+
+
 def bank_reversals_per_min(track: Track) -> float:
     """How often a minute the bank command goes from `BANKED_DEG` on one side to as much on the other."""
     side = np.sign(track.roll_command_deg)[np.abs(track.roll_command_deg) >= BANKED_DEG]
@@ -89,7 +100,7 @@ def _direction(plan: AcceptedPlan, arc_length_m: float) -> float:
 
 def _ended(flight: Flight, limits: FlightLimits) -> Finding | None:
     beyond = beyond_end_m(flight.track, flight.plans)
-    rows = np.flatnonzero(beyond > limits.cross_track_threshold_m)
+    rows = np.flatnonzero(is_past_end(flight.track, flight.plans, limits))
     if not len(rows):
         return None
     text = f"the aircraft flew on up to {beyond.max():,.0f} m beyond the end of its plan, where nothing was planned"

@@ -26,6 +26,7 @@ class FlightLimits:
         stall_angle_deg: angle of attack beyond which the wing is stalled.
         sensor_range_m: how far obstacles are seen.
         horizon_m: how far they have to be seen, so that a turn along a wall straight ahead keeps the clearance.
+        no_wind: the air has no mean wind and no gust; then what the track seems to show of one is turbulence.
         scan_period_s: time from one scan to the next.
         compute_latency_s: a plan takes effect this much later than the scan that it was made from.
         max_cross_track_m: largest cross-track error, before the navigation margin.
@@ -45,6 +46,7 @@ class FlightLimits:
     stall_angle_deg: float = math.inf
     sensor_range_m: float = math.inf
     horizon_m: float = 0.0
+    no_wind: bool = False
     scan_period_s: float = math.inf
     compute_latency_s: float = 0.0
     max_cross_track_m: float = 10.0

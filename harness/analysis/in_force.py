@@ -19,7 +19,7 @@ from harness.analysis.flight_limits import FlightLimits
 from harness.analysis.smoothness import flown_lengths, planned_profile, turn_onto_first_plan_1pm, window_m
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 
-WIND_S = 5.0
+WIND_S = 20.0
 """The wind is averaged over this time, s, so that it is the wind and not a gust of turbulence."""
 
 LEAST_WIND_MPS = 1.0
@@ -56,7 +56,7 @@ class InForce:
         rows = min(rows, len(track))
         around = np.convolve(np.ones(len(track)), np.ones(rows), "same")
         mean = np.convolve(wind, np.ones(rows), "same") / around
-        mean[np.abs(mean) < LEAST_WIND_MPS] = 0.0
+        mean[(np.abs(mean) < LEAST_WIND_MPS) | limits.no_wind] = 0.0
         return cls(
             commanded_mps,
             np.column_stack((mean.imag, mean.real)),

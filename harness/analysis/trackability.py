@@ -26,7 +26,7 @@ from harness.analysis.causes import (
     steepness_cause,
 )
 from harness.analysis.deviation import ABOUT
-from harness.analysis.findings import beyond_end_m
+from harness.analysis.findings import is_past_end
 from harness.analysis.flight_limits import LOAD_S, SPEED_S, FlightLimits
 from harness.analysis.in_force import InForce
 from harness.flight.record import AcceptedPlan, FloatArray, IntArray, Track
@@ -92,7 +92,7 @@ def legs(
         The legs in order of time; empty where no plan was flown.
     """
     force = InForce.of(track, limits, given.airspeed_mps if given else None)
-    beyond = beyond_end_m(track, plans)
+    past_end = is_past_end(track, plans, limits)
     corners = given.corners if given else ()
     ends = np.array([corner.arc_length_m for corner in corners])
     leg = track.plan_index + np.searchsorted(ends, track.arc_length_m) if corners else track.plan_index
@@ -112,7 +112,7 @@ def legs(
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if passed else math.inf
             rows = np.flatnonzero((along > since_m) & (along <= over_m))
             verdict = _judged_as_given(verdict, given, rows, passed, (track, plans, limits, force))
-        if beyond[first : last + 1].max() > limits.cross_track_threshold_m:
+        if past_end[first : last + 1].any():
             verdict = replace(verdict, trackable=False, cause=PLAN_ENDED)
         if lost is not None and last == len(track) - 1:
             cause = "stall" if "stalled" in lost else "lost control"
