@@ -152,9 +152,7 @@ def flight_limits(scenario: Scenario, planned: bool = True) -> FlightLimits:
         roll_rate_radps=guidance.roll_rate_radps,
         stall_angle_deg=frame.stall_angle_deg,
         sensor_range_m=_given(sensor.range_m),
-        no_wind=not scenario.environment.model_copy(update={"turbulence": None}).model_dump(
-            exclude_none=True
-        ),
+        no_wind=scenario.environment.wind is None and scenario.environment.gust is None,
         scan_period_s=1.0 / sensor.rate_hz,
         compute_latency_s=scenario.planner.compute_latency_s,
         horizon_m=performance.turn_radius_m + planned_m + (speed + wind) * (blind_s + performance.roll_in_s),
