@@ -33,11 +33,8 @@ from harness.cli.options import (
 from harness.cli.review import open_viewer
 from harness.cli.standard_output import say
 from harness.cli.watch import (
-    BeyondOption,
     LiveOption,
-    MavlinkOption,
     SpeedOption,
-    ViewerOption,
     Watch,
     WebOption,
     opened,
@@ -72,9 +69,6 @@ def fly(
     live: LiveOption = False,
     speed: SpeedOption = None,
     web: WebOption = False,
-    viewer: ViewerOption = None,
-    mavlink: MavlinkOption = None,
-    beyond_this_machine: BeyondOption = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
     as_json: Annotated[bool, flag("--json", "Print metrics.json, and nothing else.")] = False,
 ) -> int:
@@ -94,7 +88,7 @@ def fly(
     """
     if view and no_recording:
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
-    watch = Watch(live, web, viewer, speed, mavlink, beyond_this_machine)
+    watch = Watch(live, web, speed)
     watch.check()
     options = chosen(planner, aircraft, seed, guidance, conditions)
     replaced = [*chosen(guidance=guidance, conditions=conditions), *settings_of(settings, options)]
@@ -103,7 +97,7 @@ def fly(
     if results is not None:
         replaced += [("from", str(results.resolve())), ("run", str(run))]
     folder = out or _default_folder(loaded, told_apart(replaced))
-    with opened(watch, loaded) as looking:
+    with opened(watch) as looking:
         metrics = _fly(loaded, folder, looking.onlookers, recording=not no_recording, silent=quiet)
         otherwise = bool(digest) and not given and metrics["digest"] != digest
         if otherwise:

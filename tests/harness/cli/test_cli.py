@@ -42,7 +42,7 @@ COMMANDS = (
 FLY_OPTIONS = (
     *("--planner", "--aircraft", "--seed", "--set", "--out"),
     *("--no-recording", "--view", "--quiet", "--json"),
-    *("--live", "--speed", "--mavlink"),
+    *("--live", "--speed"),
 )
 METRICS: dict[str, Any] = {
     "outcome": "collision",

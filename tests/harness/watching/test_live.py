@@ -88,7 +88,7 @@ def test_the_flight_is_the_same_whether_a_viewer_follows_or_is_killed(
     killed_at = KillsAt(process, 20.0)
     monkeypatch.setattr("harness.watching.watched_flight.Pace", lambda speed: killed_at)
     killed = fly_watched(
-        scenario, tmp_path / "killed", True, onlookers=Onlookers(asked.viewer, None, 1.0, asked.viewer_gone)
+        scenario, tmp_path / "killed", True, onlookers=Onlookers(asked.viewer, 1.0, asked.viewer_gone)
     )
     assert process.poll() is not None
     assert killed["digest"] == alone["digest"]
@@ -168,14 +168,9 @@ def test_a_flight_that_is_paced_is_handed_over_five_times_a_second() -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--speed", "2"], "--speed goes with --live or --mavlink"),
+        (["--speed", "2"], "--speed goes with --live"),
         (["--live", "--speed", "0"], "--speed is 0; must be above 0"),
-        (["--viewer", "127.0.0.1:1"], "--viewer goes with --live"),
         (["--web"], "--web goes with --live"),
-        (["--live", "--viewer", "127.0.0.1:1"], "--viewer: nothing listens at 127.0.0.1:1"),
-        (["--live", "--viewer", "192.0.2.1:1"], "leads beyond this machine"),
-        (["--mavlink", "192.0.2.1:1"], "must be as udp:127.0.0.1:14550"),
-        (["--mavlink", "udp:192.0.2.1:1"], "leads beyond this machine"),
         (["--live"], "there is no screen to open the viewer on"),
     ],
 )
