@@ -13,6 +13,56 @@ from aircraft.guidance.interface import GuidanceLimits
 from aircraft.interface import GRAVITY_MPS2
 from aircraft.model_files import AircraftError, ModelFiles
 
+PITCH_LIMITS_DEG = (-30.0, 30.0)
+"""Pitch that the autopilot commands at the least and at most: PX4's defaults FW_P_LIM_MIN and FW_P_LIM_MAX."""
+
+LEAST_SHARE = 0.97
+"""Share of the lowest airspeed of level flight below which the autopilot lets height go for speed."""
+
+
+@dataclass(frozen=True)
+class AutopilotKeys:
+    """What a scenario says of an aircraft's autopilot, `aircraft.autopilot` and `navigation.latency_s`.
+
+    Attributes:
+        bank_limit_deg: largest bank that guidance may command; None: of the survey.
+        roll_rate_limit_degps: fastest roll that is commanded; None: of the survey.
+        roll_time_constant_s: of roll behind its command; None: of the survey.
+        pitch_limits_deg: least and largest pitch that is commanded.
+        least_airspeed_mps: below this true airspeed height goes before speed; None: `LEAST_SHARE` of the lowest of
+            level flight.
+        latency_s: age of the attitude, airspeed, height and climb that the autopilot works with.
+    """
+
+    bank_limit_deg: float | None = None
+    roll_rate_limit_degps: float | None = None
+    roll_time_constant_s: float | None = None
+    pitch_limits_deg: tuple[float, float] = PITCH_LIMITS_DEG
+    least_airspeed_mps: float | None = None
+    latency_s: float = 0.0
+
+    def figures(self) -> dict[str, float]:
+        """What replaces figures of `FIGURES` that the survey would find."""
+        named = {
+            "bank_limit_deg": self.bank_limit_deg,
+            "roll_rate_dps": self.roll_rate_limit_degps,
+            "roll_lag_s": self.roll_time_constant_s,
+        }
+        return {name: value for name, value in named.items() if value is not None}
+
+    def gains(self) -> dict[str, float]:
+        """What replaces derived gains."""
+        replaced = {}
+        if self.roll_rate_limit_degps is not None:
+            replaced["roll_rate_limit"] = math.radians(self.roll_rate_limit_degps)
+        if self.roll_time_constant_s is not None:
+            replaced["roll"] = 1.0 / self.roll_time_constant_s
+        return replaced
+
+
+DERIVED = AutopilotKeys()
+"""The autopilot as the survey derives it, without latency."""
+
 
 @dataclass(frozen=True)
 class AirframeEntry:
@@ -26,6 +76,7 @@ class AirframeEntry:
         figures: attributes of `Airframe` that replace what the survey makes of the model.
         gains: gains of the autopilot that replace derived ones, by field of `Gains`.
         actuators: its servos.
+        autopilot: what a scenario says of its autopilot.
     """
 
     name: str
@@ -35,6 +86,7 @@ class AirframeEntry:
     figures: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
     gains: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}), hash=False)
     actuators: Actuators = field(default_factory=Actuators)
+    autopilot: AutopilotKeys = DERIVED
 
 
 FIGURES = (
@@ -74,6 +126,7 @@ class Airframe:
         weave_error_m: largest cross-track error on a weave of lines and arcs as planned, at cruise in calm air.
         gains: of the autopilot.
         verified: flown against the tracking figures of the tests.
+        autopilot: what a scenario says of its autopilot.
     """
 
     name: str
@@ -94,6 +147,13 @@ class Airframe:
     weave_error_m: float
     gains: Gains
     verified: bool
+    autopilot: AutopilotKeys = DERIVED
+
+    @property
+    def least_airspeed_mps(self) -> float:
+        """Below this true airspeed the autopilot lets height go for speed."""
+        given = self.autopilot.least_airspeed_mps
+        return LEAST_SHARE * self.airspeed_range_mps[0] if given is None else given
 
     def guidance_limits(self, airspeed_mps: float | None = None) -> GuidanceLimits:
         """What a guidance law may ask of it at a true airspeed; default: cruise."""

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from functools import cache, lru_cache, partial
+from hashlib import sha256
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
 from aircraft.actuators.actuator import CONTROLS, Actuator, Actuators, NormActuator
-from aircraft.airframe import FIGURES, Airframe, AirframeEntry
+from aircraft.airframe import DERIVED, FIGURES, Airframe, AirframeEntry, AutopilotKeys
 from aircraft.autopilot import Gains
 from aircraft.card_cache import cached, figure, is_kept
 from aircraft.model_files import AircraftError as AircraftError
@@ -24,13 +25,14 @@ def aircraft_names() -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=64)
-def airframe(name: str, actuators: Actuators | None = None) -> Airframe:
+def airframe(name: str, actuators: Actuators | None = None, autopilot: AutopilotKeys = DERIVED) -> Airframe:
     """The airframe of a name or folder, surveyed by flying it unless that has been done before.
 
     Args:
         name: a name of `aircraft_names`, of another aircraft of the JSBSim wheel, or a folder that holds a
             JSBSim model.
         actuators: its servos; None: those of the airframe table, or none.
+        autopilot: what is known of its autopilot.
 
     Raises:
         AircraftError: there is none, or it cannot be loaded, trimmed or held; the message says which.
@@ -44,12 +46,22 @@ def airframe(name: str, actuators: Actuators | None = None) -> Airframe:
     if real := (entry.actuators if actuators is None else actuators).real:
         found = replace(found, actuators=_of_commands(found, real))
 
+    entry = replace(
+        entry,
+        figures={**entry.figures, **autopilot.figures()},
+        gains={**entry.gains, **autopilot.gains()},
+        autopilot=autopilot,
+    )
+
     def surveyed() -> dict[str, Any]:
         from aircraft.survey import survey
 
         return survey(entry, found)
 
-    return cached(_title(found), found.digest(), surveyed, partial(_of_survey, entry, found))
+    digest = found.digest()
+    if autopilot != DERIVED:
+        digest = sha256((digest + repr(autopilot)).encode()).hexdigest()
+    return cached(_title(found), digest, surveyed, partial(_of_survey, entry, found))
 
 
 def is_surveyed(name: str) -> bool:
@@ -115,6 +127,7 @@ def _of_survey(entry: AirframeEntry, found: ModelFiles, measured: Mapping[str, A
         level_banks=banks,
         gains=gains,
         verified=entry.verified,
+        autopilot=entry.autopilot,
         **figures,
     )
 

@@ -76,7 +76,6 @@ class Gains:
         aileron_p, aileron_p_integral: aileron over roll rate error, s, and over its integral.
         aileron_p_forward, aileron_r_forward: aileron that holds a roll rate, and a yaw rate in a turn, s.
         rudder_r: rudder over yaw rate beyond that of the coordinated turn, s.
-        rudder_beta_integral: rudder over the integral of sideslip, 1/(rad s).
         rudder_p_forward, rudder_r_forward: rudder that keeps sideslip at zero in a roll, and in a turn, s.
         altitude: climb rate over altitude error, 1/s.
         climb_limit_fps: limit of the climb command, ft/s.
@@ -87,8 +86,10 @@ class Gains:
         elevator_q_forward: elevator that makes a steady pull-up rate, s.
         elevator_turn_forward: elevator against pitch damping in a turn, s.
         elevator_load_forward: elevator per unit of load factor beyond 1.
-        throttle, throttle_integral: throttle over airspeed error, s/ft, and over its integral.
-        throttle_climb_forward: throttle over commanded climb rate, s/ft.
+        speed: energy rate (as a climb rate) over airspeed error.
+        speed_by_pitch: share of it that pitch makes where the throttle has nothing left.
+        throttle_integral: throttle over the integral of the energy rate error, 1/ft.
+        throttle_energy_forward: throttle over energy rate, s/ft.
         throttle_load_forward: throttle against induced drag, per (load factor squared - 1).
     """
 
@@ -100,7 +101,6 @@ class Gains:
     aileron_p_forward: float
     aileron_r_forward: float
     rudder_r: float
-    rudder_beta_integral: float
     rudder_p_forward: float
     rudder_r_forward: float
     altitude: float
@@ -114,9 +114,10 @@ class Gains:
     elevator_q_forward: float
     elevator_turn_forward: float
     elevator_load_forward: float
-    throttle: float
+    speed: float
+    speed_by_pitch: float
     throttle_integral: float
-    throttle_climb_forward: float
+    throttle_energy_forward: float
     throttle_load_forward: float
 
     def rounded(self, digits: int) -> Gains:
@@ -240,6 +241,7 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     pitch = pitch_pace * min(3.5, 0.315 * short_period)
     alpha_per_load = GRAVITY_FPS2 / (speed * -at.za)
     throttle = min(1.5 / at.xdt, 0.05)
+    energy_forward = GRAVITY_FPS2 / (speed * at.xdt)
     return Gains(
         qbar_psf=at.qbar_psf,
         roll=roll,
@@ -249,7 +251,6 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
         aileron_p_forward=aileron_p_forward,
         aileron_r_forward=aileron_r_forward,
         rudder_r=rudder_r,
-        rudder_beta_integral=pace * 0.28 * max(at.nb, 0.0) / -at.ndr,
         rudder_p_forward=rudder_p_forward,
         rudder_r_forward=rudder_r_forward,
         altitude=0.23 * pitch,
@@ -263,9 +264,10 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
         elevator_q_forward=(at.ma / at.za - at.mq) / -at.mde,
         elevator_turn_forward=-at.mq / -at.mde,
         elevator_load_forward=-at.ma * alpha_per_load / -at.mde,
-        throttle=throttle,
-        throttle_integral=0.3 * throttle,
-        throttle_climb_forward=GRAVITY_FPS2 / (speed * at.xdt),
+        speed=throttle / energy_forward,
+        speed_by_pitch=0.15,
+        throttle_integral=0.3 * energy_forward,
+        throttle_energy_forward=energy_forward,
         throttle_load_forward=0.5 * at.xa * alpha_per_load / at.xdt,
     )
 

@@ -13,8 +13,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 PATCH_M = 500.0
 """Half the width of a patch of the plane."""
 
@@ -176,15 +174,17 @@ class PatchedPlane:
     """
 
     def __init__(self, plane: LocalPlane, latitude_rad: float, longitude_rad: float) -> None:
+        import numpy as np
+
         from aircraft import kernels  # half a second
 
-        self._plane, self._place_in_patch = plane, kernels.place_in_patch
-        self._patch = np.array(plane.patch(latitude_rad, longitude_rad))
+        self._plane, self._place_in_patch, self._array = plane, kernels.place_in_patch, np.array
+        self._patch = self._array(plane.patch(latitude_rad, longitude_rad))
 
     def project(self, latitude_rad: float, longitude_rad: float) -> tuple[float, float, float]:
         """East and north (m) of a geodetic point, and the meridian convergence there (rad); NaN of one not finite."""
         east_m, north_m, convergence_rad = self._place_in_patch(self._patch, latitude_rad, longitude_rad)
         if math.isnan(east_m) and math.isfinite(latitude_rad + longitude_rad):
-            self._patch = np.array(self._plane.patch(latitude_rad, longitude_rad))
+            self._patch = self._array(self._plane.patch(latitude_rad, longitude_rad))
             return self._place_in_patch(self._patch, latitude_rad, longitude_rad)
         return east_m, north_m, convergence_rad

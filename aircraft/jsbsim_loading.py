@@ -33,6 +33,9 @@ SURFACES = {
 }
 """Properties by which models tell where a surface is, rad."""
 
+MOST_ALPHA_DEG, ALPHA_STEP_DEG = 40.0, 0.5
+"""Angles of attack that are looked at for the most lift."""
+
 MOVING_STEPS = 120
 LEAST_DEG = 0.5
 """A surface that moves by less is not moved by its command."""
@@ -197,6 +200,25 @@ def mass_kg(fdm: Any) -> float:
 def angle_of_attack_rad(fdm: Any) -> float:
     """Angle of attack of a trimmed aircraft."""
     return float(fdm["aero/alpha-rad"])
+
+
+def most_lift_deg(files: ModelFiles, airspeed_mps: float) -> float | None:
+    """Angle of attack at which the lift of a model stops rising, controls as trimmed at a true airspeed; None: nowhere.
+
+    Raises:
+        AircraftError: the model cannot be loaded, or not trimmed.
+    """
+    fdm = trimmed(files, airspeed_mps)
+    before_lbf, start_deg = -math.inf, math.degrees(angle_of_attack_rad(fdm))
+    for alpha_deg in np.arange(start_deg, MOST_ALPHA_DEG, ALPHA_STEP_DEG):
+        fdm["ic/vt-fps"] = airspeed_mps / FOOT_M
+        fdm["ic/alpha-deg"] = float(alpha_deg)
+        fdm.run_ic()
+        lift_lbf = float(fdm["forces/fwz-aero-lbs"])  # up, other than the axis
+        if lift_lbf <= before_lbf:
+            return float(alpha_deg) - ALPHA_STEP_DEG
+        before_lbf = lift_lbf
+    return None
 
 
 def linearised(fdm: Any) -> Derivatives:

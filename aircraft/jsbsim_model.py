@@ -27,8 +27,10 @@ GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
 
 MAX_ROLL_RAD = math.radians(75.0)
-STALL_SPEED_SHARE = 0.8
-"""Share of the lowest level-flight airspeed below which the aircraft counts as stalled."""
+ALPHA_MARGIN_DEG = 3.0
+"""Pitch commands stay this far below the angle of attack that counts as stalled."""
+STEEPEST_SINK = 0.3
+"""Sink over airspeed that the autopilot allows where the energy for more height is not there."""
 
 SETTLING_STEP_S = 1e-9
 TERRAIN_BELOW_FT = 10.0 / FOOT_M
@@ -84,7 +86,6 @@ class JsbsimModel:
         except ValueError as error:
             raise AircraftError(f"{self.airframe.name}: {error}") from None
         self._stall_rad = math.radians(self.airframe.stall_angle_deg)
-        self._stall_fps = STALL_SPEED_SHARE * self.airframe.airspeed_range_mps[0] / FOOT_M
         self._plane = PatchedPlane(plane, *map(math.radians, plane.geodetic(start.east_m, start.north_m)))
         convergence_rad = plane.convergence_rad(start.east_m, start.north_m)
         self._cosine, self._sine = math.cos(convergence_rad), math.sin(convergence_rad)
@@ -202,7 +203,7 @@ class JsbsimModel:
         roll, airspeed, altitude, alpha = [read() for read in self._read_for_fault]
         if (
             abs(alpha) <= self._stall_rad
-            and self._stall_fps <= airspeed < math.inf
+            and airspeed < math.inf
             and GROUND_FT < altitude < math.inf
             and abs(roll) <= MAX_ROLL_RAD
         ):
@@ -214,8 +215,6 @@ class JsbsimModel:
         if abs(alpha) > self._stall_rad:
             limit_deg = self.airframe.stall_angle_deg
             return f"stalled: angle of attack {math.degrees(alpha):.1f} deg, limit {limit_deg:g} deg"
-        if airspeed < self._stall_fps:
-            return f"stalled: airspeed {airspeed * FOOT_M:.1f} m/s, below {self._stall_fps * FOOT_M:.1f} m/s"
         return f"rolled over: roll {math.degrees(roll):.0f} deg, limit {math.degrees(MAX_ROLL_RAD):.0f} deg"
 
     def engage(self, on: bool = True) -> None:
@@ -231,6 +230,15 @@ class JsbsimModel:
         for control in CONTROLS:
             values[f"wayproof/trim/{control}-norm"] = fdm[f"fcs/{control}-cmd-norm"]
         values["wayproof/trim/pitch-rad"] = fdm["attitude/theta-rad"]
+        frame = self.airframe
+        least_deg, most_deg = frame.autopilot.pitch_limits_deg
+        values["wayproof/limit/least-pitch-rad"] = math.radians(least_deg)
+        values["wayproof/limit/most-pitch-rad"] = math.radians(most_deg)
+        values["wayproof/limit/most-alpha-rad"] = math.radians(frame.stall_angle_deg - ALPHA_MARGIN_DEG)
+        values["wayproof/limit/least-airspeed-fps"] = frame.least_airspeed_mps / FOOT_M
+        values["wayproof/limit/most-sink-fps"] = max(
+            STEEPEST_SINK * fdm["velocities/vtrue-fps"], values["wayproof/gain/climb-limit-fps"]
+        )
         for path, value in values.items():
             node(fdm, path).set_double_value(value)
 

@@ -24,6 +24,7 @@ from aircraft.jsbsim_loading import (
     angle_of_attack_rad,
     linearised,
     mass_kg,
+    most_lift_deg,
     trimmed,
 )
 from aircraft.jsbsim_model import JsbsimModel
@@ -46,7 +47,8 @@ ROLL_COMMAND_SHARE = 0.5
 """Share of the steady roll rate at full aileron that the roll command may ask for."""
 
 STALL_DEG, STALL_MARGIN_DEG = 15.0, 5.0
-"""Angle of attack that counts as stalled, and the least of it beyond that of the slowest level flight."""
+"""Of a model whose lift never stops rising: the angle of attack that counts as stalled, and the least of it beyond that
+of the slowest level flight."""
 
 BANDWIDTH_SHARE = 0.36
 """Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
@@ -92,10 +94,10 @@ def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
     cruise = entry.cruise_mps or middle_of_trims(files)
     frame = _held_at_cruise(entry, files, cruise)
     low, high = _edge(frame, 1.0 / SPEED_STEP), _edge(frame, SPEED_STEP)
-    alpha_deg = math.degrees(angle_of_attack_rad(trimmed(files, low)))
-    stall_deg = float(math.ceil(max(alpha_deg + STALL_MARGIN_DEG, STALL_DEG)))
-    stall_deg = entry.figures.get("stall_angle_deg", stall_deg)
-    frame = replace(frame, airspeed_range_mps=(low, high), stall_angle_deg=stall_deg)
+    if frame.stall_angle_deg == LOOSE_STALL_DEG:
+        alpha_deg = math.degrees(angle_of_attack_rad(trimmed(files, low)))
+        frame = replace(frame, stall_angle_deg=float(math.ceil(max(alpha_deg + STALL_MARGIN_DEG, STALL_DEG))))
+    frame = replace(frame, airspeed_range_mps=(low, high))
     speeds = sorted({*np.linspace(low, high, 5).round(SPEED_DIGITS).tolist(), cruise})
     return {
         "mass_kg": float(f"{frame.mass_kg:.4g}"),
@@ -186,7 +188,7 @@ def _provisional(
     figures = {
         "bank_limit_deg": BANK_LIMIT_DEG,
         "roll_rate_dps": roll_rate_dps,
-        "stall_angle_deg": LOOSE_STALL_DEG,
+        "stall_angle_deg": math.ceil(most_lift_deg(files, cruise) or LOOSE_STALL_DEG),
         "roll_lag_s": round(1.0 / placed.roll, 3),
         "roll_delay_s": round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2),
         "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),
@@ -205,6 +207,7 @@ def _provisional(
         level_banks=((cruise, figures["bank_limit_deg"]),),
         gains=placed,
         verified=entry.verified,
+        autopilot=entry.autopilot,
         **figures,
     )
 

@@ -1,0 +1,94 @@
+"""The autopilot at the edges of what an aircraft can do: it loses height, and does not stall by itself."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from aircraft.airframes import airframe
+from aircraft.frames import LocalPlane
+from aircraft.interface import GRAVITY_MPS2, FloatArray
+from aircraft.jsbsim_model import JsbsimModel
+from aircraft.start import Atmosphere, StartConditions
+
+FRAME = airframe("aerosonde")
+
+
+def started(airspeed_mps: float, altitude_m: float = 300.0, **keys: object) -> JsbsimModel:
+    start = StartConditions(0.0, 0.0, altitude_m, 0.0, airspeed_mps)
+    return JsbsimModel(FRAME, start, LocalPlane(45.0, 0.0), **keys)  # type: ignore[arg-type]
+
+
+def flown(model: JsbsimModel, bank_deg: float, altitude_m: float, speed: float, seconds: float) -> FloatArray:
+    """(n, 5) time, altitude, airspeed, pitch (deg) and throttle ten times a second; control must not be lost."""
+    rows = []
+    for _ in range(round(10 * seconds)):
+        model.command(math.radians(bank_deg), altitude_m, speed)
+        model.advance(model.step_rate_hz // 10)
+        assert model.fault() is None
+        s = model.state()
+        rows.append((s.time_s, s.up_m, s.airspeed_mps, math.degrees(s.pitch_rad), s.throttle))
+    return np.array(rows)
+
+
+def test_level_after_a_turn_that_cannot_be_held() -> None:
+    """At 20 m/s and 45 degrees of bank the elevator is at its stop; then wings level, far below the altitude."""
+    model = started(20.0)
+    flown(model, 45.0, 300.0, 20.0, 60.0)
+    after = flown(model, 0.0, model.state().up_m - 7.0, 20.0, 20.0)
+    assert after[:, 3].max() < 15.0
+    assert after[-1, 2] == pytest.approx(20.0, abs=0.3)
+    climbing = flown(model, 0.0, model.state().up_m + 60.0, 20.0, 20.0)
+    assert climbing[:, 3].max() < 20.0
+    assert climbing[:, 2].min() > 19.0
+
+
+def test_near_the_lowest_speed_a_turn_and_the_level_flight_after_it_are_held() -> None:
+    model = started(17.7)
+    turning = flown(model, 18.6, 300.0, 17.7, 60.0)
+    assert np.abs(turning[:, 1] - 300.0).max() < 5.0
+    level = flown(model, 0.0, 300.0, 17.7, 60.0)
+    assert level[:, 3].max() < 15.0
+    assert np.abs(level[-100:, 1] - 300.0).max() < 0.5
+
+
+def test_a_climb_that_is_too_steep_is_flown_at_the_commanded_airspeed() -> None:
+    """At 5,000 m there is less than 5 m/s of climb: the rest is missing from the height, not from the airspeed.
+
+    The climb at full throttle is that of the energy balance, (thrust - drag) V / weight, taken from the energy
+    that a level acceleration at full throttle gains.
+    """
+    model = started(25.0, 5000.0, climb_limit_mps=5.0)
+    flown(model, 0.0, 5600.0, 25.0, 20.0)
+    climb = flown(model, 0.0, 5600.0, 25.0, 60.0)
+    assert np.ptp(climb[:, 2]) < 0.3
+    assert np.abs(climb[:, 2] - 25.0).max() < 0.3
+    flown_mps = (climb[-1, 1] - climb[0, 1]) / (climb[-1, 0] - climb[0, 0])
+    altitude_m = float(climb[len(climb) // 2, 1])
+    level = flown(started(24.0, altitude_m), 0.0, altitude_m, 30.0, 5.0)
+    energy_m = level[:, 1] + level[:, 2] ** 2 / (2.0 * GRAVITY_MPS2)
+    full = (level[:, 4] == 1.0) & (np.abs(level[:, 2] - 25.0) < 0.6)
+    assert full.sum() > 4
+    rate_mps = np.polyfit(level[full, 0], energy_m[full], 1)[0]
+    assert flown_mps == pytest.approx(rate_mps, rel=0.1)
+
+
+@pytest.mark.parametrize("intensity", ["moderate", "severe"])
+@pytest.mark.parametrize("seed", [1, 3])
+def test_the_lowest_speeds_are_flown_in_turbulence(intensity: str, seed: int) -> None:
+    model = started(18.0, atmosphere=Atmosphere(turbulence="tustin", intensity=intensity, seed=seed))
+    track = flown(model, 15.0, 300.0, 18.0, 120.0)
+    assert np.abs(track[:, 1] - 300.0).max() < 50.0
+    assert track[:, 2].min() > 15.0
+
+
+def test_pitch_stays_within_its_limits() -> None:
+    model = started(25.0)
+    model._fdm["wayproof/limit/most-pitch-rad"] = math.radians(6.0)
+    model._fdm["wayproof/limit/least-pitch-rad"] = math.radians(1.0)
+    up = flown(model, 0.0, 400.0, 25.0, 15.0)
+    down = flown(model, 0.0, 0.0, 25.0, 15.0)
+    assert up[20:, 3].max() < 6.3
+    assert down[30:, 3].min() > 0.7
