@@ -16,7 +16,7 @@ from harness.cli.standard_output import say
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
 
-LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "campaigns")
+LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "worlds", "campaigns")
 _AIRCRAFT_ROW: Final = "{:10} {:>7} {:>10} {:>6} {:>6} {:8} "
 _WIDTH: Final = 80
 _INTERRUPT_S: Final = 0.1
@@ -55,6 +55,8 @@ def list_names(
         from planner.registry import planner_kinds
 
         _print_kinds(planner_kinds())
+    elif what == "worlds":
+        _print_worlds()
     else:
         _print_shipped(what)
     return 0
@@ -68,6 +70,19 @@ def _print_shipped(what: str) -> None:
     width = max(map(len, files), default=0)
     for name, path in files.items():
         say(_row(f"{name:{width}}  ", summary(path)))
+
+
+def _print_worlds() -> None:
+    """A row for each family of benchmark worlds: how many there are, the first one's name, its source and licence."""
+    from harness.scenario.shipped import shipped_worlds, summary
+
+    families: dict[str, list[str]] = {}
+    worlds = shipped_worlds()
+    for name in worlds:
+        families.setdefault(name.partition("/")[0], []).append(name)
+    for family, names in families.items():
+        source = summary(worlds[names[0]]).replace(", see ../LICENCES.md", "")
+        say(_row(f"{family:15} {len(names):3}  ", f"{names[0]}: {source}"))
 
 
 def _print_kinds(kinds: Mapping[str, Any]) -> None:

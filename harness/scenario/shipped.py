@@ -12,6 +12,12 @@ def shipped_scenarios() -> dict[str, Path]:
     return {path.stem: path for path in sorted(_folder().glob("*.yaml"))}
 
 
+def shipped_worlds() -> dict[str, Path]:
+    """Scenario files of the benchmark worlds by family and name, such as `barn/barn-world-006`."""
+    folder = _folder() / "worlds"
+    return {f"{path.parent.name}/{path.stem}": path for path in sorted(folder.glob("*/*.yaml"))}
+
+
 def shipped_campaigns() -> dict[str, Path]:
     """Campaign files by name."""
     return {path.stem: path for path in sorted(_folder().joinpath("campaigns").glob("*.yaml"))}
@@ -36,7 +42,8 @@ def campaign_path(text: str) -> Path:
 def scenario_path(text: str) -> Path:
     """The file that a command's SCENARIO means: a path, or the name or path of a shipped scenario.
 
-    `paper_circles` and, where there is no such file, `scenarios/paper_circles.yaml` name a shipped one.
+    `paper_circles` and, where there is no such file, `scenarios/paper_circles.yaml` name a shipped one, and
+    `barn/barn-world-006` names a benchmark world.
 
     Raises:
         InputError: there is neither such a file nor such a shipped scenario.
@@ -53,6 +60,8 @@ def scenario_path(text: str) -> Path:
     inside = path.parent in (Path(), Path("scenarios")) and path.suffix in ("", ".yaml")
     if inside and path.stem in shipped and not path.exists():
         return shipped[path.stem]
+    if not path.exists() and text in (worlds := shipped_worlds()):
+        return worlds[text]
     if path.exists():
         raise InputError(f"{text}: is not a file; give a scenario file or one of {', '.join(shipped)}")
     raise InputError(f"{text}: no such file; give a scenario file or one of {', '.join(shipped)}")

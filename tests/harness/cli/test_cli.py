@@ -225,7 +225,10 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
             ["schema", "campaigns"],
             "Invalid value for 'FORMAT': 'campaigns' is not one of 'scenario', 'campaign'.",
         ),
-        (["list", "birds"], "'birds' is not one of planners, aircraft, guidance, scenarios, campaigns"),
+        (
+            ["list", "birds"],
+            "'birds' is not one of planners, aircraft, guidance, scenarios, worlds, campaigns",
+        ),
         (["list"], "(see wayproof list --help)"),
         (["flight"], "(see wayproof --help)"),
         (["sweep", str(SCENARIO)], f"{SCENARIO}: this is a scenario: use `wayproof fly {SCENARIO}`"),
