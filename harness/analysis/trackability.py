@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.analysis.as_given import AsGiven, Corner
+from harness.analysis.as_given import AsGiven
 from harness.analysis.causes import (
     LEAD_S,
     NAVIGATION_ERROR,
@@ -111,7 +111,7 @@ def legs(
             )
             since_m, over_m = over_m, passed[-1].arc_length_m + passed[-1].half_m if passed else math.inf
             rows = np.flatnonzero((along > since_m) & (along <= over_m))
-            verdict = _judged_as_given(verdict, given, rows, passed, (track, plans, limits, force))
+            verdict = _judged_as_given(verdict, given, rows, (track, plans, limits, force))
         if past_end[first : last + 1].any():
             verdict = replace(verdict, trackable=False, cause=PLAN_ENDED)
         if lost is not None and last == len(track) - 1:
@@ -218,7 +218,6 @@ def _judged_as_given(
     leg: Leg,
     given: AsGiven,
     rows: IntArray,
-    passed: Sequence[Corner],
     flown: tuple[Track, Sequence[AcceptedPlan], FlightLimits, InForce],
 ) -> Leg:
     """A leg that is not trackable either where it is too far from the path as given.
@@ -227,20 +226,18 @@ def _judged_as_given(
         leg: as judged by altitude, airspeed and load factor.
         given: the path as given.
         rows: those of the leg, its last corner whole.
-        passed: the corners that the leg leads to.
         flown: track, plans, limits and what was in force.
     """
     off, cause = np.nan_to_num(given.deviation_m[rows]), leg.cause
     excess = off - given.allowed_m[rows]
     if len(rows) and excess.max() > 0.0:
-        cause = _cause_off_given(given, int(rows[excess.argmax()]), passed, *flown)
+        cause = _cause_off_given(given, int(rows[excess.argmax()]), *flown)
     return replace(leg, max_deviation_m=float(off.max(initial=0.0)), trackable=cause is None, cause=cause)
 
 
 def _cause_off_given(
     given: AsGiven,
     worst: int,
-    passed: Sequence[Corner],
     track: Track,
     plans: Sequence[AcceptedPlan],
     limits: FlightLimits,
@@ -250,8 +247,10 @@ def _cause_off_given(
     allowed_m, along_m = float(given.allowed_m[worst]), float(track.arc_length_m[worst])
     if _believed_within(given.believed_off_m, 0.0, allowed_m, np.intp(worst)):
         return NAVIGATION_ERROR
-    for corner in passed:
-        if abs(along_m - corner.arc_length_m) <= max(corner.half_m, ABOUT * allowed_m):
+    for corner in given.corners:
+        reach_m = max(corner.half_m, ABOUT * allowed_m)
+        after_m = reach_m + LEAD_S * float(track.groundspeed_mps[worst])
+        if -reach_m <= along_m - corner.arc_length_m <= after_m:
             cause = corner_cause(corner, allowed_m, track, worst, force)
             if cause in ("turn radius too tight", "wind drift"):
                 return cause
