@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from harness.api.look import campaign_html, comparison_html, flight_html
 from harness.api.metrics import Metrics
-from harness.api.recordings import Recording, recorded
 from harness.files.input_file import InputError
 from harness.scenario.scenario import Scenario
 
@@ -70,11 +69,11 @@ class FlightResult:
         return self.metrics.digest
 
     @property
-    def recording(self) -> Recording | None:
-        """The rerun recording: a path, with its data in `dataframe()`; None if none was made."""
+    def recording(self) -> Path | None:
+        """The rerun recording; None if none was made."""
         from harness.run_files.run_folder import RECORDING
 
-        path = Recording(self.folder / RECORDING) if self.folder else None
+        path = self.folder / RECORDING if self.folder else None
         return path if path and path.is_file() else None
 
     def show(self, width_px: int = 1000, height_px: int = 600) -> Any:
@@ -171,37 +170,11 @@ class CampaignResult:
         return summarise(self.folder)
 
     @property
-    def recordings(self) -> dict[int, Recording]:
+    def recordings(self) -> dict[int, Path]:
         """The recordings that the campaign kept, by the number of the run."""
         from harness.campaign.table import recordings_of
 
-        return {int(path.parent.name): Recording(path) for path in recordings_of(self.folder)}
-
-    def dataframe(
-        self,
-        contents: str | Sequence[str] = "/series/**",
-        index: str = "sim_time",
-        *,
-        filled: bool = False,
-        runs: Sequence[int] | None = None,
-    ) -> pa.Table:
-        """The recorded data of some entities of all runs, run below run, as `Recording.dataframe` has them of one.
-
-        Args:
-            contents: paths of entities as rerun writes them.
-            index: the timeline.
-            filled: an empty cell gets the last value before it.
-            runs: numbers of runs; default: all with a recording.
-
-        Raises:
-            InputError: one of the runs has no recording, or the extra `wayproof[catalog]` is not installed.
-        """
-        kept = self.recordings
-        missing = [run for run in runs or () if run not in kept]
-        if missing:
-            raise InputError(f"wayproof: {self.folder} has no recording of run {missing[0]}")
-        files = [*kept.values()] if runs is None else [kept[run] for run in runs]
-        return recorded(files, contents, index, filled)
+        return {int(path.parent.name): path for path in recordings_of(self.folder)}
 
     @property
     def outcomes(self) -> dict[str, int]:

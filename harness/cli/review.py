@@ -20,8 +20,7 @@ def view(
         list[Path],
         typer.Argument(
             metavar="RUN_DIR...",
-            help="Run folders (several are overlaid), then flight logs of other tools (.ulg, .bin, .igc, .mcap, "
-            ".csv); or a campaign's folder, as a table of runs.",
+            help="Run folders (several are overlaid), or a campaign's folder, as a table of runs.",
         ),
     ],
     web: Annotated[bool, flag("--web", "Show them in a browser, served on 127.0.0.1.")] = False,

@@ -21,7 +21,6 @@ TIMELINE = "sim_time"
 
 WORLD = "world"
 PLAN = "plan"
-MAP = "map"
 SERIES = "series"
 STATES = "states"
 ATTITUDE = "attitude"
@@ -152,14 +151,12 @@ class Frame:
         altitude_m: altitude to be held, above mean sea level.
         clearance_m: wanted distance from every obstacle edge.
         bank_limit_deg: largest bank command of the guidance; None where several flights are shown.
-        latitude_deg: of the plane's origin, for the map; None where it was not given.
     """
 
     bounds_m: tuple[float, float, float, float]
     altitude_m: float
     clearance_m: float
     bank_limit_deg: float | None = None
-    latitude_deg: float | None = None
 
     @property
     def kept(self) -> dict[str, Any]:
@@ -168,7 +165,6 @@ class Frame:
             "bounds_m": self.bounds_m,
             "altitude_m": self.altitude_m,
             "clearance_m": self.clearance_m,
-            "latitude_deg": self.latitude_deg,
         }
         return {name: value for name, value in values.items() if value is not None}
 
@@ -208,7 +204,6 @@ class Scene:
         scenario_yaml: the scenario as flown, for the summary.
         searches: whether a planner searches; not where a given path is flown.
         ground: heights of the true ground, where they are known.
-        origin_deg: latitude and longitude of the plane's origin, where it was given.
         believes: whether the aircraft does not know its state exactly.
         profile: altitudes to be held at places along the path, above mean sea level; None: one all along.
         wind: speed (m/s) of the steady wind, and the direction (deg clockwise from north) that it blows from.
@@ -222,7 +217,6 @@ class Scene:
     scenario_yaml: str = ""
     searches: bool = True
     ground: HeightField | None = None
-    origin_deg: tuple[float, float] | None = None
     believes: bool = False
     profile: Callable[[FloatArray], FloatArray] | None = None
     wind: tuple[float, float] = (0.0, 0.0)
@@ -254,8 +248,7 @@ class Scene:
     def frame(self) -> Frame:
         """What the views are framed on."""
         limit_deg = round(math.degrees(self.limits.bank_limit_rad), 1)
-        latitude_deg = None if self.origin_deg is None else self.origin_deg[0]
-        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg, latitude_deg)
+        return Frame(self.mission.bounds_m, self.altitude_m, self.limits.clearance_m, limit_deg)
 
     @property
     def obstacle_top_m(self) -> float:

@@ -210,7 +210,7 @@ def common_frame(runs: pa.Table) -> Frame:
     """What all recordings of a table are framed on; those that were not closed have nothing."""
     given = {
         name: [each for each in runs[column].to_pylist() if each]
-        for name in ("bounds_m", "altitude_m", "clearance_m", "latitude_deg")
+        for name in ("bounds_m", "altitude_m", "clearance_m")
         if (column := f"property:{FRAME}:{name}") in runs.column_names
     }
     (xmin, ymin), (xmax, ymax) = (
@@ -218,8 +218,7 @@ def common_frame(runs: pa.Table) -> Frame:
         for extreme, first in ((min, 0), (max, 2))
     )
     altitude_m, clearance_m = (max(each[0] for each in given[name]) for name in ("altitude_m", "clearance_m"))
-    latitude_deg = next((each[0] for each in given.get("latitude_deg", ())), None)
-    return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m, latitude_deg=latitude_deg)
+    return Frame((xmin, ymin, xmax, ymax), altitude_m, clearance_m)
 
 
 def open_table(
@@ -336,63 +335,3 @@ def table_screenshot(
         except ConnectionError as error:
             # Without a driver it listens for a moment before it gives up.
             raise ViewerError(NO_DRIVER) from error
-
-
-def series_table(
-    recordings: Sequence[Path], contents: str | Sequence[str], index: str, filled: bool = False
-) -> pa.Table:
-    """What recordings hold of some entities, row by row of a timeline.
-
-    Args:
-        recordings: files, each with an identity of its own.
-        contents: paths of entities as rerun writes them: `/series/**`, `-/series/bank/**` for what is left out.
-        index: the timeline.
-        filled: a row has the last value of whatever has none at its time.
-
-    Returns:
-        `recording`, its identity; the time, in seconds on a timeline of durations; a column for each component that
-        changes, of a scalar one number called after its entity, of anything else a list.
-
-    Raises:
-        RunFolderError: there are no recordings.
-        ViewerError: rerun's server is not installed or does not start.
-        ValueError: no recording has the timeline.
-    """
-    with catalog("recordings", recordings) as served:
-        served.all_there.wait()
-        selection = served.dataset.filter_contents(contents)
-        try:
-            rows = selection.reader(index=index, fill_latest_at=filled).to_arrow_table()
-        except Exception as error:
-            raise ValueError(f"no rows of {contents} on the timeline {index}: {error}") from error
-    return _plain(rows, index)
-
-
-def _plain(rows: pa.Table, index: str) -> pa.Table:
-    """Columns of rerun's as others read them, in the order of recording and time."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    columns: dict[str, Any] = {"recording": rows.column("rerun_segment_id")}
-    for field in rows.schema:
-        about = {key.decode(): value.decode() for key, value in (field.metadata or {}).items()}
-        column = rows.column(field.name)
-        if field.name == index and pa.types.is_duration(field.type):
-            columns[f"{index}_s"] = pc.divide(pc.cast(pc.cast(column, pa.int64()), pa.float64()), 1e9)
-        elif field.name == index:
-            columns[index] = column
-        elif about.get("rerun:component") == "Scalars:scalars":
-            columns[about["rerun:entity_path"]] = pc.list_element(_one_each(column), 0)
-        elif about.get("rerun:kind") == "data" and about.get("rerun:is_static") != "true":
-            columns[field.name] = column
-    table = pa.table(columns)
-    return table.sort_by([("recording", "ascending"), (table.column_names[1], "ascending")])
-
-
-def _one_each(column: Any) -> Any:
-    """Lists of one number, those without any taken for missing."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    empty = pc.equal(pc.list_value_length(column), 0)
-    return pc.if_else(pc.fill_null(empty, True), pa.scalar(None, column.type), column)

@@ -16,7 +16,6 @@ from harness.recording.blueprint import (
     COLOURS,
     EVENTS,
     FLOWN,
-    MAP,
     NAVIGATION,
     PLAN,
     PLAN_DELAY,
@@ -60,7 +59,6 @@ def blueprint(
     frame: Frame,
     runs: Sequence[str] = ("",),
     without: Sequence[str] = (NAVIGATION,),
-    on_earth: bool = False,
     follows: bool = False,
     lanes: int | None = None,
 ) -> Layout:
@@ -71,13 +69,10 @@ def blueprint(
         runs: entity of each run below PLAN and WORLD, ending in a slash; of a single recording the empty
             string.
         without: names of time series that have nothing to show.
-        on_earth: whether there is a map of the earth, a tab behind the plan view.
         follows: whether the cursor stays at the latest time, for a flight that goes on.
         lanes: how many lanes of states there are; default: those of `runs`.
     """
-    plan: rrb.Container | rrb.View = plan_view(frame, runs)
-    if on_earth:
-        plan = rrb.Tabs(plan, rrb.MapView(origin=MAP, name="Map", zoom=map_zoom(frame)), active_tab=0)
+    plan = plan_view(frame, runs)
     events = _events_view()
     about = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
     colours = rrb.TextDocumentView(origin=COLOURS, name="Colours")
@@ -128,14 +123,8 @@ def layout_of(frame: Frame, entities: Collection[str], runs: Sequence[str] = (""
         return thin_blueprint(frame)
     drawn = {each.split("/")[2] for each in entities if each.startswith(f"/{SERIES}/")}
     without = [name for _, names in PLOTS for name in names if name not in drawn]
-    on_earth = any(each.startswith(f"/{MAP}/") for each in entities)
-    return blueprint(frame, runs, without, on_earth, lanes=lanes)
+    return blueprint(frame, runs, without, lanes=lanes)
 
-
-MAP_PIXELS: Final = (400, 290)
-"""Width and height of the map's view in a window of 1280 x 768, less a margin."""
-LEVEL_0_PIXEL_M: Final = 156_543.0
-ZOOMS: Final = (1.0, 19.0)
 
 PLOTS: Final = (
     (4, ("cross_track", "altitude_error", NAVIGATION, "speed", THROTTLE)),
@@ -183,20 +172,6 @@ def thin_blueprint(frame: Frame) -> Layout:
         auto_layout=False,
         auto_views=False,
     )
-
-
-def map_zoom(frame: Frame) -> float | None:
-    """Zoom of the map at which the area just fits into its view; None where the latitude is not known.
-
-    The viewer's own is so near that next to nothing of an area is seen. Levels are those of OpenStreetMap: a pixel is
-    156,543 m wide on the equator at level 0, and half of that at each level on.
-    """
-    if frame.latitude_deg is None:
-        return None
-    xmin, ymin, xmax, ymax = frame.bounds_m
-    pixel_m = max((xmax - xmin) / MAP_PIXELS[0], (ymax - ymin) / MAP_PIXELS[1])
-    zoom = math.log2(LEVEL_0_PIXEL_M * math.cos(math.radians(frame.latitude_deg)) / pixel_m)
-    return min(max(zoom, ZOOMS[0]), ZOOMS[1])
 
 
 def plan_view(frame: Frame, trails: Sequence[str] = ()) -> rrb.Spatial2DView:

@@ -22,7 +22,6 @@ from harness.flight.observer import Caution
 from harness.flight.record import AcceptedPlan, FloatArray, Track
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, RunningViewer, Sink, recording_stream
-from harness.recording.geographic import globe
 from harness.recording.layout import blueprint
 from harness.recording.moving import Changing, Tracked, log_tracked_style
 from harness.recording.plans import log_plan_style, send_plans
@@ -116,15 +115,13 @@ class RerunLog:
         self._changing, self._returns = Changing(scene), Returns()
         self._nearness = Nearness(scene.limits.clearance_m)
         log_scene(self._rec, scene)
-        self._globe = globe(self._rec, scene)
         log_plan_style(self._rec)
         log_tracked_style(self._rec)
         self._log_style()
         self.flush()
 
     def _opened(self, into: Path | str) -> Sink:
-        follows, on_earth = isinstance(into, str), self._scene.origin_deg is not None
-        layout = blueprint(self._scene.frame, ("",), self._scene.empty_series, on_earth, follows)
+        layout = blueprint(self._scene.frame, ("",), self._scene.empty_series, follows=isinstance(into, str))
         if isinstance(into, str):
             return RunningViewer(self._rec, into, layout)
         return RecordingFile(self._rec, into, layout)
@@ -210,8 +207,6 @@ class RerunLog:
         self._send_happened()
         if self._whole:
             whole = np.concatenate(self._whole)
-            if self._globe is not None:
-                self._globe.log_track(whole)
             track = lines_2d([whole], look.WHOLE_TRACK, 1.5, 15)
             self._rec.log(f"{look.PLAN}/{look.WHOLE}", track, static=True)
             style: dict[str, Any] = {"colors": [look.WHOLE_TRACK], "radii": rr.Radius.ui_points(0.75)}

@@ -153,9 +153,7 @@ def _frame(chunks: Sequence[rr.chunk.Chunk], recording: Path) -> look.Frame:
                 next(column[0] for name, column in values.items() if name.endswith(key))
                 for key in ("bounds_m", "altitude_m", "clearance_m")
             )
-            latitudes = [column[0][0] for name, column in values.items() if name.endswith("latitude_deg")]
-            latitude_deg = latitudes[0] if latitudes else None
-            return look.Frame(tuple(bounds), altitude[0], clearance[0], latitude_deg=latitude_deg)
+            return look.Frame(tuple(bounds), altitude[0], clearance[0])
     raise RunFolderError(f"{recording} is not a recording of a flight")
 
 

@@ -28,8 +28,6 @@ from harness.files.input_file import InputError
 from harness.recording.blueprint import TIMELINE
 from harness.recording.local_page import LOCALHOST, local_page
 from harness.recording.overlay import send_recording, write_overlay
-from harness.recording.thin import write_log_recording
-from harness.run_files.flight_logs import READERS
 from harness.run_files.run_folder import OVERLAY, RECORDING, recording_of
 
 START_TIMEOUT_S = 30.0
@@ -62,30 +60,29 @@ def open_viewer(
     """Opens the recordings of runs in the viewer and waits until it is closed. Several are overlaid in one.
 
     Args:
-        run_dirs: run folders, incomplete ones too; after the first also flight logs of other tools, which are shown in
-            its plane. Alone: a recording, or the folder of a comparison, of which the overlay is shown.
+        run_dirs: run folders, incomplete ones too. Alone: a recording, or the folder of a comparison, of which the
+            overlay is shown.
         web: in a browser instead of a window; served until interrupted.
-        tell: is told the address for the browser, and what of a flight log is not there.
+        tell: is told the address for the browser.
 
     Raises:
         RunFolderError: a folder has no recording.
-        InputError: a flight log cannot be read.
+        InputError: a recording does not exist, or is to be overlaid.
         ViewerError: there is no screen, or the viewer does not start.
     """
     if len(run_dirs) == 1:
         run_dirs = [_overlay_of(run_dirs[0])]
     for each in run_dirs:
-        ending = each.suffix.lower()
-        if ending in (*READERS, ALONE) and not each.exists():
-            raise InputError(f"{each}: no such file")
-        if ending == ALONE and len(run_dirs) > 1:
-            raise InputError(f"{each}: a recording is opened alone; run folders are overlaid")
-        if not each.is_file():
+        if each.suffix.lower() != ALONE:
             recording_of(each)
+        elif not each.is_file():
+            raise InputError(f"{each}: no such file")
+        elif len(run_dirs) > 1:
+            raise InputError(f"{each}: a recording is opened alone; run folders are overlaid")
     if not web:
         need_screen()
     with tempfile.TemporaryDirectory(prefix="wayproof-view-") as scratch:
-        recordings = _recordings(run_dirs, Path(scratch), tell)
+        recordings = [each if each.suffix.lower() == ALONE else recording_of(each) for each in run_dirs]
         shown = recordings[0]
         if len(recordings) > 1:
             shown = Path(scratch) / "overlay.rrd"
@@ -117,23 +114,6 @@ def _overlay_of(folder: Path) -> Path:
             f"{folder} compares several scenarios; name one of {', '.join(map(str, overlays))}"
         )
     return overlays[0] if overlays else folder
-
-
-def _recordings(run_dirs: Sequence[Path], scratch: Path, tell: Callable[[str], object]) -> list[Path]:
-    """The recordings of runs, and those made of flight logs; tells what of a log is not there."""
-    recordings = []
-    if run_dirs[0].suffix.lower() == ALONE and run_dirs[0].is_file():
-        return [*run_dirs]
-    for number, each in enumerate(run_dirs):
-        if not each.is_file():
-            recordings.append(recording_of(each))
-            continue
-        if run_dirs[0].is_file():
-            raise RunFolderError(f"{each} is a flight log; name the run beside which it is to be shown first")
-        recordings.append(scratch / f"log-{number}.rrd")
-        for note in write_log_recording(each, run_dirs[0], recordings[-1]):
-            tell(f"{each}: {note}")
-    return recordings
 
 
 def need_screen() -> None:

@@ -36,7 +36,6 @@ from harness.scenario.guidance_keys import airframe_of, flown_airframe, law_of
 from harness.scenario.performance import mission_of, performance_of, wind_mps_of
 from harness.scenario.planner_keys import planner_of
 from harness.scenario.scenario import Scenario, dump_scenario
-from harness.scenario.sections import Origin
 from harness.scenario.start import air_of, start_conditions
 from harness.world.ground import Ground
 from harness.world.range_sensor import RangeSensor
@@ -228,12 +227,6 @@ def fly_to_folder(
     return figures
 
 
-def _origin_deg(scenario: Scenario) -> tuple[float, float] | None:
-    """Latitude and longitude of the plane's origin; None where it was left at its default, which is nowhere meant."""
-    origin = scenario.area.origin
-    return None if origin == Origin() else (origin.latitude_deg, origin.longitude_deg)
-
-
 def _sources(scenario: Scenario) -> list[dict[str, str]]:
     """Files that obstacles and ground were made of, for the manifest."""
     return [{"path": each.path, "sha256": each.sha256} for each in scenario.sources or ()]
@@ -271,7 +264,6 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
         text,
         searches=pilot is None,
         ground=loop.world.ground.field if loop.world.ground else None,
-        origin_deg=_origin_deg(scenario),
         believes=scenario.navigation.kind != "perfect",
         wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
     )

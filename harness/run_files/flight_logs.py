@@ -63,16 +63,6 @@ class LogTrack:
     up_m: FloatArray
     notes: tuple[str, ...] = ()
 
-    def thinned(self, most: int) -> LogTrack:
-        """Every so many of its rows, and the last, that no more than about `most` are left."""
-        rows = np.unique(
-            np.append(np.arange(0, len(self.time_s), -(-len(self.time_s) // most)), len(self.time_s) - 1)
-        )
-        time_s, east_m, north_m, up_m = (
-            each[rows] for each in (self.time_s, self.east_m, self.north_m, self.up_m)
-        )
-        return LogTrack(time_s, east_m, north_m, up_m, self.notes)
-
     @property
     def groundspeed_mps(self) -> FloatArray:
         """(n,) from the positions."""

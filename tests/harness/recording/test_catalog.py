@@ -16,11 +16,9 @@ import rerun as rr
 from PIL import Image, ImageChops
 
 from harness.analysis.metrics import metrics
-from harness.api.results import CampaignResult
 from harness.campaign.table import recordings_of, worst_first
 from harness.cli.app import main
 from harness.files.errors import RunFolderError
-from harness.files.input_file import InputError
 from harness.flight.record import AcceptedPlan, Flight, Outcome, Track
 from harness.recording import catalog as catalogs
 from harness.recording.blueprint import Frame
@@ -437,34 +435,3 @@ def test_recordings_are_asked_worst_first(campaign: Path) -> None:
     }
     pq.write_table(pa.table(rows), campaign / "results.parquet")
     assert [path.parent.name for path in worst_first(campaign, recordings)] == ["1", "2", "0"]
-
-
-def test_what_was_recorded_is_a_table(campaign: Path) -> None:
-    kept = CampaignResult(campaign)
-    one = kept.recordings[1].dataframe("/series/clearance/**")
-    assert one.column_names == [
-        "recording",
-        "sim_time_s",
-        "/series/clearance/flown",
-        "/series/clearance/wanted",
-    ]
-    assert set(one["recording"].to_pylist()) == {"run 1"}
-    times = one["sim_time_s"].to_numpy()
-    assert (times[0], times[-1]) == (0.0, 100.0)
-    np.testing.assert_allclose(one["/series/clearance/flown"].to_numpy(), 500.0 - 5.03 * times)
-    assert one["/series/clearance/wanted"].to_pylist()[0] == 100.0
-    assert one["/series/clearance/wanted"].null_count > 0
-    assert (
-        kept.recordings[1]
-        .dataframe("/series/clearance/**", filled=True)["/series/clearance/wanted"]
-        .null_count
-        == 0
-    )
-    every = kept.dataframe(["/series/**", "-/series/bank/**"])
-    assert set(every["recording"].to_pylist()) == {"run 0", "run 1", "run 2"}
-    assert "/series/bank/flown" not in every.column_names
-    assert set(kept.dataframe(runs=[2])["recording"].to_pylist()) == {"run 2"}
-    with pytest.raises(InputError, match="no recording of run 7"):
-        kept.dataframe(runs=[7])
-    with pytest.raises(InputError, match=r"no rows of /series/\*\* on the timeline wall_time"):
-        kept.recordings[1].dataframe(index="wall_time")

@@ -15,11 +15,7 @@ import rerun as rr
 from aircraft.frames import LocalPlane
 from harness.cli.app import main
 from harness.files.input_file import InputError
-from harness.recording.overlay import write_overlay
-from harness.recording.thin import cross_track_m, write_log_recording
-from harness.run_files.exports.exported_path import planned_points
 from harness.run_files.flight_logs import LogTrack, read_log
-from harness.run_files.run_folder import load_run
 
 PLANE = LocalPlane(47.0, 8.0)
 ROWS = np.arange(20, dtype=np.float64)
@@ -131,34 +127,6 @@ def test_a_file_that_is_no_log_is_told(name: str, content: bytes, sentence: str,
         read_log(tmp_path / name, PLANE)
     assert sentence in str(raised.value)
     assert "\n" not in str(raised.value)
-
-
-def test_a_log_that_is_not_there_is_told_as_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run = tmp_path / "run"
-    run.mkdir()
-    (run / "flight.rrd").write_bytes(b"")
-    assert main(["view", str(run), str(tmp_path / "none.csv"), "--web"]) == 2
-    assert capsys.readouterr().err == f"{tmp_path / 'none.csv'}: no such file\n"
-
-
-def test_cross_track_is_positive_right_of_what_was_flown_of_the_plans() -> None:
-    """Towards north, then east; where nothing was planned there is no error."""
-    planned = np.array([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)])
-    points = np.array(
-        [
-            (30.0, 500.0),
-            (-20.0, 400.0),
-            (500.0, 990.0),
-            (500.0, 1040.0),
-            (0.0, 700.0),
-            (3.0, -50.0),
-            (1100.0, 990.0),
-        ]
-    )
-    off = cross_track_m(points, planned)
-    assert off is not None
-    np.testing.assert_allclose(off, [30.0, -20.0, 10.0, -40.0, 0.0, np.nan, np.nan])
-    assert cross_track_m(points, planned[:1]) is None
 
 
 def test_a_damaged_dataflash_log_is_told_in_one_line(
@@ -311,37 +279,6 @@ def test_of_a_damaged_log_it_is_said_that_it_is(
         assert len(read_log(tmp_path / "torn.ulg", PLANE).notes) == 1
 
 
-def test_view_tells_what_of_a_log_is_not_there(tmp_path: Path, run: Path) -> None:
-    write_mcap(tmp_path / "a.mcap")
-    whole = (tmp_path / "a.mcap").read_bytes()
-    (tmp_path / "torn.mcap").write_bytes(whole[: len(whole) // 3])
-    notes = write_log_recording(tmp_path / "torn.mcap", run, tmp_path / "torn.rrd")
-    assert notes == ("damaged, or torn: read as far as it goes",)
-
-
-def test_what_was_flown_in_a_gap_is_not_drawn(tmp_path: Path, run: Path) -> None:
-    rows = [(time, 500.0 + 10.0 * time, 500.0) for time in (*range(10), *range(40, 50))]
-    text = "".join(f"{time},{east},{north}\n" for time, east, north in rows)
-    (tmp_path / "gap.csv").write_text("time_s,x_m,y_m\n" + text)
-    write_log_recording(tmp_path / "gap.csv", run, tmp_path / "gap.rrd")
-    strips: dict[str, list[float]] = {}
-    for chunk in rr.chunk.RrdReader(str(tmp_path / "gap.rrd")).stream():
-        for name, column in chunk.to_record_batch().to_pydict().items():
-            if name.endswith("LineStrips2D:strips"):
-                lines = [strip for cell in column for strip in cell]
-                strips[str(chunk.entity_path)] = [abs(line[-1][0] - line[0][0]) for line in lines]
-    assert max(strips["/plan/flown"]) == 10.0
-    assert strips["/plan/whole_track"] == [90.0, 90.0]
-
-
-def test_a_long_log_is_thinned_to_its_last_row() -> None:
-    row = np.arange(100_001.0)
-    track = LogTrack(row, row, row, row).thinned(20_000)
-    assert 10_000 < len(track.time_s) <= 20_001
-    assert (track.time_s[0], track.up_m[-1]) == (0.0, 100_000.0)
-    assert len(LogTrack(row[:5], row[:5], row[:5], row[:5]).thinned(20_000).time_s) == 5
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a short flight, with its recording."""
@@ -361,40 +298,3 @@ def summary_of(recording: Path) -> str:
             cells = chunk.to_record_batch().to_pydict()
             return str(next(cell for name, cell in cells.items() if name.endswith("text"))[0][0])
     return ""
-
-
-def test_a_log_lies_over_the_run_it_came_from(tmp_path: Path, run: Path) -> None:
-    folder = run
-    for form in ("csv", "mcap"):
-        log = tmp_path / f"flight.{form}"
-        assert main(["export", str(folder), "--format", form, "--out", str(log)]) == 0
-        flown = load_run(folder)
-        track = read_log(log, LocalPlane(47.0, 8.0))
-        assert track.time_s[-1] == pytest.approx(flown.track.time_s[-1], abs=0.2)
-        off = cross_track_m(np.column_stack((track.east_m, track.north_m)), planned_points(flown)[0])
-        assert off is not None
-        assert np.nanmax(np.abs(off)) < 2.0
-        assert form == "csv" or np.isfinite(off).mean() > 0.9
-        write_log_recording(log, folder, tmp_path / f"{form}.rrd")
-        shown = tmp_path / f"{form}-overlay.rrd"
-        write_overlay([folder / "flight.rrd", tmp_path / f"{form}.rrd"], ["run", "log"], shown)
-        assert shown.stat().st_size > 50_000
-        rows = {
-            row.split(" | ")[0]: row.split(" | ")[1:]
-            for row in summary_of(shown).splitlines()
-            if " | " in row
-        }
-        for name, near in (("| flown, km", 0.05), ("| time, s", 0.3)):
-            of_run, of_log = (float(each.strip("| ")) for each in rows[name])
-            assert of_log == pytest.approx(of_run, abs=near)
-        assert float(rows["| cross-track max, m"][1].strip("| ")) < 2.0
-        assert rows["| outcome"] == ["reached", "log |"]
-        assert rows["| trackable"] == ["yes", "log |"]
-        own = {str(chunk.entity_path) for chunk in rr.chunk.RrdReader(str(tmp_path / f"{form}.rrd")).stream()}
-        assert {"/plan/aircraft/shape", "/world/aircraft/shape", "/plan/flown"} <= own
-    far = tmp_path / "far.csv"
-    for place, km in (("-33,150", r"\d+"), ("47.1,8.2", "13")):
-        latitude, longitude = map(float, place.split(","))
-        far.write_text(f"time_s,latitude_deg,longitude_deg\n0,{place}\n1,{latitude},{longitude + 0.01}\n")
-        with pytest.raises(InputError, match=rf"comes no nearer than {km} km to the area of "):
-            write_log_recording(far, folder, tmp_path / "far.rrd")
