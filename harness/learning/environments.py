@@ -1,4 +1,4 @@
-"""The environments `wayproof/Waypoints-v0` and `wayproof/Roll-v0`.
+"""The environment `wayproof/Waypoints-v0`.
 
 Reward of a step: the share of the straight way from start to goal by which the goal came nearer; 1 more when it is
 reached; 1 less on a collision, outside the area or with control lost. An episode is terminated by what ends a flight,
@@ -8,7 +8,6 @@ and truncated by the scenario's time limit.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -20,12 +19,12 @@ from numpy.typing import NDArray
 
 from aircraft.airframes import airframe
 from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.interface import AircraftState
 from harness.flight.closed_loop import Loop
 from harness.flight.record import Outcome, digest
 from harness.flight.stepped import Status, SteppedLoop
-from harness.learning.episode import Episode
 from harness.learning.observation import LEAST, MOST, ScanKeeper, state_of
-from harness.learning.pilots import LinePilot, RollPilot, WaypointPilot
+from harness.learning.pilots import Episode, WaypointPilot
 from harness.run.scenario_flight import make_loop
 from harness.scenario.performance import mission_of
 from harness.scenario.scenario import Scenario, load_scenario
@@ -39,8 +38,11 @@ MOST_BEAMS: Final = 72
 BAD: Final = (Outcome.COLLISION, Outcome.OUT_OF_BOUNDS, Outcome.LOST_CONTROL)
 
 
-class FlightEnv(gymnasium.Env[Observation, Action], ABC):
-    """A scenario's flight, steered from outside.
+class WaypointsEnv(gymnasium.Env[Observation, Action]):
+    """`wayproof/Waypoints-v0`, a scenario's flight of which an action is the next waypoint.
+
+    Action: (2,) how far the waypoint lies to the right of the course and ahead of the aircraft, over the sensing range,
+    each from -1 to 1. From the next scan on the aircraft turns onto the line to it, and flies straight on beyond.
 
     The first interval after a reset is flown straight ahead, so that there is a scan to be observed. `reset(seed=k)`
     flies the scenario with `seed: k`; later resets without a seed draw seeds from the generator that it began. Without
@@ -78,6 +80,12 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
         self._mission = mission_of(self._own)
         limits = airframe(self._own.aircraft.model).guidance_limits(self._own.aircraft.airspeed_mps)
         self._bank_limit_rad = limits.bank_limit_rad
+        if self._updates * self._own.sensor.rate_hz < UPDATE_RATE_HZ:
+            raise ValueError(
+                f"step_s is shorter than the {1.0 / self._own.sensor.rate_hz:g} s from scan to scan: "
+                "actions would be passed over"
+            )
+        self._pilot = WaypointPilot(self._mission)
         self._scans = ScanKeeper()
         self._loop: SteppedLoop | None = None
         self._seeded, self._to_go_m = False, math.nan
@@ -88,6 +96,7 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
             }
         )
         self.observation_space = observed
+        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -104,20 +113,19 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
         return self._observed(status), self._info(status)
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Flies on for a step. What of an action lies beyond -1 and 1 is cut off; after the end nothing more is flown.
+        """Flies on for a step; after the end nothing more is flown.
 
         Raises:
             RuntimeError: no episode has begun.
-            ValueError: the action has another shape, or is not finite.
+            ValueError: the action has another shape, or lies beyond -1 and 1.
         """
         if self._loop is None:
             raise RuntimeError("reset() before step(): no episode has begun")
         before = self._loop.status
         given = np.asarray(action, dtype=np.float64)
-        if given.shape != self.action_space.shape or not np.isfinite(given).all():
-            (numbers,) = self.action_space.shape or (0,)
-            raise ValueError(f"action is {action!r}; must be {numbers} finite numbers from -1 to 1")
-        self._act(np.clip(given, -1.0, 1.0), before)
+        if given.shape != (2,) or not (np.abs(given) <= 1.0).all():
+            raise ValueError(f"action is {action!r}; must be 2 numbers from -1 to 1")
+        self._act(given, before.believed)
         status = self._advanced(before)
         reward = (self._to_go_m - status.to_go_m) / math.dist(
             self._own.mission.start_m, self._own.mission.goal_m
@@ -129,17 +137,23 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
         return self._observed(status), reward, status.done and not truncated, truncated, self._info(status)
 
     @property
-    @abstractmethod
     def episode(self) -> Episode:
         """What has been flown so far, to be flown again."""
+        return Episode(self._flown, tuple(self._pilot.noted))
 
-    @abstractmethod
     def _steered(self, loop: Loop) -> Loop:
-        """The parts of a flight with ours among them."""
+        """The parts of a flight with the agent's pilot as the planner."""
+        self._pilot = WaypointPilot(loop.mission)
+        return replace(loop, planner=self._pilot)
 
-    @abstractmethod
-    def _act(self, action: NDArray[np.float64], status: Status) -> None:
-        """Tells our part what to do."""
+    def _act(self, action: NDArray[np.float64], believed: AircraftState) -> None:
+        """Tells the pilot where to fly."""
+        right_m, ahead_m = (self._mission.sensor_range_m * action).tolist()
+        sine, cosine = math.sin(believed.course_rad), math.cos(believed.course_rad)
+        self._pilot.target_m = (
+            believed.east_m + ahead_m * sine + right_m * cosine,
+            believed.north_m + ahead_m * cosine - right_m * sine,
+        )
 
     def _advanced(self, status: Status) -> Status:
         assert self._loop is not None
@@ -166,69 +180,6 @@ class FlightEnv(gymnasium.Env[Observation, Action], ABC):
             track = self._loop.flight().track
             info |= {"outcome": status.outcome.value, "reason": status.reason, "digest": digest(track)}
         return info
-
-
-class WaypointsEnv(FlightEnv):
-    """`wayproof/Waypoints-v0`: an action is the next waypoint.
-
-    Action: (2,) how far the waypoint lies to the right of the course and ahead of the aircraft, over the sensing range,
-    each from -1 to 1. From the next scan on the aircraft turns onto the line to it, and flies straight on beyond.
-    """
-
-    def __init__(self, *args: Any, **keys: Any) -> None:
-        super().__init__(*args, **keys)
-        self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self._pilot = WaypointPilot(self._mission)
-        if self._updates * self._own.sensor.rate_hz < UPDATE_RATE_HZ:
-            raise ValueError(
-                f"step_s is shorter than the {1.0 / self._own.sensor.rate_hz:g} s from scan to scan: "
-                "actions would be passed over"
-            )
-
-    @property
-    def episode(self) -> Episode:
-        """What has been flown so far, to be flown again."""
-        return Episode(self._flown, tuple(self._pilot.noted))
-
-    def _steered(self, loop: Loop) -> Loop:
-        self._pilot = WaypointPilot(loop.mission)
-        return replace(loop, planner=self._pilot)
-
-    def _act(self, action: NDArray[np.float64], status: Status) -> None:
-        right_m, ahead_m = (self._mission.sensor_range_m * action).tolist()
-        believed = status.believed
-        sine, cosine = math.sin(believed.course_rad), math.cos(believed.course_rad)
-        self._pilot.target_m = (
-            believed.east_m + ahead_m * sine + right_m * cosine,
-            believed.north_m + ahead_m * cosine - right_m * sine,
-        )
-
-
-class RollEnv(FlightEnv):
-    """`wayproof/Roll-v0`: an action is a roll command.
-
-    Action: (1,) the roll command over the bank limit, positive to the right, held for the step. The plan is the line
-    from start to goal, from which cross-track errors are measured.
-    """
-
-    def __init__(self, *args: Any, **keys: Any) -> None:
-        super().__init__(*args, **keys)
-        self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
-        self._pilot: RollPilot | None = None
-
-    @property
-    def episode(self) -> Episode:
-        """What has been flown so far, to be flown again."""
-        return Episode(self._flown, rolls=tuple(self._pilot.noted) if self._pilot else ())
-
-    def _steered(self, loop: Loop) -> Loop:
-        model, airspeed_mps = self._own.aircraft.model, self._own.aircraft.airspeed_mps
-        self._pilot = RollPilot(airframe(model).guidance_limits(airspeed_mps), loop.mission.goal_m)
-        return replace(loop, planner=LinePilot(loop.mission), guidance=self._pilot)
-
-    def _act(self, action: NDArray[np.float64], status: Status) -> None:
-        assert self._pilot is not None
-        self._pilot.roll_rad = float(action[0]) * self._bank_limit_rad
 
 
 def _loaded(given: Scenario | str | Path) -> Scenario:

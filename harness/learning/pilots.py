@@ -1,20 +1,15 @@
-"""Planner and guidance law of a flight that is steered from outside, and of the same flight flown again.
-
-Each is told what to do by whoever steers, notes when it did that, and can be given such notes in place of somebody who
-steers: then it does the same at the same times.
-"""
+"""The planner of a flight that is steered from outside, and of the same flight flown again without whoever steered."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from aircraft.guidance.interface import GuidanceLimits, GuidanceOutput
-from aircraft.guidance.preview import PreviewConfig, PreviewLaw
-from aircraft.interface import AircraftState, Route
+from harness.scenario.scenario import Scenario
 from planner.geometry.curves import Pose, along, turn_onto
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 
@@ -29,13 +24,6 @@ class Waypoint(NamedTuple):
     time_s: float
     east_m: float
     north_m: float
-
-
-class Roll(NamedTuple):
-    """A roll command (positive right), and from when on it was given."""
-
-    time_s: float
-    roll_rad: float
 
 
 class WaypointPilot:
@@ -72,58 +60,25 @@ class WaypointPilot:
         )
 
 
-class LinePilot:
-    """A planner that gives the line from the start to the goal, once: what roll commands are flown beside."""
+@dataclass(frozen=True)
+class Episode:
+    """What was flown, and the waypoints that the agent gave.
 
-    def __init__(self, mission: Mission) -> None:
-        self._mission = mission
+    `wayproof.fly(episode.scenario, **episode.pilots)` flies it again, to the same digest.
 
-    def plan(self, request: PlanRequest) -> Plan:
-        """The line."""
-        if request.flown is not None:
-            return Plan(PlanStatus.KEPT, "the line to the goal")
-        line = Path.through([request.position_m, self._mission.goal_m])
-        return Plan(PlanStatus.FOUND, "the line to the goal", np.array([self._mission.goal_m]), line)
-
-
-class RollPilot:
-    """A guidance law that commands the rolls it is told, on the line to the goal; on any other path `preview` steers.
-
-    Args:
-        limits: of the aircraft.
-        goal_m: east and north of the goal: where the line ends.
-        noted: of an earlier flight; None where somebody sets `roll_rad`.
+    Attributes:
+        scenario: with the seed that was flown.
+        waypoints: that the planner gave.
     """
 
-    def __init__(
-        self,
-        limits: GuidanceLimits,
-        goal_m: tuple[float, float],
-        noted: Sequence[Roll] | None = None,
-    ) -> None:
-        self._limits, self._goal_m = limits, goal_m
-        self._law = PreviewLaw(PreviewConfig().resolved(limits), limits)
-        self._left = None if noted is None else [*noted]
-        self._told = False
-        self.roll_rad = 0.0
-        """What is commanded from the next update on, rad."""
-        self.noted: list[Roll] = []
+    scenario: Scenario
+    waypoints: tuple[Waypoint, ...] = ()
 
-    def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
-        """Takes a path; cross-track errors are those from it."""
-        self._law.follow(route, arc_length_m)
-        end = along(tuple(route.segments[-1].tolist()), float(route.segments[-1, 5]))
-        self._told = math.dist((end.east_m, end.north_m), self._goal_m) < NEAREST_M
+    @property
+    def pilots(self) -> dict[str, Callable[[Mission], WaypointPilot]]:
+        """`planner`, as `wayproof.fly` takes it."""
 
-    def update(self, state: AircraftState) -> GuidanceOutput:
-        """What is commanded, the bank limit observed."""
-        steered = self._law.update(state)
-        if not self._told:
-            return steered
-        if self._left and self._left[0].time_s <= state.time_s + SAME_TIME_S:
-            self.roll_rad = self._left.pop(0).roll_rad
-        limit = self._limits.bank_limit_rad
-        roll = min(max(self.roll_rad, -limit), limit)
-        if not self.noted or self.noted[-1].roll_rad != roll:
-            self.noted.append(Roll(state.time_s, roll))
-        return steered._replace(roll_command_rad=roll, bank_saturated=abs(roll) >= limit)
+        def planner(mission: Mission) -> WaypointPilot:
+            return WaypointPilot(mission, self.waypoints)
+
+        return {"planner": planner}

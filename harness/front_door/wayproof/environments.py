@@ -12,10 +12,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
 GYMNASIUM = "gymnasium"
-ENVIRONMENTS = {
-    "wayproof/Waypoints-v0": "harness.learning.environments:WaypointsEnv",
-    "wayproof/Roll-v0": "harness.learning.environments:RollEnv",
-}
+ENVIRONMENTS = {"wayproof/Waypoints-v0": "harness.learning.environments:WaypointsEnv"}
 
 
 def register_environments() -> None:

@@ -18,7 +18,6 @@ def flown(env: gymnasium.Env[Any, Any], seed: int, blind: bool = False) -> tuple
     while not over:
         push = 0.0 if blind else 0.5 * away @ (1.0 - seen["scan"]) ** 4
         right, ahead = seen["state"][[2, 1]] + push
-        action = [right, ahead] if env.action_space.shape == (2,) else [np.clip(2.0 * right, -1.0, 1.0)]
-        seen, reward, ended, cut, info = env.step(np.clip(action, -1.0, 1.0).astype(np.float32))
+        seen, reward, ended, cut, info = env.step(np.clip([right, ahead], -1.0, 1.0).astype(np.float32))
         steps, total, over = steps + 1, total + float(reward), ended or cut
     return steps, total, info
