@@ -2,6 +2,15 @@
 
 import sys
 
-from harness.cli.app import main
 
-sys.exit(main())
+def run() -> int:
+    """Runs the command line and returns its exit status; an interrupt while its modules are imported ends it too."""
+    try:
+        from harness.cli.app import main
+    except KeyboardInterrupt:
+        return 130
+    return main()
+
+
+if __name__ == "__main__":
+    sys.exit(run())

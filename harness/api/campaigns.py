@@ -115,13 +115,13 @@ def sweep(
 
     Raises:
         InputError: the campaign or the folder cannot be used; nothing was flown.
-        OSError: the folder cannot be written any more; `resume=True` goes on.
+        OSError: the folder cannot be written any more, or processes died; `resume=True` goes on.
     """
     from harness.campaign.campaign_file import load_campaign as read_campaign
     from harness.campaign.folder import CampaignFolder
     from harness.campaign.report import write_summary
     from harness.campaign.runs import CampaignRuns
-    from harness.campaign.sweep import fly_missing
+    from harness.campaign.sweep import fly_missing, told_left
     from harness.campaign.workers import dask_workers, local_workers
     from harness.scenario.shipped import campaign_path
 
@@ -135,9 +135,11 @@ def sweep(
         dask_workers(scheduler) if scheduler else local_workers(workers or os.cpu_count() or 1) as flyers,
         CampaignFolder(folder, runs, resume=resume) as claimed,
     ):
-        fly_missing(runs, claimed, flyers, progress)
+        left = fly_missing(runs, claimed, flyers, progress)
     result = CampaignResult(folder)
     write_summary(result.summary, folder)
+    if left:
+        raise OSError(f"wayproof: {told_left(left)}")
     return result
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from harness.analysis.claims import Claim, holds
 from harness.campaign.results import ERROR, metric_cells, time_cells
-from harness.files.crash import PlannerError, sentence, trace
+from harness.files.crash import sentence, trace
 from harness.files.errors import RunFolderError, WriteError
 from harness.scenario.given import GUIDANCE, PLANNER, LoopPart, registered_source
 from harness.scenario.scenario import Scenario, unpacked
@@ -73,10 +73,15 @@ class Answer:
     held: bool = False
 
 
+class NoMemoryError(Exception):
+    """There was no memory for a run: that is no fault of the run."""
+
+
 def fly_job(job: Job) -> Answer:
     """Flies a job. What goes wrong in the flight is an answer too.
 
     Raises:
+        NoMemoryError: there was none.
         OSError: the run folder cannot be written (`WriteError`), or the disk is full.
         RunFolderError: it cannot be made.
     """
@@ -92,9 +97,11 @@ def fly_job(job: Job) -> Answer:
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
     except (WriteError, RunFolderError):
         raise
-    except PlannerError as error:
-        return failed(job.run, sentence(error), trace(error))
+    except MemoryError:
+        raise NoMemoryError from None
     except Exception as error:
+        if isinstance(error.__cause__, MemoryError):
+            raise NoMemoryError from None
         if (full := _full(error)) is not None:
             raise full from None
         return failed(job.run, sentence(error), trace(error))

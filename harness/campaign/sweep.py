@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from typing import Any, Final
 
-from harness.campaign.flight import Answer, Job, failed
+from harness.campaign.flight import Answer, Job, NoMemoryError
 from harness.campaign.folder import CampaignFolder
 from harness.campaign.results import ERROR, RUNS
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.workers import WorkerDiedError, Workers
 from harness.files.errors import RunFolderError
+from harness.files.wording import counted
 from harness.flight.signals import held_back
 
 TABLES_EVERY_S: Final = 30.0
@@ -26,6 +27,9 @@ LOOK_S: Final = 2.0
 INTERRUPT_S: Final = 0.1
 """How often it is looked whether the process was asked to end, at the least."""
 
+FIRST_LEFT: Final = 5
+"""Runs that are named of those that the machine kept from their ends."""
+
 Progress = Callable[[Answer], None]
 
 
@@ -35,8 +39,11 @@ def fly_missing(
     workers: Workers,
     progress: Progress | None = None,
     enough: Callable[[], bool] = lambda: False,
-) -> None:
+) -> list[int]:
     """Flies what is missing; whatever ends it, what is done is in the folder's tables.
+
+    A run that the machine kept from its end, since its process was killed or there was no memory, is no result: it is
+    left out, and flown when the campaign is gone on with.
 
     Args:
         runs: the campaign.
@@ -45,13 +52,17 @@ def fly_missing(
         progress: told of every run that is over.
         enough: asked before every look whether what is over answers the question; what still flies is given up then.
 
+    Returns:
+        Numbers of the runs that the machine kept from their ends.
+
     Raises:
         OSError: the folder, or a run folder in it, cannot be written; or who flies has gone.
     """
+    left: list[int] = []
     jobs = _jobs(runs, folder)
     ahead = next(jobs, None)
     flying: dict[Future[Answer], int] = {}
-    tables_due = time.monotonic() + TABLES_EVERY_S
+    tables_due = time.monotonic()
     # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
     # it without end.
     with held_back() as let_interrupt_through:
@@ -64,7 +75,12 @@ def fly_missing(
                 if not flying:
                     _sleep(LOOK_S, let_interrupt_through)
                 for future in wait(flying, timeout=INTERRUPT_S, return_when=FIRST_COMPLETED).done:
-                    answer = _answer(future, flying.pop(future))
+                    run = flying.pop(future)
+                    answer = _answer(future)
+                    if answer is None:
+                        left.append(run)
+                        shutil.rmtree(folder.path / RUNS / str(run), ignore_errors=True)
+                        continue
                     if answer.row["outcome"] == ERROR:
                         # What a crash has left is no whole run folder.
                         shutil.rmtree(folder.path / RUNS / str(answer.run), ignore_errors=True)
@@ -78,6 +94,7 @@ def fly_missing(
                     tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
         finally:
             folder.write_tables()
+    return sorted(left)
 
 
 def _sleep(seconds: float, let_interrupt_through: Callable[[], None]) -> None:
@@ -95,14 +112,24 @@ def _jobs(runs: CampaignRuns, folder: CampaignFolder) -> Iterator[Job]:
             yield runs.job(number, folder.path)
 
 
-def _answer(future: Future[Answer], run: int) -> Answer:
+def _answer(future: Future[Answer]) -> Answer | None:
+    """What came of a run; None where the machine kept it from its end."""
     try:
         return future.result()
-    except WorkerDiedError:
-        reason = "the process that flew it died, each time that it was tried"
-        return failed(run, reason, f"{reason}\n")
+    except (WorkerDiedError, NoMemoryError):
+        return None
     except RunFolderError as error:
         raise OSError(str(error)) from error
+
+
+def told_left(runs: Sequence[int]) -> str:
+    """A sentence on the runs that the machine kept from their ends."""
+    first = ", ".join(map(str, runs[:FIRST_LEFT])) + (", ..." if len(runs) > FIRST_LEFT else "")
+    were, them = ("was", "it") if len(runs) == 1 else ("were", "them")
+    return (
+        f"{counted(len(runs), 'run')} {were} not flown to the end ({first}): the process died, or had no memory, each "
+        f"time that it was tried; --resume flies {them}"
+    )
 
 
 def _row(runs: CampaignRuns, answer: Answer) -> dict[str, Any]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import os
+import re
 import signal
 import socket
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -16,7 +18,7 @@ from contextlib import contextmanager
 from typing import Any, Final, Protocol
 
 from harness.campaign.flight import Answer, Job, fly_job
-from harness.files.spawning import without_main
+from harness.files.spawning import open_standard_files, without_main
 from harness.files.strict_yaml import InputError
 from harness.files.versions import versions
 from planner.compiled import own_this_process
@@ -173,6 +175,7 @@ class LocalWorkers:
 @contextmanager
 def local_workers(number: int) -> Iterator[Workers]:
     """So many processes of this machine; they end with the context, in mid-flight if need be."""
+    open_standard_files()
     before = set(multiprocessing.active_children())
     kept = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(ONE_THREAD)
@@ -192,7 +195,9 @@ def local_workers(number: int) -> Iterator[Workers]:
 
 
 @contextmanager
-def dask_workers(address: str, unencrypted: bool = False) -> Iterator[Workers]:
+def dask_workers(
+    address: str, unencrypted: bool = False, tell: Callable[[str], None] = warnings.warn
+) -> Iterator[Workers]:
     """The workers of a Dask cluster, as many as there are at any time.
 
     A job whose worker dies is flown again by another one; after the scheduler's `allowed-failures` it is given
@@ -202,11 +207,17 @@ def dask_workers(address: str, unencrypted: bool = False) -> Iterator[Workers]:
         address: of the scheduler, as tcp://127.0.0.1:8786 or tls://host:8786.
         unencrypted: whether an address beyond this machine may lead there without TLS, where whoever can change
             what is sent can run code on both ends.
+        tell: told when a worker has gone.
 
     Raises:
         InputError: the address leads beyond this machine without TLS and may not, Dask is not installed, no
             scheduler answers, or a worker has other versions than we.
     """
+    if not re.fullmatch(r"[a-z]+://.+", address):
+        raise InputError(
+            f"wayproof: --scheduler {address}: is no address; give it as tcp://HOST:PORT, or beyond this machine as "
+            "tls://HOST:PORT"
+        )
     try:
         from distributed import Client
     except ImportError as error:
@@ -230,7 +241,7 @@ def dask_workers(address: str, unencrypted: bool = False) -> Iterator[Workers]:
         for worker, theirs in client.run(versions).items():
             if theirs != ours:
                 raise InputError(f"wayproof: the worker {worker} has {theirs}; must have {ours}")
-        yield DaskWorkers(client)
+        yield DaskWorkers(client, tell)
 
 
 def _knock(address: str) -> None:
@@ -275,18 +286,23 @@ def _is_ours(family: int, place: tuple[Any, ...]) -> bool:
 class DaskWorkers:
     """The workers of a Dask cluster."""
 
-    def __init__(self, client: Any) -> None:
-        self._client = client
+    def __init__(self, client: Any, tell: Callable[[str], None]) -> None:
+        self._client, self._tell = client, tell
         self._executor = client.get_executor(pure=False)
         self._flying = 0
         self._counted = threading.Lock()
+        self._known = set(client.nthreads())
 
     def free(self) -> int:
         """Room for jobs that fly and for as many that wait."""
         try:
-            threads: int = sum(self._client.nthreads().values())
+            threads_of = self._client.nthreads()
         except OSError as error:
             raise SchedulerGoneError from error
+        for gone in sorted(self._known - set(threads_of)):
+            self._tell(f"the Dask worker {gone} has gone; others fly its runs again")
+        self._known = set(threads_of)
+        threads: int = sum(threads_of.values())
         return JOBS_EACH * threads - self._flying
 
     def start(self, job: Job) -> Future[Answer]:

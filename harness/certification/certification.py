@@ -20,7 +20,7 @@ import numpy as np
 from harness.campaign.folder import CampaignFolder
 from harness.campaign.journal import read_journal
 from harness.campaign.results import RUNS
-from harness.campaign.sweep import Progress, fly_missing
+from harness.campaign.sweep import Progress, fly_missing, told_left
 from harness.campaign.workers import Workers
 from harness.certification.bounds import verdict
 from harness.certification.certificate import Certificate, bounds, failures
@@ -116,7 +116,9 @@ def certify(
                 progress(tally)
 
         report: Progress = count
-        fly_missing(days, folder, workers, report, lambda: tally.decided)
+        left = fly_missing(days, folder, workers, report, lambda: tally.decided)
+        if left and not tally.decided:
+            raise OSError(told_left(left))
         folder.write_tables(tally.runs)
         certificate = _certificate(days, out, tally, terms, command)
         _leave_only(out / RUNS, set(certificate.failing_runs))

@@ -28,6 +28,7 @@ from harness.cli.review import report, view
 from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
 from harness.cli.sweep import sweep
 from harness.cli.world import world
+from harness.files.spawning import open_standard_files
 from harness.flight.signals import taken_as_interrupt
 from planner.compiled import own_this_process
 
@@ -91,6 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in given
     words = [word for word in given if word != "--debug"]
     if arguments is None:
+        open_standard_files()
         own_this_process()
         results_alone()
     with taken_as_interrupt() as came:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Final
 
 from rich import box
@@ -28,7 +28,7 @@ from harness.campaign.questions import QUESTIONS, difference, ratio
 from harness.campaign.runs import CampaignRuns
 from harness.campaign.summary import Cell, Summary
 from harness.campaign.summary import Table as Answers
-from harness.cli.terminal import plain
+from harness.cli.terminal import plain, progress_lines
 from harness.files.strict_yaml import Scalar
 from harness.files.wording import counted, printable
 
@@ -75,26 +75,32 @@ def check_bar(number: int) -> Iterator[Callable[[int], None] | None]:
 
 
 @contextmanager
-def sweep_bar(number: int, done: int) -> Iterator[Callable[[Answer], None] | None]:
-    """A bar of runs that are over, with rate and time left, on standard error; None without a terminal.
+def sweep_bar(number: int, done: int) -> Iterator[Callable[[Answer], None]]:
+    """A bar of runs that are over, with rate and time left, on standard error; without a terminal a line at times.
 
     Args:
         number: all runs.
         done: how many of them are over already.
     """
+    over, not_reached = done, 0
     with _bar("flights") as bar:
-        if bar is None:
-            yield None
-            return
-        task = bar.add_task("", total=number, completed=done)
-        not_reached = 0
+        task = None if bar is None else bar.add_task("", total=number, completed=done)
+
+        def told() -> str:
+            return f"{not_reached} not at the goal" if not_reached else ""
 
         def report(answer: Answer) -> None:
-            nonlocal not_reached
+            nonlocal not_reached, over
+            over += 1
             not_reached += answer.row["outcome"] != "reached"
-            bar.update(task, advance=1, description=f"{not_reached} not at the goal" if not_reached else "")
+            if bar is not None and task is not None:
+                bar.update(task, advance=1, description=told())
 
-        yield report
+        def line() -> str:
+            return ", ".join(filter(None, (f"{over} of {counted(number, 'flight')}", told())))
+
+        with progress_lines(line) if bar is None else nullcontext():
+            yield report
 
 
 @contextmanager

@@ -196,8 +196,8 @@ def _fly(
 
 
 @contextmanager
-def days_bar(most: int) -> Iterator[Callable[[Tally], None] | None]:
-    """A bar of days that count, on standard error; None where that is not a terminal.
+def days_bar(most: int) -> Iterator[Callable[[Tally], None]]:
+    """A bar of days that count, on standard error; a line every ten seconds where that is not a terminal.
 
     Args:
         most: number of days that may be flown.
@@ -205,9 +205,6 @@ def days_bar(most: int) -> Iterator[Callable[[Tally], None] | None]:
     from harness.cli.terminal import step_bar
 
     with step_bar() as bar:
-        if bar is None:
-            yield None
-            return
         yield lambda tally: bar(tally.runs, most, f"held on {tally.held} of {tally.runs} days")
 
 

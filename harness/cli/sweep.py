@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -84,10 +85,9 @@ def sweep(
         _print_runs(runs, as_json)
         return 0
     folder = out or Path("runs") / runs.campaign.name
-    flyers = (
-        dask_workers(scheduler, unencrypted) if scheduler else local_workers(workers or os.cpu_count() or 1)
-    )
-    told = _fly(runs, folder, flyers, resume=resume, silent=quiet)
+    local = partial(local_workers, workers or os.cpu_count() or 1)
+    flyers = dask_workers(scheduler, unencrypted, _warn) if scheduler else local()
+    told, whole = _fly(runs, folder, flyers, resume=resume, silent=quiet)
     summary = summarise(folder)
     page = write_summary(summary, folder)
     if as_json:
@@ -96,7 +96,11 @@ def sweep(
         print_summary(summary)
         say(f"results: {folder / 'results.parquet'}")
         say(f"summary: {page}")
-    return FAILED if "error" in told else 0
+    return FAILED if "error" in told or not whole else 0
+
+
+def _warn(text: str) -> None:
+    say(f"wayproof: {text}", err=True)
 
 
 def checked(path: Path) -> CampaignRuns:
@@ -120,13 +124,13 @@ def checked(path: Path) -> CampaignRuns:
 
 def _fly(
     runs: CampaignRuns, path: Path, workers: AbstractContextManager[Workers], *, resume: bool, silent: bool
-) -> dict[str, int]:
-    """Flies what is missing; returns how many runs ended how."""
+) -> tuple[dict[str, int], bool]:
+    """Flies what is missing; returns how many runs ended how, and whether all are over."""
     from contextlib import nullcontext
 
     from harness.campaign.folder import CampaignFolder
     from harness.campaign.results import INDEX
-    from harness.campaign.sweep import fly_missing
+    from harness.campaign.sweep import fly_missing, told_left
     from harness.cli.campaign_terminal import sweep_bar
     from harness.files.errors import RunFolderError
 
@@ -136,8 +140,10 @@ def _fly(
             CampaignFolder(path, runs, resume=resume) as folder,
             nullcontext() if silent else sweep_bar(len(runs), len(folder.done)) as report,
         ):
-            fly_missing(runs, folder, flyers, report)
-            return folder.outcomes()
+            broken_off = fly_missing(runs, folder, flyers, report)
+            if broken_off:
+                say(f"wayproof: {told_left(broken_off)}", err=True)
+            return folder.outcomes(), not broken_off
     except RunFolderError as error:
         raise bad_input(error) from error
     except OSError as error:

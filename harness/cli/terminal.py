@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 from rich import box
 from rich.console import Console
@@ -12,6 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
+from harness.cli.standard_output import say
 from harness.files.wording import printable, tallied
 
 Report: TypeAlias = Callable[[float, float, str], None]
@@ -54,11 +56,17 @@ def progress_bar(straight_m: float) -> Iterator[Report | None]:
 
 
 @contextmanager
-def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
-    """A bar of steps done on standard error, or None where that is not a terminal."""
+def step_bar() -> Iterator[Callable[[int, int, str], None]]:
+    """A bar of steps done on standard error; a line every ten seconds where that is not a terminal."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        yield None
+        state = ["begun"]
+
+        def note(done: int, of: int, what: str) -> None:
+            state[0] = f"{done} of {of}: {plain(what)}"
+
+        with progress_lines(lambda: state[0]):
+            yield note
         return
     with Progress(
         BarColumn(bar_width=20), TextColumn("{task.description}"), console=console, transient=True
@@ -69,6 +77,32 @@ def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
             bar.update(task, completed=done, total=of, description=plain(what))
 
         yield report
+
+
+LINE_EVERY_S: Final = 10.0
+"""Without a terminal, progress is a line on standard error at this interval."""
+
+
+@contextmanager
+def progress_lines(state: Callable[[], str]) -> Iterator[None]:
+    """Prints a line on standard error every ten seconds, for those who read a log.
+
+    Args:
+        state: what the line says.
+    """
+    over = threading.Event()
+
+    def tell() -> None:
+        while not over.wait(LINE_EVERY_S):
+            say(f"wayproof: {state()}", err=True)
+
+    thread = threading.Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def print_grid(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from types import ModuleType
 
 _starting = threading.Lock()
@@ -17,11 +20,31 @@ def without_main() -> Iterator[None]:
 
     Python lets a spawned process import it, for functions that are defined there. Ours need none, and a script that
     calls us at its top, without `if __name__ == "__main__":`, would begin processes without end.
+
+    An interrupt, which reaches the whole process group, is blocked in them from their first moment on: the parent
+    decides what it means.
     """
     with _starting:
+        resource_tracker.ensure_running()  # unblocks the interrupt when it begins its own process
         main = sys.modules["__main__"]
         sys.modules["__main__"] = ModuleType("__main__")
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
         finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
             sys.modules["__main__"] = main
+
+
+def open_standard_files() -> None:
+    """Opens what is closed of the file descriptors 0 to 2, to nowhere.
+
+    Else the next file that is opened gets such a number, and a process that is begun takes it for its standard output.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.set_inheritable(
+                os.open(os.devnull, os.O_RDWR), True
+            )  # gets the lowest number that is free: this one

@@ -5,15 +5,16 @@ import sys
 
 def main() -> int:
     """Runs the command line and returns its exit status."""
-    from wayproof.rooms import own_packages
-
     try:
+        from wayproof.rooms import own_packages
+
         own_packages()
+        from harness.__main__ import run
     except ImportError as error:
         sys.stderr.write(f"wayproof: {error}\n")
         return 2
-    from harness.cli.app import main as run
-
+    except KeyboardInterrupt:
+        return 130
     return run()
 
 
