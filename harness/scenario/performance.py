@@ -65,7 +65,8 @@ def mission_of(scenario: ScenarioKeys) -> Mission:
 
     The clearance is that of `planner.clearance_m` and, on top, the margin for the error of the believed position. It is
     no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept
-    from the border of the area, as far as start and goal lie within it.
+    from the border of the area, as far as start and goal lie within it, and beside it the tracking error, but for a side
+    that start or goal is near to.
 
     Args:
         scenario: all but the own keys of its planner filled in.
@@ -84,7 +85,13 @@ def mission_with(scenario: ScenarioKeys, performance: Performance) -> Mission:
     return Mission(
         goal_m=scenario.mission.goal_m,
         goal_radius_m=scenario.mission.goal_radius_m,
-        bounds_m=_inside(scenario.area.bounds_m, margin_m, scenario.mission.start_m, scenario.mission.goal_m),
+        bounds_m=_inset(
+            _inside(scenario.area.bounds_m, margin_m, scenario.mission.start_m, scenario.mission.goal_m),
+            performance.tracking_error_m,
+            performance.turn_radius_m,
+            scenario.mission.start_m,
+            scenario.mission.goal_m,
+        ),
         clearance_m=max(
             scenario.planner.clearance_m + margin_m,
             LEAST_CLEARANCE * performance.turn_radius_m,
@@ -109,4 +116,16 @@ def _inside(bounds_m: Bounds, margin_m: float, *places_m: tuple[float, float]) -
         min(ymin + margin_m, *(north for _, north in places_m)),
         max(xmax - margin_m, *(east for east, _ in places_m)),
         max(ymax - margin_m, *(north for _, north in places_m)),
+    )
+
+
+def _inset(bounds_m: Bounds, by_m: float, near_m: float, *places_m: tuple[float, float]) -> Bounds:
+    """Bounds with each side moved in, but for sides that a place is nearer to than `near_m`."""
+    xmin, ymin, xmax, ymax = bounds_m
+    east, north = zip(*places_m, strict=True)
+    return (
+        xmin + by_m * (min(east) - xmin >= near_m),
+        ymin + by_m * (min(north) - ymin >= near_m),
+        xmax - by_m * (xmax - max(east) >= near_m),
+        ymax - by_m * (ymax - max(north) >= near_m),
     )
