@@ -65,8 +65,8 @@ def mission_of(scenario: ScenarioKeys) -> Mission:
 
     The clearance is that of `planner.clearance_m` and, on top, the margin for the error of the believed position. It is
     no less than `LEAST_CLEARANCE` of the turn radius: maps and searches have cells of its size. The same margin is kept
-    from the border of the area, as far as start and goal lie within it, and beside it the tracking error, but for a side
-    that start or goal is near to.
+    from the border of the area, as far as start and goal lie within it. The tracking error is kept as well,
+    but from a side that start or goal is near to.
 
     Args:
         scenario: all but the own keys of its planner filled in.

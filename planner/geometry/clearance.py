@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from planner.geometry.curves import Point
-from planner.interface import FloatArray, Path
+from planner.interface import BoolArray, FloatArray, Path
 from planner.kernels import segments
 from planner.kernels.fans import entered
 
@@ -83,3 +83,23 @@ def first_entry(a: Point, b: Point, points_m: FloatArray, radius_m: float | Floa
 def _each(radius_m: float | FloatArray, points_m: FloatArray) -> FloatArray:
     """(m,) the radius of each of (m, 2) points."""
     return radius_m if isinstance(radius_m, np.ndarray) else np.full(len(points_m), radius_m)
+
+
+def behind(places_m: FloatArray, eye_m: Point, edges_m: FloatArray, beside_m: float) -> BoolArray:
+    """(k,) whether each of (k, 2) places lies in the shadow of one of (n, 2) edge points, or within reach of it.
+
+    Args:
+        places_m: the places.
+        eye_m: from where the edge points are seen.
+        edges_m: the edge points.
+        beside_m: a shadow is so much wider to each side than its edge point.
+    """
+    hidden = np.zeros(len(places_m), dtype=np.bool_)
+    off = places_m - eye_m
+    for east, north in (edges_m - eye_m).tolist():
+        away_m = math.hypot(east, north)
+        along_m = (off[:, 0] * east + off[:, 1] * north) / away_m
+        aside_m = np.abs(off[:, 1] * east - off[:, 0] * north) / away_m
+        # The shadow is a fan: at twice the distance it is twice as wide.
+        hidden |= (along_m > away_m) & (aside_m < beside_m * along_m / away_m)
+    return hidden

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.geometry.clearance import behind
 from planner.geometry.course import Course
-from planner.geometry.curves import Point, Segment, onward, place_on
+from planner.geometry.curves import Point, Segment, onward, place_on, sample
 from planner.geometry.path_samples import places_along
 from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
@@ -36,6 +37,7 @@ EVADING_S = 60.0
 """Certificates hold for a world that stands still. They may be broken for so many seconds after something appeared."""
 
 
+TURNING_AWAY = "no way on can be seen to be safe; turning away"
 GOES_ON = "the plan in effect goes on to its end, nearer to something than wanted"
 IN_THE_WAY = "something is in the way; turning away"
 
@@ -93,6 +95,7 @@ class Escapes:
         self._mission, self._memory, self._local = mission, memory, local
         self._certifier = Certifier(local.holds, mission.clearance_m, math.inf, step_along_m(mission))
         self._began_m: Point | None = None  # where the aircraft was when it had no plan for the first time
+        self._began_hidden = False  # the first turn led behind something: nothing was certain of it
 
     def threats(self, request: PlanRequest) -> Threats | None:
         """What is near, while something moves or has just appeared: then what was certified may be met all the same."""
@@ -110,9 +113,10 @@ class Escapes:
         self._began_m = self._began_m or request.position_m
         onward_m = self._mission.sensor_range_m
         ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))
-        if (
-            divert_to_loiter(ahead, 0.0, onward_m, self._local.holds, self._standing(LOITER_SHARES[-1]))
-            is None
+        ways = list(rolled_out([(*request.position_m, *request.direction, 0.0, lead_m)], self._local.limits))
+        least = self._standing(LOITER_SHARES[-1])
+        if divert_to_loiter(ahead, 0.0, onward_m, self._local.holds, least) is None and not any(
+            map(least.admits, ways)
         ):
             raise NoWayToBegin(NO_ROOM)
         pieces = math.ceil(onward_m / (0.25 * self._local.holds.radius_m))
@@ -120,12 +124,26 @@ class Escapes:
             if math.dist(self._began_m, request.position_m) > BLIND * self._mission.clearance_m:
                 raise NoWayToBegin(NOT_SEEN)
             return Escape(Plan(PlanStatus.NO_PATH, NOT_SEEN))
+        hidden_too: Path | None = None
         for share in LOITER_SHARES:
             standing = self._standing(share)
             turn = divert_to_loiter(ahead, 0.0, lead_m, self._local.holds, standing)
-            if turn is not None and self._best([_Option(turn)], standing, None, threats, share)[0]:
-                return self._away(request, turn, "no way on can be seen to be safe; turning away")
+            for way in [turn, *ways] if turn is not None else ways:
+                if not self._best([_Option(way, way)], standing, None, threats, share)[0]:
+                    continue
+                if not self._leads_behind(way, request):
+                    return self._away(request, way, TURNING_AWAY)
+                hidden_too = hidden_too or way
+        if hidden_too is not None:
+            self._began_hidden = True
+            return self._away(request, hidden_too, TURNING_AWAY)
         return Escape(Plan(PlanStatus.NO_PATH, NO_ROOM))
+
+    def _leads_behind(self, path: Path, request: PlanRequest) -> bool:
+        """Whether a path leads behind a face that is seen: what lies there may be part of the obstacle."""
+        places = sample(path, 0.25 * self._mission.clearance_m)
+        beside_m = request.seen.spacing_m + 0.5 * self._mission.clearance_m
+        return bool(behind(places, request.position_m, self._memory.genuine_m, beside_m).any())
 
     def from_plan(
         self,
@@ -167,7 +185,7 @@ class Escapes:
             yield _Option(left, committed.left(here), GOES_ON)
             turn = divert_to_loiter(path, from_m, to_m, self._local.holds, terrain)
             if turn is not None:
-                yield _Option(turn, None, "no way on can be seen to be safe; turning away")
+                yield _Option(turn, None, TURNING_AWAY)
             if threats is not None:
                 ways.extend(() if ways else rolled_out(prefix, self._local.limits))
                 yield from (_Option(way, way, IN_THE_WAY) for way in ways)
@@ -188,7 +206,7 @@ class Escapes:
             return Escape(best.committed.plan, best.committed)
         if best is not None:
             return self._away(request, best.path, best.reason)
-        if certain:
+        if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
         threats = threats or self._near(request)
         more_than_m = threats.room_m(left) + CLEARER * self._local.path_keeps_m

@@ -18,9 +18,9 @@ from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
 
 HELD = {
-    "aerosonde_forest": "12c81efb3b22c3f2bce31091b45ade3fdb2225d5a193137c0b37315fbbc68950",
-    "polygon_town": "8798be78462d53ee96f5bf2a29641944f5a13f7d6fd64c61172f8612094872c3",
-    "one_of_everything": "a3552cf09c273a3850e18de04f69ea71fe607fdd9653548975940d2b72ef3684",
+    "aerosonde_forest": "4e474ed7e206cadfcfba7a62946e7518b1872a1175077d62a44baac5433a5f5f",
+    "polygon_town": "ea45567a713aa7318639d53a5704a0261d0b37ac714e45593b8e6074dc0a6a65",
+    "one_of_everything": "f9a3b2c5a614f40606e7863f2c8d700d9dc2521980709b8b50d50f43bdfd1299",
 }
 """SHA-256 of the first minute of each."""
 

@@ -11,7 +11,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.geometry.clearance import distances, first_breach, first_entry, inside_bounds
+from planner.geometry.clearance import behind, distances, first_breach, first_entry, inside_bounds
 from planner.geometry.curves import Pose, along, full_turn, pose_at
 from planner.interface import FloatArray, Path
 from tests.examples import examples
@@ -153,3 +153,10 @@ def test_a_disc_about_the_start_bars_only_the_way_deeper_into_it() -> None:
 def test_no_points_and_no_line_are_clear() -> None:
     assert first_entry((0.0, 0.0), (10.0, 0.0), np.zeros((0, 2)), 50.0) == (math.inf, -1)
     assert first_entry((5.0, 5.0), (5.0, 5.0), np.array([(5.0, 5.0)]), 50.0) == (math.inf, -1)
+
+
+def test_what_lies_behind_an_edge_point() -> None:
+    # An edge point 100 m north of the eye that hides 10 m to each side: at 200 m it hides 20 m to each side.
+    places = np.array([(0.0, 99.0), (0.0, 101.0), (19.0, 200.0), (21.0, 200.0), (0.0, -200.0)])
+    hidden = behind(places, (0.0, 0.0), np.array([(0.0, 100.0)]), 10.0)
+    assert hidden.tolist() == [False, True, True, False, False]
