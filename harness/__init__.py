@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from harness.api.campaigns import certify, compare, load_campaign, sweep
     from harness.api.flights import fly, load_run
     from harness.api.metrics import Metrics
-    from harness.api.paths import check
+    from harness.api.paths import check, replay
     from harness.api.results import CampaignResult, ComparisonResult, FlightResult
     from harness.api.stepping import SteppedFlight, make
     from harness.files.crash import PlannerError
@@ -61,6 +61,7 @@ __all__ = [
     "load_run",
     "load_scenario",
     "make",
+    "replay",
     "sweep",
 ]
 
@@ -71,7 +72,7 @@ _HOMES = {
     "harness.api.campaigns": ("certify", "compare", "load_campaign", "sweep"),
     "harness.api.flights": ("fly", "load_run"),
     "harness.api.metrics": ("Metrics",),
-    "harness.api.paths": ("check",),
+    "harness.api.paths": ("check", "replay"),
     "harness.api.results": ("CampaignResult", "ComparisonResult", "FlightResult"),
     "harness.api.stepping": ("SteppedFlight", "make"),
     "harness.files.crash": ("PlannerError",),

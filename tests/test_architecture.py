@@ -136,7 +136,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("api",),
         ("cli",),
         ("certification",),
-        ("bench", "campaign", "comparison", "falsify"),
+        ("bench", "campaign", "comparison", "falsify", "replay"),
         ("learning", "report", "watching"),
         ("run",),
         ("recording",),

@@ -98,6 +98,7 @@ class WaypointLaw:
     def __init__(self, law: GuidanceLaw, acceptance_m: Acceptance, by_passing: bool = True) -> None:
         self._law, self._acceptance_m, self._by_passing = law, acceptance_m, by_passing
         self._progress: RouteProgress | None = None
+        self._leg = -1
 
     def follow(self, route: Route, arc_length_m: float = 0.0) -> None:
         """Takes a new route; the first leg is the first that ends ahead of the place on it."""
@@ -106,6 +107,11 @@ class WaypointLaw:
         self._circle = Route(route.segments[-1:], loiter=True) if route.loiter else None
         self._leg = -1
         self._next_leg()
+
+    @property
+    def leg(self) -> int:
+        """Number of the leg that is flown, from 0; -1 before the first route."""
+        return self._leg
 
     def update(self, state: AircraftState) -> GuidanceOutput:
         """Decides the roll command for the next update interval."""

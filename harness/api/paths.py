@@ -1,4 +1,4 @@
-"""A given path from Python: `check`."""
+"""A given path, and a flown log, from Python: `check`, `replay`."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from harness.scenario.shipped import scenario_path
 
 if TYPE_CHECKING:
     import numpy as np
+
+    from harness.replay.replay import Replay
 
     Points = Sequence[Sequence[float]] | np.ndarray[Any, Any]
 
@@ -87,6 +89,47 @@ def check(
     return FlightResult(
         **{**read, "scenario": check.scenario, "_scratch": scratch, "folder": folder if keep else None}
     )
+
+
+def replay(
+    log: str | Path,
+    aircraft: str,
+    mission: str | Path,
+    *,
+    out: str | Path,
+    settings: Mapping[str, str] | None = None,
+    steady_wind: bool = False,
+    recording: bool = False,
+) -> Replay:
+    """Flies the mission of a flown log with the simulated aircraft, in the wind of that day, and compares the two.
+
+        found = wayproof.replay("flight.parquet", "ultrastick25e", "mission.json", out="replay")
+        found.told["simulated"]["lap_mean_s"] - found.told["flown"]["lap_mean_s"]
+
+    Args:
+        log: a table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...).
+        aircraft: a name that `wayproof list aircraft` prints, or a folder.
+        mission: a file that `wayproof check` takes, or a JSON with `mission.corners_east_north_m`.
+        out: the folder to write.
+        settings: keys of the simulated flight's scenario, by key path; values as YAML.
+        steady_wind: one wind, not the wind as it changed in the log.
+        recording: whether to record both flights for rerun.
+
+    Raises:
+        InputError: log, mission, aircraft or folder cannot be used; nothing was flown.
+    """
+    from harness.replay.replay import replay as flown_anew
+
+    with as_input_errors():
+        return flown_anew(
+            Path(log),
+            aircraft,
+            Path(out),
+            Path(mission),
+            list((settings or {}).items()),
+            windows=not steady_wind,
+            recording=recording,
+        )
 
 
 def _world(scenario: Scenario | str | Path | None, folder: Path) -> Path | None:

@@ -24,7 +24,7 @@ from harness.cli.flights import bench, compare, fly
 from harness.cli.formats import schema, validate
 from harness.cli.names import list_names
 from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag
-from harness.cli.review import report, view
+from harness.cli.review import replay, report, view
 from harness.cli.standard_output import kept_up, results_alone, results_over, say, to_nowhere
 from harness.cli.sweep import sweep
 from harness.cli.world import world
@@ -45,6 +45,7 @@ for command in (
     sweep,
     falsify,
     certify,
+    replay,
     validate,
     schema,
     view,

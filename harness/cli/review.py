@@ -1,4 +1,4 @@
-"""The commands that show what was flown: `view`, `report`."""
+"""The commands that show what was flown: `view`, `report`, `replay`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.cli.options import FAILED, bad_input, flag
+from harness.cli.options import (
+    FAILED,
+    GuidanceOption,
+    JsonOption,
+    SettingsOption,
+    bad_input,
+    chosen,
+    flag,
+    print_json,
+    settings_of,
+)
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -210,3 +220,71 @@ def open_campaign(folder: Path, web: bool = False) -> bool:
         say(f"wayproof: {error}", err=True)
         return False
     return True
+
+
+def replay(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG",
+            help="A table (.parquet, .csv) of flown columns, or a flight log (.ulg, .bin, ...).",
+        ),
+    ],
+    aircraft: Annotated[
+        str, typer.Option(metavar="NAME", help="A name that `wayproof list aircraft` prints, or a folder.")
+    ],
+    mission: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Its mission: a file of `check`, or a JSON with its corners.",
+        ),
+    ] = None,
+    guidance: GuidanceOption = None,
+    settings: SettingsOption = None,
+    steady_wind: Annotated[
+        bool, flag("--steady-wind", "Fly one wind, not the wind as it changed in the log.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write. Default: its own in runs/replay.")
+    ] = None,
+    no_recording: Annotated[bool, flag("--no-recording", "Do not write flight.rrd.")] = False,
+    as_json: JsonOption = False,
+) -> int:
+    """Flies the mission of a flown log with the simulated aircraft, in the wind of that day, and compares the two.
+
+    For example: wayproof replay thor75.parquet --aircraft ultrastick25e --mission thor75.json
+    """
+    from aircraft.airframes import AircraftError
+    from harness.cli.terminal import print_grid
+    from harness.files.errors import RunFolderError, WriteError
+    from harness.replay.page import rows_of
+    from harness.replay.replay import replay as flown_anew
+
+    options = chosen(guidance=guidance)
+    overrides = [*options, *settings_of(settings, options)]
+    folder = out or Path("runs") / "replay" / log.stem
+    try:
+        found = flown_anew(
+            log, aircraft, folder, mission, overrides, windows=not steady_wind, recording=not no_recording
+        )
+    except (RunFolderError, AircraftError) as error:
+        raise bad_input(error) from error
+    except OSError as error:
+        raise WriteError.of("the replay", folder, error) from error
+    if as_json:
+        print_json(found.told)
+        return 0
+    told = found.told
+    wind, between = told["wind"], told["distance_between_m"]
+    say(
+        f"wind: {wind['speed_mps']:.2f} m/s from {wind['from_deg']:.0f} deg, residual {wind['residual_mps']:.2f} m/s"
+        f"{', flown as it changes' if told['wind_windows'] else ''}"
+    )
+    laps = ", ".join(map(str, told["settled_laps"]))
+    print_grid(f"{log.name}: laps {laps}", ("", "flown", "simulated", "difference"), rows_of(told))
+    say(f"distance between the tracks: p50 {between['p50']:.2f} m, p95 {between['p95']:.2f} m")
+    for note in told["notes"]:
+        say(f"note: {note}")
+    say(f"folder: {folder}")
+    return 0

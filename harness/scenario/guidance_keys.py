@@ -132,6 +132,8 @@ def card_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> LawCard | None:
     from aircraft.law_cards.cards import law_card
 
     kind, config = _made_of(spec)
+    if spec.follow == "waypoints" and not getattr(config, "switch_by_passing", True):
+        return None  # it flies to points: where it is beside the legs says nothing of how it tracks
     try:
         with PrintingAside():
             return law_card(

@@ -1,0 +1,239 @@
+"""A flown log beside the same mission simulated: what differs, as a table, a page and a recording of both."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from aircraft.frames import LocalPlane
+from harness.files.errors import RunFolderError
+from harness.files.input_file import InputError
+from harness.files.whole_file import replace_text
+from harness.flight.record import FloatArray
+from harness.replay.flown import FlownFlight, read_flown
+from harness.replay.measures import (
+    between_m,
+    figures,
+    lap_figures,
+    lap_numbers,
+    legs_of,
+    outside_m,
+    whole_laps,
+)
+from harness.replay.mission import FlownMission, Origin, read_mission
+from harness.replay.simulated import Asked, fly_anew, scenario_for
+from harness.replay.wind import FittedWind, fit_wind, fit_windows
+
+INDEX: Final = "replay.json"
+SIMULATED: Final = "simulated"
+"""The run folder of the simulated flight, in the folder of a replay."""
+RECORDING: Final = "flight.rrd"
+SCHEMA: Final = "wayproof/replay/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """A flown flight beside the same mission simulated.
+
+    Attributes:
+        told: content of `replay.json`.
+        flown, simulated: columns of both.
+        corners_m: (k, 2) of the mission.
+        folder: where it was written.
+    """
+
+    told: dict[str, Any]
+    flown: Mapping[str, FloatArray]
+    simulated: Mapping[str, FloatArray]
+    corners_m: FloatArray
+    folder: Path
+
+    def __repr__(self) -> str:
+        """A line for people."""
+        between = self.told["distance_between_m"]
+        return f"Replay({self.told['log']}: tracks {between['p50']:.1f} m apart (median))"
+
+
+def replay(
+    log: Path,
+    aircraft: str,
+    out: Path,
+    mission: Path | None = None,
+    overrides: Sequence[tuple[str, str]] = (),
+    windows: bool = True,
+    recording: bool = True,
+) -> Replay:
+    """Flies the mission of a log with the simulated aircraft in the wind that the log shows.
+
+    Args:
+        log: as `harness.replay.flown.read_flown` takes it.
+        aircraft: a name that `wayproof list aircraft` prints, or a folder.
+        out: folder to write.
+        mission: as `harness.replay.mission.read_mission` takes it; None: corners are told from the log.
+        overrides: keys of the simulated flight's scenario to replace, `guidance.kind` for one, as
+            `harness.scenario.scenario.load_scenario` takes them.
+        windows: the wind changes as the log shows it; else it is steady.
+        recording: whether to write `flight.rrd`.
+
+    Raises:
+        InputError: log, mission or aircraft cannot be used; nothing was flown.
+        RunFolderError: the folder holds something else or cannot be written.
+        AircraftError: the aircraft cannot be loaded or trimmed.
+    """
+    if mission is None:
+        raise InputError(f"{log}: its mission is not known; give --mission FILE")
+    if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / INDEX).exists())):
+        raise RunFolderError(f"{out} holds other things; give a new folder")
+    flown_mission = read_mission(mission)
+    origin = flown_mission.origin or Origin(0.0, 0.0)
+    flight = read_flown(log, LocalPlane(origin.latitude_deg, origin.longitude_deg))
+    wind = fit_wind(flight)
+    winds = (fit_windows(flight) if windows else []) or [wind]
+    asked = _asked(flight, flown_mission, winds, wind)
+    scenario = scenario_for(asked, aircraft, overrides)
+
+    corners = len(flown_mission.corners_m)
+    legs = legs_of(flight, flown_mission, asked.first)
+    laps = flight["lap"] if "lap" in flight else lap_numbers(legs, asked.first, corners, 1)
+    count = int(laps[-1] - laps[0]) + 1
+    out.mkdir(parents=True, exist_ok=True)
+    replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
+    simulated = fly_anew(scenario, asked, count, out / SIMULATED)
+    columns = dict(flight.columns)
+    columns["time_s"] = columns["time_s"] - columns["time_s"][0]
+    if flight.airspeed_mps is not None:
+        columns["airspeed_mps"] = flight.airspeed_mps
+    altitude_m = float(scenario.mission.altitude_m)
+    sides = {
+        "flown": _Side(columns, flown_mission, legs, laps, asked.height_m, _ended(flight, flown_mission)),
+        "simulated": _Side(
+            simulated,
+            flown_mission,
+            simulated["leg"],
+            lap_numbers(simulated["leg"], asked.first, corners, int(laps[0])),
+            altitude_m,
+            ended=bool(simulated["leg"][-1] >= count * corners - 0.5),
+        ),
+    }
+    told = {
+        "schema": SCHEMA,
+        "complete": True,
+        "log": str(log),
+        "aircraft": aircraft,
+        "guidance": dict(scenario.guidance),
+        "wind": wind.told(),
+        "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds] if windows else [],
+        "airspeed_mps": asked.airspeed_mps,
+        "latency_s": scenario.navigation.latency_s,
+        **_compared(sides["flown"], sides["simulated"]),
+        "notes": list(flight.notes),
+    }
+    found = Replay(told, columns, simulated, flown_mission.corners_m, out)
+    _write(found, {"flown": asked.height_m, "simulated": altitude_m}, recording)
+    return found
+
+
+def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Asked:
+    """Where it begins, and with which airspeed and height."""
+    airspeed, commanded = flight.airspeed_mps, mission.airspeed_mps
+    through = np.hypot(flight["ve_mps"] - wind.east_mps, flight["vn_mps"] - wind.north_mps)
+    if commanded is None:
+        commanded = float(np.nanmedian(through if airspeed is None else airspeed))
+    elif "airspeed_tas_mps" in flight and "airspeed_ias_mps" in flight:
+        commanded *= float(np.nanmedian(flight["airspeed_tas_mps"] / flight["airspeed_ias_mps"]))
+    if mission.height_m is not None and "baro_height_m" in flight:
+        height_m = mission.height_m + float(np.nanmedian(flight["up_m"] - flight["baro_height_m"]))
+    else:
+        height_m = float(np.nanmedian(flight["up_m"]))
+    return Asked(flight, mission, _first(flight, mission), winds, commanded, height_m)
+
+
+def _first(flight: FlownFlight, mission: FlownMission) -> int:
+    """The corner that the flight heads for first: the log's, else the one after the nearest."""
+    corners = mission.corners_m
+    if "target_index" in flight and flight["target_index"][0] >= 0:
+        return int(flight["target_index"][0]) % len(corners)
+    away = np.hypot(*(corners - (flight["east_m"][0], flight["north_m"][0])).T)
+    return (int(away.argmin()) + 1) % len(corners)
+
+
+def _ended(flight: FlownFlight, mission: FlownMission) -> bool:
+    """Whether the log ends where a lap does: at corner 0, as near as it comes in two rows."""
+    step_m = float(np.hypot(flight["ve_mps"][-1], flight["vn_mps"][-1])) * float(
+        np.diff(flight["time_s"])[-1]
+    )
+    away = np.hypot(*(mission.corners_m[0] - (flight["east_m"][-1], flight["north_m"][-1])))
+    return bool(away <= (mission.acceptance_m or 0.0) + 2.0 * step_m)
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One of the two flights, as it is measured."""
+
+    columns: Mapping[str, FloatArray]
+    mission: FlownMission
+    legs: FloatArray
+    laps: FloatArray
+    height_m: float
+    ended: bool
+
+    @property
+    def whole(self) -> list[int]:
+        return whole_laps(self.laps, self.legs, len(self.mission.corners_m), self.ended)
+
+    @property
+    def outside(self) -> FloatArray:
+        return outside_m(self.columns, self.mission.corners_m)
+
+    def lap(self, lap: int) -> dict[str, Any]:
+        return lap_figures(self.columns, self.outside, self.laps, self.legs, lap, self.height_m)
+
+
+def _compared(flown: _Side, simulated: _Side) -> dict[str, Any]:
+    """Laps and figures of both."""
+    settled = [lap for lap in flown.whole if lap in simulated.whole]
+    if not settled:
+        missing = "the log" if not flown.whole else "the simulated flight"
+        raise InputError(f"{missing} has no whole lap after lap 1; there is nothing to compare")
+    rows: list[dict[str, Any]] = [
+        {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
+    ]
+    told: dict[str, Any] = {"settled_laps": settled, "laps": rows}
+    for name, side in (("flown", flown), ("simulated", simulated)):
+        pooled = figures(side.columns, side.outside, np.isin(side.laps, settled), side.height_m)
+        told[name] = {
+            "outside_p95_m": pooled["outside_p95_m"],
+            "outside_max_mean_m": float(np.mean([row[name]["outside_max_m"] for row in rows])),
+            "lap_mean_s": float(np.mean([row[name]["time_s"] for row in rows])),
+            **{key: value for key, value in pooled.items() if not key.startswith("outside")},
+        }
+    apart = np.concatenate(
+        [between_m(flown.columns, simulated.columns, flown.laps == k, simulated.laps == k) for k in settled]
+    )
+    told["distance_between_m"] = {"p50": float(np.median(apart)), "p95": float(np.percentile(apart, 95))}
+    return told
+
+
+def _write(found: Replay, heights_m: Mapping[str, float], recording: bool) -> None:
+    """Writes the recording of both, the page and, last, the index."""
+    from harness.replay.page import replay_html
+
+    if recording:
+        from harness.recording.tracks import write_tracks
+
+        tracks = {
+            name: {
+                **columns,
+                "height_m": columns["up_m"] - heights_m[name],
+                "outside_m": outside_m(columns, found.corners_m),
+            }
+            for name, columns in (("flown", found.flown), ("simulated", found.simulated))
+        }
+        write_tracks(f"replay of {found.told['log']}", found.corners_m, tracks, found.folder / RECORDING)
+    replace_text(found.folder / "report.html", replay_html(found))
+    replace_text(found.folder / INDEX, json.dumps(found.told, indent=2) + "\n")

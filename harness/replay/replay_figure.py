@@ -1,0 +1,48 @@
+"""The figure of a replay: both tracks from above, with the corners of the mission."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from harness.report.figure_style import COLOURS, WIDTH_IN, styled
+
+if TYPE_CHECKING:
+    from harness.replay.replay import Replay
+
+
+def replay_figure(found: Replay) -> Figure:
+    """Draws a replay."""
+    with styled(WIDTH_IN) as figure:
+        axes = figure.subplots()
+        corners = np.vstack((found.corners_m, found.corners_m[:1]))
+        axes.plot(*corners.T, color="0.7", lw=1.0, marker="s", ms=4, label="corners of the mission")
+        axes.plot(found.flown["east_m"], found.flown["north_m"], color="0.2", lw=1.4, label="flown")
+        simulated = found.simulated
+        axes.plot(
+            simulated["east_m"],
+            simulated["north_m"],
+            color=COLOURS[1],
+            lw=1.2,
+            ls=(0, (6, 1.5)),
+            label="simulated",
+        )
+        wind = found.told["wind"]
+        towards = math.radians(wind["from_deg"]) + math.pi
+        axes.annotate(
+            f"wind {wind['speed_mps']:.1f} m/s",
+            xy=(0.5 + 0.08 * math.sin(towards), 0.5 + 0.08 * math.cos(towards)),
+            xytext=(0.5 - 0.08 * math.sin(towards), 0.5 - 0.08 * math.cos(towards)),
+            xycoords="axes fraction",
+            arrowprops={"arrowstyle": "->", "color": "0.4"},
+            color="0.4",
+            ha="center",
+        )
+        axes.set_aspect("equal")
+        axes.set_xlabel("east, m")
+        axes.set_ylabel("north, m")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3, frameon=False)
+    return figure

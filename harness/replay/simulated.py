@@ -1,0 +1,203 @@
+"""The mission of a flown flight, flown anew by the simulated aircraft in the wind of that day."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from aircraft.guidance.waypoints import WaypointLaw
+from aircraft.interface import AircraftState
+from harness.files.input_file import InputError
+from harness.flight.closed_loop import Loop
+from harness.flight.record import FloatArray, Outcome
+from harness.flight.termination import Ending
+from harness.replay.flown import FlownFlight
+from harness.replay.mission import FlownMission
+from harness.replay.wind import FittedWind
+from harness.run.path_flight import GivenPath
+from harness.run.scenario_flight import fly_to_folder, make_loop
+from harness.run_files.run_folder import load_run
+from harness.scenario.scenario import Scenario, scenario_of
+from planner.interface import Path as PlannedPath
+
+DEFAULT_LAW: Final = "bearing"
+"""Gain 1.5, and no switch by passing."""
+LATENCY_S: Final = 0.12
+"""Age of the state that the law works with: the delay that autopilots take for a satellite receiver."""
+ABOUT_M: Final = 1000.0
+LOW_M: Final = 50.0
+UNKNOWN_ALTITUDE_M: Final = 300.0
+"""A log whose heights are not above the sea is flown here."""
+LONGER: Final = 1.25
+"""The simulated aircraft has this share of the flown time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is flown anew.
+
+    Attributes:
+        flight: what was flown.
+        mission: its mission.
+        first: number of the corner that it was heading for at its first row.
+        winds: as fitted, time rising from the first row.
+        airspeed_mps: true airspeed that was commanded.
+        height_m: that was commanded, as `up_m` has it.
+    """
+
+    flight: FlownFlight
+    mission: FlownMission
+    first: int
+    winds: Sequence[FittedWind]
+    airspeed_mps: float
+    height_m: float
+
+    def route_m(self, laps: int) -> FloatArray:
+        """(n, 2): from where the log begins through the corners, lap for lap, and half way on: its end is no corner."""
+        corners = self.mission.corners_m
+        order = (self.first + np.arange(laps * len(corners))) % len(corners)
+        start = np.array((self.flight["east_m"][0], self.flight["north_m"][0]))
+        beyond = 0.5 * (corners[order[-1]] + corners[(order[-1] + 1) % len(corners)])
+        return np.vstack((start, corners[order], beyond))
+
+
+class LapsEnd:
+    """Over once all legs are flown, or the time is up. Implements `Termination`.
+
+    Args:
+        law: that flies the legs.
+        legs: number of them.
+        limit_s: time limit.
+    """
+
+    contact_m = math.inf
+
+    def __init__(self, law: WaypointLaw, legs: int, limit_s: float) -> None:
+        self._law, self._legs, self._limit_s = law, legs, limit_s
+        self._before_s = 0.0
+        self.switches_s: list[float] = []
+        """Times of the updates in which a corner was reached."""
+
+    def to_go_m(self, state: AircraftState) -> float:
+        """Nothing is known of it."""
+        return math.nan
+
+    def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
+        """How the flight ends now; None while it goes on."""
+        self.switches_s += [self._before_s] * (max(self._law.leg, 0) - len(self.switches_s))
+        self._before_s = state.time_s
+        if fault is not None:
+            return Ending(Outcome.LOST_CONTROL, fault)
+        if state.time_s >= self._limit_s:
+            return Ending(Outcome.TIMEOUT, f"not all corners after {state.time_s:.0f} s")
+        if state.time_s > 0.0 and self._law.leg >= self._legs:
+            return Ending(Outcome.REACHED, f"all corners flown to after {state.time_s:.0f} s")
+        return None
+
+
+def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str]] = ()) -> Scenario:
+    """The flight as a scenario.
+
+    Args:
+        asked: what is flown anew.
+        aircraft: a name that `wayproof list aircraft` prints, or a folder.
+        overrides: keys to replace, as `harness.scenario.scenario.load_scenario` takes them.
+
+    Raises:
+        InputError: the aircraft cannot fly it.
+    """
+    flight, mission = asked.flight, asked.mission
+    places = np.vstack((np.column_stack((flight["east_m"], flight["north_m"])), mission.corners_m))
+    low, high = places.min(axis=0) - ABOUT_M, places.max(axis=0) + ABOUT_M
+    start, goal = places[0], mission.corners_m[asked.first]
+    far = max(float(np.hypot(*(goal - start))), 2.0)
+    origin = mission.origin
+    altitude_m = asked.height_m + (origin.altitude_m if origin else 0.0)
+    winds = [(wind.time_s, wind.speed_mps, wind.from_deg) for wind in asked.winds]
+    keys: dict[str, Any] = {
+        "schema": "wayproof/scenario/1",
+        "name": "replay",
+        "area": {"bounds_m": [*low.tolist(), *high.tolist()]},
+        "mission": {
+            "start_m": start.tolist(),
+            "course_deg": math.degrees(math.atan2(flight["ve_mps"][0], flight["vn_mps"][0])) % 360.0,
+            "goal_m": goal.tolist() if far > 2.0 else [start[0], start[1] + 10.0],
+            "goal_radius_m": min(0.5 * far, 10.0),
+            "altitude_m": altitude_m if altitude_m >= LOW_M else UNKNOWN_ALTITUDE_M,
+            "time_limit_s": LONGER * float(flight["time_s"][-1] - flight["time_s"][0]) + 60.0,
+        },
+        "aircraft": {"model": aircraft, "airspeed_mps": asked.airspeed_mps},
+        "guidance": {
+            "kind": DEFAULT_LAW,
+            "follow": "waypoints",
+            **({} if mission.acceptance_m is None else {"acceptance_radius_m": mission.acceptance_m}),
+        },
+        "navigation": {
+            "kind": "gnss",
+            **dict.fromkeys(("position_sigma_m", "velocity_sigma_mps", "heading_sigma_deg"), 0.0),
+            **dict.fromkeys(("airspeed_sigma_mps", "altitude_sigma_m"), 0.0),
+            "latency_s": LATENCY_S,
+        },
+        "environment": {
+            "wind": {
+                "speed_mps": winds[0][1],
+                "from_deg": winds[0][2],
+                "changes": [list(row) for row in winds if row[0] > 0.0],
+            }
+        },
+    }
+    if origin:
+        keys["area"]["origin"] = {"latitude_deg": origin.latitude_deg, "longitude_deg": origin.longitude_deg}
+    scenario = scenario_of(keys, overrides)
+    if scenario.guidance.follow != "waypoints":
+        raise InputError(
+            "command line: guidance.follow: is path; must be waypoints, as the log's corners are flown to"
+        )
+    return scenario
+
+
+def fly_anew(scenario: Scenario, asked: Asked, laps: int, folder: Path) -> dict[str, FloatArray]:
+    """Flies it into a run folder.
+
+    Args:
+        scenario: of `scenario_for`.
+        asked: what is flown anew.
+        laps: so many times round.
+        folder: the run folder.
+
+    Returns:
+        Columns of the track, with the number of the leg in `leg`.
+
+    Raises:
+        AircraftError: the aircraft cannot be loaded or trimmed.
+        RunFolderError: the folder holds something else or cannot be written.
+    """
+    points = asked.route_m(laps)
+    ways = np.diff(points, axis=0)
+    length = np.hypot(*ways.T)
+    lines = length > 1e-6
+    points, ways, length = points[:-1][lines], ways[lines], length[lines]
+    segments = np.column_stack((points, ways / length[:, None], np.zeros(len(length)), length))
+    ends: list[LapsEnd] = []
+
+    def make(scenario: Scenario) -> Loop:
+        loop = make_loop(scenario)
+        law = loop.guidance
+        assert isinstance(law, WaypointLaw)
+        ends.append(LapsEnd(law, len(segments) - 1, scenario.mission.time_limit_s or math.inf))
+        planner = GivenPath(points, PlannedPath(segments))
+        return replace(loop, sensor=None, planner=planner, termination=ends[-1])
+
+    fly_to_folder(scenario, folder, recording=False, make=make, pilot="replay")
+    track = load_run(folder).track
+    columns = {
+        name: np.asarray(getattr(track, name), dtype=np.float64)
+        for name in ("time_s", "east_m", "north_m", "up_m", "roll_deg", "airspeed_mps")
+    }
+    columns["leg"] = np.searchsorted(ends[0].switches_s, columns["time_s"] + 1e-6).astype(np.float64)
+    return columns

@@ -1,0 +1,102 @@
+"""The wind of a flown flight: what explains its speed over the ground by its airspeed, without a heading.
+
+Least squares of | ground velocity - wind | = airspeed (Gauss-Newton). Where no airspeed is known, one for all rows is
+fitted with the wind. The aircraft must turn: in straight flight only the wind along the way shows.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.files.input_file import InputError
+from harness.flight.record import FloatArray
+from harness.replay.flown import FlownFlight
+
+STEPS = 50
+LEAST_TURN_DEG = 60.0
+"""Courses of a window must span this much."""
+WINDOW_S, WINDOW_EVERY_S = 20.0, 10.0
+"""Winds that change are fitted to windows that long, so often: about half a lap of a small square."""
+
+
+@dataclass(frozen=True)
+class FittedWind:
+    """A wind.
+
+    Attributes:
+        east_mps, north_mps: the direction it blows towards.
+        residual_mps: root mean square of what is left of the airspeed.
+        time_s: middle of the window; 0 for a whole flight.
+    """
+
+    east_mps: float
+    north_mps: float
+    residual_mps: float
+    time_s: float = 0.0
+
+    @property
+    def speed_mps(self) -> float:
+        """Its speed."""
+        return math.hypot(self.east_mps, self.north_mps)
+
+    @property
+    def from_deg(self) -> float:
+        """Where it blows from, clockwise from north."""
+        return math.degrees(math.atan2(-self.east_mps, -self.north_mps)) % 360.0
+
+    def told(self) -> dict[str, float]:
+        """For `replay.json`."""
+        return {"speed_mps": self.speed_mps, "from_deg": self.from_deg, "residual_mps": self.residual_mps}
+
+
+def fit_wind(flight: FlownFlight, time_s: float = 0.0) -> FittedWind:
+    """The one wind that explains a flight best.
+
+    Raises:
+        InputError: the flight does not turn enough to tell it.
+    """
+    velocity = np.array((flight["ve_mps"], flight["vn_mps"]))
+    airspeed = flight.airspeed_mps
+    known = np.isfinite(velocity).all(axis=0) & (True if airspeed is None else np.isfinite(airspeed))
+    velocity = velocity[:, known]
+    airspeed = None if airspeed is None else airspeed[known]
+    if _turned_deg(velocity) < LEAST_TURN_DEG:
+        raise InputError(
+            f"{flight.source}: turns by less than {LEAST_TURN_DEG:g} deg; the wind cannot be told"
+        )
+    wind, common = np.zeros(2), float(np.hypot(*velocity).mean())
+    for _ in range(STEPS):
+        through = velocity - wind[:, None]
+        speed = np.maximum(np.hypot(*through), 1e-6)
+        left = speed - (common if airspeed is None else airspeed)
+        slopes = -(through / speed).T
+        if airspeed is None:
+            slopes = np.column_stack((slopes, -np.ones(len(speed))))
+        change = np.linalg.lstsq(slopes, -left, rcond=None)[0]
+        wind = wind + change[:2]
+        common += float(change[2]) if airspeed is None else 0.0
+        if float(np.abs(change).max()) < 1e-9:
+            break
+    return FittedWind(float(wind[0]), float(wind[1]), float(np.sqrt(np.mean(left**2))), time_s)
+
+
+def fit_windows(flight: FlownFlight) -> list[FittedWind]:
+    """The winds of windows one after the other; none of those in which the aircraft does not turn enough."""
+    times: FloatArray = flight["time_s"] - flight["time_s"][0]
+    found = []
+    for middle_s in np.arange(0.0, times[-1] + WINDOW_EVERY_S, WINDOW_EVERY_S).tolist():
+        rows = np.flatnonzero(np.abs(times - middle_s) <= 0.5 * WINDOW_S)
+        if len(rows) >= 3 and times[rows[-1]] - times[rows[0]] >= 0.5 * WINDOW_S - 1.0:
+            try:
+                found.append(fit_wind(flight.rows(rows), middle_s))
+            except InputError:
+                continue
+    return found
+
+
+def _turned_deg(velocity: FloatArray) -> float:
+    course = np.unwrap(np.arctan2(velocity[0], velocity[1]))
+    return math.degrees(float(np.ptp(course)))

@@ -1,0 +1,138 @@
+"""`replay`: the wind against one that was put in, measures against shapely-free geometry, Thor against its own json."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+import wayproof
+from harness.cli.app import main
+
+FLOWN = Path(__file__).parents[4] / "shared" / "flown"
+needs_flown = pytest.mark.skipif(not (FLOWN / "thor75.json").is_file(), reason="shared/flown is not here")
+SQUARE = [[0, 0], [150, 0], [150, 150], [0, 150]]
+
+
+def circles(tmp_path: Path, wind: tuple[float, float], laps: int = 4) -> tuple[Path, Path]:
+    """A log of circles through the air at 18 m/s that drift not: about the middle of a square, in a wind."""
+    time_s = np.arange(0.0, 40.0 * laps, 0.1)
+    angle = math.tau * time_s / 40.0
+    air = 18.0
+    through = np.array(
+        [np.cos(angle), np.sin(angle)]
+    )  # direction over the ground; speed by the wind triangle
+    along = through.T @ np.array(wind)
+    speed = along + np.sqrt(along**2 - (wind[0] ** 2 + wind[1] ** 2) + air**2)
+    columns = {
+        "time_s": time_s,
+        "east_m": 75.0 + 90.0 * np.sin(angle),
+        "north_m": 75.0 - 90.0 * np.cos(angle),
+        "up_m": np.full_like(time_s, 300.0),
+        "ve_mps": speed * through[0],
+        "vn_mps": speed * through[1],
+        "airspeed_tas_mps": np.full_like(time_s, air),
+        "lap": 1.0 + np.floor(time_s / 40.0),
+    }
+    log, mission = tmp_path / "log.parquet", tmp_path / "mission.json"
+    pq.write_table(pa.table(columns), log)
+    keys = {"corners_east_north_m": SQUARE, "acceptance_radius_m": 45.0, "bank_limit_deg": 45.0}
+    mission.write_text(json.dumps({"mission": keys}))
+    return log, mission
+
+
+def test_a_wind_that_was_put_in_is_found_and_measures_are_those_of_geometry(tmp_path: Path) -> None:
+    log, mission = circles(tmp_path, (4.0, -3.0))
+    found = wayproof.replay(
+        log, "aerosonde", mission, out=tmp_path / "out", settings={"aircraft.airspeed_mps": "18"}
+    )
+    told = found.told
+    assert told["wind"]["speed_mps"] == pytest.approx(5.0, abs=0.01)
+    assert told["wind"]["from_deg"] == pytest.approx(math.degrees(math.atan2(-4.0, 3.0)) % 360, abs=0.2)
+    assert told["wind"]["residual_mps"] < 1e-3
+    east, north = found.flown["east_m"], found.flown["north_m"]
+    settled = np.isin(found.flown["lap"], told["settled_laps"])
+    beyond = np.hypot(
+        np.maximum(np.maximum(-east, east - 150.0), 0.0), np.maximum(np.maximum(-north, north - 150.0), 0.0)
+    )
+    assert told["flown"]["outside_p95_m"] == pytest.approx(np.percentile(beyond[settled], 95), abs=1e-6)
+    assert told["flown"]["lap_mean_s"] == pytest.approx(40.0, abs=0.11)
+    assert json.loads((tmp_path / "out" / "replay.json").read_text()) == told
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert f"{told['flown']['outside_p95_m']:.2f}" in page
+
+
+@needs_flown
+def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "thor"
+    arguments = ["--aircraft", "ultrastick25e", "--mission", str(FLOWN / "thor75.json"), "--out", str(out)]
+    assert main(["replay", str(FLOWN / "thor75.parquet"), *arguments, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    facts = json.loads((FLOWN / "thor75.json").read_text())
+    assert told["settled_laps"] == [2, 3]
+    of_laps = [facts["laps"][lap] for lap in "23"]
+    assert told["flown"]["lap_mean_s"] == pytest.approx(np.mean([lap["time_s"] for lap in of_laps]), abs=0.02)
+    worst = np.mean([lap["outside_square_m"]["max"] for lap in of_laps])
+    assert told["flown"]["outside_max_mean_m"] == pytest.approx(worst, abs=0.02)
+    wind = facts["all_laps_of_this_file"]["wind_fit"]
+    assert told["wind"]["speed_mps"] == pytest.approx(wind["speed_mps"], abs=0.1)
+    assert told["wind"]["from_deg"] == pytest.approx(wind["from_deg"], abs=2.0)
+    assert told["wind"]["residual_mps"] == pytest.approx(wind["residual_rms_mps"], abs=0.05)
+    flown, simulated = told["flown"], told["simulated"]
+    assert simulated["outside_p95_m"] == pytest.approx(flown["outside_p95_m"], rel=0.1)
+    assert simulated["outside_max_mean_m"] == pytest.approx(flown["outside_max_mean_m"], rel=0.1)
+    assert simulated["lap_mean_s"] == pytest.approx(flown["lap_mean_s"], rel=0.02)
+    assert told["distance_between_m"]["p50"] <= 3.0
+    assert (out / "flight.rrd").stat().st_size > 100_000
+    again = wayproof.load_run(out / "simulated")
+    assert again.digest == wayproof.fly(again.scenario).digest or again.outcome == "reached"
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"mission": {"acceptance_radius_m": 10}}, "mission.corners_east_north_m: is missing"),
+        ({"mission": {"corners_east_north_m": [[0, 0], [1]]}}, "must be two or more pairs"),
+        ({"mission": {"corners_east_north_m": SQUARE, "bank_limit_deg": "45"}}, "bank_limit_deg: is '45'"),
+    ],
+)
+def test_a_wrong_mission_is_told(
+    tmp_path: Path, change: dict[str, Any], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
+    mission.write_text(json.dumps(change))
+    out = tmp_path / "out"
+    assert (
+        main(["replay", str(log), "--aircraft", "aerosonde", "--mission", str(mission), "--out", str(out)])
+        == 2
+    )
+    assert told in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_log_that_lacks_a_column_or_goes_straight_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, mission = circles(tmp_path, (0.0, 1.0), laps=2)
+    arguments = ["--aircraft", "aerosonde", "--mission", str(mission), "--out", str(tmp_path / "out")]
+    table = pq.read_table(log)
+    pq.write_table(table.drop_columns(["north_m"]), log)
+    assert main(["replay", str(log), *arguments]) == 2
+    assert "has no column north_m" in capsys.readouterr().err
+    straight = {
+        **{name: table[name] for name in table.column_names},
+        "ve_mps": pa.array(np.full(len(table), 9.0)),
+    }
+    pq.write_table(pa.table({**straight, "vn_mps": pa.array(np.full(len(table), 9.0))}), log)
+    assert main(["replay", str(log), *arguments]) == 2
+    assert "the wind cannot be told" in capsys.readouterr().err
+    assert main(["replay", str(log), "--aircraft", "aerosonde"]) == 2
+    assert "give --mission FILE" in capsys.readouterr().err
