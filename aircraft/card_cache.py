@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 import os
@@ -42,12 +43,17 @@ def cached(
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         with file.open("rb") as opened:
             kept = json.loads(opened.read(MAX_BYTES))
-        if kept["digest"] == digest:
+        if kept["digest"] == digest and kept["sha256"] == _sha256(kept["result"]):
             return read(kept["result"])
     result: dict[str, Any] = json.loads(json.dumps(measure()))
     with suppress(OSError):
-        _write(file, json.dumps({"digest": digest, "result": result}, indent=1))
+        _write(file, json.dumps({"digest": digest, "sha256": _sha256(result), "result": result}, indent=1))
     return read(result)
+
+
+def _sha256(result: dict[str, Any]) -> str:
+    """Of what was measured, so that no number of it is edited unseen."""
+    return hashlib.sha256(json.dumps(result, sort_keys=True).encode()).hexdigest()
 
 
 def is_kept(title: str, digest: str) -> bool:

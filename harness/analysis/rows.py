@@ -317,7 +317,8 @@ def to_csv(rows: Sequence[Row]) -> str:
     writer = csv.DictWriter(text, [field.name for field in fields(Row)], lineterminator="\n")
     writer.writeheader()
     for row in rows:
-        writer.writerow(asdict(row))
+        cells = asdict(row).items()
+        writer.writerow({key: printable(cell) if isinstance(cell, str) else cell for key, cell in cells})
     return text.getvalue()
 
 

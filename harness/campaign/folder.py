@@ -16,14 +16,14 @@ from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Final
 
 from aircraft.airframes import airframe
-from harness.campaign.journal import JOURNAL, columns, read_journal, rows, time_rows
+from harness.campaign.journal import JOURNAL, columns, read_journal, rows, sealed, time_rows
 from harness.campaign.results import INDEX, RESULTS, SCHEMA, TIMES, TIMINGS, table
 from harness.campaign.runs import CampaignRuns
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.files.input_file import read_index
 from harness.files.versions import versions
-from harness.files.whole_file import PARTIAL, replace_text
+from harness.files.whole_file import PARTIAL, append_to, replace_text, replacing
 from harness.files.wording import counted
 from planner.registry import distribution_of
 
@@ -64,7 +64,7 @@ class CampaignFolder:
         self._stack = ExitStack()
         try:
             self.done = self._claim(resume)
-            self._journal: IO[bytes] = self._stack.enter_context((path / JOURNAL).open("ab"))
+            self._journal: IO[bytes] = self._stack.enter_context(append_to(path / JOURNAL))
         except OSError as error:
             self._stack.close()
             raise RunFolderError(f"cannot write the campaign {path}: {error.strerror or error}") from error
@@ -74,8 +74,7 @@ class CampaignFolder:
 
     def append(self, run: int, row: Mapping[str, Any], times: Mapping[str, Any], held: bool = False) -> None:
         """Puts a run that is over on the disk."""
-        line = json.dumps({"run": run, "row": row, "times": times, "held": held}, allow_nan=False)
-        self._journal.write(line.encode() + b"\n")
+        self._journal.write(sealed({"run": run, "row": row, "times": times, "held": held}))
         self._journal.flush()
         os.fsync(self._journal.fileno())
         self.done.add(run)
@@ -110,12 +109,8 @@ class CampaignFolder:
     def _write_table(self, name: str, content: pa.Table) -> None:
         import pyarrow.parquet as pq
 
-        partial = self.path / (name + PARTIAL)
-        with partial.open("wb") as file:
+        with replacing(self.path / name) as file:
             pq.write_table(content, file, compression="zstd")
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(self.path / name)
 
     def _claim(self, resume: bool) -> set[int]:
         """Locks the folder, checks and writes its index; returns the runs that are over."""

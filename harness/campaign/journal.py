@@ -6,6 +6,7 @@ was written is damage: no more is made of the journal then, for what it holds wo
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from harness.campaign.runs import CampaignRuns
 
 JOURNAL: Final = "journal.jsonl"
+SEAL: Final = "sha256"
+"""Key of the SHA-256 of what a line tells."""
 
 
 @dataclass(frozen=True)
@@ -99,12 +102,21 @@ def read_journal(folder: Path) -> Journal:
             break
         if line is None or not _is_over(line):
             raise _damaged(path, number, "no run")
+        if sealed(line) != text:
+            raise _damaged(path, number, "something else than was written: its sha256 is another")
         run, over = line["run"], Over(line["row"], line["times"], line.get("held") is True)
         if runs.setdefault(run, over) != over:
             raise _damaged(path, number, f"run {run} otherwise than line {lines[run]}")
         lines.setdefault(run, number)
         end += len(text)
     return Journal(path, runs, lines, end)
+
+
+def sealed(told: Mapping[str, Any]) -> bytes:
+    """The line that tells of a run: `run`, `row`, `times` and what else there is, with the SHA-256 of all that."""
+    text = json.dumps({key: value for key, value in told.items() if key != SEAL}, allow_nan=False)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return f'{text[:-1]}, "{SEAL}": "{digest}"}}\n'.encode()
 
 
 def _texts(path: Path) -> Iterator[tuple[bytes, bool]]:

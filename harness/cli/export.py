@@ -43,6 +43,7 @@ def export(
     """
     from harness.files.errors import RunFolderError
     from harness.files.input_file import InputError
+    from harness.files.whole_file import replace_bytes
     from harness.run_files.exports.export import exported
     from harness.run_files.run_folder import WRONG_CONTENT, damaged, load_run
 
@@ -57,7 +58,7 @@ def export(
     if out is None:
         _write(file.content)
     else:
-        out.write_bytes(file.content)
+        replace_bytes(out, file.content)
     for note in file.notes:
         say(note, err=True)
     return 0

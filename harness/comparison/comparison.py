@@ -135,12 +135,14 @@ def _compared(
     chapters = []
     for name, own in by_name.items():
         flights = [each for each in entries if each.row.scenario == name]
+        if (out / name).is_symlink():  # of a folder that somebody sent
+            (out / name).unlink()
         (out / name).mkdir(exist_ok=True)
         _overlay(out / name, flights)
         chapters.append(chapter(out / name, own[0], flights, optima[name]))
-    (out / CSV).write_text(to_csv(done.rows), encoding="utf-8")
-    (out / MARKDOWN).write_text(_markdown(done), encoding="utf-8")
-    (out / REPORT).write_text(_report(done, chapters), encoding="utf-8")
+    replace_text(out / CSV, to_csv(done.rows))
+    replace_text(out / MARKDOWN, _markdown(done))
+    replace_text(out / REPORT, _report(done, chapters))
     _write_index(out, done, complete=True)
     return done
 

@@ -19,6 +19,7 @@ from harness.falsify.keys import Load, Vary, scenario_at
 from harness.falsify.search import Judge, Point, Searched, Verdict, search
 from harness.files.crash import sentence
 from harness.files.strict_yaml import InputError
+from harness.files.whole_file import replace_text
 from harness.scenario.scenario import Scenario, dump_scenario
 
 Until: TypeAlias = Literal["failed", "untrackable"]
@@ -178,9 +179,8 @@ def falsify(
         result = _breaking(base, vary, until, conditions, tolerance, searched, trials)
         if result.found is not None:
             failing = scenario_at(load, vary, result.found.displacement)
-            (out / FALSIFIED).write_text(
-                dump_scenario(failing.model_copy(update={"seed": result.found.seed})), encoding="utf-8"
-            )
+            text = dump_scenario(failing.model_copy(update={"seed": result.found.seed}))
+            replace_text(out / FALSIFIED, text)
         if len(vary) == 2:
             from harness.falsify.figure import write_figure
 

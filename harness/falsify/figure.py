@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from harness.falsify.keys import Vary, number_text
+from harness.files.whole_file import replace_bytes
 from harness.report.figure_style import colour, png, styled, svg
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ def write_figure(breaking: Breaking, paths: Sequence[Path]) -> None:
     """Writes the figure of a search over two keys, as SVG or PNG by the name of each file."""
     figure = drawn(breaking)
     for path in paths:
-        path.write_bytes(png(figure) if path.suffix == ".png" else svg(figure))
+        replace_bytes(path, png(figure) if path.suffix == ".png" else svg(figure))
 
 
 def drawn(breaking: Breaking) -> Figure:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
@@ -17,7 +18,7 @@ from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.files.input_file import read_index
 from harness.files.strict_yaml import InputError
-from harness.files.whole_file import PARTIAL, replace_text
+from harness.files.whole_file import PARTIAL, fresh, replace_text
 
 SCHEMA: Final = "wayproof/falsify/1"
 INDEX: Final = "falsify.json"
@@ -93,7 +94,7 @@ class SearchFolder:
                     f"{out} is not empty and not a search: choose another folder or empty it first"
                 )
             self._file = stack.enter_context(
-                (out / (TRIALS + PARTIAL)).open("w", encoding="utf-8", newline="")
+                io.TextIOWrapper(fresh(out / (TRIALS + PARTIAL)), "utf-8", newline="")
             )
             self._plain = [each.name for each in fields(Trial) if each.name not in ("displacement", "values")]
             names = [*self._plain[:2], *(each.key for each in vary), *self._plain[2:]]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 
 class RunFolderError(ValueError):
     """A run folder cannot be made or read; the message is one sentence that says why."""
@@ -15,5 +13,5 @@ class WriteError(OSError):
     @classmethod
     def of(cls, what: str, folder: object, error: OSError) -> WriteError:
         """The error about something that was being written to a folder when another error came."""
-        reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())
+        reason = error.strerror or " ".join(str(error).split())
         return cls(f"cannot write {what} in {folder} ({reason}); it is marked incomplete")

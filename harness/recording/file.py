@@ -14,6 +14,7 @@ from typing import Final, Protocol
 
 import rerun as rr
 
+from harness.files.whole_file import fresh
 from harness.recording.layout import Layout
 
 ANSWER_S: Final = 5.0
@@ -105,7 +106,7 @@ class RecordingFile:
 
     def __init__(self, rec: rr.RecordingStream, path: Path, default_blueprint: Layout) -> None:
         self._rec, self._path = rec, path
-        self._file = path.open("wb", buffering=0)
+        self._file = fresh(path)
         self._out, into = os.pipe()
         self._fault: OSError | None = None
         self._mover = threading.Thread(target=self._move, name="recording", daemon=True)

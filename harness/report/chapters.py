@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from harness.analysis.planned import PlannedRows, planned_rows
 from harness.analysis.rows import Row, number, row_of
 from harness.files.errors import RunFolderError
+from harness.files.whole_file import replace_bytes
 from harness.files.wording import counted
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
@@ -218,8 +219,8 @@ def _picture(stem: Path, figure: Any, caption: str) -> Picture:
     from harness.report.page import Picture
 
     content = svg(figure)
-    stem.with_name(f"{stem.name}.svg").write_bytes(content)
-    stem.with_name(f"{stem.name}.png").write_bytes(png(figure))
+    replace_bytes(stem.with_name(f"{stem.name}.svg"), content)
+    replace_bytes(stem.with_name(f"{stem.name}.png"), png(figure))
     return Picture(content, caption, caption)
 
 

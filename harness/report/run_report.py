@@ -69,11 +69,11 @@ def _written(run: Run, folder: Path) -> Path:
         platform=manifest["platform"]["system"],
         written=manifest["started_utc"],
     )
-    page.with_suffix(".csv").write_text(to_csv([flight.row]), encoding="utf-8")
+    replace_text(page.with_suffix(".csv"), to_csv([flight.row]))
     # A line of code shows HTML and does not follow it; a program that makes HTML of all of it must not either.
     shown = printable(" ".join(command.splitlines())).replace("<", "&lt;")
     repeat = f"## How to repeat it\n\n    {shown}\n\nDigest of the track: `{escaped(flight.row.digest)}`\n"
-    page.with_suffix(".md").write_text(f"{to_markdown([flight.row])}\n{repeat}", encoding="utf-8")
+    replace_text(page.with_suffix(".md"), f"{to_markdown([flight.row])}\n{repeat}")
     replace_text(page, text)
     return page
 

@@ -15,6 +15,7 @@ import os
 import platform
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,7 +26,7 @@ from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.files.input_file import MAX_JSON_BYTES, read_index, read_text
 from harness.files.versions import FLOWN_WITH, versions
-from harness.files.whole_file import PARTIAL, replace_text
+from harness.files.whole_file import PARTIAL, replace_text, replacing
 from harness.flight.record import (
     BELIEVED_FIELDS,
     TRACK_COLUMNS,
@@ -61,6 +62,9 @@ REPORT_FILES = tuple(
 """What `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000
 """Of a scenario and of a JSON file in the folder."""
+
+HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, RECORDING)
+"""Files whose SHA-256 the manifest of a complete run has."""
 
 SCHEMA = "wayproof/run/1"
 DISTRIBUTIONS = (*FLOWN_WITH, "rerun-sdk", "pyarrow")
@@ -139,13 +143,17 @@ class RunFolder:
                 "cpus": os.cpu_count(),
             },
         }
+        made = [each for each in (path, *path.parents) if not each.exists()]
         try:
             lock = _claim(path)
-            replace_text(path / MANIFEST, _json(manifest))
-            for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, *REPORT_FILES):
-                (path / name).unlink(missing_ok=True)
-                (path / (name + PARTIAL)).unlink(missing_ok=True)
-            replace_text(path / SCENARIO, scenario_yaml)
+            with ExitStack() as undo:
+                undo.callback(_take_back, path, made)
+                replace_text(path / MANIFEST, _json(manifest))
+                for name in (METRICS, PLANS, TRACK, SCENARIO, RECORDING, *REPORT_FILES):
+                    (path / name).unlink(missing_ok=True)
+                    (path / (name + PARTIAL)).unlink(missing_ok=True)
+                replace_text(path / SCENARIO, scenario_yaml)
+                undo.pop_all()
         except OSError as error:
             raise RunFolderError(f"cannot write the run folder {path}: {error.strerror or error}") from error
         return cls(path, manifest, lock)
@@ -176,11 +184,10 @@ class RunFolder:
             "use_byte_stream_split": [each for each in rows.column_names if each != WHOLE],
         }
         for name, table, how in ((TRACK, rows, split), (PLANS, plans_table(plans), {})):
-            pq.write_table(table, self.path / (name + PARTIAL), compression=COMPRESSION, **how)
-            os.replace(self.path / (name + PARTIAL), self.path / name)
+            with replacing(self.path / name) as file:
+                pq.write_table(table, file, compression=COMPRESSION, **how)
         replace_text(self.path / METRICS, text)
-        tables = (TRACK, PLANS, RECORDING)
-        sums = {name: _sha256(self.path / name) for name in tables if (self.path / name).exists()}
+        sums = {name: _sha256(self.path / name) for name in HASHED if (self.path / name).exists()}
         replace_text(self.path / MANIFEST, _json({**self._manifest, "complete": True, "sha256": sums}))
 
     def __enter__(self) -> RunFolder:
@@ -234,7 +241,7 @@ def load_run(path: Path) -> Run:
     import pyarrow.parquet as pq
 
     try:
-        for name in (TRACK, PLANS):
+        for name in (TRACK, PLANS, METRICS, SCENARIO):
             _check(path / name, manifest)
         table = pq.read_table(path / TRACK)
         columns = {
@@ -290,7 +297,9 @@ def recording_of(path: Path) -> Path:
         _there(path)
         raise RunFolderError(f"{path} has no {RECORDING}: not a run folder, or flown with --no-recording")
     try:
-        _check(recording, read_index(path / MANIFEST, SCHEMA) or {})
+        manifest = read_index(path / MANIFEST, SCHEMA) or {}
+        for name in manifest.get("sha256", {}):
+            _check(path / name, manifest)
     except (OSError, *WRONG_CONTENT) as error:
         raise damaged(path, error) from error
     return recording
@@ -301,7 +310,7 @@ def _check(path: Path, manifest: Mapping[str, Any]) -> None:
     if not path.is_file():
         raise ValueError(f"{path.name} is missing or not a file")
     if manifest.get("sha256", {}).get(path.name) not in (None, _sha256(path)):
-        raise ValueError(f"{path.name} is not what was written")
+        raise ValueError(f"{path.name} is not what was written: its sha256 is not that in {MANIFEST}")
 
 
 def _claim(path: Path) -> FolderLock:
@@ -319,6 +328,15 @@ def _claim(path: Path) -> FolderLock:
             f"{path} is not empty and not a run folder: choose another folder or empty it first"
         )
     return lock
+
+
+def _take_back(path: Path, made: Sequence[Path]) -> None:
+    """Removes the manifest of a run that could not begin, in a folder that was made for it, and the folder."""
+    if path in made:
+        with suppress(OSError):
+            (path / MANIFEST).unlink(missing_ok=True)
+            for each in made:
+                each.rmdir()
 
 
 def _json(content: Mapping[str, Any]) -> str:

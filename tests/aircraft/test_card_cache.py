@@ -73,6 +73,15 @@ def test_a_corrupt_file_is_made_anew(folder: Path, wreck: str) -> None:
     assert measure.times == 2
 
 
+def test_an_edited_number_is_measured_anew(folder: Path) -> None:
+    measure = Measurement()
+    first = cached("a", "d" * 64, measure)
+    (file,) = folder.iterdir()
+    file.write_text(file.read_text("utf-8").replace("0.3000", "0.3001"), "utf-8")
+    assert cached("a", "d" * 64, measure) == first
+    assert measure.times == 2
+
+
 def test_a_folder_that_cannot_be_written_costs_only_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -104,8 +104,8 @@ def read_or_refused(arguments: list[str], folder: Path, capsys: pytest.CaptureFi
     assert all(str(folder) in line and len(line) < 800 for line in lines) or "leave --what out" in said.err
 
 
-@pytest.mark.parametrize("name", ["track.parquet", "plans.parquet"])
-def test_one_bit_of_a_table_is_enough(
+@pytest.mark.parametrize("name", ["track.parquet", "plans.parquet", "metrics.json", "scenario.yaml"])
+def test_one_bit_of_a_file_is_enough(
     name: str, a_run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     copy = tmp_path / "run"
@@ -138,7 +138,8 @@ def test_view_of_a_damaged_recording(
         said = capsys.readouterr().err
         assert (
             said
-            == f"wayproof: the run in {copy} is damaged: flight.rrd is not what was written; fly it again\n"
+            == f"wayproof: the run in {copy} is damaged: flight.rrd is not what was written: its sha256 is not that in "
+            "manifest.json; fly it again\n"
         )
 
     each()

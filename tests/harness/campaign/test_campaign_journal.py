@@ -13,7 +13,7 @@ import pytest
 
 from harness.campaign.campaign_file import load_campaign
 from harness.campaign.folder import CampaignFolder
-from harness.campaign.journal import JOURNAL
+from harness.campaign.journal import JOURNAL, sealed
 from harness.campaign.results import RESULTS
 from harness.campaign.runs import CampaignRuns
 from harness.cli.app import main
@@ -54,7 +54,7 @@ def edited(index: int, cells: dict[str, Any] | None = None, **changes: Any) -> C
     def edit(lines: Lines) -> Lines:
         line = json.loads(lines[index])
         line["row"] |= cells or {}
-        lines[index] = json.dumps(line | changes).encode() + b"\n"
+        lines[index] = sealed(line | changes)
         return lines
 
     return edit
@@ -102,6 +102,10 @@ DAMAGE: dict[str, tuple[Callable[[Lines], Lines], str]] = {
     "a type": (
         edited(1, cells={"flown_length_m": "far"}),
         ":2: is damaged: it tells of a value of another type",
+    ),
+    "an outcome": (
+        lambda lines: [lines[0].replace(b'"outcome": "', b'"outcome": "not '), *lines[1:]],
+        ":1: is damaged: it tells of something else than was written: its sha256 is another",
     ),
     "a time": (edited(1, times={"wall_s": "long"}), ":2: is damaged: it tells of a value of another type"),
 }

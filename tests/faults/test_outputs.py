@@ -1,0 +1,139 @@
+"""Outputs go to fresh files of their folder: no link is followed, edits are found, full disks survived."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import os
+import resource
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from harness.cli.app import main
+from harness.files.whole_file import PARTIAL, append_to, fresh, replace_text
+from tests.faults.command import FOREST
+
+OUTPUTS = ("report.html", "report.csv", "report.md", "path.svg", "path.png")
+
+
+@pytest.fixture
+def sent(a_run: Path, tmp_path: Path) -> Path:
+    """A run folder that somebody sent."""
+    shutil.copytree(a_run, tmp_path / "run")
+    return tmp_path / "run"
+
+
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """No file can grow beyond a size."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_report_writes_through_no_link(sent: Path, tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    for name in OUTPUTS:
+        for link in (sent / name, sent / f"{name}{PARTIAL}"):
+            link.unlink(missing_ok=True)
+            link.symlink_to(victim)
+    assert main(["report", str(sent)]) == 0
+    assert victim.read_text() == "mine"
+    assert not any((sent / name).is_symlink() for name in OUTPUTS)
+
+
+def test_a_flight_writes_through_no_link(sent: Path, tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    for name in ("manifest.json", "scenario.yaml", "metrics.json", "track.parquet", "flight.rrd"):
+        (sent / f"{name}{PARTIAL}").symlink_to(victim)
+    (sent / "flight.rrd").unlink()
+    (sent / "flight.rrd").symlink_to(victim)
+    assert main(["fly", str(FOREST), "--out", str(sent), "--quiet"]) == 0
+    assert victim.read_text() == "mine"
+    assert not (sent / "flight.rrd").is_symlink()
+
+
+def test_a_pipe_in_the_place_of_an_output_is_refused_at_once(
+    sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (sent / "report.csv").unlink(missing_ok=True)
+    os.mkfifo(sent / "report.csv")
+    assert main(["report", str(sent)]) == 2
+    assert "report.csv: is a pipe or a device, not a file" in capsys.readouterr().err
+    os.mkfifo(tmp_path / "pipe")
+    assert main(["export", str(sent), "--format", "csv", "--out", str(tmp_path / "pipe")]) == 2
+    assert "pipe: is a pipe or a device, not a file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["metrics.json", "scenario.yaml"])
+def test_an_edited_file_of_a_run_is_named_with_its_sha256(
+    name: str, sent: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (sent / name).read_text()
+    (sent / name).write_text(text.replace("timeout", "reached").replace("radius_m: ", "radius_m: 1"))
+    assert (sent / name).read_text() != text
+    for command in (["report"], ["export", "--format", "csv"], ["view", "--web"]):
+        assert main([*command, str(sent)]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"{name} is not what was written: its sha256 is not that in manifest.json" in line
+
+
+def test_an_export_that_finds_no_room_leaves_the_file_as_it_was(
+    sent: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "way.csv"
+    out.write_text("the one before")
+    with full_disk(100):
+        assert main(["export", str(sent), "--format", "csv", "--out", str(out)]) == 2
+    assert "way.csv" in capsys.readouterr().err
+    assert out.read_text() == "the one before"
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["run", "way.csv"]
+
+
+def test_a_run_that_finds_no_room_at_its_start_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "some" / "run"
+    with full_disk(800):  # the manifest has room, the scenario has none
+        status = main(["fly", str(FOREST), "--out", str(out), "--quiet", "--no-recording"])
+    assert status == 2
+    assert not (tmp_path / "some").exists()
+    assert ": " in capsys.readouterr().err
+
+
+def test_what_lies_in_the_place_of_a_file_is_replaced_or_refused(tmp_path: Path) -> None:
+    (tmp_path / "target").write_text("kept")
+    (tmp_path / "a").symlink_to(tmp_path / "target")
+    (tmp_path / f"a{PARTIAL}").write_text("stale")
+    replace_text(tmp_path / "a", "new")
+    assert ((tmp_path / "a").read_text(), (tmp_path / "a").is_symlink()) == ("new", False)
+    assert (tmp_path / "target").read_text() == "kept"
+    assert not (tmp_path / f"a{PARTIAL}").exists()
+    (tmp_path / "j").symlink_to(tmp_path / "target")
+    with pytest.raises(OSError, match="j: is a link"):
+        append_to(tmp_path / "j")
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(IsADirectoryError, match="folder"):
+        fresh(tmp_path / "folder")
+
+
+def test_control_characters_of_a_planners_text_are_spelt_out(sent: Path) -> None:
+    metrics = json.loads((sent / "metrics.json").read_text())
+    (sent / "metrics.json").write_text(json.dumps(metrics | {"reason": "red \x1b[31m"}))
+    manifest = json.loads((sent / "manifest.json").read_text())
+    manifest["sha256"]["metrics.json"] = hashlib.sha256((sent / "metrics.json").read_bytes()).hexdigest()
+    (sent / "manifest.json").write_text(json.dumps(manifest))
+    assert main(["report", str(sent)]) == 0
+    (row,) = csv.DictReader(io.StringIO((sent / "report.csv").read_text()))
+    assert row["reason"] == "red \\x1b[31m"
