@@ -53,6 +53,10 @@ class RouteProgress:
         self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
         self._starts_m, self._endless = self.rows[:, 6].tolist(), np.isinf(self.rows[:, 5]).tolist()
 
+    def restart(self, arc_length_m: float) -> None:
+        """Looks for the nearest point from there on (m from the route's start), as if the route was new."""
+        self._row, self._along_m = place_on_rows(self.rows, arc_length_m)
+
     def along(self, east_m: float, north_m: float) -> Along:
         """How far along the nearest point is, from the last one onwards: `nearest` in a third of the time.
 

@@ -76,8 +76,10 @@ def mission_waypoints(route: Route) -> FloatArray:
     last = arc_point(rows[-1], rows[-1][5])[:2]
     kept = [points[0]]
     for point in points[1:]:
-        if math.dist(point, kept[-1]) >= LEAST_LEG_M and math.dist(point, last) >= LEAST_LEG_M:
+        if math.dist(point, kept[-1]) >= LEAST_LEG_M:
             kept.append(point)
+    while len(kept) > 1 and math.dist(kept[-1], last) < LEAST_LEG_M:
+        kept.pop()
     if math.dist(last, kept[-1]) < LEAST_LEG_M and len(kept) == 1:
         _, _, along_east, along_north = arc_point(rows[-1], rows[-1][5])
         kept[0] = (last[0] - LEAST_LEG_M * along_east, last[1] - LEAST_LEG_M * along_north)
@@ -96,7 +98,7 @@ class WaypointLaw:
     """
 
     def __init__(self, law: GuidanceLaw, acceptance_m: Acceptance, by_passing: bool = True) -> None:
-        self._law, self._acceptance_m, self._by_passing = law, acceptance_m, by_passing
+        self.law, self.acceptance_m, self.by_passing = law, acceptance_m, by_passing
         self._progress: RouteProgress | None = None
         self._leg = -1
 
@@ -119,7 +121,7 @@ class WaypointLaw:
             raise RuntimeError("follow() a route before update()")
         while self._leg < len(self._points) - 1 and self._reached(state):
             self._next_leg()
-        roll_rad, _, _, saturated, _, airspeed_mps = self._law.update(state)
+        roll_rad, _, _, saturated, _, airspeed_mps = self.law.update(state)
         place = self._progress.along(state.east_m, state.north_m)
         return GuidanceOutput(
             roll_rad, place.cross_track_m, place.arc_length_m, saturated, place.past_end, airspeed_mps
@@ -132,25 +134,25 @@ class WaypointLaw:
             start, end = self._points[self._leg], self._points[self._leg + 1]
             self._along = end[0] - start[0], end[1] - start[1]
             self._turn_rad = self._turn_at_end_rad()
-            self._law.follow(_line(start, end))
-            if isinstance(self._law, PointLaw):
-                self._law.fly_to(*end)
+            self.law.follow(_line(start, end))
+            if isinstance(self.law, PointLaw):
+                self.law.fly_to(*end)
         elif self._circle is not None:
-            self._law.follow(self._circle)
-        elif isinstance(self._law, PointLaw):
+            self.law.follow(self._circle)
+        elif isinstance(self.law, PointLaw):
             end, share = self._points[-1], FAR_M / math.hypot(*self._along)
-            self._law.fly_to(end[0] + share * self._along[0], end[1] + share * self._along[1])
+            self.law.fly_to(end[0] + share * self._along[0], end[1] + share * self._along[1])
 
     def _reached(self, state: AircraftState) -> bool:
         """Whether the leg's end counts as reached: near enough, or passed."""
         end_east, end_north = self._points[self._leg + 1]
         east, north = end_east - state.east_m, end_north - state.north_m
-        if self._by_passing and east * self._along[0] + north * self._along[1] <= 0.0:
+        if self.by_passing and east * self._along[0] + north * self._along[1] <= 0.0:
             return True
         turn = self._turn_rad
-        if turn == 0.0 and self._by_passing:
+        if turn == 0.0 and self.by_passing:
             return False
-        return math.hypot(east, north) <= self._acceptance_m(state.groundspeed_mps, turn)
+        return math.hypot(east, north) <= self.acceptance_m(state.groundspeed_mps, turn)
 
     def _turn_at_end_rad(self) -> float:
         """By how much the leg after this one is turned from it, at least 0; 0 where there is none."""

@@ -125,7 +125,7 @@ def _rounded(corner: dict[str, Any]) -> str:
     if corner["flown_cut_m"] is None:
         return f"not reached; {allowed}"
     if not corner["radius_m"]:
-        return f"no arc leads straight back, passed at {corner['flown_cut_m']:.0f} m; {allowed}"
+        return f"passed at {corner['flown_cut_m']:.0f} m; {allowed}"
     told = f"radius {corner['radius_m']:.0f} m, cut by {corner['flown_cut_m']:.0f} m"
     if corner["most_off_m"] > max(1.1 * corner["flown_cut_m"], corner["allowed_cut_m"]):
         told += f", {corner['most_off_m']:.0f} m off after it"

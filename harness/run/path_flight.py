@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from aircraft.guidance.altitude import AltitudeGuidance
-from aircraft.guidance.progress import RouteProgress
+from aircraft.guidance.mission_legs import MissionLaw
+from aircraft.guidance.progress import Along, RouteProgress
+from aircraft.guidance.waypoints import WaypointLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
 from harness.flight.closed_loop import Loop, fly
@@ -19,12 +21,17 @@ from planner.interface import FloatArray, Path, Plan, PlanRequest, PlanStatus
 
 
 def fly_along(
-    plan: PathPlan, loop: Loop, observers: Sequence[Observer] = (), progress: Progress | None = None
+    plan: PathPlan,
+    kind: str,
+    loop: Loop,
+    observers: Sequence[Observer] = (),
+    progress: Progress | None = None,
 ) -> Flight:
     """Flies a path to its end.
 
     Args:
         plan: the path, with its altitudes and airspeeds.
+        kind: the guidance law's.
         loop: the parts of the flight; its sensor and planner are not asked, its mission does not end the flight. Used
             up.
         observers: look on.
@@ -32,12 +39,22 @@ def fly_along(
     """
     path = Path(plan.way.segments)
     limit_s = 2.0 * path.length_m / max(_slowest_mps(loop.model.state(), plan), 1.0) + 60.0
+    guidance, route = loop.guidance, Route(path.segments)
+    progress_of = RouteProgress(route)
+
+    def where(state: AircraftState) -> Along:
+        return progress_of.along(state.east_m, state.north_m)
+
+    if isinstance(guidance, WaypointLaw):
+        guidance = MissionLaw(guidance, kind, plan.legs)
+        where = guidance.along
     along = replace(
         loop,
+        guidance=guidance,
         sensor=None,
         planner=GivenPath(plan.way.waypoints_m, path),
         vertical=AltitudeGuidance(plan.profile, plan.climb_gain_1ps, plan.climb_mps),
-        termination=PathEnd(Route(path.segments), loop.mission.goal_radius_m, limit_s),
+        termination=PathEnd(where, route_length(route), loop.mission.goal_radius_m, limit_s),
     )
     return replace(fly(along, observers, progress), compute_ms=())  # nothing was searched for
 
@@ -58,26 +75,29 @@ class PathEnd:
     """A flight along a path: over at its end, or when it takes too long. Implements `Termination`.
 
     Args:
-        route: the path.
+        where: the place of an aircraft on the path.
+        length_m: of the path.
         near_m: so near to the path where it ends, the end is reached.
         limit_s: time limit.
     """
 
     contact_m = math.inf
 
-    def __init__(self, route: Route, near_m: float, limit_s: float) -> None:
-        self._progress, self._length_m = RouteProgress(route), route_length(route)
+    def __init__(
+        self, where: Callable[[AircraftState], Along], length_m: float, near_m: float, limit_s: float
+    ) -> None:
+        self._where, self._length_m = where, length_m
         self._near_m, self._limit_s = near_m, limit_s
 
     def to_go_m(self, state: AircraftState) -> float:
         """Length of the path that is left."""
-        return self._length_m - self._progress.nearest(state.east_m, state.north_m).arc_length_m
+        return self._length_m - self._where(state).arc_length_m
 
     def verdict(self, state: AircraftState, fault: str | None) -> Ending | None:
         """How the flight ends now; None while it goes on."""
         if fault is not None:
             return Ending(Outcome.LOST_CONTROL, fault)
-        time_s, nearest = state.time_s, self._progress.nearest(state.east_m, state.north_m)
+        time_s, nearest = state.time_s, self._where(state)
         off_m = abs(nearest.cross_track_m)
         if nearest.past_end and off_m > self._near_m:
             return Ending(

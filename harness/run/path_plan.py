@@ -6,12 +6,14 @@ import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from aircraft.airframe import Airframe
 from aircraft.climb import climb_rates
 from aircraft.guidance.altitude import VerticalProfile, flat
+from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, MissionLeg, straight
 from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.flying import Flying, Ground
@@ -49,6 +51,7 @@ class PathPlan:
         marks: number and arc length of every item of a mission; none for a drawn line.
         bends: number and arc length of the points of a drawn line at which its slope changes.
         notes: what was assumed, a line each.
+        legs: the path leg by leg, for a law that flies to its waypoints.
     """
 
     way: FlyBy
@@ -58,6 +61,7 @@ class PathPlan:
     marks: tuple[tuple[int, float], ...] = ()
     bends: tuple[tuple[int, float], ...] = ()
     notes: tuple[str, ...] = ()
+    legs: tuple[MissionLeg, ...] = ()
 
     @property
     def climb_gain_1ps(self) -> float:
@@ -107,7 +111,10 @@ def planned(
         way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest=tightest)
         profile = _drawn_profile(given, way, scenario, altitude_m, ground)
         bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
-        return PathPlan(way, profile, profile.airspeed_mps, frame, bends=bends)
+        places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]
+        ends = zip(pairwise(places.tolist()), pairwise(way.stations_m.tolist()), strict=True)
+        legs = tuple(straight(*each, None) for each in ends)
+        return PathPlan(way, profile, profile.airspeed_mps, frame, bends=bends, legs=legs)
     flying = Flying(
         airspeed_mps=speed,
         airspeed_range_mps=(_slowest_turning_mps(frame), frame.airspeed_range_mps[1]),
@@ -116,6 +123,8 @@ def planned(
         free_cut_m=free_m,
         ground=ground,
         least_radius_m=frame.least_radius_m,
+        heads_for_centres=scenario.guidance.follow == "waypoints"
+        and scenario.guidance.kind in HEADING_FOR_CENTRES,
         corner_m=corner_m,
         wind_mps=wind_mps,
     )
@@ -134,7 +143,15 @@ def planned(
             *notes,
             f"items {items}{more}: above ground, which is taken to be as high as home everywhere",
         )
-    return PathPlan(route.way, profile, route.asked_mps, frame, route.marks, notes=notes)
+    loiters = [step.item for step in given.mission.program.steps if step.loiter is not None]
+    if loiters and scenario.guidance.follow == "waypoints":
+        how = (
+            "heads for its centre and then joins it"
+            if flying.heads_for_centres
+            else "joins it along a tangent"
+        )
+        notes = (*notes, f"to a loiter's circle the aircraft {how}, with the law {scenario.guidance.kind}")
+    return PathPlan(route.way, profile, route.asked_mps, frame, route.marks, notes=notes, legs=route.legs)
 
 
 def _no_lower(profile: VerticalProfile) -> tuple[VerticalProfile, tuple[str, ...]]:

@@ -102,7 +102,7 @@ def measured(check: PathCheck, flight: Flight, limits: FlightLimits) -> dict[str
         first = seen.contacts[0]
         figures["outcome"] = Outcome.COLLISION.value
         figures["reason"] = f"touched {first.name} after {first.start_s:.0f} s; {flight.reason}"
-    passed = [_passed(corner, track, off_m) for corner in corners]
+    passed = [_passed(corner, track, off_m, tolerance) for corner in corners]
     figures["trackable"] = (
         figures["trackable"]
         and figures["outcome"] == Outcome.REACHED.value
@@ -214,9 +214,9 @@ def _sufficient_m(
     """The limit at all corners that would have been kept, rounded up to 1 m; None where none would, or no other."""
 
     def off_at_corners(these: Sequence[JudgedCorner]) -> float:
-        return max(float(_passed(corner, track, off_m)["most_off_m"]) for corner in these)
+        return max(float(_passed(corner, track, off_m, tolerance_m)["most_off_m"]) for corner in these)
 
-    reached = [_passed(corner, track, off_m) for corner in corners]
+    reached = [_passed(corner, track, off_m, tolerance_m) for corner in corners]
     if all(each["kept"] for each in reached) or any(each["flown_cut_m"] is None for each in reached):
         return None
     limit_m = 0.0
@@ -297,13 +297,19 @@ def _kept_figures(seen: Kept) -> dict[str, Any]:
     }
 
 
-def _passed(corner: JudgedCorner, track: Track, off_m: FloatArray) -> dict[str, Any]:
-    """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there."""
+def _passed(corner: JudgedCorner, track: Track, off_m: FloatArray, tolerance_m: float) -> dict[str, Any]:
+    """What is told of a corner; `flown_cut_m` is None where the aircraft did not get there.
+
+    What it is off counts up to where it is within the tolerance of the path again.
+    """
     place, about = corner.corner, at_corner(track, corner)
-    flown = None
-    if bool((track.arc_length_m >= corner.arc_length_m).any()):
+    flown, most = None, 0.0
+    if about.any() and bool((track.arc_length_m >= corner.arc_length_m).any()):
+        last = int(np.flatnonzero(about)[-1])
+        back = np.flatnonzero(off_m[last:] <= tolerance_m)
+        about[last : last + int(back[0]) if len(back) else len(track)] = True
         flown = float(np.hypot(track.east_m - place.east_m, track.north_m - place.north_m)[about].min())
-    most = float(off_m[about].max(initial=flown or 0.0))
+        most = max(flown, float(off_m[about].max()))
     return {
         **dataclasses.asdict(place),
         "flown_cut_m": flown,

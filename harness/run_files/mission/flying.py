@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from aircraft.guidance.altitude import VerticalProfile
+from aircraft.guidance.mission_legs import MissionLeg
 from harness.run_files.given_path import FloatArray, FlyBy
 from harness.run_files.mission.steps import Program
 
@@ -34,6 +35,7 @@ class Flying:
         climb_mps: fastest climb and descent at an airspeed.
         free_cut_m: a corner may be passed at this distance only to make its arc wider.
         least_radius_m: of a turn at the bank limit at an airspeed, in calm air; None: the same.
+        heads_for_centres: a loiter is flown to as far as its circle on the line to its centre; else along a tangent.
         corner_m: how far off every corner may be passed; None: as its item says, else `CORNER_M`.
         wind_mps: east + i north where the wind blows to.
         ground: height of the ground; None: not known, then it is taken to be as high as home.
@@ -46,6 +48,7 @@ class Flying:
     free_cut_m: float
     ground: Ground | None = None
     least_radius_m: Callable[[float], float] | None = None
+    heads_for_centres: bool = False
     corner_m: float | None = None
     wind_mps: complex = 0j
 
@@ -75,6 +78,7 @@ class MissionRoute:
         asked_mps: the airspeeds that the mission asks for, as those of the profile; the aircraft may not hold them.
         marks: item and arc length where each is reached.
         notes: what was assumed, a line each.
+        legs: the mission leg by leg, for a law that flies to its waypoints.
     """
 
     way: FlyBy
@@ -82,3 +86,4 @@ class MissionRoute:
     asked_mps: FloatArray
     marks: tuple[tuple[int, float], ...]
     notes: tuple[str, ...]
+    legs: tuple[MissionLeg, ...]

@@ -10,11 +10,14 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
+from aircraft.guidance.mission_legs import MissionLeg, straight
+from aircraft.interface import Route
 from harness.files.input_file import InputError
 from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.circle import (
@@ -57,6 +60,7 @@ class _Vertex(NamedTuple):
     item: int | None
     acceptance_m: float = 0.0
     agl_m: float | None = None
+    centre: complex | None = None  # of the circle that it lies on, for which the aircraft heads
 
 
 def mission_route(mission: GivenMission, flying: Flying, source: str) -> MissionRoute:
@@ -99,6 +103,7 @@ class _Build:
         self._speeds: list[tuple[float, float, float]] = []
         self._marks: list[tuple[int, float]] = []
         self._notes: list[str] = []
+        self._legs: list[MissionLeg] = []
         self._asked_mps = self._mps = flying.airspeed_mps
         self._altitude_m = math.nan
 
@@ -198,6 +203,11 @@ class _Build:
         length += self._up_to(target, length, center, radius, side)
         self._speeds.append((self._length_m, self._asked_mps, self._mps))
         self._altitudes.append((self._length_m, entry))
+        if length > SAME_PLACE_M:
+            circle = Route(np.array(arc(*self._pose, side, radius, math.tau)), loiter=True)
+            around = (self._length_m, self._length_m + length)
+            centre_m = (center.real, center.imag)
+            self._legs.append(MissionLeg(circle, around, centre_m=centre_m, swept_rad=length / radius))
         pieces = max(math.ceil(length / radius / ARC_RAD), 1)
         for _ in range(pieces):
             self._append(arc(*self._pose, side, radius, length / radius / pieces))
@@ -205,7 +215,7 @@ class _Build:
         self._marks.append((step.item, self._length_m))
         self._altitude_m = altitude
         if target is not None and leaves_at(target, center, radius, side) is None:
-            self._append(towards(self._pose, target, turn_m))
+            self._turn(towards(self._pose, target, turn_m))
         self._add(_Vertex(self._pose[0], altitude, None))
 
     def _join(
@@ -214,6 +224,11 @@ class _Build:
         """Gets onto a circle."""
         here, heading = self._here(), self._heading()
         touch = joins_at(here, center, radius, side) if here is not None else None
+        if here is not None and touch is not None and self._run and self._flying.heads_for_centres:
+            self._join_from_far(
+                step, center, center + radius * (here - center) / abs(here - center), side, altitude
+            )
+            return
         if here is not None and touch is not None and self._run and not self._kinks(touch):
             self._add(_Vertex(touch, altitude, None))
             self.flush()
@@ -221,13 +236,25 @@ class _Build:
             self.flush()
             assert self._pose is not None
             if not _on_circle(self._pose, center, radius, side):
-                self._append(onto(self._pose, center, radius, side, turn_m))
+                self._turn(onto(self._pose, center, radius, side, turn_m))
         else:  # it begins here
             out = (here - center) / abs(here - center) if here is not None and here != center else 1j
             self._run, self._speeds_of_run = [], []
             self._pose = center + radius * out, direction_on(center + out, center, side)
         assert self._pose is not None
         self._waypoints.append((self._pose[0], self._length_m))
+
+    def _join_from_far(
+        self, step: MissionStep, center: complex, edge: complex, side: int, altitude: float
+    ) -> None:
+        """Gets onto a circle as autopilots do that head for its centre: there is a corner where they join it."""
+        self._add(_Vertex(edge, altitude, None, centre=center))
+        self.flush()
+        self._pose = edge, direction_on(edge, center, side)
+        self._corners.append(
+            CutCorner(step.item, edge.real, edge.imag, -90.0 * side, 0.0, 0.0, self._length_m, 0.0)
+        )
+        self._waypoints.append((edge, self._length_m))
 
     def _kinks(self, place: complex) -> bool:
         """Whether a line from the end of the circle that was flown last leads to a place only after a turn."""
@@ -243,7 +270,7 @@ class _Build:
         step, place = self._steps[number + 1], self._places[number + 1]
         if place is None or step.straight or (step.loiter is not None and abs(place - center) < SAME_PLACE_M):
             return None
-        if step.loiter is None:
+        if step.loiter is None or self._flying.heads_for_centres:
             return place
         # From circle to circle along a common tangent: both ends are found in turns.
         other = -1 if step.loiter.clockwise else 1
@@ -267,6 +294,13 @@ class _Build:
             return 0.0
         place = (self._pose[0] - center) * cmath.exp(1j * side * length / radius)
         return ((side * cmath.phase((leave - center) / place)) % math.tau) * radius
+
+    def _turn(self, rows: Sequence[Row]) -> None:
+        """Adds a way that is flown as it is, whatever the law."""
+        if rows:
+            along = (self._length_m, self._length_m + sum(row[5] for row in rows))
+            self._legs.append(MissionLeg(Route(np.array(rows)), along))
+        self._append(rows)
 
     def _append(self, rows: Sequence[Row]) -> None:
         """Adds lines and arcs as they are."""
@@ -306,8 +340,16 @@ class _Build:
                 )
             self.rows += [(*row,) for row in way.segments.tolist()]
             self._pose, length_m = end_of(self.rows[-1]), float(way.segments[:, 5].sum())
+            self._add_legs(run, stations + self._length_m)
         self._note(run, speeds, stations + self._length_m)
         self._length_m += length_m
+
+    def _add_legs(self, run: Sequence[_Vertex], stations: FloatArray) -> None:
+        """The legs between waypoints; those that only mark where a circle is joined or left are passed."""
+        for (begin, end), along in zip(pairwise(run), pairwise(stations.tolist()), strict=True):
+            if abs(end.place - begin.place) > SAME_PLACE_M:
+                acceptance_m = 0.0 if end.item is None else end.acceptance_m or None
+                self._legs.append(straight((begin.place, end.place), along, acceptance_m, end.centre))
 
     def _tightest(self, run: Sequence[_Vertex], speeds: Sequence[tuple[float, float]]) -> Tightest | None:
         """How tightly the corners of a run are rounded at the most."""
@@ -361,7 +403,7 @@ class _Build:
             np.concatenate(self._given),
         )
         profile = VerticalProfile(along, altitude, np.maximum.accumulate(since), flown)
-        return MissionRoute(way, profile, asked, tuple(self._marks), tuple(self._notes))
+        return MissionRoute(way, profile, asked, tuple(self._marks), tuple(self._notes), tuple(self._legs))
 
 
 def _on_circle(pose: Pose, center: complex, radius: float, side: int) -> bool:

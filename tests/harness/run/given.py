@@ -10,8 +10,12 @@ from typing import Any
 
 import numpy as np
 
-METRES_PER_DEGREE = 111_195.0
 LATITUDE_DEG, LONGITUDE_DEG, HOME_M = 47.0, 8.0, 300.0
+SEMI_MAJOR_M, ECCENTRICITY_2 = 6_378_137.0, 0.00669437999014  # WGS 84
+_FLAT = 1.0 - ECCENTRICITY_2 * math.sin(math.radians(LATITUDE_DEG)) ** 2
+NORTH_M = math.radians(SEMI_MAJOR_M * (1.0 - ECCENTRICITY_2) / _FLAT**1.5)
+EAST_M = math.radians(SEMI_MAJOR_M / math.sqrt(_FLAT) * math.cos(math.radians(LATITUDE_DEG)))
+"""Metres in a degree of latitude and of longitude."""
 
 Array = np.ndarray[Any, Any]
 
@@ -26,8 +30,8 @@ def item(
 ) -> str:
     """A line of a .waypoints file, its altitude above home."""
     four = [*params, 0.0, 0.0, 0.0, 0.0][:4]
-    latitude = LATITUDE_DEG + north_m / METRES_PER_DEGREE
-    longitude = LONGITUDE_DEG + east_m / (METRES_PER_DEGREE * math.cos(math.radians(LATITUDE_DEG)))
+    latitude = LATITUDE_DEG + north_m / NORTH_M
+    longitude = LONGITUDE_DEG + east_m / EAST_M
     cells = [number, 0, 3, command, *four, f"{latitude:.9f}", f"{longitude:.9f}", up_m, 1]
     return "\t".join(map(str, cells))
 
