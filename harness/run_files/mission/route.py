@@ -10,16 +10,15 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
-from aircraft.guidance.mission_legs import MissionLeg, straight
+from aircraft.guidance.mission_legs import MissionLeg
 from aircraft.interface import Route
 from harness.files.input_file import InputError
-from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy, Tightest, fly_by
+from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy
 from harness.run_files.mission.circle import (
     Pose,
     Row,
@@ -31,9 +30,10 @@ from harness.run_files.mission.circle import (
     onto,
     towards,
 )
-from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute, corner_limit_m
-from harness.run_files.mission.items import GROUND, HOME, SEA
+from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute
+from harness.run_files.mission.items import GROUND
 from harness.run_files.mission.steps import MissionStep
+from harness.run_files.mission.waypoint_run import Vertex, altitude_m, legs_of, rounded
 
 LANDING_HEIGHT_M: Final = 15.0
 """A landing is flown down to this height above its place; flare and touchdown are not."""
@@ -52,15 +52,6 @@ SAME_DIRECTION: Final = 1e-5
 
 SAMPLE_M: Final = 5.0
 """Points along circles are this close together, where a track is compared with them."""
-
-
-class _Vertex(NamedTuple):
-    place: complex
-    altitude_m: float
-    item: int | None
-    acceptance_m: float = 0.0
-    agl_m: float | None = None
-    centre: complex | None = None  # of the circle that it lies on, for which the aircraft heads
 
 
 def mission_route(mission: GivenMission, flying: Flying, source: str) -> MissionRoute:
@@ -92,7 +83,7 @@ class _Build:
         self.rows: list[Row] = []
         self._length_m = 0.0
         self._pose: Pose | None = None
-        self._run: list[_Vertex] = []
+        self._run: list[Vertex] = []
         self._speeds_of_run: list[
             tuple[float, float]
         ] = []  # asked and flown on the way to each vertex of the run
@@ -134,7 +125,7 @@ class _Build:
             self._land(step, at, altitude)
         else:
             agl = step.height_m if step.above == GROUND and self._flying.ground is not None else None
-            self._add(_Vertex(at, altitude, step.item, step.acceptance_m, agl))
+            self._add(Vertex(at, altitude, step.item, step.acceptance_m, agl))
 
     def _here(self) -> complex | None:
         if self._run:
@@ -148,7 +139,7 @@ class _Build:
         height = float(self._flying.ground(np.array([place.real]), np.array([place.imag]))[0])
         return height if math.isfinite(height) else self._home_m
 
-    def _add(self, vertex: _Vertex) -> None:
+    def _add(self, vertex: Vertex) -> None:
         self._run.append(vertex)
         self._speeds_of_run.append((self._asked_mps, self._mps))
         self._altitude_m = vertex.altitude_m
@@ -166,7 +157,7 @@ class _Build:
             self._notes.append(f"item {step.item}: not flown, there is no course before it")
             return
         altitude = altitude_m(step, self._home_m, self._ground_m(here), self._altitude_m)
-        self._add(_Vertex(here + self._climbing_m(altitude) * heading, altitude, step.item))
+        self._add(Vertex(here + self._climbing_m(altitude) * heading, altitude, step.item))
 
     def _climbing_m(self, altitude_m: float) -> float:
         """How far it takes to climb or sink from the present altitude to another; 1 m at the least."""
@@ -178,10 +169,10 @@ class _Build:
     def _land(self, step: MissionStep, place: complex, altitude: float) -> None:
         here, above = self._here(), altitude + LANDING_HEIGHT_M
         if here is None or not self._altitude_m > above:
-            self._add(_Vertex(place, max(altitude, min(above, self._altitude_m)), step.item))
+            self._add(Vertex(place, max(altitude, min(above, self._altitude_m)), step.item))
             return
         share = (self._altitude_m - above) / (self._altitude_m - altitude)
-        self._add(_Vertex(here + share * (place - here), above, step.item))
+        self._add(Vertex(here + share * (place - here), above, step.item))
 
     def _loiter(self, number: int, center: complex, altitude: float) -> None:
         step = self._steps[number]
@@ -216,7 +207,7 @@ class _Build:
         self._altitude_m = altitude
         if target is not None and leaves_at(target, center, radius, side) is None:
             self._turn(towards(self._pose, target, turn_m))
-        self._add(_Vertex(self._pose[0], altitude, None))
+        self._add(Vertex(self._pose[0], altitude, None))
 
     def _join(
         self, step: MissionStep, center: complex, radius: float, side: int, turn_m: float, altitude: float
@@ -230,7 +221,7 @@ class _Build:
             )
             return
         if here is not None and touch is not None and self._run and not self._kinks(touch):
-            self._add(_Vertex(touch, altitude, None))
+            self._add(Vertex(touch, altitude, None))
             self.flush()
         elif here is not None and heading is not None:
             self.flush()
@@ -248,7 +239,7 @@ class _Build:
         self, step: MissionStep, center: complex, edge: complex, side: int, altitude: float
     ) -> None:
         """Gets onto a circle as autopilots do that head for its centre: there is a corner where they join it."""
-        self._add(_Vertex(edge, altitude, None, centre=center))
+        self._add(Vertex(edge, altitude, None, centre=center))
         self.flush()
         self._pose = edge, direction_on(edge, center, side)
         self._corners.append(
@@ -327,10 +318,7 @@ class _Build:
             if self._pose is None:  # nothing was flown to it yet
                 self._run, self._speeds_of_run = run[-1:], speeds[-1:]
         else:
-            radii = np.array([self._flying.turn_radius_m(flown) for _, flown in speeds])
-            free = self._flying.free_cut_m
-            frees = np.array([min(free, vertex.acceptance_m or free) for vertex in run])
-            way = fly_by(points, radii, frees, overshoot=True, tightest=self._tightest(run, speeds))
+            way = rounded(run, np.array([flown for _, flown in speeds]), self._flying)
             stations = way.stations_of(points)
             self._given.append(way.given_m + np.array((0.0, 0.0, self._length_m)))
             for corner in way.corners:
@@ -340,29 +328,12 @@ class _Build:
                 )
             self.rows += [(*row,) for row in way.segments.tolist()]
             self._pose, length_m = end_of(self.rows[-1]), float(way.segments[:, 5].sum())
-            self._add_legs(run, stations + self._length_m)
+            self._legs += legs_of(run, stations + self._length_m)
         self._note(run, speeds, stations + self._length_m)
         self._length_m += length_m
 
-    def _add_legs(self, run: Sequence[_Vertex], stations: FloatArray) -> None:
-        """The legs between waypoints; those that only mark where a circle is joined or left are passed."""
-        for (begin, end), along in zip(pairwise(run), pairwise(stations.tolist()), strict=True):
-            if abs(end.place - begin.place) > SAME_PLACE_M:
-                acceptance_m = 0.0 if end.item is None else end.acceptance_m or None
-                self._legs.append(straight((begin.place, end.place), along, acceptance_m, end.centre))
-
-    def _tightest(self, run: Sequence[_Vertex], speeds: Sequence[tuple[float, float]]) -> Tightest | None:
-        """How tightly the corners of a run are rounded at the most."""
-        flying = self._flying
-        if flying.least_radius_m is None:
-            return None
-        flown = np.array([speed for _, speed in speeds])
-        least = np.array([flying.least_radius_m(speed) for speed in flown.tolist()])
-        limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
-        return Tightest(least, limits, flying.wind_mps / flown)
-
     def _note(
-        self, run: Sequence[_Vertex], speeds: Sequence[tuple[float, float]], stations: FloatArray
+        self, run: Sequence[Vertex], speeds: Sequence[tuple[float, float]], stations: FloatArray
     ) -> None:
         """Altitudes, speeds and items along waypoints."""
         for place, (vertex, station) in enumerate(zip(run, stations.tolist(), strict=True)):
@@ -375,7 +346,7 @@ class _Build:
                 self._marks.append((vertex.item, station))
                 self._waypoints.append((vertex.place, station))
 
-    def _follow(self, begin: _Vertex, end: _Vertex, begin_m: float, end_m: float) -> None:
+    def _follow(self, begin: Vertex, end: Vertex, begin_m: float, end_m: float) -> None:
         """Altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it."""
         assert end.agl_m is not None
         begin_agl_m = begin.altitude_m - self._ground_m(begin.place)
@@ -411,18 +382,3 @@ def _on_circle(pose: Pose, center: complex, radius: float, side: int) -> bool:
     if abs(abs(pose[0] - center) - radius) > SAME_PLACE_M:
         return False
     return abs(direction_on(pose[0], center, side) - pose[1]) < 1e-3
-
-
-def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, before_m: float) -> float:
-    """Altitude of a step above mean sea level.
-
-    Args:
-        step: the step.
-        home_altitude_m: of home, above mean sea level.
-        ground_m: of the ground below it, above mean sea level; NaN where it is not known.
-        before_m: of the step before, NaN at the first.
-    """
-    if step.height_m is None:
-        return before_m if math.isfinite(before_m) else home_altitude_m
-    base = {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
-    return step.height_m + base

@@ -60,7 +60,7 @@ def test_a_loiter_is_joined_as_the_laws_autopilot_does_and_gone_round_as_often_a
     law: str, heads_for_centre: bool, tmp_path: Path
 ) -> None:
     center, radius = np.array((0.0, 2500.0)), 150.0
-    loiter = item(3, *center, command=18, params=(2, 0, radius))
+    loiter = item(3, 0.0, 2500.0, command=18, params=(2, 0, radius))
     path = waypoints_file(tmp_path, [(0.0, 0.0), (0.0, 800.0)], more=[loiter, item(4, 2000.0, 2500.0)])
     run, track = flown(path, law)
     off = track - center
