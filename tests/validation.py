@@ -1,0 +1,107 @@
+"""Makes aircraft/VALIDATION.md and its figure: simulated flights beside flown ones. `python -m tests.validation FLOWN`.
+
+FLOWN is the folder with thor75.parquet, thor75.json, proto09.parquet and proto09.json.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from harness.flight.record import FloatArray
+from harness.replay.flown import FlownFlight
+from harness.replay.page import rows_of
+from harness.replay.replay import Replay, replay
+from harness.replay.replay_figure import replay_figure
+from harness.replay.wind import fit_wind
+from harness.report.figure_style import svg
+
+HERE = Path(__file__).parents[1] / "aircraft"
+GRAVITY_MPS2 = 9.80665
+TRIED = {
+    "as above": (),
+    "state not old": (("navigation.latency_s", "0"),),
+    "state 0.24 s old": (("navigation.latency_s", "0.24"),),
+    "airspeed 18.1 m/s": (("aircraft.airspeed_mps", "18.1"),),
+    "gain 1": (("guidance.gain", "1"),),
+    "gain 3": (("guidance.gain", "3"),),
+    "light turbulence": (("environment.turbulence", "{intensity: light}"),),
+}
+"""What the answer hangs on: name, and keys of the simulated flight."""
+
+
+def main(flown: Path) -> None:
+    """Writes the page and its figure."""
+    found = {name: _thor(flown, keys) for name, keys in TRIED.items()}
+    told = found["as above"].told
+    (HERE.parent / ".pictures" / "validation_thor.svg").write_bytes(svg(replay_figure(found["as above"])))
+    between, wind = told["distance_between_m"], told["wind"]
+    page = Path(__file__).with_name("validation_page.md").read_text("utf-8")
+    text = page.format(
+        latency=told["latency_s"],
+        laps=" and ".join(map(str, told["settled_laps"])),
+        table="\n".join(f"| {' | '.join(row)} |" for row in rows_of(told)),
+        **between,
+        speed=wind["speed_mps"],
+        from_deg=wind["from_deg"],
+        residual=wind["residual_mps"],
+        tried="\n".join(_tried(name, each.told) for name, each in found.items()),
+        count=len(told["settled_laps"]),
+        fast=told["flown"]["airspeed_p95_mps"],
+        high=told["flown"]["height_error_p95_m"],
+        proto="\n".join(_proto(flown)),
+    )
+    (HERE / "VALIDATION.md").write_text(text, encoding="utf-8")
+
+
+def _thor(flown: Path, keys: tuple[tuple[str, str], ...]) -> Replay:
+    with TemporaryDirectory() as folder:
+        log, mission = flown / "thor75.parquet", flown / "thor75.json"
+        return replay(log, "ultrastick25e", Path(folder), mission, keys, recording=False)
+
+
+def _tried(name: str, told: dict[str, Any]) -> str:
+    figures = told["simulated"]
+    cells = [figures["outside_p95_m"], figures["outside_max_mean_m"], figures["lap_mean_s"]]
+    return f"| {name} | {' | '.join(f'{cell:.1f}' for cell in (*cells, told['distance_between_m']['p50']))} |"
+
+
+def _proto(flown: Path) -> list[str]:
+    facts = json.loads((flown / "proto09.json").read_text("utf-8"))
+    table = pq.read_table(flown / "proto09.parquet")
+    columns: dict[str, FloatArray] = {
+        name: table[name].cast("float64").to_numpy() for name in table.column_names
+    }
+    rows = []
+    for name, loiter in facts["loiters"].items():
+        chosen = np.flatnonzero(
+            (columns["time_s"] >= loiter["from_s"]) & (columns["time_s"] <= loiter["to_s"])
+        )
+        turn = {each: values[chosen] for each, values in columns.items()}
+        place = {each: turn[each] for each in ("time_s", "east_m", "north_m", "ve_mps", "vn_mps")}
+        wind = fit_wind(FlownFlight(Path(name), place))
+        east, north = turn["ve_mps"] - wind.east_mps, turn["vn_mps"] - wind.north_mps
+        speed = float(np.hypot(east, north).mean())
+        turned = float(np.ptp(np.unwrap(np.arctan2(east, north))))
+        rate = turned / float(turn["time_s"][-1] - turn["time_s"][0])
+        tangents = (
+            float(np.tan(np.radians(turn["roll_deg"])).mean()),
+            float(turn["q_degps"].mean() / turn["r_degps"].mean()),
+        )
+        radii = [speed**2 / (GRAVITY_MPS2 * tangent) for tangent in tangents]
+        share = speed * rate / (GRAVITY_MPS2 * tangents[0])
+        cells = (loiter["circle_fitted"]["radius_m"], speed / rate, *radii)
+        assert math.isfinite(sum(cells))
+        rows.append(f"| {name} | {' | '.join(f'{cell:.1f}' for cell in cells)} | {share:.2f} |")
+    return rows
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
