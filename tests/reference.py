@@ -5,6 +5,8 @@ Whatever pdoc warns of is an error: a name that does not resolve, an annotation 
 
 from __future__ import annotations
 
+import posixpath
+import re
 import sys
 import warnings
 from pathlib import Path
@@ -16,7 +18,15 @@ import pdoc.extract
 
 import wayproof
 
-MODULES = ("wayproof", "planner", "aircraft", "harness", "!harness.front_door")
+MODULES = (
+    "wayproof",
+    *("planner.interface", "planner.registry", "planner.contract"),
+    *("aircraft.interface", "aircraft.guidance.interface", "aircraft.guidance.contract"),
+)
+"""The public face: the front door, and what planners, aircraft and guidance laws of others are built on."""
+FIRST_PAGE = '<!doctype html><meta http-equiv="refresh" content="0; url=wayproof.html"><a href="wayproof.html">wayproof</a>'
+NO_DEFAULT = re.compile(r"\s*=\s*(?:<[^>]*>)*PydanticUndefined(?:</[^>]*>)*")
+"""What pydantic holds as the default of a field that has none."""
 
 
 def write(folder: Path) -> None:
@@ -29,6 +39,36 @@ def write(folder: Path) -> None:
         for name in pdoc.extract.walk_specs(MODULES):
             _resolve_rows(pdoc.extract.load_module(name))
         pdoc.pdoc(*MODULES, output_directory=folder)
+    for page in folder.rglob("*.html"):
+        page.write_text(_mended(page.read_text("utf-8")), "utf-8")
+    (folder / "index.html").write_text(FIRST_PAGE, "utf-8")
+    check(folder)
+
+
+def _mended(text: str) -> str:
+    """A page without pydantic's word for no default, and without links to fields that are known by an alias only."""
+    places = set(re.findall(r'id="([^"]*)"', text))
+    text = NO_DEFAULT.sub("", text)
+    return re.sub(
+        r'<a href="#([^"]*)"([^>]*)>(.*?)</a>',
+        lambda link: link[0] if link[1] in places else link[3],
+        text,
+    )
+
+
+def check(folder: Path) -> None:
+    """Fails if a page has a link into a page that has no such place, or a default that is none."""
+    texts = {page.relative_to(folder).as_posix(): page.read_text("utf-8") for page in folder.rglob("*.html")}
+    faults = []
+    for name, text in texts.items():
+        faults += [f"{name}: PydanticUndefined"] * ("PydanticUndefined" in text)
+        links = re.findall(r'href="([^":$]*)"', text)
+        for page, _, anchor in (link.partition("#") for link in links):
+            target = posixpath.normpath(posixpath.join(posixpath.dirname(name), page)) if page else name
+            if target not in texts or (anchor and f'id="{anchor}"' not in texts[target]):
+                faults.append(f"{name}: a dead link to {target}#{anchor}")
+    if faults:
+        raise SystemExit("\n".join(faults))
 
 
 def _resolve_rows(module: ModuleType) -> None:
