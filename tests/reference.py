@@ -24,7 +24,7 @@ MODULES = (
     *("aircraft.interface", "aircraft.guidance.interface", "aircraft.guidance.contract"),
 )
 """The public face: the front door, and what planners, aircraft and guidance laws of others are built on."""
-FIRST_PAGE = '<!doctype html><meta http-equiv="refresh" content="0; url=wayproof.html"><a href="wayproof.html">wayproof</a>'
+FIRST_PAGE = '<!doctype html><meta http-equiv="refresh" content="0; url=wayproof.html">'
 NO_DEFAULT = re.compile(r"\s*=\s*(?:<[^>]*>)*PydanticUndefined(?:</[^>]*>)*")
 """What pydantic holds as the default of a field that has none."""
 

@@ -39,6 +39,7 @@ NEEDS_CATALOG: Final = (
 )
 COLUMNS: Final = {
     "outcome": "outcome",
+    "severity": "severity",
     "clearance_ratio": "clearance/wanted",
     "min_clearance_m": "min clearance, m",
     "cross_track_max_m": "cross-track max, m",
@@ -55,13 +56,12 @@ COLUMNS: Final = {
     "planner": "planner",
     "aircraft": "aircraft",
     "seed": "seed",
-    "severity": "severity",
 }
 """Figures of a run that the table shows, in this order, and how they are headed.
 
 A browser cuts a heading that is longer than the name of its figure by more than a letter."""
-FIRST: Final = 2
-"""So many of them come before the varied keys: there may be more keys than fit a window."""
+LEADING_COLUMNS: Final = 3
+"""Number of columns before the varied keys, of which more may be varied than fit a window."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,9 @@ def _lay_out(dataset: Any, scratch: Path) -> None:
         Column("rerun_segment_id", name="run"),
         *(Column(_figure(name), name=label) for name, label in COLUMNS.items() if _figure(name) in names),
     ]
-    columns[1 + FIRST : 1 + FIRST] = [Column(name, name=name.rpartition(":")[2]) for name in varied]
+    columns[1 + LEADING_COLUMNS : 1 + LEADING_COLUMNS] = [
+        Column(name, name=name.rpartition(":")[2]) for name in varied
+    ]
     shown = {column.source for column in columns}
     hidden = [Column(name, visible=False) for name in names if name not in shown]
     rrb.TableBlueprint(
