@@ -22,6 +22,8 @@ from contextlib import contextmanager, suppress
 from fractions import Fraction
 from typing import Any, Generic, ParamSpec, TypeVar
 
+from planner.kernel_cache import seal
+
 FLOAT, COUNT, BOOL = "float64", "intp", "boolean"
 FLOATS = "Array(float64, 1, 'C', readonly=True)"
 ROWS = "Array(float64, 2, 'C', readonly=True)"
@@ -80,6 +82,7 @@ class Compiled(Generic[P, R]):
         import numba  # half a second
 
         _learn_to_fuse()
+        seal()
         signature = f"({', '.join(self._arguments)},)"
         try:
             code: Any = numba.njit(signature, cache=True, error_model="numpy")(self._function)

@@ -86,7 +86,12 @@ ONLY_IN = {
     "mcap_protobuf": ("harness/run_files/exports/recordings.py", "harness/run_files/flight_logs.py"),
     "aerofiles": ("harness/run_files/igc_path.py",),
     "foxglove_schemas_protobuf": ("harness/run_files/exports/recordings.py",),
-    "numba": ("planner/compiled.py", "aircraft/kernels.py", "aircraft/guidance/machine_code.py"),
+    "numba": (
+        "planner/compiled.py",
+        "planner/kernel_cache.py",
+        "aircraft/kernels.py",
+        "aircraft/guidance/machine_code.py",
+    ),
     "ompl": ("planner/baselines/dubins_tree.py",),
     "harness.cli.app": ("harness/__main__.py", "harness/front_door/wayproof/__main__.py"),
     "wayproof": ("harness/front_door/wayproof/*.py",),
@@ -160,7 +165,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("geometry",),
         ("kernels",),
         ("compiled", "plan_checks"),
-        ("interface",),
+        ("interface", "kernel_cache"),
     ),
 }
 """Subpackages and modules of a package, from the top down: each may import itself and what stands below it."""

@@ -13,6 +13,7 @@ from harness.scenario import own_keys
 from harness.scenario.sections import AircraftSpec, GuidanceSpec
 from harness.scenario.validation import KeyFault
 from planner.compiled import begin_compiling
+from planner.kernel_cache import seal
 from planner.registry import planner_kinds
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def _prepare(model: str) -> None:
     except AircraftError:
         return  # The survey says more of it.
     if not surveyed:
+        seal()
         planner_kinds()  # What is imported is compiled.
         begin_compiling(SURVEY_BYTES)
 
@@ -107,6 +109,7 @@ def limits_of(aircraft: AircraftSpec) -> GuidanceLimits:
 
 def law_of(spec: GuidanceSpec, aircraft: AircraftSpec) -> GuidanceLaw:
     """The law for one flight, from a section that `resolved` returned."""
+    seal()  # before the laws' machine code is loaded
     kind, config = _made_of(spec)
     limits = limits_of(aircraft)
     with PrintingAside():

@@ -1,0 +1,58 @@
+"""Compiled code on disk, each file with its SHA-256: damaged code would end the process, or be flown with."""
+
+from __future__ import annotations
+
+import functools
+import sys
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+SEAL_BYTES = 32
+"""Length of the SHA-256 behind the content of a file, which unpickling does not read."""
+FRAME = b"\x80\x05\x95"
+"""How an index begins: numba's version as a pickle of one frame, whose length follows in eight bytes."""
+
+
+@functools.cache
+def seal() -> None:
+    """Has numba write a SHA-256 behind what it keeps, and compile anew where that is another."""
+    from numba.core.caching import IndexDataCacheFile as File
+
+    kept: Any = File
+    dump, load_index, load_data = kept._dump, kept._load_index, kept._load_data
+
+    def sealed_dump(self: Any, content: Any) -> bytes:
+        data: bytes = dump(self, content)
+        return data + sha256(data).digest()
+
+    def checked_index(self: Any) -> Any:
+        path = Path(self._index_path)
+        return load_index(self) if not path.exists() or _is_whole(path, is_index=True) else {}
+
+    def checked_data(self: Any, name: str) -> Any:
+        path = Path(self._data_path(name))
+        if path.exists() and not _is_whole(path):
+            raise OSError("is not as it was written")  # which numba takes for a missing file
+        return load_data(self, name)
+
+    kept._dump, kept._load_index, kept._load_data = sealed_dump, checked_index, checked_data
+
+
+def _is_whole(path: Path, is_index: bool = False) -> bool:
+    """Whether a file is as it was written; where it is not, that is told."""
+    data = path.read_bytes()
+    begin = 0
+    if is_index:
+        begin = len(FRAME) + 8 + int.from_bytes(data[3:11], "little") if data.startswith(FRAME) else len(data)
+    whole = sha256(data[begin:-SEAL_BYTES]).digest() == data[begin:][-SEAL_BYTES:]
+    if not whole:
+        _tell(str(path.parent))
+    return whole
+
+
+@functools.cache
+def _tell(folder: str) -> None:
+    sys.stderr.write(
+        f"wayproof: compiled code in {folder} is damaged, or of an older version: compiled anew\n"
+    )

@@ -1,0 +1,45 @@
+"""Compiled code on disk that is damaged is compiled anew, with one line, and never run."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+KERNEL = "import numba\n@numba.njit('float64(float64)', cache=True)\ndef twice(x):\n    return 2.0 * x\n"
+CALL = """
+from planner.kernel_cache import seal
+seal()
+import kernel
+print(kernel.twice(21.0), sum(kernel.twice.stats.cache_hits.values()))
+"""
+
+
+def called(folder: Path) -> tuple[str, list[str]]:
+    """What the kernel gives and how often it was loaded; the lines on standard error."""
+    path = f"{ROOT}{os.pathsep}{folder}"
+    done = subprocess.run(
+        [sys.executable, "-c", CALL],
+        env={**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder / "cache")},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return done.stdout.strip(), done.stderr.splitlines()
+
+
+@pytest.mark.parametrize(("ending", "place"), [("nbc", 0.5), ("nbi", 0.9)])
+def test_a_damaged_kernel_is_compiled_anew(ending: str, place: float, tmp_path: Path) -> None:
+    (tmp_path / "kernel.py").write_text(KERNEL)
+    assert called(tmp_path) == ("42.0 0", [])
+    assert called(tmp_path) == ("42.0 1", [])
+    (file,) = (tmp_path / "cache").rglob(f"*.{ending}")
+    data = bytearray(file.read_bytes())
+    data[int(place * len(data))] ^= 1
+    file.write_bytes(data)
+    result, (line,) = called(tmp_path)
+    assert result == "42.0 0"
+    assert "is damaged, or of an older version: compiled anew" in line
+    assert called(tmp_path) == ("42.0 1", [])
