@@ -46,6 +46,7 @@ def airframe(name: str, actuators: Actuators | None = None, autopilot: Autopilot
     if real := (entry.actuators if actuators is None else actuators).real:
         found = replace(found, actuators=_of_commands(found, real))
 
+    found = replace(found, latency_s=autopilot.latency_s)
     entry = replace(
         entry,
         figures={**entry.figures, **autopilot.figures()},

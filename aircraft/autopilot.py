@@ -272,42 +272,52 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     )
 
 
-def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float) -> float:
+def roll_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
     """The lesser of the phase margins of the roll rate loop and of the roll loop around it.
 
     Args:
         at: the aircraft at trim.
         gains: of the autopilot.
         lag_s: time constant of the aileron's servo.
+        latency_s: age of the roll angle.
     """
     s = 1j * FREQUENCIES_RADPS
     plant = at.lda / (s - at.lp) / (1.0 + lag_s * s)
     return _margin_deg(
-        plant, gains.aileron_p + gains.aileron_p_integral / s, gains.aileron_p_forward, gains.roll
+        plant, gains.aileron_p + gains.aileron_p_integral / s, gains.aileron_p_forward, gains.roll, latency_s
     )
 
 
-def pitch_margin_deg(at: Derivatives, gains: Gains, lag_s: float) -> float:
+def pitch_margin_deg(at: Derivatives, gains: Gains, lag_s: float, latency_s: float = 0.0) -> float:
     """The lesser of the phase margins of the pitch rate loop and of the pitch loop around it.
 
     Args:
         at: the aircraft at trim.
         gains: of the autopilot.
         lag_s: time constant of the elevator's servo.
+        latency_s: age of the pitch angle.
     """
     s = 1j * FREQUENCIES_RADPS
     short_period = s * s - (at.mq + at.za) * s + at.mq * at.za - at.ma
     plant = -at.mde * (s - at.za) / short_period / (1.0 + lag_s * s)
     return _margin_deg(
-        plant, gains.elevator_q + gains.elevator_q_integral / s, gains.elevator_q_forward, gains.pitch
+        plant,
+        gains.elevator_q + gains.elevator_q_integral / s,
+        gains.elevator_q_forward,
+        gains.pitch,
+        latency_s,
     )
 
 
-def _margin_deg(plant: ComplexArray, feedback: ComplexArray, forward: float, outer: float) -> float:
+def _margin_deg(
+    plant: ComplexArray, feedback: ComplexArray, forward: float, outer: float, latency_s: float
+) -> float:
     """The lesser margin of a rate loop and of the attitude loop around it, which has a feed-forward of the rate."""
     inner = feedback * plant
     rate = (forward * plant + inner) / (1.0 + inner)
-    return min(_phase_margin_deg(inner), _phase_margin_deg(outer / (1j * FREQUENCIES_RADPS) * rate))
+    old = 1j * FREQUENCIES_RADPS * latency_s  # the angle of then, and what the rate of now makes of it since
+    attitude = outer / (1j * FREQUENCIES_RADPS) * rate * (np.exp(-old) + old)
+    return min(_phase_margin_deg(inner), _phase_margin_deg(attitude))
 
 
 def _phase_margin_deg(loop: ComplexArray) -> float:

@@ -128,7 +128,8 @@ def _load(files: ModelFiles, step_rate_hz: int) -> Any:
     )  # before the model: its filters and integrators take their step when they are loaded
     with ExitStack() as stack:
         try:
-            derived = stack.enter_context(with_autopilot(files.model, files.actuators, files.deviation))
+            late = files.latency_s, round(files.latency_s * step_rate_hz)
+            derived = stack.enter_context(with_autopilot(files.model, files.actuators, files.deviation, late))
             fdm.set_aircraft_path(str(derived))
             fdm.set_engine_path(str(files.engines))
             fdm.set_systems_path(str(files.systems))

@@ -36,6 +36,7 @@ class ModelFiles:
         systems: folder that its shared systems are read from.
         actuators: controls, and what moves each where it does not do what it is told at once.
         deviation: by how much the flown aircraft differs; no survey is flown with it.
+        latency_s: age of the attitude, airspeed, height and climb that the autopilot works with.
     """
 
     model: Path
@@ -43,6 +44,7 @@ class ModelFiles:
     systems: Path
     actuators: tuple[tuple[str, NormActuator], ...] = ()
     deviation: Deviation = AS_MODELLED
+    latency_s: float = 0.0
 
     @property
     def name(self) -> str:
@@ -57,6 +59,7 @@ class ModelFiles:
         """
         sha = hashlib.sha256(version("jsbsim").encode())
         sha.update(repr(self.actuators).encode() if self.actuators else b"")
+        sha.update(repr(self.latency_s).encode() if self.latency_s else b"")
         known = (self.model.parent, OWN, _wheel())
         shared = {each for each in (self.engines, self.systems) if not any(map(each.is_relative_to, known))}
         for folder in (self.model.parent, OWN, *sorted(shared)):

@@ -6,6 +6,7 @@ Every flight begins trimmed, 300 m above the sea, in calm air. Speeds are true a
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -17,11 +18,11 @@ from aircraft.autopilot import NEEDED_DEG, Derivatives, Gains, gains, pitch_marg
 from aircraft.envelope import performance
 from aircraft.frames import LocalPlane
 from aircraft.guidance.interface import UPDATE_RATE_HZ
-from aircraft.guidance.preview import PreviewConfig, PreviewLaw
+from aircraft.guidance.latency import as_it_was
+from aircraft.guidance.preview import PreviewConfig, PreviewLaw, bandwidth_of_delay_margin
 from aircraft.interface import GRAVITY_MPS2, STEP_RATE_HZ, AircraftState, Route
 from aircraft.jsbsim_loading import (
     REFERENCE_ALTITUDE_M,
-    angle_of_attack_rad,
     linearised,
     mass_kg,
     most_lift_deg,
@@ -46,9 +47,8 @@ ROLL_RATE_DPS = 60.0
 ROLL_COMMAND_SHARE = 0.5
 """Share of the steady roll rate at full aileron that the roll command may ask for."""
 
-STALL_DEG, STALL_MARGIN_DEG = 15.0, 5.0
-"""Of a model whose lift never stops rising: the angle of attack that counts as stalled, and the least of it beyond that
-of the slowest level flight."""
+UNSTALLED_DEG = 20.0
+"""Angle of attack that counts as stalled of a model whose lift never stops rising."""
 
 BANDWIDTH_SHARE = 0.36
 """Bandwidth of the cross-track correction over that of roll: more and the two begin to work against each other."""
@@ -57,7 +57,9 @@ ROLL_LIMITED_S = 0.1
 """Flying time; a cross-track error of that much flight is corrected without reaching the limit of roll rate.
 Correcting an error e at bandwidth w takes a change of g * roll of w^3 e; beyond the limit it becomes unstable."""
 
-LOOSE_STALL_DEG = 40.0
+DELAY_MARGIN_S = 0.5
+"""Further delay that the cross-track loop of `preview` bears where the latency of the state is known."""
+
 DOUBLET = (10.0, -10.0, 0.0)
 REVERSALS = (30.0, -30.0, 15.0, 0.0)
 RESTED_SHARE = 0.7
@@ -94,9 +96,6 @@ def survey(entry: AirframeEntry, files: ModelFiles) -> dict[str, Any]:
     cruise = entry.cruise_mps or middle_of_trims(files)
     frame = _held_at_cruise(entry, files, cruise)
     low, high = _edge(frame, 1.0 / SPEED_STEP), _edge(frame, SPEED_STEP)
-    if frame.stall_angle_deg == LOOSE_STALL_DEG:
-        alpha_deg = math.degrees(angle_of_attack_rad(trimmed(files, low)))
-        frame = replace(frame, stall_angle_deg=float(math.ceil(max(alpha_deg + STALL_MARGIN_DEG, STALL_DEG))))
     frame = replace(frame, airspeed_range_mps=(low, high))
     speeds = sorted({*np.linspace(low, high, 5).round(SPEED_DIGITS).tolist(), cruise})
     return {
@@ -123,12 +122,13 @@ def _held_at_cruise(entry: AirframeEntry, files: ModelFiles, cruise: float) -> A
     try:
         at = linearised(trimmed(files, cruise))
         reason: str | None = None
-        roll_lag_s = _lag_s(files, "aileron")
-        pitch_pace = _pitch_pace(at, _lag_s(files, "elevator"))
+        roll_lag_s, latency_s = _lag_s(files, "aileron"), files.latency_s
+        pitch_pace = _pitch_pace(at, _lag_s(files, "elevator"), latency_s)
         for pace in PACES:
             placed = replace(gains(at, pace, pitch_pace).rounded(GAIN_DIGITS), **entry.gains)
-            if roll_lag_s and (margin_deg := roll_margin_deg(at, placed, roll_lag_s)) < NEEDED_DEG:
-                reason = _too_slow("aileron", roll_lag_s, "roll", margin_deg)
+            margin_deg = roll_margin_deg(at, placed, roll_lag_s, latency_s)
+            if (roll_lag_s or latency_s) and margin_deg < NEEDED_DEG:
+                reason = _too_slow("aileron", roll_lag_s + latency_s, "roll", margin_deg)
                 continue
             frame = _provisional(entry, files, cruise, at, placed)
             if reason := not_held(frame, cruise, REVERSALS):
@@ -158,17 +158,18 @@ def _lag_s(files: ModelFiles, control: str) -> float:
     return servos[control].lag_s if control in servos else 0.0
 
 
-def _pitch_pace(at: Derivatives, lag_s: float) -> float:
-    """The fastest pace in pitch whose loops keep their margin behind the elevator's servo.
+def _pitch_pace(at: Derivatives, lag_s: float, latency_s: float) -> float:
+    """The fastest pace in pitch whose loops keep their margin behind the elevator's servo and an old pitch angle.
 
     Raises:
         ValueError: they keep it at none.
     """
-    margin_deg = math.inf
-    for pace in PACES if lag_s else PACES[:1]:
-        if not lag_s or (margin_deg := pitch_margin_deg(at, gains(at, 1.0, pace), lag_s)) >= NEEDED_DEG:
+    late = lag_s or latency_s
+    for pace in PACES if late else PACES[:1]:
+        margin_deg = pitch_margin_deg(at, gains(at, 1.0, pace), lag_s, latency_s)
+        if not late or margin_deg >= NEEDED_DEG:
             return pace
-    raise ValueError(_too_slow("elevator", lag_s, "pitch", margin_deg))
+    raise ValueError(_too_slow("elevator", lag_s + latency_s, "pitch", margin_deg))
 
 
 def _too_slow(control: str, lag_s: float, loop: str, margin_deg: float) -> str:
@@ -185,12 +186,16 @@ def _provisional(
     roll_rate_dps = ROLL_COMMAND_SHARE * math.degrees(1.0 / max(abs(placed.aileron_p_forward), 1e-6))
     roll_rate_dps = float(math.floor(min(roll_rate_dps, ROLL_RATE_DPS)))
     slow = (GRAVITY_MPS2 * math.radians(roll_rate_dps) / (ROLL_LIMITED_S * cruise)) ** (1.0 / 3.0)
+    roll_delay_s = round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2)
+    if files.latency_s:
+        roll_delay_s = round(roll_delay_s + files.latency_s, 3)
+        slow = min(slow, bandwidth_of_delay_margin(DELAY_MARGIN_S, roll_delay_s))
     figures = {
         "bank_limit_deg": BANK_LIMIT_DEG,
         "roll_rate_dps": roll_rate_dps,
-        "stall_angle_deg": math.ceil(most_lift_deg(files, cruise) or LOOSE_STALL_DEG),
+        "stall_angle_deg": math.ceil(most_lift_deg(files, cruise) or UNSTALLED_DEG),
         "roll_lag_s": round(1.0 / placed.roll, 3),
-        "roll_delay_s": round(1.0 / (abs(at.lp) + at.lda * placed.aileron_p) + _lag_s(files, "aileron"), 2),
+        "roll_delay_s": roll_delay_s,
         "guidance_bandwidth_radps": round(min(BANDWIDTH_SHARE * placed.roll, slow), 3),
         "turn_rate_share": 1.0,
         **entry.figures,
@@ -300,8 +305,9 @@ def weaving_error_m(frame: Airframe, speed: float) -> float:
     law = PreviewLaw(PreviewConfig().resolved(limits), limits)
     law.follow(weave(performance(frame, speed).turn_radius_m))
     model, worst = in_flight(frame, speed), 0.0
+    past: deque[AircraftState] = deque()
     while True:
-        output = law.update(model.state())
+        output = law.update(as_it_was(past, model.state(), frame.files.latency_s))
         if model.fault() or output.past_end:
             return math.inf if model.fault() else worst
         worst = max(worst, abs(output.cross_track_m))

@@ -7,6 +7,7 @@ error from obstacles.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +15,8 @@ from typing import Any
 from aircraft.airframe import Airframe
 from aircraft.envelope import performance
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLaw
-from aircraft.interface import Route
+from aircraft.guidance.latency import as_it_was
+from aircraft.interface import AircraftState, Route
 from aircraft.jsbsim_loading import REFERENCE_ALTITUDE_M
 from aircraft.model_files import AircraftError
 from aircraft.start import Atmosphere
@@ -105,8 +107,9 @@ class LawSurvey:
         model = in_flight(self.frame, speed, Atmosphere(wind_north_mps=north_mps))
         most_s = SLOWEST_SHARE * float(route.segments[:, 5].sum()) / (speed - abs(north_mps))
         worst_m, cut, updates = 0.0, 0, 0
+        past: deque[AircraftState] = deque()
         while True:
-            state = model.state()
+            state = as_it_was(past, model.state(), self.frame.files.latency_s)
             output = law.update(state)
             if model.fault() or state.time_s > most_s:
                 return math.inf, 1.0

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from aircraft.guidance.latency import as_it_was
 from aircraft.interface import AircraftState, FloatArray
 from harness.scenario.navigation import Navigation
 
@@ -22,9 +23,6 @@ AIRSPEED_CORRELATION_S: Final = 300.0
 
 _POSITION, _VELOCITY, _HEADING, _AIRSPEED, _ALTITUDE = slice(0, 2), slice(2, 5), 5, 6, 7
 
-
-GROWS_OLD: Final = AircraftState._fields[1 : AircraftState._fields.index("load_factor") + 1]
-"""What of a state is as old as the latency: all from position to load factor."""
 
 LOOKS_APART_S: Final = 5.0
 """What moves is told from looks at it that are about so far apart in time."""
@@ -120,7 +118,7 @@ class Navigator:
         """
         if self._perfect:
             return state
-        return self._erroneous(_as_it_was(self._past, state, self._navigation.latency_s))
+        return self._erroneous(as_it_was(self._past, state, self._navigation.latency_s))
 
     def _erroneous(self, state: AircraftState) -> AircraftState:
         """A state with the errors of its time."""
@@ -175,34 +173,6 @@ class Navigator:
             if begin_s <= time_s < end_s:
                 return index
         return -1
-
-
-def _as_it_was(past: deque[AircraftState], state: AircraftState, latency_s: float) -> AircraftState:
-    """The state some time ago, but for its time; before the first one it moves evenly.
-
-    Args:
-        past: states of earlier calls, the oldest first; this one is added, and those that are too old go.
-        state: the state now.
-        latency_s: how long ago.
-    """
-    if latency_s == 0.0:
-        return state
-    if not past or state.time_s > past[-1].time_s:
-        past.append(state)
-    then_s = state.time_s - latency_s
-    while len(past) > 1 and past[1].time_s <= then_s:
-        past.popleft()
-    old = past[0]
-    new = past[1] if len(past) > 1 else old
-    share = (then_s - old.time_s) / (new.time_s - old.time_s) if then_s > old.time_s else 0.0
-    lead_s = min(then_s - old.time_s, 0.0)
-    values = {name: (1.0 - share) * a + share * b for name, a, b in zip(old._fields, old, new, strict=True)}
-    values["heading_rad"] = old.heading_rad + share * math.remainder(
-        new.heading_rad - old.heading_rad, math.tau
-    )
-    values |= {"east_m": values["east_m"] + lead_s * old.velocity_east_mps}
-    values |= {"north_m": values["north_m"] + lead_s * old.velocity_north_mps}
-    return state._replace(**{name: values[name] for name in GROWS_OLD})
 
 
 def _stream(root: np.random.SeedSequence, number: int) -> np.random.Generator:

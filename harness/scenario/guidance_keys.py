@@ -68,21 +68,24 @@ def _prepare(model: str) -> None:
 
 
 def airframe_of(spec: AircraftSpec) -> Airframe:
-    """The airframe of a scenario, with its servos.
+    """The airframe of a scenario, with its servos and its autopilot.
 
     Raises:
         AircraftError: there is none, or it cannot be flown.
     """
     from aircraft.actuators.actuator import Actuator, Actuators
+    from aircraft.airframe import DERIVED, AutopilotKeys
     from aircraft.airframes import airframe
 
     _prepare(spec.model)
-    servos = spec.actuators
+    servos, autopilot = spec.actuators, DERIVED
+    if spec.autopilot is not None:
+        own = spec.autopilot.model_dump()
+        autopilot = AutopilotKeys(latency_s=own.pop("state_latency_s") or 0.0, **own)
     if servos is None:
-        return airframe(spec.model)
-    return airframe(
-        spec.model, Actuators.alike(Actuator(servos.lag_s, servos.rate_limit_degps, servos.deadband_deg))
-    )
+        return airframe(spec.model) if autopilot == DERIVED else airframe(spec.model, None, autopilot)
+    actuator = Actuator(servos.lag_s, servos.rate_limit_degps, servos.deadband_deg)
+    return airframe(spec.model, Actuators.alike(actuator), autopilot)
 
 
 def flown_airframe(spec: AircraftSpec) -> Airframe:

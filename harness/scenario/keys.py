@@ -10,6 +10,7 @@ from harness.scenario.environment import Environment, GroundSpec, SourceSpec
 from harness.scenario.navigation import Navigation
 from harness.scenario.obstacles import Obstacle
 from harness.scenario.sections import (
+    MAX_COORDINATE_M,
     AircraftSpec,
     Area,
     GuidanceSpec,
@@ -17,12 +18,45 @@ from harness.scenario.sections import (
     PlannerSpec,
     Section,
     Sensor,
-    TrackabilitySpec,
     UncertaintySpec,
     key,
 )
 from harness.scenario.simulation import Simulation
 from harness.scenario.validation import NAME_PATTERN
+
+
+class TrackabilitySpec(Section):
+    """What a leg of the flight may be off before it counts as not trackable."""
+
+    cross_track_m: float = key(
+        "Distance of the true position from the plan; what the planner keeps for navigation errors comes on top.",
+        unit="m",
+        derived="a tenth of planner.clearance_m where the file gives that, else 10 m",
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
+    altitude_m: float = key(
+        "Distance from mission.altitude_m.",
+        unit="m",
+        derived="10 m",
+        gt=0,
+        le=MAX_COORDINATE_M,
+    )
+    airspeed_mps: float = key(
+        "Error of the true airspeed, averaged over 20 s.",
+        unit="m/s",
+        derived="a tenth of aircraft.airspeed_mps",
+        gt=0,
+        le=1000,
+    )
+    load_factor: float = key(
+        "Load factor, averaged over 1 s.",
+        unit="1",
+        derived="the limit manoeuvring load factor of 14 CFR 23.337 (amendment 23-48) for the aircraft's mass, "
+        "2.1 + 24000 / (weight in lb + 10000) and at most 3.8",
+        gt=1,
+        le=20,
+    )
 
 
 class ScenarioKeys(Section):

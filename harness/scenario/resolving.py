@@ -19,7 +19,7 @@ from harness.scenario.files_resolved import resolved as files_expanded
 from harness.scenario.keys import ScenarioKeys
 from harness.scenario.navigation import planning_margin_m
 from harness.scenario.performance import LEAST_CLEARANCE, mission_with, performance_of, wind_mps_of
-from harness.scenario.sections import AircraftSpec, Area, MissionSpec, Section
+from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Section
 from harness.scenario.simulation import step_rate_hz
 from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
@@ -57,9 +57,10 @@ def resolve(
     nominal = _nominal_airframe(aircraft)
     keys = with_servos(keys.updated(simulation=simulation, mission=mission, aircraft=aircraft), nominal)
     aircraft = _filled(keys.aircraft, airspeed_mps=_cruise_mps(keys.aircraft))
-    guidance = guidance_keys.resolved(keys.guidance, aircraft, as_flown)
     keys = with_day(keys.updated(aircraft=aircraft), nominal)
-    aircraft = keys.aircraft
+    aircraft = _with_latency(keys.aircraft, keys.navigation.latency_s)
+    keys = keys.updated(aircraft=aircraft)
+    guidance = guidance_keys.resolved(keys.guidance, aircraft, as_flown)
     scenario = keys.updated(guidance=guidance)
     if as_flown and not guidance_keys.is_here(guidance):
         return scenario  # what follows from how the law tracks stands there
@@ -112,6 +113,14 @@ def resolve(
     return scenario.updated(planner=planner_keys.resolved(planner, told, as_flown))
 
 
+def _with_latency(aircraft: AircraftSpec, latency_s: float) -> AircraftSpec:
+    """An aircraft whose autopilot is tuned for the age of the state, where there is one."""
+    if not latency_s and aircraft.autopilot is None:
+        return aircraft
+    autopilot = _filled(aircraft.autopilot or AutopilotSpec(), state_latency_s=latency_s)
+    return aircraft.model_copy(update={"autopilot": autopilot})
+
+
 def _filled(section: Part, **defaults: float) -> Part:
     """A section with those of its keys filled in that the file leaves out."""
     missing = {key: value for key, value in defaults.items() if getattr(section, key) is None}
@@ -162,7 +171,7 @@ def _nominal_airframe(spec: AircraftSpec) -> Airframe:
     from aircraft.airframes import AircraftError
 
     try:
-        return guidance_keys.airframe_of(spec.model_copy(update={"actuators": None}))
+        return guidance_keys.airframe_of(spec.model_copy(update={"actuators": None, "autopilot": None}))
     except AircraftError as error:
         raise KeyFault(("aircraft", "model"), str(error)) from error
 

@@ -160,6 +160,62 @@ class ActuatorsSpec(Section):
     )
 
 
+PitchLimit = Annotated[float, Field(ge=-90, le=90)]
+
+
+class AutopilotSpec(Section):
+    """What the autopilot may do, where that is other than the aircraft's card has it."""
+
+    bank_limit_deg: float | None = key(
+        "Largest bank that guidance may command. Default: that of the aircraft's card.",
+        unit="deg",
+        default=None,
+        ge=5,
+        le=70,
+    )
+    roll_rate_limit_degps: float | None = key(
+        "Fastest roll that is commanded. Default: that of the aircraft's card.",
+        unit="deg/s",
+        default=None,
+        gt=0,
+        le=720,
+    )
+    roll_time_constant_s: float | None = key(
+        "Time constant of roll behind its command. Default: that of the aircraft's card.",
+        unit="s",
+        default=None,
+        ge=0.05,
+        le=5,
+    )
+    pitch_limits_deg: Annotated[tuple[PitchLimit, PitchLimit], Strict(False)] = key(
+        "Least and largest pitch that is commanded.", unit="deg", default=(-30.0, 30.0)
+    )
+    least_airspeed_mps: float | None = key(
+        "Below this true airspeed height goes before speed. Default: 0.97 of the lowest of level flight.",
+        unit="m/s",
+        default=None,
+        gt=0,
+        le=1000,
+    )
+    state_latency_s: float = key(
+        "Age of attitude, airspeed and height that the autopilot works with; it and guidance are tuned for it.",
+        unit="s",
+        derived="navigation.latency_s",
+        ge=0,
+        le=2,
+    )
+
+    @model_validator(mode="after")
+    def _pitch_in_order(self) -> AutopilotSpec:
+        least, most = self.pitch_limits_deg
+        if not -90.0 <= least < 0.0 < most <= 90.0:
+            raise KeyFault(
+                ("pitch_limits_deg",),
+                f"is [{least:g}, {most:g}]; must be a negative and a positive angle to 90 degrees",
+            )
+        return self
+
+
 SHARES: Final = {
     "mass": "Mass and inertias, as a share of the empty weight",
     "thrust": "Thrust, as a share",
@@ -233,6 +289,9 @@ class AircraftSpec(Section):
     actuators: ActuatorsSpec | None = key(
         "Servos behind the autopilot. Default: those of the aircraft, else of the conditions, or none.",
         default=None,
+    )
+    autopilot: AutopilotSpec | None = key(
+        "What the autopilot may do. Default: as the aircraft's card has it.", default=None
     )
     deviation: DeviationSpec | None = key(
         "How the flown aircraft differs from its model. Default: drawn with the uncertainty, else not at all.",
@@ -339,37 +398,3 @@ class GuidanceSpec(Section):
     def own(self) -> dict[str, Any]:
         """The law's own keys."""
         return dict(self.__pydantic_extra__ or {})
-
-
-class TrackabilitySpec(Section):
-    """What a leg of the flight may be off before it counts as not trackable."""
-
-    cross_track_m: float = key(
-        "Distance of the true position from the plan; what the planner keeps for navigation errors comes on top.",
-        unit="m",
-        derived="a tenth of planner.clearance_m where the file gives that, else 10 m",
-        gt=0,
-        le=MAX_COORDINATE_M,
-    )
-    altitude_m: float = key(
-        "Distance from mission.altitude_m.",
-        unit="m",
-        derived="10 m",
-        gt=0,
-        le=MAX_COORDINATE_M,
-    )
-    airspeed_mps: float = key(
-        "Error of the true airspeed, averaged over 20 s.",
-        unit="m/s",
-        derived="a tenth of aircraft.airspeed_mps",
-        gt=0,
-        le=1000,
-    )
-    load_factor: float = key(
-        "Load factor, averaged over 1 s.",
-        unit="1",
-        derived="the limit manoeuvring load factor of 14 CFR 23.337 (amendment 23-48) for the aircraft's mass, "
-        "2.1 + 24000 / (weight in lb + 10000) and at most 3.8",
-        gt=1,
-        le=20,
-    )

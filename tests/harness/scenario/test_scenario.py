@@ -59,6 +59,7 @@ def test_limits_follow_from_the_written_clearance_and_from_nobody_who_flies() ->
         ("guidance.acceptance_radius_m", 300.0),
         ("environment.turbulence.intensity", "severe"),
         ("aircraft.actuators.rate_limit_degps", 60.0),
+        ("aircraft.autopilot.bank_limit_deg", 40.0),
     ):
         other = light.with_({key: value}).trackability
         assert (other.cross_track_m, other.altitude_m) == (10.0, 10.0), key
@@ -440,7 +441,16 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         for name, key in keys
         if name
         not in holders
-        | {"environment", "wind", "turbulence", "gust", "trackability", "simulation", "actuators"}
+        | {
+            "environment",
+            "wind",
+            "turbulence",
+            "gust",
+            "trackability",
+            "simulation",
+            "actuators",
+            "autopilot",
+        }
     ]
     required = {
         "schema",
