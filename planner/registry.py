@@ -14,7 +14,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
-from planner.baselines import bug1, bug2, dubins_tree, tangent_bug, vfh_plus
+from planner.baselines import bendy_ruler, bug1, bug2, dubins_tree, mppi, tangent_bug, vfh_plus
 from planner.interface import Mission, Planner
 from planner.paper import config as paper_config
 from planner.paper import rolling as paper
@@ -88,6 +88,18 @@ BUILT_IN = (
         summary="VFH+ (Ulrich, Borenstein): polar histogram masked by the turn radius; local, can be caught",
         config=vfh_plus.VfhPlusConfig,
         make=vfh_plus.VfhPlus,
+    ),
+    PlannerKind(
+        kind="bendy_ruler",
+        summary="ArduPilot's BendyRuler, steered at the turn radius: probes bearings and a second line; local",
+        config=bendy_ruler.BendyRulerConfig,
+        make=bendy_ruler.BendyRuler,
+    ),
+    PlannerKind(
+        kind="mppi",
+        summary="MPPI (Williams et al.): weighted mean of sampled turns over a horizon; local, from a seed",
+        config=mppi.MppiConfig,
+        make=mppi.Mppi,
     ),
     PlannerKind(
         kind="dubins_tree",

@@ -21,13 +21,13 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from planner.geometry.clearance import first_breach, inside_bounds
-from planner.geometry.curves import SHORTEST_M, Limits, Point, Pose, Segment, turn_onto
+from planner.baselines.steering import off, steer
+from planner.geometry.clearance import first_breach
+from planner.geometry.curves import Limits, Point, Pose, Segment
 from planner.geometry.joining import branch_off, stuck
 from planner.geometry.margin import MARGIN_KEY, margin_of
-from planner.interface import BoolArray, FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.interface import BoolArray, FloatArray, Mission, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 
 WIDE_RAD = math.radians(80.0)
@@ -118,7 +118,7 @@ class VfhPlus:
         if (
             last is not None
             and path is not None
-            and abs(_off(choice, last)) < 0.5 * self._width_rad
+            and abs(off(choice, last)) < 0.5 * self._width_rad
             and left > 0.5 * self._look_m(pose[:2])
             and math.isinf(first_breach(path, near, mission.clearance_m, request.arc_length_m))
         ):
@@ -139,8 +139,8 @@ class VfhPlus:
         half = np.arcsin(np.minimum(self._keep_m / np.maximum(distance, 1e-9), 1.0))
         # The paper's a - b d^2 with unit certainty, 1 here and 0 at the rim.
         magnitude = 1.0 - np.square(distance / self._window_m)
-        off = np.abs(_off(self._bearings[:, None], np.arctan2(dy, dx)))
-        primary = (magnitude * (off <= half)).sum(axis=1)
+        aside = np.abs(off(self._bearings[:, None], np.arctan2(dy, dx)))
+        primary = (magnitude * (aside <= half)).sum(axis=1)
         low, high = self._config.free_below, self._config.blocked_above
         self._blocked = np.where(primary > high, True, np.where(primary < low, False, self._blocked))
         return self._blocked | self._outside(pose)
@@ -156,7 +156,7 @@ class VfhPlus:
     def _masked(self, pose: Pose, near: FloatArray, blocked: BoolArray) -> BoolArray:
         """Which sectors are blocked or lie behind an obstacle that a turn there would touch."""
         course = math.atan2(pose.tangent_north, pose.tangent_east)
-        relative = _off(self._bearings, course)
+        relative = off(self._bearings, course)
         masked = blocked.copy()
         for side in (1.0, -1.0):  # left, right
             radius = self._limits.radius_m
@@ -165,7 +165,7 @@ class VfhPlus:
                 pose.north_m + side * radius * pose.tangent_east,
             )
             touching = np.hypot(near[:, 0] - x, near[:, 1] - y) < radius + self._keep_m
-            bearing = side * _off(np.arctan2(near[:, 1] - pose.north_m, near[:, 0] - pose.east_m), course)
+            bearing = side * off(np.arctan2(near[:, 1] - pose.north_m, near[:, 0] - pose.east_m), course)
             ahead = bearing[touching & (bearing >= 0.0)]
             limit = float(ahead.min()) if len(ahead) else math.pi
             masked |= side * relative > limit
@@ -179,7 +179,7 @@ class VfhPlus:
 
         def cost(bearing: float) -> float:
             terms = ((GOAL_WEIGHT, goal), (COURSE_WEIGHT, course), (CHOICE_WEIGHT, last))
-            return float(sum(weight * abs(_off(bearing, other)) for weight, other in terms))
+            return float(sum(weight * abs(off(bearing, other)) for weight, other in terms))
 
         return min(self._candidates(masked, goal), key=cost, default=None)
 
@@ -210,46 +210,14 @@ class VfhPlus:
         """The turn to a direction, and straight on along it."""
         look = self._look_m(pose[:2])
         target = pose.east_m + look * math.cos(choice), pose.north_m + look * math.sin(choice)
-        turn = turn_onto(pose, target, self._limits.radius_m)
-        if turn is None:
-            return Plan(PlanStatus.NO_PATH, "the goal is nearer than a turn")
-        arcs, last = [row for row in turn if row[4]], turn[-1]
-        room_m = last[5] if last[4] else _to_border_m(last, self._mission.bounds_m)
-        if room_m < SHORTEST_M or (arcs and not inside_bounds(Path(np.array(arcs)), self._mission.bounds_m)):
-            return stuck("no turn stays inside the area", request, self._mission, self._memory.points_m)
-        turn[-1] = (*last[:5], min(last[5], room_m))
-        path = Path(np.array([*prefix, *turn]))
         free = self._bearings[~masked]
         half = 0.5 * self._width_rad
-        return Plan(
-            PlanStatus.FOUND,
-            f"steering {math.degrees(math.pi / 2 - choice) % 360:.0f} degrees",
-            np.array([request.position_m, *(row[:2] for row in turn[1:]), target]),
-            path,
-            partial(
-                PlanPicture,
-                np.array([request.position_m, self._mission.goal_m]),
-                self._window_m,
-                np.column_stack(
-                    (np.cos(free - half), np.sin(free - half), np.cos(free + half), np.sin(free + half))
-                ),
+        picture = partial(
+            PlanPicture,
+            np.array([request.position_m, self._mission.goal_m]),
+            self._window_m,
+            np.column_stack(
+                (np.cos(free - half), np.sin(free - half), np.cos(free + half), np.sin(free + half))
             ),
         )
-
-
-def _to_border_m(straight: Segment, bounds_m: tuple[float, float, float, float]) -> float:
-    """How far a straight line stays inside the area; negative where it begins outside."""
-    x, y, ux, uy, _, _ = straight
-    xmin, ymin, xmax, ymax = bounds_m
-    room = [math.inf]
-    for low, high, place, pace in ((xmin, xmax, x, ux), (ymin, ymax, y, uy)):
-        if not low <= place <= high:
-            return -math.inf
-        if pace:
-            room.append(((high if pace > 0.0 else low) - place) / pace)
-    return min(room)
-
-
-def _off(a: ArrayLike, b: ArrayLike) -> FloatArray:
-    """The turn from direction b to direction a, in [-pi, pi)."""
-    return np.asarray((np.subtract(a, b) + math.pi) % math.tau - math.pi, dtype=np.float64)
+        return steer(request, self._mission, (pose, prefix), target, self._memory.points_m, picture)

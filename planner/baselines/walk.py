@@ -199,10 +199,18 @@ class Walker(ABC, Generic[WalkState]):
         if taken_back and any(map(self._has_gone, self.follows(place, state))):
             state = self.begin(place)
         legs = tuple(self.walk(place, state))
+        if self._begins_off_m(legs, place) > self.mission.off_path_m:
+            # Off its boundary, as an aircraft that cuts corners comes to be, the way back to it is blocked.
+            legs = tuple(self.walk(place, self.begin(place)))
         if not must and not self.prefers(legs, left):
             self._look_at_m = arc_length_m + self.look_again_m()
             return Plan(PlanStatus.NO_BETTER, "the walk serves as well as a new one")
         return self._found(legs, request, place)
+
+    def _begins_off_m(self, legs: Sequence[WalkLeg[WalkState]], place: Point) -> float:
+        """How far from a place a walk begins."""
+        first = next((segment for leg in legs for segment in leg.segments), None)
+        return 0.0 if first is None else math.dist(first[:2], place)
 
     def _begun(self, request: PlanRequest) -> Plan:
         """A walk from the beginning of the algorithm."""
@@ -226,14 +234,14 @@ class Walker(ABC, Generic[WalkState]):
     def _found(
         self, legs: tuple[WalkLeg[WalkState], ...], request: PlanRequest, place: Point | None = None
     ) -> Plan:
-        legs = tuple(connected(legs))
+        here = place or request.position_m
+        legs = tuple(connected(legs, here, self.mission.off_path_m))
         segments = [segment for leg in legs for segment in leg.segments]
         end = legs[-1].state
         if not segments:
             reason = end.sentence if isinstance(end, Enclosed) else "there is no room to move"
             proven = isinstance(end, Enclosed) and self._unrest.settled(request.time_s)
             return Plan(PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PATH, reason)
-        here = place or request.position_m
         last = along(segments[-1], segments[-1][5])[:2]
         self.legs, self.breach_m, self._look_at_m = legs, math.inf, self.look_again_m()
         self._plan = Plan(
@@ -303,18 +311,26 @@ def _same_way(segment: Segment, at_m: float, mark: Mark) -> bool:
     return tx * mark.ux + ty * mark.uy > 0.0
 
 
-def connected(legs: Sequence[WalkLeg[WalkState]]) -> Iterator[WalkLeg[WalkState]]:
-    """Legs with a straight line wherever a segment begins off where the one before ends, as beside a boundary."""
-    at: Point | None = None
+def connected(
+    legs: Sequence[WalkLeg[WalkState]], begin: Point | None = None, off_m: float = math.inf
+) -> Iterator[WalkLeg[WalkState]]:
+    """Legs with a straight line wherever a segment begins off where the one before ends, as beside a boundary.
+
+    Args:
+        legs: the walk.
+        begin: where the vehicle is.
+        off_m: the walk may begin so far from there without a line.
+    """
+    at, gap_of_m = begin, off_m
     for leg in legs:
         segments: list[Segment] = []
         for segment in leg.segments:
             gap_m = 0.0 if at is None else math.dist(at, segment[:2])
-            if at is not None and gap_m > GAP_M:
+            if at is not None and gap_m > gap_of_m:
                 ux, uy = (segment[0] - at[0]) / gap_m, (segment[1] - at[1]) / gap_m
                 segments.append((*at, ux, uy, 0.0, gap_m))
             segments.append(segment)
-            at = along(segment, segment[5])[:2]
+            at, gap_of_m = along(segment, segment[5])[:2], GAP_M
         yield replace(leg, segments=tuple(segments))
 
 

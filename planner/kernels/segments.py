@@ -118,6 +118,19 @@ def to_nearer(points: FloatArray, ax: float, ay: float, bx: float, by: float) ->
     return away
 
 
+@compiled(ROWS, ROWS)
+def to_nearest(places: FloatArray, points: FloatArray) -> FloatArray:
+    """(k,) distance of each of (k, 2) places to the nearest of (m, 2) points, m; infinite where there is none."""
+    away = np.empty(len(places))
+    for i in range(len(places)):
+        least = math.inf
+        for j in range(len(points)):
+            dx, dy = places[i, 0] - points[j, 0], places[i, 1] - points[j, 1]
+            least = min(least, dx * dx + dy * dy)
+        away[i] = math.sqrt(least)
+    return away
+
+
 @compiled(ROWS, FLOAT)
 def pose(rows: FloatArray, arc_length: float) -> tuple[float, float, float, float, float]:
     """Place and tangent at a arc_length, clamped to the ends, and the curvature there."""

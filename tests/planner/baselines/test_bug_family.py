@@ -478,3 +478,11 @@ def test_legs_that_begin_off_the_one_before_are_joined_by_a_line() -> None:
     assert line == pytest.approx((100.0, 0.0, 0.6, 0.8, 0.0, 5.0))
     assert (second.state, after) == ("two", north)
     assert list(connected(())) == []
+
+
+def test_a_walk_begins_where_the_vehicle_is() -> None:
+    north = (0.0, 30.0, 0.0, 1.0, 0.0, 5.0)
+    (led,) = connected((WalkLeg("follow", (north,)),), begin=(0.0, 0.0), off_m=10.0)
+    assert led.segments == ((0.0, 0.0, 0.0, 1.0, 0.0, 30.0), north)
+    (near,) = connected((WalkLeg("follow", (north,)),), begin=(0.0, 25.0), off_m=10.0)
+    assert near.segments == (north,)

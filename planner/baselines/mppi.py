@@ -1,0 +1,207 @@
+"""MPPI: model-predictive path integral control, the sampling planner that mobile robots fly today (Nav2 has one).
+
+G. Williams, P. Drews, B. Goldfain, J. M. Rehg and E. A. Theodorou, "Information-theoretic model predictive control:
+theory and applications to autonomous driving", IEEE Transactions on Robotics 34(6), 2018.
+
+1. The nominal controls are a curvature for each step of the horizon, from the plan before, moved on by the time flown.
+2. K sequences are drawn about them, the noise correlated from step to step, and rolled out from the start by the
+   paper's model: an arc of one curvature a step, none tighter than the turn radius.
+3. A rollout costs its way and what is left to the goal, a little for turns, and much for each place that is too near
+   to an edge or outside.
+4. The new nominal controls are the mean of the sequences with the weights exp(-cost / lambda), several times over.
+
+The path is the rollout of the nominal controls. It is deterministic: the samples follow from the seed and their count.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from planner.geometry.clearance import first_breach, inside_bounds
+from planner.geometry.curves import Pose, Segment, along
+from planner.geometry.joining import branch_off, stuck
+from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
+from planner.kernels.segments import to_nearest
+from planner.memory import ObstacleMemory
+
+STEP_RADII = 0.5
+"""Length of a step in turn radii."""
+
+NOISE_SHARE, CORRELATION = 0.6, 0.8
+"""Sigma of the sampled curvature over the largest one, and its correlation from step to step."""
+
+TOO_NEAR_COST, BLOCKED_COST = 3.0, 50.0
+"""Cost, in steps, of a place within the margin and of one within the clearance or outside the area."""
+
+TURN_COST = 0.05
+"""Cost, in steps, of a step flown at the turn radius; it falls with the square of the curvature."""
+
+LAMBDA_STEPS = 0.3
+"""Temperature lambda, in steps."""
+
+ROUNDS = 3
+"""The weighted mean is taken so many times."""
+
+UPDATE_S = 1.0
+"""The controls are optimised anew after so much time."""
+
+DRAWN = 24
+"""So many of the rollouts are drawn in a recording."""
+
+
+@dataclass(frozen=True)
+class MppiConfig:
+    """Keys of `planner.kind: mppi`."""
+
+    samples: int = field(
+        default=256,
+        metadata={"doc": "K, sequences drawn in a round", "unit": "1", "minimum": 8, "maximum": 10_000},
+    )
+    steps: int = field(
+        default=24,
+        metadata={
+            "doc": "steps of the horizon, half a turn radius each",
+            "unit": "1",
+            "minimum": 4,
+            "maximum": 200,
+        },
+    )
+    seed: int = field(
+        default=1, metadata={"doc": "the samples follow from it", "unit": "1", "minimum": 0, "maximum": 2**31}
+    )
+    margin_m: float | None = field(default=None, metadata=MARGIN_KEY)
+
+    def resolved(self, mission: Mission) -> MppiConfig:
+        """This config with every None replaced by its default for the mission."""
+        return replace(self, margin_m=margin_of(mission) if self.margin_m is None else self.margin_m)
+
+
+class Mppi:
+    """The planner for one flight."""
+
+    def __init__(self, config: MppiConfig, mission: Mission) -> None:
+        self._config, self._mission = config.resolved(mission), mission
+        self._step_m = STEP_RADII * mission.turn_radius_m
+        self._most_1pm = 1.0 / mission.turn_radius_m
+        self._memory = ObstacleMemory(mission.clearance_m)
+        self._random = np.random.default_rng(self._config.seed)
+        self._nominal = np.zeros(self._config.steps)
+        self._optimised_s, self._begins_m = -math.inf, 0.0
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """The controls optimised anew once a second, and where the path in effect is cut."""
+        self._memory.take_in(request.seen)
+        mission, path, points = (
+            self._mission,
+            request.flown.path if request.flown else None,
+            self._memory.points_m,
+        )
+        cut = path is not None and math.isfinite(
+            first_breach(path, points, mission.clearance_m, request.arc_length_m)
+        )
+        if path is not None and not cut and request.time_s < self._optimised_s + UPDATE_S:
+            return Plan(PlanStatus.KEPT, "the controls are less than a second old")
+        self._optimised_s = request.time_s
+        pose, prefix = branch_off(request, mission)
+        lead_m = sum(row[5] for row in prefix)
+        self._move_on(request.arc_length_m + lead_m - self._begins_m if prefix else math.inf)
+        self._begins_m = lead_m
+        rollouts = self._optimise(pose, self._nearby(pose))
+        rows = self._path(pose)
+        found = Path(np.array([*prefix, *rows]))
+        free = math.isinf(first_breach(Path(np.array(rows)), points, 0.5 * mission.clearance_m))
+        if not free or not inside_bounds(found, mission.bounds_m):
+            self._nominal[:] = 0.0
+            return stuck("the best rollout is blocked", request, mission, points)
+        return Plan(
+            PlanStatus.FOUND,
+            f"mean of {self._config.samples} rollouts",
+            np.array([request.position_m, *(row[:2] for row in rows), along(rows[-1], rows[-1][5])[:2]]),
+            found,
+            partial(_picture, request.position_m, mission.goal_m, rollouts[:DRAWN]),
+        )
+
+    def _move_on(self, flown_m: float) -> None:
+        """Step 1: the nominal controls from a place on their rollout on; beyond it, straight."""
+        steps = self._config.steps
+        at = np.arange(steps) + min(flown_m / self._step_m, steps)
+        self._nominal = np.interp(at, np.arange(steps), self._nominal, right=0.0)
+
+    def _nearby(self, pose: Pose) -> FloatArray:
+        """(m, 2) edge points that a rollout may meet, one for each square of half the clearance."""
+        points = self._memory.points_m
+        reach = self._step_m * self._config.steps + 2.0 * self._mission.clearance_m
+        near = points[np.hypot(*(points - pose[:2]).T) < reach]
+        squares = np.floor(near / (0.5 * max(self._mission.clearance_m, 1.0)))
+        _, first = np.unique(squares, axis=0, return_index=True)
+        return np.ascontiguousarray(near[np.sort(first)])
+
+    def _optimise(self, pose: Pose, points_m: FloatArray) -> FloatArray:
+        """Steps 2 to 4; returns the rollouts of the last round, (K, steps, 2)."""
+        count, steps = self._config.samples, self._config.steps
+        for round_number in range(ROUNDS):
+            noise = (
+                self._random.normal(size=(count, steps)) * NOISE_SHARE * self._most_1pm / (1 + round_number)
+            )
+            for i in range(1, steps):
+                noise[:, i] = CORRELATION * noise[:, i - 1] + math.sqrt(1.0 - CORRELATION**2) * noise[:, i]
+            noise[0] = 0.0
+            controls = np.clip(self._nominal + noise, -self._most_1pm, self._most_1pm)
+            places = self.rollout(pose, controls)
+            turning = np.square(controls / self._most_1pm).sum(axis=1)
+            cost = self.costs(places, points_m) + TURN_COST * turning
+            weights = np.exp((cost.min() - cost) / LAMBDA_STEPS)
+            self._nominal = weights @ controls / weights.sum()
+        return places
+
+    def rollout(self, pose: Pose, controls: FloatArray) -> FloatArray:
+        """(K, steps, 2) places at the ends of the steps of (K, steps) curvatures; a step is an arc."""
+        turn = controls * self._step_m
+        course = math.atan2(pose.tangent_north, pose.tangent_east) + np.cumsum(turn, axis=1)
+        chord = self._step_m * np.sinc(0.5 * turn / np.pi)
+        middle = course - 0.5 * turn
+        steps = np.stack((chord * np.cos(middle), chord * np.sin(middle)), axis=2)
+        return np.asarray(np.cumsum(steps, axis=1) + pose[:2])
+
+    def costs(self, places: FloatArray, points_m: FloatArray) -> FloatArray:
+        """(K,) costs in steps: the least sum of way and distance left, and what is too near or outside before that."""
+        mission, config = self._mission, self._config
+        assert config.margin_m is not None
+        left = np.hypot(*np.moveaxis(places - mission.goal_m, 2, 0)) / self._step_m
+        way = left + np.arange(1, places.shape[1] + 1)
+        last = np.argmin(np.where(left < mission.goal_radius_m / self._step_m, way - 1e6, way), axis=1)
+        last = np.where(left.min(axis=1) > 1.0, places.shape[1] - 1, last)
+        room = to_nearest(np.ascontiguousarray(places.reshape(-1, 2)), points_m).reshape(places.shape[:2])
+        xmin, ymin, xmax, ymax = mission.bounds_m
+        x, y = places[:, :, 0], places[:, :, 1]
+        outside = (x < xmin) | (x > xmax) | (y < ymin) | (y > ymax)
+        keep = mission.clearance_m + config.margin_m
+        # Between the ends of a step, half a step apart from them, the way comes nearer by no more than this.
+        sagitta = keep - math.sqrt(max(keep * keep - 0.25 * self._step_m**2, 0.25 * keep * keep))
+        penalty = np.where(room < keep + sagitta, TOO_NEAR_COST, 0.0)
+        penalty[(room < mission.clearance_m) | outside] = BLOCKED_COST
+        before = np.arange(places.shape[1]) <= last[:, None]
+        return np.asarray(
+            np.take_along_axis(way, last[:, None], axis=1)[:, 0] + (penalty * before).sum(axis=1)
+        )
+
+    def _path(self, pose: Pose) -> list[Segment]:
+        """The nominal controls as arcs."""
+        rows: list[Segment] = []
+        for curvature in self._nominal.tolist():
+            rows.append((*pose, curvature, self._step_m))
+            pose = along(rows[-1], self._step_m)
+        return rows
+
+
+def _picture(
+    position_m: tuple[float, float], goal_m: tuple[float, float], rollouts: FloatArray
+) -> PlanPicture:
+    return PlanPicture(
+        np.array([position_m, goal_m]), candidates=tuple(np.array([position_m, *each]) for each in rollouts)
+    )

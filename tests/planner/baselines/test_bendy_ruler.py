@@ -1,0 +1,67 @@
+"""BendyRuler's bearings against angles worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.baselines.bendy_ruler import BendyRuler, BendyRulerConfig
+from planner.contract import MISSION
+
+HERE = (1000.0, 7000.0)
+EAST = replace(MISSION, goal_m=(19_000.0, 7000.0))
+
+
+def ruler(**keys: float) -> BendyRuler:
+    """Lines of 1,200 m that keep 220 m."""
+    return BendyRuler(BendyRulerConfig(**keys), EAST)
+
+
+def bearing(planner: BendyRuler, *points: tuple[float, float]) -> float:
+    seen = np.array(points).reshape(-1, 2) + HERE
+    return math.degrees(planner.bearing(HERE, seen))
+
+
+def test_with_nothing_in_the_way_it_flies_at_the_goal() -> None:
+    assert bearing(ruler()) == 0.0
+    # The first line keeps 300 m from what lies 300 m beyond its end; the second ones keep 0 and 300 sin 45 deg = 212 m.
+    # Turned by 5 deg, the one 45 deg to the left keeps 304.6 sin 45 deg + 104.6 cos 45 deg = 289 m.
+    assert bearing(ruler(), (1500.0, 0.0)) == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize(("ahead_m", "turn_deg"), [(600.0, 25.0), (400.0, 35.0), (1000.0, 15.0)])
+def test_the_first_of_the_bearings_in_turns_that_keeps_the_margin_is_taken(
+    ahead_m: float, turn_deg: float
+) -> None:
+    # asin(220 / 600) = 21.5 deg, asin(220 / 400) = 33.4 deg, asin(220 / 1000) = 12.7 deg; steps of 5, left first.
+    assert bearing(ruler(), (ahead_m, 0.0)) == pytest.approx(turn_deg)
+    assert bearing(ruler(), (ahead_m, 1.0)) == pytest.approx(turn_deg), "a hair to the left: still the left"
+    beside = ahead_m * math.sin(math.radians(10.0))
+    assert bearing(ruler(), (ahead_m, beside)) < 0.0, "to the left by 10 deg: the right"
+
+
+def test_where_no_bearing_is_clear_the_one_of_the_largest_margin_is_taken() -> None:
+    ring = [
+        (150.0 * math.cos(a), 150.0 * math.sin(a))
+        for a in np.radians(np.arange(0.0, 360.0, 3.0))
+        if abs(a - 2.0) > 0.3
+    ]
+    assert bearing(ruler(), *ring) == pytest.approx(math.degrees(2.0), abs=5.0)
+
+
+def test_a_bearing_far_off_the_last_one_is_resisted() -> None:
+    planner = ruler()
+    planner._bearing = math.radians(80.0)
+    # Straight at the goal the margin is 260 m, along the last bearing 221 m: no better by half.
+    points = ((600.0, 260.0), (600.0, -260.0), (300.0, 408.0))
+    assert bearing(planner, *points) == pytest.approx(80.0)
+    planner._config = replace(planner._config, cont_angle_deg=90.0)
+    assert bearing(planner, *points) == 0.0
+
+
+def test_lines_beyond_the_sensor_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"lookahead_m is 7000, more than sensor.range_m 6000"):
+        BendyRulerConfig(lookahead_m=7000.0).resolved(MISSION)
