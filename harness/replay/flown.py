@@ -98,7 +98,7 @@ def read_flown(path: Path, plane: LocalPlane) -> FlownFlight:
 def _heads(path: Path) -> set[str]:
     try:
         with path.open(encoding="utf-8-sig") as file:
-            return {head.strip() for head in file.readline().split(",")}
+            return {head.strip().strip('"') for head in file.readline().split(",")}
     except (OSError, UnicodeDecodeError):
         return set()
 

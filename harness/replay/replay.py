@@ -93,7 +93,7 @@ def replay(
     origin = flown_mission.origin or Origin(0.0, 0.0)
     flight = read_flown(log, LocalPlane(origin.latitude_deg, origin.longitude_deg))
     wind = fit_wind(flight)
-    winds = (fit_windows(flight) if windows else []) or [wind]
+    winds = (fit_windows(flight, wind) if windows else []) or [wind]
     asked = _asked(flight, flown_mission, winds, wind)
     scenario = scenario_for(asked, aircraft, overrides)
 

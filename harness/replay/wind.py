@@ -7,6 +7,7 @@ fitted with the wind. The aircraft must turn: in straight flight only the wind a
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from harness.flight.record import FloatArray
 from harness.replay.flown import FlownFlight
 
 STEPS = 50
-LEAST_TURN_DEG = 60.0
+LEAST_TURN_DEG = 90.0
 """Courses of a window must span this much."""
 WINDOW_S, WINDOW_EVERY_S = 20.0, 10.0
 """Winds that change are fitted to windows that long, so often: about half a lap of a small square."""
@@ -30,12 +31,14 @@ class FittedWind:
         east_mps, north_mps: the direction it blows towards.
         residual_mps: root mean square of what is left of the airspeed.
         time_s: middle of the window; 0 for a whole flight.
+        airspeed_mps: that was fitted with it, where none is known.
     """
 
     east_mps: float
     north_mps: float
     residual_mps: float
     time_s: float = 0.0
+    airspeed_mps: float = math.nan
 
     @property
     def speed_mps(self) -> float:
@@ -52,18 +55,23 @@ class FittedWind:
         return {"speed_mps": self.speed_mps, "from_deg": self.from_deg, "residual_mps": self.residual_mps}
 
 
-def fit_wind(flight: FlownFlight, time_s: float = 0.0) -> FittedWind:
+def fit_wind(flight: FlownFlight, time_s: float = 0.0, airspeed: FloatArray | None = None) -> FittedWind:
     """The one wind that explains a flight best.
+
+    Args:
+        flight: the flight.
+        time_s: middle of the window that it is of.
+        airspeed: (n,) in place of the flight's.
 
     Raises:
         InputError: the flight does not turn enough to tell it.
     """
     velocity = np.array((flight["ve_mps"], flight["vn_mps"]))
-    airspeed = flight.airspeed_mps
+    airspeed = flight.airspeed_mps if airspeed is None else airspeed
     known = np.isfinite(velocity).all(axis=0) & (True if airspeed is None else np.isfinite(airspeed))
     velocity = velocity[:, known]
-    airspeed = None if airspeed is None else airspeed[known]
-    if _turned_deg(velocity) < LEAST_TURN_DEG:
+    course = np.unwrap(np.arctan2(*velocity))
+    if not course.size or math.degrees(np.ptp(course)) < LEAST_TURN_DEG:
         raise InputError(
             f"{flight.source}: turns by less than {LEAST_TURN_DEG:g} deg; the wind cannot be told"
         )
@@ -71,32 +79,31 @@ def fit_wind(flight: FlownFlight, time_s: float = 0.0) -> FittedWind:
     for _ in range(STEPS):
         through = velocity - wind[:, None]
         speed = np.maximum(np.hypot(*through), 1e-6)
-        left = speed - (common if airspeed is None else airspeed)
-        slopes = -(through / speed).T
-        if airspeed is None:
-            slopes = np.column_stack((slopes, -np.ones(len(speed))))
-        change = np.linalg.lstsq(slopes, -left, rcond=None)[0]
-        wind = wind + change[:2]
-        common += float(change[2]) if airspeed is None else 0.0
+        left = speed - (common if airspeed is None else airspeed[known])
+        slopes = np.column_stack((*(-through / speed), -np.ones(len(speed))))
+        change = np.zeros(3)
+        columns = slice(3 if airspeed is None else 2)
+        change[columns] = np.linalg.lstsq(slopes[:, columns], -left, rcond=None)[0]
+        wind, common = wind + change[:2], common + float(change[2])
         if float(np.abs(change).max()) < 1e-9:
             break
-    return FittedWind(float(wind[0]), float(wind[1]), float(np.sqrt(np.mean(left**2))), time_s)
+    return FittedWind(float(wind[0]), float(wind[1]), float(np.sqrt(np.mean(left**2))), time_s, common)
 
 
-def fit_windows(flight: FlownFlight) -> list[FittedWind]:
-    """The winds of windows one after the other; none of those in which the aircraft does not turn enough."""
+def fit_windows(flight: FlownFlight, whole: FittedWind) -> list[FittedWind]:
+    """The winds of windows one after the other; none of those in which the aircraft does not turn enough.
+
+    Args:
+        flight: the flight.
+        whole: the wind of all of it; its airspeed stands for one that was not measured.
+    """
     times: FloatArray = flight["time_s"] - flight["time_s"][0]
+    measured = flight.airspeed_mps
+    airspeed = np.full_like(times, whole.airspeed_mps) if measured is None else measured
     found = []
     for middle_s in np.arange(0.0, times[-1] + WINDOW_EVERY_S, WINDOW_EVERY_S).tolist():
         rows = np.flatnonzero(np.abs(times - middle_s) <= 0.5 * WINDOW_S)
         if len(rows) >= 3 and times[rows[-1]] - times[rows[0]] >= 0.5 * WINDOW_S - 1.0:
-            try:
-                found.append(fit_wind(flight.rows(rows), middle_s))
-            except InputError:
-                continue
+            with suppress(InputError):
+                found.append(fit_wind(flight.rows(rows), middle_s, airspeed[rows]))
     return found
-
-
-def _turned_deg(velocity: FloatArray) -> float:
-    course = np.unwrap(np.arctan2(velocity[0], velocity[1]))
-    return math.degrees(float(np.ptp(course)))

@@ -128,6 +128,70 @@ def check_start_and_goal(
                 )
 
 
+COURSE_STEP_DEG: Final = 5
+"""Arcs and courses are looked at in steps of this."""
+
+
+def check_start_leads_in(area: Area, mission: MissionSpec, turn_radius_m: float) -> None:
+    """The flight does not begin by leaving the area: straight on, or a turn to one side, keeps within it.
+
+    Args:
+        area: the area.
+        mission: start and course.
+        turn_radius_m: the tightest turn over the ground.
+
+    Raises:
+        KeyFault: it begins so; the sentence has the courses that would do.
+    """
+    if _stays_inside(area, mission.start_m, mission.course_deg, turn_radius_m):
+        return
+    courses = range(0, 360, COURSE_STEP_DEG)
+    good = [each for each in courses if _stays_inside(area, mission.start_m, float(each), turn_radius_m)]
+    told = f"such as {_ranges(good)}" if good else "and no course would do: start farther from the border"
+    raise KeyFault(
+        ("mission", "course_deg"),
+        f"is {mission.course_deg:.0f}, which leads out of area.bounds_m at once: no turn of {turn_radius_m:.0f} m from "
+        f"start_m {list(mission.start_m)} stays inside; must be another, {told}",
+    )
+
+
+def _stays_inside(area: Area, start: Point, course_deg: float, radius_m: float) -> bool:
+    """Whether a turn to one side, or none, stays in the area until two radii straight ahead are inside."""
+    xmin, ymin, xmax, ymax = area.bounds_m
+
+    def inside(east: float, north: float) -> bool:
+        return xmin - 1e-3 <= east <= xmax + 1e-3 and ymin - 1e-3 <= north <= ymax + 1e-3
+
+    for side in (1.0, -1.0):  # to the right, to the left
+        for turned_deg in range(0, 361, COURSE_STEP_DEG):
+            course, turned = math.radians(course_deg), side * math.radians(turned_deg)
+            east = start[0] + side * radius_m * (math.cos(course) - math.cos(course + turned))
+            north = start[1] - side * radius_m * (math.sin(course) - math.sin(course + turned))
+            if not inside(east, north):
+                break
+            ahead_m = 2.0 * radius_m
+            if turned_deg == 360 or inside(
+                east + ahead_m * math.sin(course + turned), north + ahead_m * math.cos(course + turned)
+            ):
+                return True
+    return False
+
+
+def _ranges(courses: Sequence[int]) -> str:
+    """Courses in steps as ranges, over north too."""
+    parts: list[list[int]] = []
+    for course in courses:
+        if parts and course - parts[-1][-1] == COURSE_STEP_DEG:
+            parts[-1].append(course)
+        else:
+            parts.append([course])
+    if len(parts) > 1 and parts[0][0] == 0 and parts[-1][-1] == 360 - COURSE_STEP_DEG:
+        parts[0] = parts.pop() + parts[0]
+    return " or ".join(
+        f"{part[0]} to {part[-1]} deg" if len(part) > 1 else f"{part[0]} deg" for part in parts
+    )
+
+
 def _is_far(obstacle: Obstacle, point: Point, distance_m: float) -> bool:
     """Whether a polygon's upright box alone says that it is farther away: of 100,000 obstacles most are."""
     if obstacle.polygon is None:

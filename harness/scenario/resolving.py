@@ -11,8 +11,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, TypeVar
 
+from aircraft.interface import GRAVITY_MPS2
 from harness.scenario import guidance_keys, planner_keys
-from harness.scenario.checks import check_local_plane, check_start_and_goal
+from harness.scenario.checks import check_local_plane, check_start_and_goal, check_start_leads_in
 from harness.scenario.conditions import with_day, with_servos
 from harness.scenario.files_resolved import plane_point
 from harness.scenario.files_resolved import resolved as files_expanded
@@ -109,6 +110,7 @@ def resolve(
     scenario, names = _with_files_expanded(scenario, radius_m, folder)
     if ends_checked:
         check_start_and_goal(scenario.area, scenario.obstacles, mission, planner.clearance_m, names)
+        check_start_leads_in(scenario.area, mission, _tightest_m(aircraft, wind_mps))
     told = mission_with(scenario, performance)
     return scenario.updated(planner=planner_keys.resolved(planner, told, as_flown))
 
@@ -188,6 +190,12 @@ def _cruise_mps(spec: AircraftSpec) -> float:
 def _limit_load_factor(spec: AircraftSpec) -> float:
     weight_lb = guidance_keys.airframe_of(spec).mass_kg / POUND_KG
     return min(3.8, 2.1 + 24000.0 / (weight_lb + 10000.0))
+
+
+def _tightest_m(spec: AircraftSpec, wind_mps: float) -> float:
+    """Radius of the tightest turn over the ground, downwind."""
+    bank_rad = guidance_keys.limits_of(spec).bank_limit_rad
+    return (spec.airspeed_mps + wind_mps) ** 2 / (GRAVITY_MPS2 * math.tan(bank_rad))
 
 
 def _rounded_up(value: float, step: int) -> float:

@@ -108,7 +108,8 @@ def test_mission_of_tells_the_planner_what_the_scenario_says() -> None:
     mission = mission_of(scenario)
     assert mission.goal_m == (31000.0, 1000.0)
     assert mission.clearance_m == 70.0
-    assert mission.bounds_m == (0.0, 0.0, 40000.0, 40000.0)
+    off_m = mission.tracking_error_m
+    assert mission.bounds_m == pytest.approx((off_m, off_m, 40000.0 - off_m, 40000.0 - off_m))
     assert mission.turn_radius_m == performance(airframe("aerosonde"), 25.0).turn_radius_m
     assert mission.sensor_range_m == scenario.sensor.range_m
 

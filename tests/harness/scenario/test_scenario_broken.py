@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from harness.cli.app import main
+from harness.files.input_file import InputError
+from harness.scenario.scenario import parse_scenario
 
 GOOD = """\
 schema: wayproof/scenario/1
@@ -335,3 +337,28 @@ def test_names_a_file_that_cannot_be_read(
     (fault,) = faults_of(tmp_path / name, capsys)
     assert fault.startswith(f"{tmp_path / name}: ")
     assert "paper_circles" in fault
+
+
+@pytest.mark.parametrize(
+    ("start", "course", "told"),
+    [
+        ("[0, 5000]", 270, "such as 0 to 180 deg"),
+        ("[0, 0]", 225, "such as 0 to 90 deg"),
+        ("[5000, 10000]", 0, "such as 90 to 270 deg"),
+        ("[30, 5000]", 270, "such as "),
+    ],
+)
+def test_a_mission_that_begins_by_leaving_is_refused_with_courses_that_would_do(
+    start: str, course: float, told: str
+) -> None:
+    text = (
+        "schema: wayproof/scenario/1\nname: border\narea: {{bounds_m: [0, 0, 10000, 10000]}}\n"
+        f"mission: {{{{start_m: {start}, course_deg: {{}}, goal_m: [5000, 5500]}}}}\n"
+    )
+    with pytest.raises(InputError) as caught:
+        parse_scenario(text.format(course), "border.yaml")
+    said = str(caught.value)
+    assert said.startswith("border.yaml:4: mission.course_deg: ")
+    assert told in said
+    assert parse_scenario(text.format(135 if course == 0 else 45))  # a course that was told
+    assert parse_scenario(text.format(course).replace(start, "[5000, 2000]"))
