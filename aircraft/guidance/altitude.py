@@ -66,17 +66,18 @@ def flat(altitude_m: float, airspeed_mps: float) -> VerticalProfile:
     return VerticalProfile(nought, nought + altitude_m, nought, nought + airspeed_mps)
 
 
-def slewed(airspeeds_mps: FloatArray, time_s: FloatArray) -> FloatArray:
+def slewed(airspeeds_mps: FloatArray, time_s: FloatArray, before_mps: float) -> FloatArray:
     """(n,) airspeeds as they are commanded, row by row, where those are asked for.
 
     Args:
         airspeeds_mps: (n,) asked for.
         time_s: (n,) when.
+        before_mps: commanded before the first row.
     """
-    if not len(airspeeds_mps) or np.ptp(airspeeds_mps) == 0.0:
+    if (airspeeds_mps == before_mps).all():
         return airspeeds_mps
     commanded = np.empty(len(airspeeds_mps))
-    speed, before = float(airspeeds_mps[0]), float(time_s[0])
+    speed, before = before_mps, float(time_s[0])
     for row, (wanted, now) in enumerate(zip(airspeeds_mps.tolist(), time_s.tolist(), strict=True)):
         change = SPEED_CHANGE_PER_S * speed * (now - before)
         speed += min(max(wanted - speed, -change), change)

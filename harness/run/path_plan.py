@@ -17,7 +17,8 @@ from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, MissionLeg, stra
 from harness.files.input_file import InputError
 from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
 from harness.run_files.mission.flying import Flying, Ground
-from harness.run_files.mission.route import mission_route
+from harness.run_files.mission.route import CLIMB_SHARE, mission_route
+from harness.run_files.mission.waypoint_run import without_steps
 from harness.run_files.path_files import PathAsGiven
 from harness.scenario.guidance_keys import airframe_of
 from harness.scenario.performance import performance_of
@@ -184,8 +185,14 @@ def _drawn_profile(
             )
     if np.ptp(altitudes) <= SAME_ALTITUDE_M:
         return flat(float(altitudes[0]), speed)
+    stations = way.stations_of(given.points_m).tolist()
+
+    def slope() -> float:
+        return CLIMB_SHARE * min(climb_rates(airframe_of(scenario.aircraft)).at(speed)) / speed
+
+    along, high = np.array(without_steps(list(zip(stations, altitudes.tolist(), strict=True)), slope)).T
     nought = np.zeros(1)
-    return VerticalProfile(way.stations_of(given.points_m), altitudes, nought, nought + speed)
+    return VerticalProfile(along, high, nought, nought + speed)
 
 
 def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, float], ...]:

@@ -259,7 +259,7 @@ def _as_given(
     along = np.nan_to_num(track.arc_length_m)
     profile = plan.profile
     asked = np.searchsorted(profile.speed_from_m, along, side="right") - 1
-    speeds = slewed(plan.asked_mps[np.maximum(asked, 0)], track.time_s)
+    speeds = slewed(plan.asked_mps[np.maximum(asked, 0)], track.time_s, float(plan.asked_mps[0]))
     if profile.level:
         fastest = np.full((len(track), 2), np.inf)
     else:

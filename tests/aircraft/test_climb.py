@@ -102,4 +102,4 @@ def test_airspeeds_change_slowly_in_command_and_in_what_they_are_held_against() 
     assert commanded[-1] == 20.0
     time_s = np.arange(1, 201) / 10.0
     asked = np.append(25.0, np.full(200, 20.0))
-    assert slewed(asked, np.append(0.0, time_s))[1:] == pytest.approx(commanded)
+    assert slewed(asked, np.append(0.0, time_s), float(asked[0]))[1:] == pytest.approx(commanded)

@@ -16,6 +16,12 @@ Pose = tuple[complex, complex]
 SHORTEST_M = 1e-6
 NEAR = 1e-9
 
+ON_CIRCLE_M = 0.01
+"""A place no further from a circle lies on it."""
+
+SAME_DIRECTION = 1e-5
+"""Directions that differ by less, in radians, are no corner."""
+
 
 def line(begin: complex, ahead: complex, length_m: float) -> list[Row]:
     """A straight segment; none where it is too short to be one."""
@@ -121,3 +127,35 @@ def towards(pose: Pose, place: complex, turn_m: float) -> list[Row]:
         return []
     _, turn, swept = min(ways)
     return arc(begin, ahead, turn, turn_m, swept)
+
+
+def up_to(pose: Pose, target: complex | None, length_m: float, circle: tuple[complex, float, int]) -> float:
+    """How much further round a circle it is to where the way to a place leaves it.
+
+    Args:
+        pose: on the circle.
+        target: the place; None: it is left where it is.
+        length_m: so far round from the pose.
+        circle: centre, radius and side.
+    """
+    center, radius, side = circle
+    leave = None if target is None else leaves_at(target, center, radius, side)
+    if leave is None:
+        return 0.0
+    place = (pose[0] - center) * cmath.exp(1j * side * length_m / radius)
+    return ((side * cmath.phase((leave - center) / place)) % math.tau) * radius
+
+
+def turns_to(pose: Pose | None, place: complex) -> bool:
+    """Whether a line from a pose, if there is one, leads to a place only after a turn."""
+    if pose is None:
+        return False
+    way = place - pose[0]
+    return abs(way) > SHORTEST_M and abs(way / abs(way) - pose[1]) > SAME_DIRECTION
+
+
+def on_circle(pose: Pose, center: complex, radius: float, side: int) -> bool:
+    """Whether a pose is on a circle, and goes round it."""
+    if abs(abs(pose[0] - center) - radius) > ON_CIRCLE_M:
+        return False
+    return abs(direction_on(pose[0], center, side) - pose[1]) < 1e-3

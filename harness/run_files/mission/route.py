@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from aircraft.guidance.altitude import VerticalProfile
-from aircraft.guidance.mission_legs import MissionLeg
+from aircraft.guidance.mission_legs import MissionLeg, straight
 from aircraft.interface import Route
 from harness.files.input_file import InputError
 from harness.run_files.given_path import SAME_PLACE_M, CutCorner, FloatArray, FlyBy
@@ -27,13 +27,24 @@ from harness.run_files.mission.circle import (
     end_of,
     joins_at,
     leaves_at,
+    on_circle,
     onto,
     towards,
+    turns_to,
+    up_to,
 )
 from harness.run_files.mission.flying import Flying, GivenMission, MissionRoute
 from harness.run_files.mission.items import GROUND
+from harness.run_files.mission.short_leg import begins_before_m, corner_radius_m, short_leg
 from harness.run_files.mission.steps import MissionStep
-from harness.run_files.mission.waypoint_run import Vertex, altitude_m, legs_of, rounded
+from harness.run_files.mission.waypoint_run import (
+    Vertex,
+    altitude_m,
+    followed,
+    legs_of,
+    rounded,
+    without_steps,
+)
 
 LANDING_HEIGHT_M: Final = 15.0
 """A landing is flown down to this height above its place; flare and touchdown are not."""
@@ -41,14 +52,8 @@ LANDING_HEIGHT_M: Final = 15.0
 CLIMB_SHARE: Final = 0.8
 """A loiter to an altitude and a climb straight on are as long as this share of the fastest climb takes."""
 
-FOLLOWED_M: Final = 50.0
-"""The ground is looked up so often along a leg whose altitude is above it."""
-
 ARC_RAD: Final = math.pi / 2
 """Longest arc of a circle in one segment."""
-
-SAME_DIRECTION: Final = 1e-5
-"""Directions that differ by less, in radians, are no corner."""
 
 SAMPLE_M: Final = 5.0
 """Points along circles are this close together, where a track is compared with them."""
@@ -96,6 +101,8 @@ class _Build:
         self._notes: list[str] = []
         self._legs: list[MissionLeg] = []
         self._asked_mps = self._mps = flying.airspeed_mps
+        if mission.program.steps[0].airspeed_mps is not None:  # the aircraft comes with its own
+            self._speeds.append((0.0, self._asked_mps, self._mps))
         self._altitude_m = math.nan
 
     def fly(self, number: int) -> None:
@@ -191,7 +198,7 @@ class _Build:
             length = loiter.time_s * self._mps
         assert self._pose is not None
         target = self._target(number, center, radius, side)
-        length += self._up_to(target, length, center, radius, side)
+        length += up_to(self._pose, target, length, (center, radius, side))
         self._speeds.append((self._length_m, self._asked_mps, self._mps))
         self._altitudes.append((self._length_m, entry))
         if length > SAME_PLACE_M:
@@ -220,13 +227,16 @@ class _Build:
                 step, center, center + radius * (here - center) / abs(here - center), side, altitude
             )
             return
-        if here is not None and touch is not None and self._run and not self._kinks(touch):
+        alone = len(self._run) <= 1
+        if touch is not None and not alone and self._turn_onto((center, radius, side), touch):
+            pass
+        elif touch is not None and self._run and not (alone and turns_to(self._pose, touch)):
             self._add(Vertex(touch, altitude, None))
             self.flush()
         elif here is not None and heading is not None:
             self.flush()
             assert self._pose is not None
-            if not _on_circle(self._pose, center, radius, side):
+            if not on_circle(self._pose, center, radius, side):
                 self._turn(onto(self._pose, center, radius, side, turn_m))
         else:  # it begins here
             out = (here - center) / abs(here - center) if here is not None and here != center else 1j
@@ -234,6 +244,41 @@ class _Build:
             self._pose = center + radius * out, direction_on(center + out, center, side)
         assert self._pose is not None
         self._waypoints.append((self._pose[0], self._length_m))
+
+    def _turn_onto(self, circle: tuple[complex, float, int], touch: complex) -> bool:
+        """Gets onto a circle from a waypoint so near that the turn there ends on it; whether that was so."""
+        last, heading = self._run[-1], self._heading()
+        apart = [
+            abs(last.place - each.place) for each in self._run if abs(last.place - each.place) > SAME_PLACE_M
+        ]
+        if heading is None or not apart or abs(touch - last.place) <= SAME_PLACE_M:
+            return False
+        before = next(each for each in self._run[::-1] if abs(last.place - each.place) > SAME_PLACE_M)
+        angle = cmath.phase((touch - last.place) / heading)
+        turn_m = corner_radius_m(self._flying, self._mps, last.acceptance_m, angle)
+        leg_m = abs(last.place - before.place)
+        back_m = begins_before_m(leg_m, abs(touch - last.place), angle, turn_m)
+        if back_m <= 0.0:
+            return False
+        self._run[-1] = last._replace(place=last.place - back_m * heading)
+        self.flush()
+        assert self._pose is not None
+        made = short_leg(self._pose, (last.place, touch), circle, turn_m, self._length_m)
+        self.rows += made.rows
+        self._pose, self._length_m = end_of(self.rows[-1]), self._length_m + sum(row[5] for row in made.rows)
+        self._given.append(made.given_m)
+        begins_m = self._legs.pop().stations_m[0]
+        at_m = made.arc_length_m
+        self._legs.append(straight((before.place, last.place), (begins_m, at_m), last.acceptance_m or None))
+        self._legs.append(straight((last.place, touch), (at_m, self._length_m), 0.0))
+        turn_deg = math.degrees(angle)
+        place = last.place
+        self._corners.append(
+            CutCorner(last.item or 0, place.real, place.imag, turn_deg, turn_m, made.cut_m, at_m, made.half_m)
+        )
+        if last.item is not None:
+            self._marks[-1], self._waypoints[-1] = (last.item, at_m), (place, at_m)
+        return True
 
     def _join_from_far(
         self, step: MissionStep, center: complex, edge: complex, side: int, altitude: float
@@ -246,13 +291,6 @@ class _Build:
             CutCorner(step.item, edge.real, edge.imag, -90.0 * side, 0.0, 0.0, self._length_m, 0.0)
         )
         self._waypoints.append((edge, self._length_m))
-
-    def _kinks(self, place: complex) -> bool:
-        """Whether a line from the end of the circle that was flown last leads to a place only after a turn."""
-        if self._pose is None or len(self._run) > 1 or abs(place - self._pose[0]) <= SAME_PLACE_M:
-            return False
-        ahead = (place - self._pose[0]) / abs(place - self._pose[0])
-        return abs(ahead - self._pose[1]) > SAME_DIRECTION
 
     def _target(self, number: int, center: complex, radius: float, side: int) -> complex | None:
         """What the aircraft turns to as it leaves a circle; None where it goes on round it or straight."""
@@ -274,17 +312,6 @@ class _Build:
                 return aim
             aim = touch
         return aim
-
-    def _up_to(
-        self, target: complex | None, length: float, center: complex, radius: float, side: int
-    ) -> float:
-        """How much further round a circle it is to where the way to a place leaves it."""
-        assert self._pose is not None
-        leave = None if target is None else leaves_at(target, center, radius, side)
-        if leave is None:
-            return 0.0
-        place = (self._pose[0] - center) * cmath.exp(1j * side * length / radius)
-        return ((side * cmath.phase((leave - center) / place)) % math.tau) * radius
 
     def _turn(self, rows: Sequence[Row]) -> None:
         """Adds a way that is flown as it is, whatever the law."""
@@ -340,20 +367,15 @@ class _Build:
             before = float(stations[max(place - 1, 0)])
             self._speeds.append((before, *speeds[place]))
             if place and vertex.agl_m is not None:
-                self._follow(run[place - 1], vertex, before, station)
+                self._altitudes += followed((run[place - 1], vertex), (before, station), self._ground_m)
             self._altitudes.append((station, vertex.altitude_m))
             if vertex.item is not None:
                 self._marks.append((vertex.item, station))
                 self._waypoints.append((vertex.place, station))
 
-    def _follow(self, begin: Vertex, end: Vertex, begin_m: float, end_m: float) -> None:
-        """Altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it."""
-        assert end.agl_m is not None
-        begin_agl_m = begin.altitude_m - self._ground_m(begin.place)
-        for share in np.linspace(0.0, 1.0, 1 + math.ceil((end_m - begin_m) / FOLLOWED_M))[1:-1].tolist():
-            ground = self._ground_m(begin.place + share * (end.place - begin.place))
-            height = begin_agl_m + share * (end.agl_m - begin_agl_m)
-            self._altitudes.append((begin_m + share * (end_m - begin_m), ground + height))
+    def _slope(self) -> float:
+        """Climb over distance that the aircraft flies where no leg is there for it."""
+        return CLIMB_SHARE * min(self._flying.climb_mps(self._mps)) / self._mps
 
     def route(self) -> MissionRoute:
         """What was made."""
@@ -363,7 +385,8 @@ class _Build:
             if not number or abs(place - self._waypoints[number - 1][0]) > SAME_PLACE_M
         ]
         places = np.array([(place.real, place.imag) for place, _ in kept])
-        along, altitude = np.array(sorted(self._altitudes, key=lambda each: each[0])).T
+        every = sorted(self._altitudes, key=lambda each: each[0])
+        along, altitude = np.array(without_steps(every, self._slope)).T
         since, asked, flown = np.array(self._speeds).T
         way = FlyBy(
             places,
@@ -375,10 +398,3 @@ class _Build:
         )
         profile = VerticalProfile(along, altitude, np.maximum.accumulate(since), flown)
         return MissionRoute(way, profile, asked, tuple(self._marks), tuple(self._notes), tuple(self._legs))
-
-
-def _on_circle(pose: Pose, center: complex, radius: float, side: int) -> bool:
-    """Whether a pose is on a circle, and goes round it."""
-    if abs(abs(pose[0] - center) - radius) > SAME_PLACE_M:
-        return False
-    return abs(direction_on(pose[0], center, side) - pose[1]) < 1e-3

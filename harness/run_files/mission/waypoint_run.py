@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from harness.run_files.given_path import SAME_PLACE_M, FloatArray, FlyBy, Tighte
 from harness.run_files.mission.flying import Flying, corner_limit_m
 from harness.run_files.mission.items import GROUND, HOME, SEA
 from harness.run_files.mission.steps import MissionStep
+
+FOLLOWED_M: Final = 50.0
+"""The ground is looked up so often along a leg whose altitude is above it."""
 
 
 class Vertex(NamedTuple):
@@ -84,3 +87,53 @@ def altitude_m(step: MissionStep, home_altitude_m: float, ground_m: float, befor
         return before_m if math.isfinite(before_m) else home_altitude_m
     base = {SEA: 0.0, HOME: home_altitude_m, GROUND: ground_m}[step.above]
     return step.height_m + base
+
+
+def without_steps(
+    points: Sequence[tuple[float, float]], slope: Callable[[], float]
+) -> list[tuple[float, float]]:
+    """Altitudes along a route, where two at one place are a ramp: the aircraft climbs or sinks on the way on.
+
+    At the end of the route it does so before. A ramp that would be longer than the way to the next altitude goes there.
+    There are as many altitudes as before.
+
+    Args:
+        points: arc length, not falling, and altitude (m).
+        slope: of a ramp; asked for where there is one.
+    """
+    ramped = [points[0]]
+    for number, (along, high) in enumerate(points[1:], start=1):
+        before, height = ramped[-1]
+        if along - before > SAME_PLACE_M or high == height:
+            ramped.append((along, high))
+            continue
+        run = abs(high - height) / slope()
+        after = next((place for place, _ in points[number:] if place > along + SAME_PLACE_M), None)
+        if after is None:
+            earlier = ramped[-2][0] if len(ramped) > 1 else before
+            ramped[-1] = (max(before - run, earlier), height)
+            ramped.append((along, high))
+        else:
+            ramped.append((before + run, high) if before + run < after else (before, height))
+    return ramped
+
+
+def followed(
+    ends: tuple[Vertex, Vertex], stations_m: tuple[float, float], ground_m: Callable[[complex], float]
+) -> list[tuple[float, float]]:
+    """Altitudes on the way to a waypoint that is above ground: above it all the way, as ArduPilot flies it.
+
+    Args:
+        ends: of the leg; the second has a height above ground.
+        stations_m: arc lengths at both.
+        ground_m: height of the ground at a place.
+    """
+    (begin, end), (begin_m, end_m) = ends, stations_m
+    assert end.agl_m is not None
+    begin_agl_m = begin.altitude_m - ground_m(begin.place)
+    above = []
+    for share in np.linspace(0.0, 1.0, 1 + math.ceil((end_m - begin_m) / FOLLOWED_M))[1:-1].tolist():
+        height = begin_agl_m + share * (end.agl_m - begin_agl_m)
+        ground = ground_m(begin.place + share * (end.place - begin.place))
+        above.append((begin_m + share * (end_m - begin_m), ground + height))
+    return above
