@@ -13,12 +13,12 @@ from pathlib import Path, PurePath
 
 MAX_FILES = 1000
 MAX_BYTES = 5_000_000
-"""Of an XML file."""
+"""Largest size of an XML file."""
 MAX_FOLDER_BYTES = 200_000_000
-"""Of all files together, pictures and meshes that JSBSim does not read among them: each goes into the digest."""
+"""Largest size of all files together; all go into the digest, also those that JSBSim does not read."""
 MAX_ENTITY = 100
 MAX_DEPTH = 60
-"""Of elements; the deepest of JSBSim's own models has 13."""
+"""Deepest nesting of elements; the deepest of JSBSim's own models has 13."""
 
 
 def faults(folder: Path) -> Iterator[str]:

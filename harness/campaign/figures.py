@@ -43,7 +43,7 @@ MOST_FAILURES: Final = 9
 MAP_TICKS_IN = 0.3
 """What each has beside it."""
 ROW_LETTERS = 56
-"""So many letters of names below panels are as wide as the figure."""
+"""Number of letters, in names below panels, that are as wide as the figure."""
 LABEL_LETTERS = 32
 """A longer label of a group loses its middle, for it takes room from what is drawn."""
 

@@ -18,7 +18,7 @@ MOST_NUMBERS: Final = 8
 
 BINS: Final = 4
 MOST_NAMES: Final = 12
-"""Of more different names, the rarest share a group."""
+"""Most names with a group of their own; the rarest of more share one."""
 
 NONE: Final = "not set"
 

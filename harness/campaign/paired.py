@@ -19,12 +19,12 @@ from harness.flight.record import FloatArray
 CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 9999
 FEWEST_CASES: Final = 4
-"""Of fewer, more than a fortieth of all resamples are one case only: there is no 95 % interval."""
+"""Least number of cases with an interval: with fewer, more than a fortieth of all resamples hold one case only."""
 BATCH: Final = 500
 """Resamples in memory at a time."""
 
 SEED: Final = 1
-"""Of the resampling, so that the same runs give the same interval."""
+"""Seed of the resampling: the same runs give the same interval."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from harness.files.strict_yaml import Scalar
 from harness.files.wording import counted, printable
 
 FIRST, LAST = 15, 5
-"""Of more runs than both, so many are shown."""
+"""Numbers of the first and last runs that are shown where there are more runs than both together."""
 
 WIDTH: Final = 400
 """A table of runs may be this wide where it does not go to a terminal."""

@@ -9,10 +9,10 @@ from harness.cli.terminal import error_rows, legible, plain, spread
 from harness.files.wording import counted
 
 MOST_ITEMS = 12
-"""So many items of a mission are told of one by one."""
+"""Most items of a mission that are listed one by one."""
 
 SHOWN = 6
-"""So many corners, legs, contacts and breaches are listed; the others are counted."""
+"""Most corners, legs, contacts and breaches that are listed; the others are counted."""
 
 
 def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:

@@ -11,7 +11,7 @@ from harness.falsify.keys import number_text
 from harness.files.wording import counted
 
 MOST_BANDS: Final = 12
-"""So many neighbouring bands of outcomes are listed; the rest is in `falsify.csv`."""
+"""Most neighbouring bands of outcomes that are listed; the rest is in `falsify.csv`."""
 
 
 def breaking_rows(breaking: Breaking) -> dict[str, str]:

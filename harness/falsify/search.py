@@ -36,7 +36,7 @@ STEPS: Final = 8
 """The diagonal is cut into so many parts."""
 
 POPULATION: Final = 8
-"""Of the differential evolution; a power of two, as its Sobol points want it."""
+"""Population of the differential evolution: a power of two, as Sobol points require."""
 
 NO_CONDITION: Final = 2.0
 """The margin of a place away from the diagonal where there is no scenario: behind all that passed."""
@@ -45,7 +45,7 @@ LEAST: Final = 2
 """Fewer conditions than the two ends of the diagonal make no search."""
 
 DRAWS: Final = 64
-"""So many Sobol points in a row that bring no new condition end the search: whole numbers leave no others."""
+"""The search ends after this many Sobol points in a row without a new condition: whole numbers leave no others."""
 
 
 @dataclass(frozen=True)

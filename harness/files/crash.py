@@ -6,10 +6,10 @@ import re
 import traceback
 
 MOST_LETTERS = 2000
-"""So many characters of what others say are told in a sentence."""
+"""Most characters of a text from other code that stand in a sentence."""
 
 MOST_TRACE_LETTERS = 40_000
-"""So many characters are kept of a traceback, of its beginning and its end."""
+"""Most characters of a traceback that are kept, half from its beginning and half from its end."""
 
 
 class PlannerError(RuntimeError):

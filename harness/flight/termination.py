@@ -58,7 +58,7 @@ class MissionEnd:
         self._appears_s = -math.inf
         # At the last look at the obstacles: where, when, and how much clearance.
         self._measured = (0.0, 0.0, 0.0, 0.0)
-        self._over: Position | None = None  # where it was at the last look at the ground
+        self._above_before: Position | None = None  # where it was at the last look at the ground
         self._looked: tuple[Fix, float] | None = None  # at the last look of all: surely so much clearance
         self.contact_m = math.inf
 
@@ -107,7 +107,7 @@ class MissionEnd:
     def _ground_hit(self, ground: Ground, state: AircraftState) -> str:
         """A sentence if the aircraft is below the ground, or was since the last look; else empty."""
         here = state.east_m, state.north_m, state.up_m
-        before, self._over = self._over, here
+        before, self._above_before = self._above_before, here
         above_m = ground.above_m(here)
         if above_m <= 0.0:
             return f"flew into the terrain: {-above_m:.1f} m below the ground at {here[2] - above_m:.0f} m"

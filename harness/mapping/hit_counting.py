@@ -26,7 +26,7 @@ SCORES_OUT, SLOTS_OUT, PLACE = "int8[::1]", "int32[::1]", "complex128"
 
 
 @compiled(COUNTS, PLACES, SCORES, SLOTS, FLOAT, COUNT, COUNT, BOOL, FLOAT, COUNT)
-def news(
+def new_edges(
     hits: IntArray,
     places: ComplexArray,
     score: NDArray[np.int8],
@@ -236,7 +236,7 @@ def count_hits(
     COUNT,
     PLACE,
 )
-def count_news(
+def count_new_edges(
     cell_m: float,
     rows: int,
     rays: int,
@@ -254,6 +254,6 @@ def count_news(
     first_score: int,
     corner: complex,
 ) -> tuple[int, int, bool]:
-    """`count_hits` of what is `news`; there is room for `PARTS` times as many points as hits."""
-    cells, found = news(hits, places, score, slot, cell_m, rows, rays, closed, join_m, first_score)
+    """`count_hits` of the `new_edges`; there is room for `PARTS` times as many points as hits."""
+    cells, found = new_edges(hits, places, score, slot, cell_m, rows, rays, closed, join_m, first_score)
     return count_hits(cells, found, score, slot, points, cell_of, since, known, revision, first_score, corner)

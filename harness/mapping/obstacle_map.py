@@ -17,7 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.mapping.edge_grid import EdgeGrid
-from harness.mapping.hit_counting import CONFIRMED, PARTS, count_hits, count_news, edges_after, ends, news
+from harness.mapping.hit_counting import (
+    CONFIRMED,
+    PARTS,
+    count_hits,
+    count_new_edges,
+    edges_after,
+    ends,
+    new_edges,
+)
 from harness.mapping.scan import RangeScan, all_round, supported
 from harness.mapping.scan_comparison import count_looked_through, near_any
 from planner.interface import BoolArray, ComplexArray, FloatArray, IntArray
@@ -143,7 +151,7 @@ class ObstacleMap:
             self.last_removal_revision = self.revision
 
     def _take_in(self, scan: RangeScan, nearest_m: float, ignored: BoolArray | None) -> None:
-        """Counts hits; where they are news, also what lies between them; and near outlines in detail.
+        """Counts hits; where they are new, also what lies between them; and near outlines in detail.
 
         Most of what is in sight has been seen so often that it is certain: that is found out first.
         """
@@ -163,9 +171,13 @@ class ObstacleMap:
         closed = all_round(scan) and bool(hits[0] + rays - hits[-1] <= 2)
         if nearest_m >= self._near_by:
             self._grow(PARTS * len(hits))
-            self._take_over(count_news(cell, self._ny, rays, closed, join, hits, places, *self._counted()))
+            self._take_over(
+                count_new_edges(cell, self._ny, rays, closed, join, hits, places, *self._counted())
+            )
             return
-        cells, found = news(hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first)
+        cells, found = new_edges(
+            hits, places, self._score, self._slot, cell, self._ny, rays, closed, join, first
+        )
         corners = nearest_m < DETAIL[-1][0] * self._clearance
         near = ends(hits, places, scan.ranges_m, cell, closed, join, corners)
         ranges, places = scan.ranges_m[hits[near]], places[near]

@@ -36,9 +36,9 @@ BESIDE = 0.2
 ENDS = 0.01
 """Each end has this share of the weight of all that lies between."""
 STIFF, STIFF_IN_NOISE = 1e-4, 0.05
-"""So much holds the shift at the prediction; the more returns err, the less a bend in an outline tells."""
+"""Weight that holds the shift at the prediction; the more returns err, the less a bend in an outline tells."""
 BEYOND = 5
-"""So many rays beyond an end are looked at: that all of them are lost by chance is hardly possible."""
+"""Number of rays beyond an end of an outline that are compared: chance hardly ever loses all of them."""
 FARTHEST = 0.95
 """Share of the sensing range: an outline that is lost further away does not end there."""
 
@@ -92,7 +92,7 @@ def means(points: ComplexArray, several: int) -> ComplexArray:
     return (np.add.reduceat(points, first) / counts).astype(np.complex128)
 
 
-class Laid(NamedTuple):
+class Registration(NamedTuple):
     """An outline laid upon returns.
 
     Attributes:
@@ -118,7 +118,7 @@ def register(
     apart_m: float,
     stiff: float = STIFF,
     near_m: float = 0.0,
-) -> Laid | None:
+) -> Registration | None:
     """Lays an outline upon the returns of a scan.
 
     Args:
@@ -164,7 +164,7 @@ def register(
         shift += _least_squares(1j * along[own[inner]], off.imag[inner], ends, shift, stiff)
     if abs(shift) > gate_m:
         return None
-    return Laid(shift, np.asarray(members, dtype=np.intp))
+    return Registration(shift, np.asarray(members, dtype=np.intp))
 
 
 @compiled(PLACES, PLACES)

@@ -137,7 +137,7 @@ class SensedMap:
         self._edges.update(scan, ignored)
         self.revision = self._edges.revision
         if self.revision != before:
-            self._take_back(scan, self.edges_since(before))
+            self._clear_free_space(scan, self.edges_since(before))
         if self.moving or self._moving.follows:
             self._note_moving(scan)
         self._free.update(scan)
@@ -149,9 +149,9 @@ class SensedMap:
             self.revision = self._edges.revision
         self.moving = self._moving.found
         for each in self.moving:
-            self._take_back(scan, each.points_m)
+            self._clear_free_space(scan, each.points_m)
 
-    def _take_back(self, scan: RangeScan, edges_m: FloatArray) -> None:
+    def _clear_free_space(self, scan: RangeScan, edges_m: FloatArray) -> None:
         """What was seen to be free is not, where edges stand in it."""
         if self._free.take_back(scan, edges_m):
             self.last_contradiction_s = scan.available_s

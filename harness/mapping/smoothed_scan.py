@@ -17,7 +17,7 @@ from planner.compiled import COUNT, COUNTS, FLOATS, FLOATS_OUT, compiled
 from planner.interface import FloatArray, IntArray
 
 HALVES = (2, 4, 8, 16)
-"""So many rays to either side are taken together: the most of these that lie within the width, or the first."""
+"""Numbers of rays to either side that a median may take in: the largest that lies within the width, or the first."""
 ERR = 0.55
 """Standard deviation of the median of five over that of each, for normal errors."""
 

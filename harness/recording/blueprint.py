@@ -60,16 +60,16 @@ OBSTACLE: Colour = (112, 120, 138)
 EDGE: Colour = (214, 218, 226)
 MOVING: Colour = (176, 116, 92)
 MOVES: Colour = (255, 150, 96)
-"""Of what the map takes to move."""
+"""Colour of obstacles that the map takes to move."""
 MET: Colour = (196, 124, 232)
 MOVING_DIM: Colour = (96, 68, 56)
 START: Colour = (128, 140, 160)
 GOAL: Colour = (52, 160, 92)
-"""Of start and goal: their labels are legible on black and on white."""
+"""Colour of the goal, as START is that of the start: labels in both are legible on black and on white."""
 START_LIGHT: Colour = (222, 230, 244)
 GOAL_LIGHT: Colour = (160, 246, 190)
 END_LIGHT: Colour = (255, 216, 210)
-"""Of these and of the mark of an end, on our own dark background: there a light browser puts labels on grey."""
+"""Colour of the label where a flight ends, as the two before are those of start and goal on a dark background."""
 GOAL_DIM: Colour = (48, 112, 72)
 AIRCRAFT: Colour = (255, 255, 255)
 TRACK: Colour = (255, 179, 64)
@@ -85,17 +85,17 @@ WANTED: Colour = (255, 92, 92)
 CALM: Colour = (58, 64, 74)
 HOLD: Colour = (156, 84, 60)
 MODES: tuple[Colour, ...] = ((36, 98, 130), (88, 76, 148), (34, 112, 104), (122, 66, 116), (96, 104, 52))
-"""Of the planner's states, in the order in which they come up; dark, for white letters."""
+"""Colours of the planner's states in the order in which they come up: dark, for white letters."""
 AXES: tuple[Colour, ...] = ((255, 84, 84), (96, 211, 130), (92, 148, 255))
-"""Of the body axes: ahead, to the left, up."""
+"""Colours of the body axes: ahead, to the left, up."""
 
 ERROR_COLOURS: tuple[Colour, ...] = ((255, 214, 92), (255, 138, 48), (255, 44, 84))
-"""Of the flown track: on the plan, half the way, and at or beyond the error from which on it is not tracked."""
+"""Colours of the flown track: on the plan, at half the error limit, and at or beyond the limit."""
 
 TOLD_PLAN: Colour = (58, 150, 214)
 TOLD: Colour = (134, 142, 156)
 WARNED: Colour = (214, 120, 20)
-"""Of the lines of the event log, those of warnings last: legible on black and on white."""
+"""Colour of warnings in the event log, as the two before are those of plans and events: legible on black and white."""
 
 BELIEVED_OFF = "cross_track/believed"
 """Below SERIES: the cross-track error that guidance sees."""

@@ -36,7 +36,7 @@ from harness.recording.scene import (
     quaternions,
     send_believed,
 )
-from harness.recording.sensed import News, Sensed, returns_m
+from harness.recording.sensed import NewEdges, Sensed, returns_m
 from harness.recording.series import Returns, curves, send_curves, send_levels
 from harness.recording.solids import strips_2d, strips_3d
 from harness.recording.states import (
@@ -270,29 +270,29 @@ class RerunLog:
                     [len(each) for each in points]
                 ),
             )
-            self._send_news(scans, self._sensed.take(scans, points))
+            self._send_new_edges(scans, self._sensed.take(scans, points))
         events, self._events = self._events, []
         self._told_s = send_events(self._rec, events, self._told_s)
 
-    def _send_news(self, scans: list[RangeScan], news: News) -> None:
+    def _send_new_edges(self, scans: list[RangeScan], new: NewEdges) -> None:
         """Shows obstacles from their first sight on, and the parts of them that were sensed."""
-        for index, (number, away_m) in news.first.items():
+        for index, (number, away_m) in new.first.items():
             time_s = scans[number].time_s
             self._rec.set_time(look.TIMELINE, duration=look.nanoseconds(time_s))
             log_obstacle(self._rec, self._scene, index)
             text = f"obstacle {index} comes into view, {away_m / 1e3:.1f} km away"
             self._events.append((time_s, text, look.TOLD))
-        rows, counts = np.unique(news.scans, return_counts=True)
+        rows, counts = np.unique(new.scans, return_counts=True)
         if not len(rows):
             return
         times = [look.time_column(np.array([scans[row].time_s for row in rows]))]
         self._rec.send_columns(
             f"{look.PLAN}/{look.SENSED}",
             times,
-            rr.Points2D.columns(positions=news.points_m).partition(counts),
+            rr.Points2D.columns(positions=new.points_m).partition(counts),
         )
-        posts = np.full((len(news.points_m), 2, 3), self._scene.base_m)
-        posts[:, :, :2] = news.points_m[:, None]
+        posts = np.full((len(new.points_m), 2, 3), self._scene.base_m)
+        posts[:, :, :2] = new.points_m[:, None]
         posts[:, 1, 2] = self._scene.obstacle_top_m
         self._rec.send_columns(
             f"{look.WORLD}/{look.SENSED}",

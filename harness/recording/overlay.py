@@ -26,7 +26,7 @@ OWN = (look.FLOWN, look.WHOLE, look.END, "aircraft")
 """Below PLAN and WORLD: what is drawn of every run."""
 
 COLOUR_NAMES = ("orange", "blue", "pink", "green", "violet", "red", "yellow", "grey")
-"""Of `rerun_blueprint.OVERLAY`, for the summary."""
+"""Names of the colours in `blueprint.OVERLAY`, for the summary."""
 
 FLOWN_LINE = "/flown"
 """Ends the entities of the time series that are drawn of every run."""

@@ -22,7 +22,7 @@ NEAR_CELLS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class News:
+class NewEdges:
     """What some scans have shown for the first time.
 
     Attributes:
@@ -51,7 +51,7 @@ class Sensed:
         self._known = np.zeros(0, dtype=np.int64)
         self._seen: set[int] = set()
 
-    def take(self, scans: Sequence[RangeScan], points: Sequence[FloatArray]) -> News:
+    def take(self, scans: Sequence[RangeScan], points: Sequence[FloatArray]) -> NewEdges:
         """Takes consecutive scans and what they returned (`returns_m`); tells what none before them had shown."""
         scan = np.repeat(np.arange(len(points)), [len(each) for each in points])
         where = np.concatenate([np.zeros((0, 2)), *points])
@@ -59,7 +59,7 @@ class Sensed:
         new = np.sort(np.unique(cells, return_index=True)[1])
         new = new[~np.isin(cells[new], self._known)]
         if not len(self._obstacles) or not len(new):
-            return News(np.zeros((0, 2)), np.zeros(0, dtype=np.intp), {})
+            return NewEdges(np.zeros((0, 2)), np.zeros(0, dtype=np.intp), {})
         times = np.array([each.time_s for each in scans])[scan[new]]
         nearest, off_m = self._nearest(where[new], times)
         near = off_m <= NEAR_CELLS * self._cell_m
@@ -72,7 +72,7 @@ class Sensed:
                 seen_by = scans[scan[row]]
                 away_m = np.hypot(*(where[row] - (seen_by.east_m, seen_by.north_m)))
                 first[index] = int(scan[row]), float(away_m)
-        return News(where[kept], scan[kept], first)
+        return NewEdges(where[kept], scan[kept], first)
 
     def _nearest(self, places: FloatArray, times_s: FloatArray) -> tuple[IntArray, FloatArray]:
         """(k,) obstacles whose edges are nearest to places, and how far; only of those near the box of all places."""

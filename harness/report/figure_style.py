@@ -15,10 +15,10 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Of the planners in order; told apart with any colour vision (Okabe and Ito, 2008)."""
+"""Colours of the planners in order. Any colour vision tells them apart (Okabe and Ito, 2008)."""
 
 DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1)), (0, (6, 1, 1, 1)), (0, (1, 1)))
-"""Of the planners in order, so that they differ in print too."""
+"""Line styles of the planners in order: they differ in print too."""
 
 STYLE: dict[Any, Any] = {
     "font.size": 9,

@@ -44,7 +44,7 @@ FENCES: Mapping[str, dict[str, Any]] = {
 }
 POINT: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder": 6}
 MOST_POINTS = 300
-"""Of more than these, as those of a sampled curve, none is drawn."""
+"""Most points of a path that are marked; a path with more is a sampled curve, and none is marked."""
 
 ABOUT = 0.15
 """The figure reaches this share of the path's span beyond it."""

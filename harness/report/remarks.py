@@ -11,7 +11,7 @@ LONG_AT_LIMIT: Final = 0.05
 MANY_LOST: Final = 0.25
 """Share of the returns: a sensor that loses more is no usual one."""
 FAR_JUMP: Final = 0.5
-"""Of the wanted clearance: so far at once the believed position may carry a plan into an obstacle."""
+"""Share of the wanted clearance. A jump of the believed position by more can carry a plan into an obstacle."""
 
 
 class Remark(NamedTuple):

@@ -26,7 +26,7 @@ from harness.run_files.igc_path import NEEDS_LOGS, igc_fixes
 
 MAX_BYTES: Final = 1_000_000_000
 MAX_TEXT_BYTES: Final = 200_000_000
-"""Of a log that is read line by line: some millions of rows."""
+"""Largest size of a log that is read line by line: some millions of rows."""
 FARTHEST_M: Final = 2e7
 """No place on earth is farther from another."""
 LONGEST_S: Final = 1e7

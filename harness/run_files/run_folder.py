@@ -61,7 +61,7 @@ REPORT_FILES = tuple(
 )
 """What `wayproof report` adds to a run folder."""
 MAX_BYTES = 64_000_000
-"""Of a scenario and of a JSON file in the folder."""
+"""Largest size of a scenario or JSON file in the folder that is read."""
 
 HASHED: Final = (SCENARIO, METRICS, TRACK, PLANS, RECORDING)
 """Files whose SHA-256 the manifest of a complete run has."""

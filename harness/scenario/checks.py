@@ -24,7 +24,7 @@ POLE_ROOM_M: Final = 10_000.0
 """No area comes nearer to a pole: there, longitude turns too fast for the guidance's patches of 500 m of the plane."""
 
 SIDE_POINTS: Final = 16
-"""So many points of each side of an area are held against the geodesic; the error grows with the distance."""
+"""Number of points of each side of an area that are compared with the geodesic."""
 
 
 def check_local_plane(area: Area) -> None:

@@ -31,7 +31,7 @@ _WANTED: Final = {
     "model_attributes_type": "a mapping `key: value`",
 }
 NAME_PATTERN: Final = r"^[a-z0-9._-]*[a-z0-9_-][a-z0-9._-]*$"
-"""Of a name that a folder may be called after."""
+"""Pattern of a name that a folder may be called after."""
 
 _PATTERNS: Final = {NAME_PATTERN: "have only a-z, 0-9, '.', '_' and '-', and not only dots"}
 _BOUNDS: Final = {

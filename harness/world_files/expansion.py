@@ -25,11 +25,11 @@ from harness.world_files.terrain import height_field
 MARGIN: Final = 0.02
 """What lies outside the area by more than this share of its longer side is left out."""
 DECIMALS: Final = 3
-"""Of a corner's metres: it is rounded to a millimetre."""
+"""Decimals of a corner in metres: corners are rounded to a millimetre."""
 MAX_CORNERS: Final = 900_000
-"""Of all files together: a scenario with more could not be read again."""
+"""Most corners of all files together: a scenario with more could not be read again."""
 MANY_CORNERS: Final = 20_000
-"""Of more corners those of their hull say what a file covers."""
+"""Most corners that are compared with the area one by one; of more, only their hull is."""
 MAX_POLYGONS: Final = 150_000
 HEIGHTS_M: Final = (-1000.0, 30_000.0)
 """Bottom and top of what has none."""

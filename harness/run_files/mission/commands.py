@@ -211,7 +211,7 @@ WHY_NOT: Final = {
     SCRIPT: "a script of the aircraft flies it",
     ARC_WAYPOINT: "an arc of a multicopter: ArduPlane goes on to the next item",
 }
-"""Of what is not flown, where there is more to say than that it cannot be."""
+"""Reasons why commands are not flown, where there is one to tell."""
 
 
 def name_of(command: int) -> str:

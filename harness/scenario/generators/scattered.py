@@ -33,7 +33,7 @@ from harness.scenario.sections import MAX_COORDINATE_M, Section, key
 
 TRIES: Final = 100
 AT_ONCE: Final = 10
-"""So many places are tried at a time."""
+"""Number of places that are tried at a time."""
 
 FULL: Final = 5000
 """After so many without a place the area is full, and nothing more is tried."""

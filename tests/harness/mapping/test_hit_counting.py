@@ -17,10 +17,10 @@ from harness.mapping.hit_counting import (
     CORNER,
     PARTS,
     count_hits,
-    count_news,
+    count_new_edges,
     edges_after,
     ends,
-    news,
+    new_edges,
 )
 from planner.interface import ComplexArray, FloatArray, IntArray
 
@@ -72,7 +72,7 @@ def test_news_are_hits_that_are_not_certain_and_what_lies_between(seed: int, fir
     hits, places, _, closed = hits_of(rng)
     score, known = grids_of(rng)
     slot = slots_of(known)
-    cells, found = news(hits, places, score, slot, CELL, SIDE, RAYS, closed, JOIN, first_score)
+    cells, found = new_edges(hits, places, score, slot, CELL, SIDE, RAYS, closed, JOIN, first_score)
     uncertain = [score[cell_at(place)] < CERTAIN for place in places.tolist()]
     expected = [place for place, fresh in zip(places.tolist(), uncertain, strict=True) if fresh]
     for part in range(1, PARTS):
@@ -152,9 +152,9 @@ def test_news_that_are_counted_at_once_count_the_same(seed: int, first_score: in
 
     one, other = counted(), counted()
     state: list[Any] = [len(known), 7, first_score, complex(5.0, 6.0)]
-    cells, found = news(hits, places, one[0], one[1], CELL, SIDE, RAYS, closed, JOIN, first_score)
+    cells, found = new_edges(hits, places, one[0], one[1], CELL, SIDE, RAYS, closed, JOIN, first_score)
     told = count_hits(cells, found, *(one + state))
-    assert count_news(CELL, SIDE, RAYS, closed, JOIN, hits, places, *(other + state)) == told
+    assert count_new_edges(CELL, SIDE, RAYS, closed, JOIN, hits, places, *(other + state)) == told
     for left, right in zip(one, other, strict=True):
         np.testing.assert_array_equal(left, right)
 

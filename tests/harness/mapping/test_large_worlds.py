@@ -94,19 +94,19 @@ def looks(rng: np.random.Generator, low_m: float, high_m: float) -> list[RangeSc
 def test_what_a_scan_shows_of_a_crowd_is_told_by_the_nearest_edge(seed: int) -> None:
     obstacles, scans = crowd(300, 2000.0, seed), looks(np.random.default_rng(seed), 500.0, 1500.0)
     points = [returns_m(scan) for scan in scans]
-    news = Sensed(obstacles, CELL_M).take(scans, points)
+    new_edges = Sensed(obstacles, CELL_M).take(scans, points)
     where, times = np.concatenate(points), np.repeat([0.0, 20.0, 80.0], 300)
     away = np.abs([each.distance(where, times) for each in obstacles])
     near = away.min(axis=0) <= NEAR_CELLS * CELL_M
     nearest = away.argmin(axis=0)
-    assert set(news.first) <= set(nearest[near].tolist())
+    assert set(new_edges.first) <= set(nearest[near].tolist())
     shown = {
         tuple(point): index for point, index, so in zip(where.tolist(), nearest, near, strict=True) if so
     }
-    assert len(news.points_m) > 100
-    for point in news.points_m.tolist():
+    assert len(new_edges.points_m) > 100
+    for point in new_edges.points_m.tolist():
         assert obstacles[shown[tuple(point)]].stands_for_ever
-        assert shown[tuple(point)] in news.first
+        assert shown[tuple(point)] in new_edges.first
 
 
 @pytest.mark.flights
@@ -118,10 +118,10 @@ def test_what_a_scan_shows_of_a_large_crowd_takes_little_memory() -> None:
     )  # What is imported and compiled at the first call stays.
     sensed = Sensed(obstacles, CELL_M)
     tracemalloc.start()
-    news = sensed.take(scans, points)
+    new_edges = sensed.take(scans, points)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert len(news.first) > 100
+    assert len(new_edges.first) > 100
     assert peak < 20e6
 
 
