@@ -11,8 +11,9 @@ import numpy as np
 
 from harness.analysis.as_given import AsGiven
 from harness.analysis.causes import saturated
-from harness.analysis.findings import bank_reversals_per_min, contradictions_s, findings
+from harness.analysis.findings import findings
 from harness.analysis.flight_limits import FlightLimits
+from harness.analysis.registry import METRICS
 from harness.analysis.smoothness import (
     flown_lengths,
     flown_profile,
@@ -89,8 +90,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "trackable": bool(verdicts) and all(leg.trackable for leg in verdicts),
         "trackability": [dict(vars(leg)) for leg in verdicts],
         "findings": [dataclasses.asdict(each) for each in findings(flight, limits)],
-        "bank_reversals_per_min": bank_reversals_per_min(track),
-        "plan_contradictions": len(contradictions_s(track, flight.plans)),
+        **{metric.path: metric.of(flight, limits) for metric in METRICS if metric.of is not None},
         "replans": max(len(flight.plans) - 1, 0),
         "plan_delay_s": percentiles([plan.delay_s for plan in flight.plans if math.isfinite(plan.delay_s)]),
         "lost_returns": lost_returns(flight.lost_returns),

@@ -15,7 +15,7 @@ BANK_SLACK_DEG = 0.01
 
 
 def moments(track: Track, clearance_m: float, bank_at_limit: bool) -> Mapping[str, float]:
-    """Simulated time, s, of the largest and least figures of a track, by `Figure.short`; without those it has not.
+    """Simulated time, s, of the largest and least figures of a track, by `Metric.short`; without those it has not.
 
     Of several equal values the first counts. The time below the wanted clearance has its beginning, and so has that at
     the bank limit.
@@ -32,7 +32,7 @@ def moments(track: Track, clearance_m: float, bank_at_limit: bool) -> Mapping[st
         "below s": _first(track.clearance_m < clearance_m),
         "κ·R fl.": _largest(np.abs(flown_profile(track).curvature_1pm)),
         "bank %": _first(bank_deg >= top_deg),
-        "xt max": _largest(np.where(track.plan_index >= 0, np.abs(track.cross_track_m), np.nan)),
+        "tse max": _largest(np.where(track.plan_index >= 0, np.abs(track.cross_track_m), np.nan)),
     }
     if track.has_beliefs:
         off_m = track.believed_m[:, :2] - np.column_stack((track.east_m, track.north_m))

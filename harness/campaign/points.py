@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.campaign.results import ERROR, RESULTS, RUNS, fly_again
+from harness.analysis.metric import severity
+from harness.analysis.registry import BY_NAME
+from harness.campaign.results import RESULTS, RUNS, fly_again
 from harness.campaign.table import (
     HOW_BAD,
     NAMED,
@@ -38,10 +40,6 @@ CLOSEST: Final = 3
 """Runs shown where none failed: those that came closest to an obstacle."""
 FIRST: Final = 5
 """Runs that are named of those that were not tracked for the same causes."""
-SEVERITY: Final = tuple(
-    f"collision lost_control out_of_bounds planner_failed {ERROR} timeout unreachable".split()
-)
-"""Outcomes other than `reached`, the worst first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,17 +80,20 @@ def run_points(folder: Path) -> RunPoints:
 
 
 STANDING_OUT: Final = {
-    "cross_track_m.max": ("cross-track error", "m", 1.0),
-    "altitude_error_m.max": ("altitude error", "m", 1.0),
-    "navigation_error_m.max": ("navigation error", "m", 1.0),
-    "navigation_jump_m": ("jump of the believed position", "m", 1.0),
-    "bank_saturation_fraction": ("time at the bank limit", "%", 100.0),
-    "max_load_factor": ("load factor", "", 1.0),
-    "plan_delay_s.max": ("plan delay", "s", 1.0),
-    "lost_returns.max": ("returns lost in the worst scan", "%", 100.0),
-    "smoothness.flown.heading_change_deg": ("heading change", "deg", 1.0),
-    "length_ratio": ("length over the optimum", "", 1.0),
-}
+    BY_NAME[name].path: (BY_NAME[name].title.removesuffix(" max"), BY_NAME[name].unit, BY_NAME[name].factor)
+    for name in (
+        "total_system_error_max_m",
+        "altitude_error_max_m",
+        "navigation_error_max_m",
+        "navigation_jump_m",
+        "bank_saturation_fraction",
+        "max_load_factor",
+        "plan_delay_max_s",
+        "lost_returns_max",
+        "flown_heading_change_deg",
+        "bank_reversals_per_min",
+    )
+} | {"length_ratio": ("length over the optimum", "", 1.0)}
 """Figures whose largest value is named with its run, by their column of the results; label, unit and factor for it."""
 
 OF_NAVIGATION: Final = ("navigation_error_m.max", "navigation_jump_m")
@@ -290,12 +291,11 @@ def worst_runs(runs: Runs, folder: Path, keys: Sequence[str]) -> tuple[WorstRun,
     """
     ratio = _clearance_ratio(runs)
     near = ratio if np.isfinite(ratio).any() else runs.min_clearance_m
-    severity = {outcome: place for place, outcome in enumerate((*SEVERITY, "reached"))}
     outcomes = runs.names["outcome"]
     order = sorted(
         range(len(runs)),
         key=lambda row: (
-            severity.get(outcomes[row], len(SEVERITY) - 1),
+            -severity(outcomes[row]),
             near[row] if np.isfinite(near[row]) else np.inf,
             runs.run[row],
         ),

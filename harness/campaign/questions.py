@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from harness.analysis.rows import DASH, number
+from harness.analysis.metric import number
+from harness.analysis.rows import DASH
 from harness.campaign.paired import Estimate
 from harness.campaign.summary import Cell
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.rows import number
+from harness.analysis.metric import number
 from harness.campaign.points import run_points
 from harness.campaign.questions import QUESTIONS, difference, ratio, shade
 from harness.campaign.summary import Summary

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from harness.analysis.rows import ERROR as ERROR  # the same word for the same thing
-from harness.analysis.smoothness import Smoothness
+from harness.analysis.metric import ERROR as ERROR  # the same word for the same thing
+from harness.analysis.registry import METRICS as FIGURES
 from harness.files.strict_yaml import InputError
 
 if TYPE_CHECKING:
@@ -38,40 +37,13 @@ RUN: Final = {
 }
 """Columns before those of the varied keys, and what they hold."""
 
-_SPREAD = ("rms", "p95", "max")
+WITHOUT_TIMES: Final = tuple(each for each in FIGURES if not each.timed and not each.derived)
+
 METRICS: Final = {
-    "outcome": "text",
-    "reason": "text",
-    "flown_length_m": "number",
-    "planned_length_m": "number",
-    "flight_time_s": "number",
-    "min_clearance_m": "number",
-    "clearance_violation_s": "number",
-    **{f"cross_track_m.{name}": "number" for name in _SPREAD},
-    **{f"altitude_error_m.{name}": "number" for name in _SPREAD},
-    **{f"navigation_error_m.{name}": "number" for name in _SPREAD},
-    "navigation_jump_m": "number",
-    "navigation_margin_m": "number",
-    "min_altitude_above_ground_m": "number",
-    **{f"smoothness.{of}.{f.name}": "number" for of in ("planned", "flown") for f in fields(Smoothness)},
-    "bank_saturation_fraction": "number",
-    "max_load_factor": "number",
-    "trackable": "bool",
-    "trackability.legs": "int",
-    "trackability.not_trackable": "int",
-    "trackability.causes": "text",
-    "replans": "int",
-    **{f"plan_delay_s.{name}": "number" for name in ("p50", "p99", "max")},
-    **{f"lost_returns.{name}": "number" for name in ("share", "max")},
+    **{each.path: each.kind for each in WITHOUT_TIMES},
     "wanted_clearance_m": "number",
     "optimum_m": "number",
     "length_ratio": "number",
-    "digest": "text",
-    "error": "text",
-    "deviation_from_given_m.p95": "number",
-    "deviation_from_given_m.max": "number",
-    "check.ok": "bool",
-    "check.verdict": "text",
 }
 """Columns after them: what `metrics.json` has, dots between its levels, times left out, and more.
 
@@ -82,13 +54,8 @@ world and keeps the clearance, `length_ratio` the flown length over it where the
 traceback.
 """
 
-TIMES: Final = {
-    "run": "int",
-    "compute_ms.p50": "number",
-    "compute_ms.p99": "number",
-    "compute_ms.max": "number",
-    "wall_s": "number",
-    "realtime_factor": "number",
+TIMES: Final = {"run": "int"} | {
+    each.path.removeprefix("timing."): each.kind for each in FIGURES if each.timed
 }
 """Columns of `timings.parquet`."""
 
@@ -103,15 +70,9 @@ def metric_cells(
         wanted_clearance_m: distance from obstacles that the planner was to keep.
         optimum_m: length of the shortest path; None where there is none or it is not wanted.
     """
-    legs = metrics["trackability"]
-    causes = sorted({leg["cause"] for leg in legs if leg["cause"]})
     reached = metrics["outcome"] == "reached"
-    flat = dict(_flat({name: value for name, value in metrics.items() if name not in _NOT_FLAT}))
     return {
-        **{name: value for name, value in flat.items() if name in METRICS},
-        "trackability.legs": len(legs),
-        "trackability.not_trackable": sum(not leg["trackable"] for leg in legs),
-        "trackability.causes": "; ".join(causes),
+        **{each.path: each.value(metrics) for each in WITHOUT_TIMES},
         "wanted_clearance_m": wanted_clearance_m,
         "optimum_m": optimum_m,
         "length_ratio": metrics["flown_length_m"] / optimum_m if reached and optimum_m else None,
@@ -120,23 +81,7 @@ def metric_cells(
 
 def time_cells(metrics: Mapping[str, Any]) -> dict[str, Any]:
     """The wall-clock times of `metrics.json` as cells of a row, by column."""
-    compute, timing = metrics["compute_ms"], metrics["timing"]
-    return {
-        **{f"compute_ms.{name}": compute[name] for name in ("p50", "p99", "max")},
-        "wall_s": timing["wall_s"],
-        "realtime_factor": timing["realtime_factor"],
-    }
-
-
-_NOT_FLAT = ("trackability", "compute_ms", "timing")
-
-
-def _flat(content: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, Any]]:
-    for name, value in content.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{name}.")
-        else:
-            yield prefix + name, value
+    return {each.path.removeprefix("timing."): each.value(metrics) for each in FIGURES if each.timed}
 
 
 def table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str], metadata: str) -> pa.Table:

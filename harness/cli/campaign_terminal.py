@@ -22,7 +22,7 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from harness.analysis.rows import number
+from harness.analysis.metric import number
 from harness.campaign.flight import Answer
 from harness.campaign.questions import QUESTIONS, difference, ratio
 from harness.campaign.runs import CampaignRuns

@@ -12,7 +12,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
-from harness.analysis.rows import DASH, ERROR, FIGURES, ON_TERMINAL, Row
+from harness.analysis.metric import ERROR
+from harness.analysis.registry import METRICS
+from harness.analysis.rows import DASH, ON_TERMINAL, Row
 from harness.cli.terminal import plain
 from harness.comparison.flights import Progress as Report
 from harness.files.wording import printable
@@ -21,7 +23,7 @@ from harness.scenario.scenario import Scenario
 WIDTH = 80
 LEGEND = (
     "ratio: length over the optimum; clear: least clearance; κ·R: tightest planned turn, above 1 too tight; "
-    "tracks: all legs trackable; xt: cross-track error, m; p99: planner time"
+    "tracks: all legs trackable; tse: total system error, m; p99: planner time"
 )
 NAME_WIDTH = 14
 """A longer name goes on in the next line."""
@@ -64,7 +66,7 @@ def print_comparison(rows: Sequence[Row]) -> None:
     title.
     """
     console = Console()
-    shown = [next(figure for figure in FIGURES if figure.short == short) for short in ON_TERMINAL]
+    shown = [next(figure for figure in METRICS if figure.short == short) for short in ON_TERMINAL]
     for name in dict.fromkeys(row.scenario for row in rows):
         own = [row for row in rows if row.scenario == name]
         by_law = all(row.guidance for row in own) and len({row.planner for row in own}) == 1
@@ -83,7 +85,7 @@ def print_comparison(rows: Sequence[Row]) -> None:
             )
         for row in own:
             style = _STYLE.get(row.outcome, "bold red")
-            cells = [plain(figure.text(row)) or DASH for figure in shown]
+            cells = [plain(row.text(figure)) or DASH for figure in shown]
             cells[0] = f"[{style}]{cells[0]}[/]"
             table.add_row(plain("\n".join(_name_lines(row, by_law))), *cells)
         console.print(table, width=min(WIDTH, console.width))

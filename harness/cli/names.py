@@ -16,7 +16,7 @@ from harness.cli.standard_output import say
 if TYPE_CHECKING:
     from aircraft.airframe import Airframe
 
-LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "worlds", "campaigns")
+LISTED: Final = ("planners", "aircraft", "guidance", "scenarios", "worlds", "campaigns", "metrics")
 _AIRCRAFT_ROW: Final = "{:10} {:>7} {:>10} {:>6} {:>6} {:8} "
 _WIDTH: Final = 80
 _INTERRUPT_S: Final = 0.1
@@ -55,6 +55,8 @@ def list_names(
         from planner.registry import planner_kinds
 
         _print_kinds(planner_kinds())
+    elif what == "metrics":
+        _print_metrics()
     elif what == "worlds":
         _print_worlds()
     else:
@@ -70,6 +72,22 @@ def _print_shipped(what: str) -> None:
     width = max(map(len, files), default=0)
     for name, path in files.items():
         say(_row(f"{name:{width}}  ", summary(path)))
+
+
+def _print_metrics() -> None:
+    """Every figure of a flight that people are shown: its name, place in `metrics.json`, unit, and what it means."""
+    from harness.analysis.registry import METRICS
+
+    for metric in METRICS:
+        if metric.title:
+            unit = f" [{metric.unit}]" if metric.unit else ""
+            hint = f": {metric.hint}" if metric.hint else ""
+            place = f" ({metric.path})" if metric.path != metric.name and not metric.derived else ""
+            say(
+                textwrap.fill(
+                    f"{metric.name}{place}: {metric.title}{unit}{hint}", _WIDTH, subsequent_indent="  "
+                )
+            )
 
 
 def _print_worlds() -> None:

@@ -11,12 +11,13 @@ import json
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.analysis.rows import ERROR, Row, to_csv, to_markdown
+from harness.analysis.metric import ERROR
+from harness.analysis.rows import Row, to_csv, to_markdown
 from harness.comparison.flights import ComparedAnswer, ComparedFlight, Progress, fly_all
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
@@ -60,7 +61,12 @@ class Comparison:
 
     def plain(self, complete: bool = True) -> dict[str, Any]:
         """The content of `comparison.json`."""
-        return {"schema": SCHEMA, "complete": complete, **asdict(self)}
+        return {
+            "schema": SCHEMA,
+            "complete": complete,
+            **vars(self),
+            "rows": [row.plain() for row in self.rows],
+        }
 
 
 def fly_and_compare(

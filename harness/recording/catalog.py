@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from harness.analysis.registry import METRICS
 from harness.files.errors import RunFolderError
 from harness.recording.blueprint import FRAME, Frame
 from harness.recording.layout import layout_of
@@ -41,21 +42,9 @@ COLUMNS: Final = {
     "outcome": "outcome",
     "severity": "severity",
     "clearance_ratio": "clearance/wanted",
-    "min_clearance_m": "min clearance, m",
-    "cross_track_max_m": "cross-track max, m",
-    "bank_saturation_percent": "bank at limit, %",
-    "plan_delay_max_s": "plan delay max, s",
-    "navigation_jump_m": "navigation jump, m",
-    "lost_returns_max_percent": "lost in worst scan, %",
-    "trackable": "trackable",
-    "causes": "causes",
+    **{metric.recorded_as: metric.heading for metric in METRICS if metric.heading},
+    **{name: name for name in ("planner", "aircraft", "seed")},
     "wind_mps": "wind, m/s",
-    "replans": "replans",
-    "planner_max_ms": "planner max, ms",
-    "flight_time_s": "flight, s",
-    "planner": "planner",
-    "aircraft": "aircraft",
-    "seed": "seed",
 }
 """Figures of a run that the table shows, in this order, and how they are headed.
 

@@ -12,7 +12,8 @@ from typing import Any, Final
 
 import rerun as rr
 
-from harness.analysis.rows import escaped, number
+from harness.analysis.metric import number
+from harness.analysis.rows import escaped
 from harness.files.errors import RunFolderError
 from harness.recording import blueprint as look
 from harness.recording.file import RecordingFile, recording_stream

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from harness.analysis.causes import is_allowed_for
+from harness.analysis.metric import ERROR, SEVERITY
+from harness.analysis.registry import METRICS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,17 +27,8 @@ NO_RECORDINGS: Final = (
     "one, `failures` a whole one of those that failed"
 )
 """Said of a campaign of which there is no table."""
-SEVERITY: Final = {
-    "collision": 7.0,
-    "lost_control": 6.0,
-    "out_of_bounds": 5.0,
-    "planner_failed": 4.0,
-    "timeout": 3.0,
-    "unreachable": 2.0,
-}
-"""How bad an outcome is; a run that reached the goal has 1 where it was not trackable or came nearer to an obstacle
-than was wanted, and else 0."""
-FAIR: Final = {"reached, but not tracked or too near": 1.0, "reached": 0.0}
+NOT_FAIR: Final = {"reached, but not tracked or too near": 1.0}
+"""Severity of a run that reached its goal and was not tracked, or came nearer to an obstacle than was wanted."""
 
 Value = str | float | int | bool
 
@@ -57,36 +50,23 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
     causes = sorted({leg["cause"] for leg in metrics["trackability"] if leg["cause"]})
     off_m = metrics.get("navigation_error_m", {}).get("max")
     allowed = is_allowed_for(causes, off_m, metrics.get("navigation_margin_m"))
-    lost = metrics["lost_returns"]["max"]
     wind, turbulence = scenario.environment.wind, scenario.environment.turbulence
-    found: dict[str, Value | None] = {
-        "outcome": metrics["outcome"],
-        "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
-        "trackable": bool(metrics["trackable"]),
+    figures = {
+        metric.recorded_as: metric.factor * value if metric.unit == "%" and value is not None else value
+        for metric in METRICS
+        if metric.recorded
+        for value in (metric.value(metrics),)
+    }
+    found: dict[str, Value | None] = figures | {
         "causes": ", ".join(causes) or None,
-        "min_clearance_m": clearance_m,
+        "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
         "clearance_ratio": ratio,
-        "clearance_violation_s": metrics["clearance_violation_s"],
-        "cross_track_p95_m": metrics["cross_track_m"]["p95"],
-        "cross_track_max_m": metrics["cross_track_m"]["max"],
-        "altitude_error_p95_m": metrics["altitude_error_m"]["p95"],
-        "navigation_error_max_m": off_m,
-        "navigation_jump_m": metrics.get("navigation_jump_m"),
-        "plan_delay_max_s": metrics["plan_delay_s"]["max"],
-        "lost_returns_max_percent": None if lost is None else 100.0 * lost,
-        "bank_saturation_percent": 100.0 * metrics["bank_saturation_fraction"],
-        "flown_length_m": metrics["flown_length_m"],
-        "flight_time_s": metrics["flight_time_s"],
-        "replans": int(metrics["replans"]),
-        "planner_p99_ms": metrics["compute_ms"]["p99"],
-        "planner_max_ms": metrics["compute_ms"]["max"],
         "scenario": scenario.name,
         "planner": scenario.planner.kind,
         "aircraft": scenario.aircraft.model,
         "seed": str(scenario.seed),  # may be larger than 64 bits
         "wind_mps": wind.speed_mps if wind else 0.0,
         "turbulence": turbulence.intensity if turbulence else "none",
-        "reason": metrics["reason"],
     }
     return {name: _rounded(value) for name, value in found.items() if value is not None}
 
@@ -98,7 +78,8 @@ def _rounded(value: Value) -> Value:
 
 def severity_told() -> str:
     """What the figure `severity` says, for people who see it in a table."""
-    outcomes = ", ".join(f"{value:.0f} {name.replace('_', ' ')}" for name, value in (SEVERITY | FAIR).items())
+    told = sorted({**SEVERITY, **NOT_FAIR}.items(), key=lambda each: -each[1])
+    outcomes = ", ".join(f"{value:.0f} {name.replace('_', ' ')}" for name, value in told if name != ERROR)
     return f"severity: the outcome before the point ({outcomes}), behind it more the less clearance there was"
 
 
@@ -111,7 +92,8 @@ def severity(outcome: str, trackable: bool, clearance_ratio: float | None) -> fl
         clearance_ratio: least clearance over the wanted one; None where there was nothing to keep clear of.
     """
     fair = trackable and (clearance_ratio is None or clearance_ratio >= 1.0)
-    whole = SEVERITY.get(outcome, 0.0 if fair else 1.0)
+    (not_fair,) = NOT_FAIR.values()
+    whole = not_fair if outcome == "reached" and not fair else SEVERITY.get(outcome, 0.0)
     near = 0.0 if clearance_ratio is None else 1.0 / (1.0 + math.exp(min(clearance_ratio, 50.0)))
     return round(whole + near, 6)
 

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from harness.analysis.rows import escaped, number
+from harness.analysis.metric import number
+from harness.analysis.rows import escaped
 
 if TYPE_CHECKING:
     from harness.recording.blueprint import Scene

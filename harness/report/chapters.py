@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from harness.analysis.metric import number
 from harness.analysis.planned import PlannedRows, planned_rows
-from harness.analysis.rows import Row, number, row_of
+from harness.analysis.rows import Row, row_of
 from harness.files.errors import RunFolderError
 from harness.files.whole_file import replace_bytes
 from harness.files.wording import counted

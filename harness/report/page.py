@@ -10,7 +10,8 @@ from typing import Any
 import jinja2
 
 from harness.analysis.causes import FINDINGS
-from harness.analysis.rows import DASH, Figure, Row, number, shown_figures
+from harness.analysis.metric import Metric, number
+from harness.analysis.rows import DASH, Row, shown_figures
 from harness.report.remarks import Remark
 
 
@@ -116,7 +117,7 @@ def run_html(
         chapter: with one row, and the figures of the path and of its profiles.
         legs: `trackability` of `metrics.json`.
         checked: `metrics.json` of a path that was given; None where a planner made the path.
-        moments: when figures came about, by `Figure.short` (`harness.analysis.moments`).
+        moments: when figures came about, by `Metric.short` (`harness.analysis.moments`).
         judged: what else than the distance from the path legs were judged by.
         remarks: what is said before the figures.
         aircraft: its name.
@@ -160,6 +161,6 @@ def rendered(template: str, **values: Any) -> str:
     return environment.get_template(template).render(shown=_shown, dash=DASH, **values)
 
 
-def _shown(rows: Sequence[Row]) -> list[Figure]:
+def _shown(rows: Sequence[Row]) -> list[Metric]:
     """What a page shows of rows: a digest stands elsewhere."""
     return [figure for figure in shown_figures(rows) if figure.short != "digest"]

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from harness.analysis.rows import number
+from harness.analysis.metric import number
 from harness.report.figure_style import colour, styled
 from harness.report.figures import (
     LEGEND_ROW_IN,

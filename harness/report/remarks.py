@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from harness.analysis.rows import Row, number
+from harness.analysis.metric import number
+from harness.analysis.rows import Row
 
 LONG_AT_LIMIT: Final = 0.05
 """Share of the time at the bank limit: in a flight as planned the command is hardly ever cut."""

@@ -27,7 +27,7 @@ def test_each_figure_has_the_time_at_which_it_came_about(make_track: Callable[..
         course_deg=np.repeat([0.0, 10.0], [50, 51]),
     )
     found = moments(track, 100.0, bank_at_limit=True)
-    assert found["xt max"] == pytest.approx(3.0)
+    assert found["tse max"] == pytest.approx(3.0)
     assert found["clear m"] == pytest.approx(4.0)
     assert found["below s"] == pytest.approx(3.8)
     assert found["bank %"] == pytest.approx(6.0)

@@ -227,7 +227,7 @@ print(sorted({"jsbsim", "numba", "rerun", "pyarrow"} & set(sys.modules)), file=s
         ),
         (
             ["list", "birds"],
-            "'birds' is not one of planners, aircraft, guidance, scenarios, worlds, campaigns",
+            "'birds' is not one of planners, aircraft, guidance, scenarios, worlds, campaigns, metrics",
         ),
         (["list"], "(see wayproof list --help)"),
         (["flight"], "(see wayproof --help)"),

@@ -20,8 +20,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from harness.analysis.metric import number
 from harness.analysis.planned import PlannedRows, planned_rows
-from harness.analysis.rows import Row, number, row_of, to_csv, to_markdown
+from harness.analysis.rows import Row, row_of, to_csv, to_markdown
 from harness.cli.app import main
 from harness.cli.compare_terminal import print_comparison
 from harness.flight.record import AcceptedPlan, Track
@@ -420,9 +421,10 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
 
 def test_the_terminal_table_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
     worst = Row(
-        "a-scenario", "a_planner_with_a_long_name", "planner_failed", "[bold] it raised", 123456.7,
-        optimum_m=1e5, ratio=12.3456, min_clearance_m=-1234.5, tightest_turn=123.456, trackable=False,
-        cross_track_max_m=1234.5, planner_p99_ms=123.4,
+        "a-scenario", "a_planner_with_a_long_name", "planner_failed", "[bold] it raised",
+        flown_length_m=123456.7, optimum_m=1e5, ratio=12.3456, min_clearance_m=-1234.5, tightest_turn=123.456,
+        trackable=False,
+        total_system_error_max_m=1234.5, planner_p99_ms=123.4,
     )  # fmt: skip
     print_comparison([worst, Row("a-scenario", "b", "error", "[bold] it died")])
     lines = capsys.readouterr().out.splitlines()
@@ -446,7 +448,7 @@ def test_the_terminal_table_never_breaks_a_word_of_a_name(
             planner,
             "planner_failed",
             "x",
-            123456.7,
+            flown_length_m=123456.7,
             ratio=12.3456,
             planner_p99_ms=123.4,
             guidance=law,

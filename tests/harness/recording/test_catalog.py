@@ -193,7 +193,7 @@ def test_severity_is_explained_where_the_table_is_opened(
     (campaign / "campaign.json").write_text("{}")
     assert main(["view", str(campaign)]) == 0
     said = capsys.readouterr().err
-    assert "sorted by severity: the outcome before the point (7 collision, 6 lost control, " in said
+    assert "sorted by severity: the outcome before the point (8 collision, 7 lost control, " in said
     assert (
         "2 unreachable, 1 reached, but not tracked or too near, 0 reached), behind it more the less" in said
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,18 +9,21 @@ import pytest
 from harness.analysis.rows import Row
 from harness.report.remarks import remarks
 
-USUAL = Row(
-    "forest",
-    "rolling_window",
-    "reached",
-    "inside the goal circle",
-    min_clearance_m=43.0,
-    clearance_violation_s=0.0,
-    bank_saturation_fraction=0.01,
-    plan_delay_max_s=0.5,
-    lost_returns=0.1,
-    navigation_jump_m=5.0,
-)
+FIGURES: dict[str, Any] = {
+    "min_clearance_m": 43.0,
+    "clearance_violation_s": 0.0,
+    "bank_saturation_fraction": 0.01,
+    "plan_delay_max_s": 0.5,
+    "lost_returns": 0.1,
+    "navigation_jump_m": 5.0,
+}
+
+
+def flown(**odd: Any) -> Row:
+    return Row("forest", "rolling_window", "reached", "inside the goal circle", **{**FIGURES, **odd})
+
+
+USUAL = flown()
 WANTED_M, SPEED_MPS = 40.0, 25.0
 
 
@@ -57,13 +59,13 @@ def test_of_a_usual_flight_nothing_is_said() -> None:
     ],
 )
 def test_what_is_odd_is_said_in_words(odd: dict[str, Any], about: str, text: str) -> None:
-    assert remarks(replace(USUAL, **odd), WANTED_M, SPEED_MPS) == [(about, text)]
+    assert remarks(flown(**odd), WANTED_M, SPEED_MPS) == [(about, text)]
 
 
 def test_a_path_that_was_given_keeps_no_clearance_and_waits_for_no_plan() -> None:
-    row = replace(USUAL, clearance_violation_s=9.0, plan_delay_max_s=9.0)
+    row = flown(clearance_violation_s=9.0, plan_delay_max_s=9.0)
     assert remarks(row, WANTED_M, SPEED_MPS, given=True) == []
 
 
 def test_without_a_wanted_clearance_nothing_is_measured_against_it() -> None:
-    assert remarks(replace(USUAL, plan_delay_max_s=9.0, navigation_jump_m=50.0), 0.0, SPEED_MPS) == []
+    assert remarks(flown(plan_delay_max_s=9.0, navigation_jump_m=50.0), 0.0, SPEED_MPS) == []

@@ -124,7 +124,7 @@ def test_the_page_says_when_the_figures_came_about(run: Path) -> None:
     followed_m = np.where(track.plan_index >= 0, np.abs(track.cross_track_m), 0.0)
     for label, row in (
         ("least clearance, m", track.clearance_m.argmin()),
-        ("cross-track error max, m", followed_m.argmax()),
+        ("total system error max, m", followed_m.argmax()),
     ):
         _, _, cells = page.partition(f'<tr><th scope="row">{label}</th>')
         assert f'<td class="dim">at {track.time_s[row]:.1f} s</td>' in cells.partition("</tr>")[0]

@@ -1,0 +1,120 @@
+"""What is known of a figure of a flight, and how bad an outcome is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+from harness.analysis.flight_limits import FlightLimits
+from harness.flight.record import Flight
+
+ERROR: Final = "error"
+"""Outcome of a flight whose software failed before its end; the other outcomes are those of `metrics.json`."""
+
+SEVERITY: Final[Mapping[str, float]] = {
+    "collision": 8.0,
+    "lost_control": 7.0,
+    "out_of_bounds": 6.0,
+    "planner_failed": 5.0,
+    ERROR: 4.0,
+    "timeout": 3.0,
+    "unreachable": 2.0,
+    "reached": 0.0,
+}
+"""How bad an outcome is, the worst first. A flight that reached its goal and was not tracked, or came nearer to an
+obstacle than was wanted, has 1."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One figure of a flight.
+
+    Attributes:
+        name: as a column of a comparison and as a property of a recording, with its unit.
+        title: what people are shown, without the unit; empty for one that only programs are shown.
+        unit: after `factor`; empty without one.
+        short: the same in a few letters, for a terminal; empty for one that is in no table for people.
+        path: its place in `metrics.json`, dots between the levels, and its column in a campaign; default: `name`.
+        kind: what it is.
+        factor: from the value in the file to the one shown.
+        digits: decimals shown; None: three or four digits in all.
+        worse: whether more or less of it is worse; empty where neither is.
+        hint: what it means, where the title does not say it.
+        rare: a table for people has it only where any flight has it.
+        derived: it takes more than `metrics.json`: the world, or the aircraft.
+        timed: it depends on the machine's speed: not among the results of a campaign.
+        recorded: it is among the properties of a recording.
+        heading: of its column in the viewer's table of runs; empty where it is not shown there.
+        get: looks it up in the content of `metrics.json`; default: at `path`.
+        of: computes it from a flight and its limits; None for one that `harness.analysis.metrics` computes.
+    """
+
+    name: str
+    title: str = ""
+    unit: str = ""
+    short: str = ""
+    path: str = ""
+    kind: Literal["number", "int", "bool", "text"] = "number"
+    factor: float = 1.0
+    digits: int | None = None
+    worse: Literal["more", "less", ""] = ""
+    hint: str = ""
+    rare: bool = False
+    derived: bool = False
+    timed: bool = False
+    recorded: bool = False
+    heading: str = ""
+    get: Callable[[Mapping[str, Any]], Any] | None = None
+    of: Callable[[Flight, FlightLimits], Any] | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "path", self.path or self.name)
+
+    @property
+    def label(self) -> str:
+        """The title with its unit."""
+        return f"{self.title}, {self.unit}" if self.unit else self.title
+
+    @property
+    def recorded_as(self) -> str:
+        """Its name among the properties of a recording, which hold percent in place of shares."""
+        return self.name.removesuffix("_fraction") + "_percent" if self.unit == "%" else self.name
+
+    def value(self, metrics: Mapping[str, Any]) -> Any:
+        """Its value in the content of `metrics.json`; None where there is none."""
+        if self.get is not None:
+            return self.get(metrics)
+        found: Any = metrics
+        for level in self.path.split("."):
+            found = found.get(level) if isinstance(found, Mapping) else None
+        return found
+
+    def text(self, value: Any) -> str:
+        """A value as people are shown it; empty where there is none."""
+        if value is None:
+            return ""
+        if self.kind == "bool":
+            return "yes" if value else "no"
+        if self.kind == "text":
+            return str(value)[:12] if self.name == "digest" else str(value)
+        if self.kind == "int":
+            return str(value)
+        return number(value, self.factor) if self.digits is None else f"{value * self.factor:.{self.digits}f}"
+
+
+def number(value: float | None, factor: float = 1.0) -> str:
+    """A value times a factor with three or four digits; empty where there is none."""
+    if value is None:
+        return ""
+    scaled = value * factor
+    if abs(scaled) < 1e-3:
+        return "0" if scaled == 0 else f"{scaled:.1e}"
+    return (
+        f"{scaled:.0f}" if abs(scaled) >= 1000 else f"{scaled:.3g}" if abs(scaled) < 100 else f"{scaled:.1f}"
+    )
+
+
+def severity(outcome: str) -> float:
+    """How bad an outcome is; one that is not known is the mildest of those that did not reach the goal."""
+    return SEVERITY.get(outcome, SEVERITY["unreachable"])

@@ -1,0 +1,306 @@
+"""All figures of a flight, each named once: where it stands in `metrics.json`, its unit, label, format and meaning.
+
+Columns of campaigns and comparisons, tables for people, properties of recordings, rankings and `wayproof list metrics`
+are made of this list. To add a figure that follows from a flight alone, append a `Metric` with `of`: it then stands in
+`metrics.json` and in all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, Final
+
+from harness.analysis.findings import bank_reversals_per_min, contradictions_s
+from harness.analysis.metric import Metric
+from harness.analysis.smoothness import Smoothness
+
+
+def _causes(metrics: Mapping[str, Any]) -> list[str]:
+    """The causes of all legs that were not tracked, in order of time."""
+    return [leg["cause"] for leg in metrics["trackability"] if leg["cause"]]
+
+
+def _spread(name: str, title: str, hint: str = "", short: str = "", rare: bool = False) -> list[Metric]:
+    """rms, 95th percentile and maximum of an error in metres; the largest is a property of recordings."""
+    stem = name.removesuffix("_m")
+    return [Metric(f"{stem}_rms_m", path=f"{name}.rms")] + [
+        Metric(
+            f"{stem}_{of}_m",
+            f"{title} {of}",
+            "m",
+            f"{short} {of}" if short else "",
+            f"{name}.{of}",
+            worse="more",
+            hint=hint if of == "p95" else "",
+            rare=rare,
+            recorded=True,
+            heading=f"{title} max, m" if short and not rare and of == "max" else "",
+        )
+        for of in ("p95", "max")
+    ]
+
+
+def _smooth(
+    figure: str, title: str, unit: str, short: str, factor: float = 1.0, hint: str = ""
+) -> list[Metric]:
+    """A figure of the planned and of the flown path."""
+    return [
+        Metric(
+            f"{of}_{figure}",
+            f"{title} {of}",
+            unit,
+            each,
+            f"smoothness.{of}.{figure}",
+            factor=factor,
+            worse="more",
+            hint=hint if of == "planned" else "",
+        )
+        for of, each in (
+            ("planned", short),
+            ("flown", "flown \N{DEGREE SIGN}" if short.startswith("turn") else f"{short} fl."),
+        )
+    ]
+
+
+_SMOOTH_FOR_PEOPLE: Final = ("heading_change_deg", "bending_energy_1pm")
+
+METRICS: Final[tuple[Metric, ...]] = (
+    Metric(
+        "outcome",
+        "outcome",
+        short="outcome",
+        kind="text",
+        hint="how the flight ended; error: the software failed before the end, which says nothing of the aircraft",
+        recorded=True,
+        heading="outcome",
+    ),
+    Metric("reason", kind="text", recorded=True),
+    Metric("flown_length_m", "flown length", "km", "km", factor=1e-3, recorded=True),
+    Metric("planned_length_m"),
+    Metric("flight_time_s", "flight time", "s", recorded=True, heading="flight, s"),
+    Metric("optimum_m", derived=True),
+    Metric(
+        "ratio",
+        "ratio to the clairvoyant optimum",
+        short="ratio",
+        digits=4,
+        derived=True,
+        worse="more",
+        hint="flown length over the shortest path of a point that knows the world and keeps the clearance",
+    ),
+    Metric(
+        "min_clearance_m",
+        "least clearance",
+        "m",
+        "clear m",
+        worse="less",
+        recorded=True,
+        heading="min clearance, m",
+    ),
+    Metric(
+        "clearance_violation_s", "below the wanted clearance", "s", "below s", worse="more", recorded=True
+    ),
+    Metric("turn_radius_m", derived=True),
+    Metric(
+        "tightest_turn",
+        "tightest planned turn, curvature \N{MIDDLE DOT} turn radius",
+        short="\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R",
+        digits=2,
+        derived=True,
+        worse="more",
+        hint="largest planned curvature times the smallest turn radius; above 1 the aircraft cannot follow",
+    ),
+    Metric(
+        "tightest_flown_turn",
+        "tightest flown turn, curvature \N{MIDDLE DOT} turn radius",
+        short="\N{GREEK SMALL LETTER KAPPA}\N{MIDDLE DOT}R fl.",
+        digits=2,
+        derived=True,
+        worse="more",
+        hint="largest curvature of the track times the smallest turn radius that a plan may ask for",
+    ),
+    Metric(
+        "trackable",
+        "trackable",
+        short="tracks",
+        kind="bool",
+        worse="less",
+        hint="every leg was flown within the limits for cross-track error, altitude, airspeed and load",
+        recorded=True,
+        heading="trackable",
+    ),
+    Metric(
+        "cause",
+        "cause of the first leg not tracked",
+        short="cause",
+        kind="text",
+        get=lambda metrics: next(iter(_causes(metrics)), ""),
+    ),
+    Metric(
+        "causes",
+        path="trackability.causes",
+        kind="text",
+        get=lambda metrics: "; ".join(sorted(set(_causes(metrics)))),
+        recorded=True,
+        heading="causes",
+    ),
+    Metric("legs", path="trackability.legs", kind="int", get=lambda metrics: len(metrics["trackability"])),
+    Metric(
+        "legs_not_trackable",
+        path="trackability.not_trackable",
+        kind="int",
+        worse="more",
+        get=lambda metrics: sum(not leg["trackable"] for leg in metrics["trackability"]),
+    ),
+    Metric(
+        "bank_saturation_fraction",
+        "time at the bank limit",
+        "%",
+        "bank %",
+        factor=100.0,
+        worse="more",
+        recorded=True,
+        heading="bank at limit, %",
+    ),
+    Metric("max_load_factor", "load factor max", worse="more"),
+    *_spread(
+        "total_system_error_m",
+        "total system error",
+        "distance of the true position from the path, as planned or as given",
+        short="tse",
+    ),
+    *_spread("cross_track_m", "cross-track error"),
+    *_spread("altitude_error_m", "altitude error"),
+    *_spread(
+        "flight_technical_error_m",
+        "flight technical error",
+        "distance of the believed position from the path",
+    ),
+    *_spread(
+        "navigation_error_m",
+        "navigation error",
+        "distance from the true position to the one that the aircraft believed to have",
+        short="nav",
+        rare=True,
+    ),
+    Metric(
+        "navigation_jump_m",
+        "jump of the believed position max",
+        "m",
+        "nav jump",
+        worse="more",
+        hint="the most that the navigation error changes in a tenth of a second, when a fix comes back for example",
+        rare=True,
+        recorded=True,
+        heading="navigation jump, m",
+    ),
+    Metric("navigation_margin_m"),
+    Metric("min_altitude_above_ground_m", worse="less"),
+    *_smooth(
+        "heading_change_deg",
+        "heading change",
+        "\N{DEGREE SIGN}",
+        "turn \N{DEGREE SIGN}",
+        hint="sum of all changes of direction of the plans in effect",
+    ),
+    *_smooth(
+        "bending_energy_1pm",
+        "bending energy",
+        "1/km",
+        "bend",
+        1e3,
+        hint="integral of the squared curvature along the plans in effect",
+    ),
+    *(
+        Metric(f"{of}_{each.name}", path=f"smoothness.{of}.{each.name}", worse="more")
+        for of in ("planned", "flown")
+        for each in fields(Smoothness)
+        if each.name not in _SMOOTH_FOR_PEOPLE
+    ),
+    *(
+        Metric(
+            f"planner_{of}_ms",
+            f"planner time {of}",
+            "ms",
+            f"{of} ms",
+            f"compute_ms.{of}",
+            worse="more",
+            timed=True,
+            recorded=True,
+            heading="planner max, ms" if of == "max" else "",
+        )
+        for of in ("p50", "p99", "max")
+    ),
+    Metric("wall_s", path="timing.wall_s", timed=True),
+    Metric("realtime_factor", path="timing.realtime_factor", timed=True),
+    *(Metric(f"plan_delay_{of}_s", path=f"plan_delay_s.{of}") for of in ("p50", "p99")),
+    Metric(
+        "plan_delay_max_s",
+        "plan delay max",
+        "s",
+        "delay s",
+        "plan_delay_s.max",
+        worse="more",
+        hint="simulated time from the latest scan that a plan could know of until it was flown",
+        rare=True,
+        recorded=True,
+        heading="plan delay max, s",
+    ),
+    Metric(
+        "lost_returns",
+        "returns lost by the sensor",
+        "%",
+        "lost %",
+        "lost_returns.share",
+        factor=100.0,
+        worse="more",
+        hint="share of the beams that met something and returned nothing",
+        rare=True,
+    ),
+    Metric(
+        "lost_returns_max",
+        "returns lost in the worst scan",
+        "%",
+        path="lost_returns.max",
+        factor=100.0,
+        worse="more",
+        recorded=True,
+        heading="lost in worst scan, %",
+    ),
+    Metric(
+        "bank_reversals_per_min",
+        "bank reversals",
+        "1/min",
+        "rev/min",
+        worse="more",
+        hint="how often a minute the bank command goes from 10\N{DEGREE SIGN} on one side to as much on the other",
+        recorded=True,
+        of=lambda flight, limits: bank_reversals_per_min(flight.track),
+    ),
+    Metric(
+        "plan_contradictions",
+        "plans that contradict the one before",
+        short="contra",
+        kind="int",
+        worse="more",
+        hint="they lead to the other side of the course within 5 s of flight",
+        rare=True,
+        recorded=True,
+        of=lambda flight, limits: len(contradictions_s(flight.track, flight.plans)),
+    ),
+    Metric("replans", "replans", short="replans", kind="int", recorded=True, heading="replans"),
+    Metric("deviation_p95_m", path="deviation_from_given_m.p95", worse="more"),
+    Metric("deviation_max_m", path="deviation_from_given_m.max", worse="more"),
+    Metric("check_ok", path="check.ok", kind="bool", worse="less"),
+    Metric("check_verdict", path="check.verdict", kind="text"),
+    Metric("error", kind="text"),
+    Metric("digest", "digest", short="digest", kind="text"),
+)
+"""All figures, in the order in which people are shown them."""
+
+BY_NAME: Final[Mapping[str, Metric]] = {metric.name: metric for metric in METRICS}
+"""The same by name."""
+
+BY_PATH: Final[Mapping[str, Metric]] = {metric.path: metric for metric in METRICS if not metric.derived}
+"""Those of `metrics.json` alone by their place in it."""
