@@ -16,15 +16,7 @@ from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
 from harness.replay.flown import FlownFlight, read_flown
-from harness.replay.measures import (
-    between_m,
-    figures,
-    lap_figures,
-    lap_numbers,
-    legs_of,
-    outside_m,
-    whole_laps,
-)
+from harness.replay.measures import Side, legs_of
 from harness.replay.mission import FlownMission, Origin, read_mission
 from harness.replay.simulated import Asked, fly_anew, scenario_for
 from harness.replay.wind import FittedWind, fit_wind, fit_windows
@@ -97,27 +89,25 @@ def replay(
     asked = _asked(flight, flown_mission, winds, wind)
     scenario = scenario_for(asked, aircraft, overrides)
 
-    corners = len(flown_mission.corners_m)
-    legs = legs_of(flight, flown_mission, asked.first)
-    laps = flight["lap"] if "lap" in flight else lap_numbers(legs, asked.first, corners, 1)
+    corners_m, columns = flown_mission.corners_m, dict(flight.columns)
+    legs = legs_of(columns, corners_m, asked.first, flown_mission.acceptance_m)
+    laps = columns["lap"] if "lap" in columns else 1.0 + _laps(legs, asked)
     count = int(laps[-1] - laps[0]) + 1
     out.mkdir(parents=True, exist_ok=True)
     replace_text(out / INDEX, json.dumps({"schema": SCHEMA, "complete": False}) + "\n")
     simulated = fly_anew(scenario, asked, count, out / SIMULATED)
-    columns = dict(flight.columns)
     columns["time_s"] = columns["time_s"] - columns["time_s"][0]
     if flight.airspeed_mps is not None:
         columns["airspeed_mps"] = flight.airspeed_mps
-    altitude_m = float(scenario.mission.altitude_m)
     sides = {
-        "flown": _Side(columns, flown_mission, legs, laps, asked.height_m, _ended(flight, flown_mission)),
-        "simulated": _Side(
+        "flown": Side(columns, corners_m, legs, laps, asked.height_m, _ended(flight, flown_mission)),
+        "simulated": Side(
             simulated,
-            flown_mission,
+            corners_m,
             simulated["leg"],
-            lap_numbers(simulated["leg"], asked.first, corners, int(laps[0])),
-            altitude_m,
-            ended=bool(simulated["leg"][-1] >= count * corners - 0.5),
+            laps[0] + _laps(simulated["leg"], asked),
+            scenario.mission.altitude_m,
+            bool(simulated["leg"][-1] >= count * len(corners_m)),
         ),
     }
     told = {
@@ -130,12 +120,19 @@ def replay(
         "wind_windows": [{"time_s": each.time_s, **each.told()} for each in winds] if windows else [],
         "airspeed_mps": asked.airspeed_mps,
         "latency_s": scenario.navigation.latency_s,
-        **_compared(sides["flown"], sides["simulated"]),
+        **_compared(sides),
         "notes": list(flight.notes),
     }
-    found = Replay(told, columns, simulated, flown_mission.corners_m, out)
-    _write(found, {"flown": asked.height_m, "simulated": altitude_m}, recording)
+    found = Replay(told, columns, simulated, corners_m, out)
+    _write(found, sides, recording)
     return found
+
+
+def _laps(legs: FloatArray, asked: Asked) -> FloatArray:
+    """(n,) laps begun after the first: each begins when corner 0 is reached."""
+    corners = len(asked.mission.corners_m)
+    laps: FloatArray = np.floor((legs + (asked.first - 1) % corners) / corners)
+    return laps
 
 
 def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Asked:
@@ -171,55 +168,27 @@ def _ended(flight: FlownFlight, mission: FlownMission) -> bool:
     return bool(away <= (mission.acceptance_m or 0.0) + 2.0 * step_m)
 
 
-@dataclass(frozen=True, eq=False)
-class _Side:
-    """One of the two flights, as it is measured."""
-
-    columns: Mapping[str, FloatArray]
-    mission: FlownMission
-    legs: FloatArray
-    laps: FloatArray
-    height_m: float
-    ended: bool
-
-    @property
-    def whole(self) -> list[int]:
-        return whole_laps(self.laps, self.legs, len(self.mission.corners_m), self.ended)
-
-    @property
-    def outside(self) -> FloatArray:
-        return outside_m(self.columns, self.mission.corners_m)
-
-    def lap(self, lap: int) -> dict[str, Any]:
-        return lap_figures(self.columns, self.outside, self.laps, self.legs, lap, self.height_m)
-
-
-def _compared(flown: _Side, simulated: _Side) -> dict[str, Any]:
+def _compared(sides: Mapping[str, Side]) -> dict[str, Any]:
     """Laps and figures of both."""
+    flown, simulated = sides["flown"], sides["simulated"]
     settled = [lap for lap in flown.whole if lap in simulated.whole]
     if not settled:
         missing = "the log" if not flown.whole else "the simulated flight"
         raise InputError(f"{missing} has no whole lap after lap 1; there is nothing to compare")
     rows: list[dict[str, Any]] = [
-        {"lap": lap, "flown": flown.lap(lap), "simulated": simulated.lap(lap)} for lap in settled
+        {"lap": lap, **{name: side.lap(lap) for name, side in sides.items()}} for lap in settled
     ]
     told: dict[str, Any] = {"settled_laps": settled, "laps": rows}
-    for name, side in (("flown", flown), ("simulated", simulated)):
-        pooled = figures(side.columns, side.outside, np.isin(side.laps, settled), side.height_m)
-        told[name] = {
-            "outside_p95_m": pooled["outside_p95_m"],
-            "outside_max_mean_m": float(np.mean([row[name]["outside_max_m"] for row in rows])),
-            "lap_mean_s": float(np.mean([row[name]["time_s"] for row in rows])),
-            **{key: value for key, value in pooled.items() if not key.startswith("outside")},
-        }
-    apart = np.concatenate(
-        [between_m(flown.columns, simulated.columns, flown.laps == k, simulated.laps == k) for k in settled]
-    )
+    for name, side in sides.items():
+        told[name] = side.figures(np.isin(side.laps, settled))
+        told[name]["outside_max_mean_m"] = float(np.mean([row[name]["outside_max_m"] for row in rows]))
+        told[name]["lap_mean_s"] = float(np.mean([row[name]["time_s"] for row in rows]))
+    apart = np.concatenate([flown.to_m(simulated, lap) for lap in settled])
     told["distance_between_m"] = {"p50": float(np.median(apart)), "p95": float(np.percentile(apart, 95))}
     return told
 
 
-def _write(found: Replay, heights_m: Mapping[str, float], recording: bool) -> None:
+def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     """Writes the recording of both, the page and, last, the index."""
     from harness.replay.page import replay_html
 
@@ -228,11 +197,11 @@ def _write(found: Replay, heights_m: Mapping[str, float], recording: bool) -> No
 
         tracks = {
             name: {
-                **columns,
-                "height_m": columns["up_m"] - heights_m[name],
-                "outside_m": outside_m(columns, found.corners_m),
+                **side.columns,
+                "height_m": side.columns["up_m"] - side.height_m,
+                "outside_m": side.outside,
             }
-            for name, columns in (("flown", found.flown), ("simulated", found.simulated))
+            for name, side in sides.items()
         }
         write_tracks(f"replay of {found.told['log']}", found.corners_m, tracks, found.folder / RECORDING)
     replace_text(found.folder / "report.html", replay_html(found))

@@ -131,7 +131,14 @@ def scenario_for(asked: Asked, aircraft: str, overrides: Sequence[tuple[str, str
             "altitude_m": altitude_m if altitude_m >= LOW_M else UNKNOWN_ALTITUDE_M,
             "time_limit_s": LONGER * float(flight["time_s"][-1] - flight["time_s"][0]) + 60.0,
         },
-        "aircraft": {"model": aircraft, "airspeed_mps": asked.airspeed_mps},
+        "aircraft": {
+            "model": aircraft,
+            "airspeed_mps": asked.airspeed_mps,
+            "autopilot": {
+                "state_latency_s": 0.0,
+                **({} if mission.bank_limit_deg is None else {"bank_limit_deg": mission.bank_limit_deg}),
+            },
+        },
         "guidance": {
             "kind": DEFAULT_LAW,
             "follow": "waypoints",

@@ -15,6 +15,7 @@ from harness.files.whole_file import replace_bytes
 from harness.files.wording import counted
 from harness.run_files.given_path import GIVEN
 from harness.run_files.run_folder import Run
+from harness.scenario.conditions import told
 from harness.scenario.performance import performance_of
 from harness.scenario.scenario import Scenario
 from harness.scenario.validation import KeyFault
@@ -110,7 +111,11 @@ def chapter(folder: Path, scenario: Scenario, entries: Sequence[ReportedFlight],
             )
         pictures.append(_picture(folder / "profiles", figures.profiles(scene, numbered), PROFILES))
     rows = [each.row for each in entries]
-    facts = _facts(scene, optimum) | without_fix(scenario, scenario.mission.time_limit_s)
+    facts = (
+        {"conditions": told(scenario)}
+        | _facts(scene, optimum)
+        | without_fix(scenario, scenario.mission.time_limit_s)
+    )
     return Chapter(scene.name, facts, rows, pictures, optimum.reason)
 
 
@@ -139,7 +144,11 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         _picture(folder / "path", path, caption),
         _picture(folder / "profiles", strips, PROFILES),
     ]
-    facts = _facts(scene, optimum) | without_fix(scenario, metrics["flight_time_s"])
+    facts = (
+        {"conditions": told(scenario)}
+        | _facts(scene, optimum)
+        | without_fix(scenario, metrics["flight_time_s"])
+    )
     if "check" in metrics:  # a path that was given is compared with no other
         del facts["clairvoyant optimum"]
     if "check" in metrics and not scene.obstacles:

@@ -17,11 +17,10 @@ from harness.scenario.checks import check_local_plane, check_start_and_goal, che
 from harness.scenario.conditions import with_day, with_servos
 from harness.scenario.files_resolved import plane_point
 from harness.scenario.files_resolved import resolved as files_expanded
-from harness.scenario.keys import ScenarioKeys
+from harness.scenario.keys import ScenarioKeys, step_rate_hz
 from harness.scenario.navigation import planning_margin_m
 from harness.scenario.performance import LEAST_CLEARANCE, mission_with, performance_of, wind_mps_of
 from harness.scenario.sections import AircraftSpec, Area, AutopilotSpec, MissionSpec, Section
-from harness.scenario.simulation import step_rate_hz
 from harness.scenario.start import check_level_flight
 from harness.scenario.validation import KeyFault
 from planner.geometry.margin import TOLERATED_SHARE
