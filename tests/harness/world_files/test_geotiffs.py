@@ -48,18 +48,6 @@ def terrain(path: Path, **reading: Any) -> Raster:
     return found
 
 
-@pytest.mark.parametrize("order", ["BIG", "LITTLE"])
-@pytest.mark.parametrize("packed", [{}, {"compress": "lzw"}, {"compress": "deflate", "predictor": 2}])
-@pytest.mark.parametrize("kind", ["int16", "uint16", "int32", "float32", "float64"])
-@pytest.mark.parametrize("tiled", [False, True])
-def test_heights_whatever_the_order_of_their_bytes(
-    order: str, packed: dict[str, Any], kind: str, tiled: bool, tmp_path: Path
-) -> None:
-    how: dict[str, Any] = {"tiled": True, "blockxsize": 32, "blockysize": 32} if tiled else {}
-    path = made(tmp_path / "a.tif", HEIGHTS.astype(kind), ENDIANNESS=order, **packed, **how)
-    assert terrain(path).values.tolist() == HEIGHTS.tolist()
-
-
 @pytest.mark.parametrize("inside", [True, False])
 def test_cells_that_a_mask_takes_out_have_no_height(inside: bool, tmp_path: Path) -> None:
     mask = np.full(HEIGHTS.shape, 255, dtype=np.uint8)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import math
 from pathlib import Path
@@ -14,7 +13,6 @@ import shapely
 from PIL import Image
 from pyproj import CRS
 
-from harness.world_files.expansion import loaded_file
 from harness.world_files.kinds import read
 from harness.world_files.parts import (
     FOOT_M,
@@ -76,25 +74,6 @@ def test_a_geotiffs_heights_are_in_its_own_unit(how: dict[str, Any], metres: flo
     assert terrain.values[0, 0] == pytest.approx(metres)
     assert np.isnan(terrain.values[1, 2])
     assert np.isnan(terrain.values).sum() == 1
-
-
-@pytest.mark.parametrize("kind", ["Area", "Point"])
-@pytest.mark.parametrize("crs", ["EPSG:4326", "EPSG:32632", "EPSG:3035"])
-def test_a_geotiff_lies_where_rasterio_has_it(crs: str, kind: str, tmp_path: Path) -> None:
-    rasterio = pytest.importorskip("rasterio")
-    degrees = crs == "EPSG:4326"
-    west, north, cell = (8.0, 47.0, 0.001) if degrees else (4_200_000.0, 2_700_000.0, 25.0)
-    path, place = tmp_path / "a.tif", rasterio.transform.from_origin(west, north, cell, cell)
-    with rasterio.open(
-        path, "w", driver="GTiff", height=3, width=3, count=1, dtype="float32", crs=crs, transform=place
-    ) as file:
-        file.write(np.ones((3, 3), dtype="float32"), 1)
-        file.update_tags(AREA_OR_POINT=kind)
-    found = read_any(path)
-    assert found.terrain is not None
-    with rasterio.open(path) as file:
-        assert found.terrain.affine == pytest.approx(tuple(file.transform)[:6])
-    assert CRS(found.crs) == CRS(crs)
 
 
 def test_a_picture_is_no_terrain(tmp_path: Path) -> None:
@@ -445,30 +424,6 @@ def test_a_ros_map_of_raw_numbers_and_one_that_is_turned(tmp_path: Path) -> None
         read_any(written(tmp_path / "m.yaml", text.format("octal", 0)))
 
 
-KML = (
-    '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2"><Document>'
-    "<NetworkLink><name>n</name></NetworkLink><Placemark><name>z</name><MultiGeometry><Polygon>"
-    "<extrude>1</extrude><altitudeMode>{}</altitudeMode><outerBoundaryIs><LinearRing><coordinates>"
-    "8,47,120 8.001,47,120 8.001,47.001,120 8,47.001,120 8,47,120</coordinates></LinearRing></outerBoundaryIs>"
-    "</Polygon></MultiGeometry></Placemark></Document></kml>"
-)
-
-
-@pytest.mark.parametrize(
-    ("mode", "top"),
-    [
-        ("absolute", Limit(120.0)),
-        ("relativeToGround", Limit(120.0, Datum.GROUND)),
-        ("clampToGround", NO_TOP),
-    ],
-)
-def test_the_altitude_modes_of_kml(mode: str, top: Limit, tmp_path: Path) -> None:
-    found = read_any(written(tmp_path / "a.kml", KML.format(mode)))
-    (part,) = found.parts
-    assert (part.bottom, part.top) == (NO_BOTTOM, top)
-    assert any("link" in note for note in found.notes)
-
-
 def test_geojson_in_an_older_files_own_system_with_several_polygons(tmp_path: Path) -> None:
     square = [[[3e5 + x, 6.7e6 + y] for x, y in ((0, 0), (100, 0), (100, 100), (0, 100), (0, 0))]]
     away = [[[x + 500, y] for x, y in square[0]]]
@@ -582,20 +537,6 @@ def test_a_city_object_with_a_vertex_that_is_not_there_is_named(index: Any, tmp_
         read_any(path)
 
 
-def test_reading_leaves_the_collection_of_cycles_as_it_was(tmp_path: Path) -> None:
-    good = written(tmp_path / "a.geojson", json.dumps(feature({})))
-    bad = written(tmp_path / "b.geojson", "{")
-    for on in (True, False):
-        (gc.enable if on else gc.disable)()
-        try:
-            loaded_file(good, None, Reading())
-            with pytest.raises(WorldFileError):
-                loaded_file(bad, None, Reading())
-            assert gc.isenabled() is on
-        finally:
-            gc.enable()
-
-
 @pytest.mark.parametrize(
     ("tags", "bottom", "top"),
     [
@@ -691,23 +632,6 @@ def test_a_feature_without_a_geometry_is_counted(tmp_path: Path) -> None:
 
 
 AIRSPACE = "AC D\nAN Zürich CTR\nAL SFC\nAH 3500 ft\nV X=47:30:00 N 008:30:00 E\nDC 5\n"
-
-
-@pytest.mark.parametrize(
-    "data",
-    [
-        AIRSPACE.replace(" ", "\t", 3).replace("AH ", "AH\t").encode(),
-        AIRSPACE.replace("\n", "\r\n").encode("utf-8-sig"),
-        AIRSPACE.encode("latin-1"),
-        AIRSPACE.encode("utf-16"),
-    ],
-)
-def test_airspace_is_the_same_in_every_encoding_and_with_tabs(data: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    path.write_bytes(data)
-    (part,) = read_any(path).parts
-    assert (part.name.replace("\t", " "), part.bottom) == ("Zürich CTR", NO_BOTTOM)
-    assert same(part.top, Limit(3500 * FOOT_M))
 
 
 def test_kml_with_blanks_after_commas_and_lines_beside_its_polygon(tmp_path: Path) -> None:
@@ -880,16 +804,6 @@ def test_heights_of_a_city_are_in_the_unit_of_its_system(
     assert found.notes == (*((note,) if note else ()), "passed over: 1 GeometryInstance")
 
 
-def test_a_file_is_read_once_however_its_folder_is_written(tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
-    path = geojson(tmp_path / "a.geojson", feature({}))
-    again = tmp_path / "out" / ".." / "a.geojson"
-    assert loaded_file(again, None, Reading()) is loaded_file(path, None, Reading())
-    link = tmp_path / "N47E008.geojson"
-    link.symlink_to(path)
-    assert loaded_file(link, None, Reading()) is not loaded_file(path, None, Reading())
-
-
 @pytest.mark.parametrize(
     ("command", "area"),
     [
@@ -913,17 +827,6 @@ def test_a_small_arc_whose_ends_are_one_place_is_no_circle(tmp_path: Path) -> No
     text = f"AC R\nAN square\nAL GND\nAH FL100\n{corners}V X=50:00:00 N 010:00:00 E\n{arc}"
     (part,) = read_any(written(tmp_path / "a.txt", text)).parts
     assert part.footprint.area == pytest.approx((5 / 60) ** 2)
-
-
-def test_a_zone_of_ed269_without_a_geometry_is_counted(tmp_path: Path) -> None:
-    circle = {
-        "horizontalProjection": {"type": "Circle", "center": [8.0, 47.0], "radius": 500},
-        "upperLimit": 9,
-    }
-    zones = [{"identifier": "a", "geometry": [circle]}, {"identifier": "b", "geometry": []}]
-    found = read_any(written(tmp_path / "a.json", json.dumps({"features": zones})))
-    assert [part.name for part in found.parts] == ["a"]
-    assert "1 zone without a geometry passed over" in found.notes
 
 
 def test_names_of_zones_may_be_in_capitals(tmp_path: Path) -> None:
