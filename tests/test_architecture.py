@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -327,3 +328,18 @@ def test_a_breach_is_seen(path: str, source: str) -> None:
 )
 def test_what_is_allowed_is_no_breach(path: str, source: str) -> None:
     assert breaches(path, source) == []
+
+
+def test_outputs_are_written_by_one_writer() -> None:
+    """`harness.files.whole_file` follows no link and leaves no half file; others write into scratch folders only."""
+    writes = re.compile(r"\.write_(text|bytes)\(|open\([^)]*\"[wa]b?\+?\"")
+    found = {
+        path for path, source in SOURCES.items() if path.startswith("harness/") and writes.search(source)
+    }
+    scratch = {
+        "harness/api/paths.py",
+        "harness/recording/viewer.py",
+        "harness/run_files/flight_logs.py",
+        "harness/cli/standard_output.py",
+    }
+    assert found == scratch

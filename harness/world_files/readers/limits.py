@@ -28,55 +28,37 @@ _WORD: Final = re.compile(
 """Words that a limit may consist of. Of others, as `ASK 123.5`, nothing is guessed."""
 _METRES: Final = re.compile(r"\d\s*(M|METRES?|METERS?|MTR)(?=\b|AMSL|MSL|AGL|ASFC|GND|SFC)")
 _LOWER: Final = (
-    "lowerlimit", "lower_limit", "lower", "lower_val", "floor", "bottom", "loweraltitude", "lower_altitude",
-    "minaltitude", "min_altitude", "altitudemin", "altmin", "alt_min", "minalt", "min_alt", "altitude_min",
-    "lower_limit_altitude",
+    "lowerlimit", "lower", "lowerval", "floor", "bottom", "loweraltitude", "minaltitude", "altitudemin", "altmin",
+    "minalt", "lowerlimitaltitude",
 )  # fmt: skip
 _UPPER: Final = (
-    "upperlimit", "upper_limit", "upper", "upper_val", "ceiling", "top", "upperaltitude", "upper_altitude",
-    "maxaltitude", "max_altitude", "altitudemax", "altmax", "alt_max", "maxalt", "max_alt", "altitude_max",
-    "upper_limit_altitude",
+    "upperlimit", "upper", "upperval", "ceiling", "top", "upperaltitude", "maxaltitude", "altitudemax", "altmax",
+    "maxalt", "upperlimitaltitude",
 )  # fmt: skip
-"""Names of limits; unit and reference may follow, as in `floor_ft_agl`."""
-_AFTER: Final = re.compile(r"(?:_(ft|feet|m|metres|meters|agl|amsl|msl|gnd))+$")
-_METRES_AFTER: Final = frozenset(("m", "metres", "meters"))
+"""Names of limits without their underscores; unit and reference may follow, as in `floor_ft_agl`."""
+_TAILS: Final = frozenset(("ft", "feet", "m", "metres", "meters", "agl", "amsl", "msl", "gnd"))
 _BEGINS: Final = {"lower": ("lower", "min", "floor", "bottom"), "upper": ("upper", "max", "ceiling", "top")}
-"""What the names of attributes begin with that belong to one of the limits."""
+"""Beginnings of the names of attributes that belong to one of the limits."""
 _UNITS: Final = ("uom", "unit")
-"""What the name of an attribute has that says in what unit a limit is."""
-_BOTH_UNITS: Final = (
-    "uom", "unit", "units", "uomdimensions", "altitudeunit", "altitude_unit", "unitofmeasure",
-)  # fmt: skip
+"""Parts of the name of an attribute with the unit of a limit."""
+_BOTH_UNITS: Final = ("uom", "unit", "units", "uomdimensions", "altitudeunit", "unitofmeasure")
 _REFERENCES: Final = ("ref", "code", "datum", "type")
-"""What the name of an attribute has that says what a limit is counted from, as `lowerReference`, `UPPER_CODE`."""
+"""Parts of the name of an attribute with the reference of a limit, as `lowerReference`, `UPPER_CODE`."""
 _BOTH_REFERENCES: Final = (
-    "reference", "altitudereference", "altitude_reference", "verticalreference", "vertical_reference", "datum",
-    "verticaldatum", "vertical_datum", "altituderef", "altitude_ref", "altitudedatum", "altitude_datum",
-    "altitudetype", "altitude_type", "heightreference", "height_reference",
+    "reference", "altitudereference", "verticalreference", "datum", "verticaldatum", "altituderef", "altitudedatum",
+    "altitudetype", "heightreference",
 )  # fmt: skip
 _GRID: Final = ("apt1_", "map_eff")
 """What attributes begin with in the facility maps of the FAA."""
 NO_NUMBER: Final = -9000.0
 """Limits so low stand for one that is not known, as -9998 of the FAA's files."""
 _HEIGHT: Final = (
-    "height",
-    "building:height",
-    "building_height",
-    "measuredheight",
-    "render_height",
-    "bldg_height",
-    "est_height",
+    "height", "building:height", "building_height", "measuredheight", "render_height", "bldg_height", "est_height",
     "hoehe",
-)
+)  # fmt: skip
 _LEVELS: Final = (
-    "building:levels",
-    "building_levels",
-    "levels",
-    "num_floors",
-    "floors",
-    "storeys",
-    "stories",
-)
+    "building:levels", "building_levels", "levels", "num_floors", "floors", "storeys", "stories",
+)  # fmt: skip
 _MIN_HEIGHT: Final = ("min_height", "render_min_height", "base_height")
 _MIN_LEVEL: Final = ("building:min_level", "min_level", "min_floor")
 
@@ -250,7 +232,14 @@ def is_building(tags: Mapping[str, Any]) -> bool:
 
 def has_limits(tags: Mapping[str, Any]) -> bool:
     """Whether attributes give the limits of an airspace."""
-    return any(tags[key] is not None and _AFTER.sub("", key.lower()) in (*_LOWER, *_UPPER) for key in tags)
+    return any(tags[key] is not None and _parted(key)[0] in (*_LOWER, *_UPPER) for key in tags)
+
+
+def _parted(key: str) -> tuple[str, frozenset[str]]:
+    """The name of an attribute without underscores, and the unit and the reference that it ends with."""
+    words = key.lower().split("_")
+    count = next((k for k, word in enumerate(reversed(words)) if word not in _TAILS), len(words))
+    return "".join(words[: len(words) - count]), frozenset(words[len(words) - count :])
 
 
 def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit, Limit]:
@@ -258,28 +247,28 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
 
     A limit without a reference is taken as above mean sea level, which is noted.
     """
-    tags = {key.lower(): value for key, value in tags.items() if value is not None}
-    if "ceiling" in tags and any(key.startswith(_GRID) for key in tags):
-        return _above_the_grid(tags, notes)
+    lower = {key.lower(): value for key, value in tags.items() if value is not None}
+    if "ceiling" in lower and any(key.startswith(_GRID) for key in lower):
+        return _above_the_grid(lower, notes)
+    parted = [(*_parted(key), value) for key, value in lower.items()]
+    said = {key.replace("_", ""): str(value) for key, value in lower.items()}
     found: list[Limit | None] = []
     bare = alone = False
     for names, none, word in ((_LOWER, NO_BOTTOM, "lower"), (_UPPER, NO_TOP, "upper")):
-        key = next((each for known in names for each in tags if _AFTER.sub("", each) == known), None)
-        if key is None:
+        given = next((each for known in names for each in parted if each[0] == known), None)
+        if given is None:
             found.append(none)
             continue
-        ends = set(key.split("_"))
-        unit = "ft" if ends & {"ft", "feet"} else _said(tags, word, _UNITS, _BOTH_UNITS)
-        alone |= not unit and not ends & _METRES_AFTER and _is_number(tags[key])
-        unit = unit or "m"
-        reference = " ".join(ends & {"agl", "gnd", "amsl", "msl"}) or _said(
-            tags, word, _REFERENCES, _BOTH_REFERENCES
-        )
-        datum = Datum.GROUND if _GROUND.search(reference.upper()) else Datum.SEA
-        limit = _limit(tags[key], unit.lower(), datum)
+        _, ends, value = given
+        unit = "ft" if ends & {"ft", "feet"} else _said(said, word, _UNITS, _BOTH_UNITS)
+        alone |= not unit and not ends & {"m", "metres", "meters"} and _is_number(value)
+        reference = " ".join(ends & {"agl", "gnd", "amsl", "msl"})
+        reference = (reference or _said(said, word, _REFERENCES, _BOTH_REFERENCES)).upper()
+        datum = Datum.GROUND if _GROUND.search(reference) else Datum.SEA
+        limit = _limit(value, (unit or "m").lower(), datum)
         found.append(limit)
-        told = unit.upper() == "FL" or _REFERENCE.search(reference.upper()) is not None
-        bare |= not told and limit is not None and _bare(tags[key], limit)
+        told = unit.upper() == "FL" or _REFERENCE.search(reference) is not None
+        bare |= not told and limit is not None and _bare(value, limit)
     if alone:
         notes.append(f"{name or 'a part'}: its limits name no unit; taken as metres")
     if bare:
@@ -287,10 +276,10 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     return band_of(found[0], found[1], notes, name)
 
 
-def _said(tags: Mapping[str, Any], word: str, has: tuple[str, ...], both: tuple[str, ...]) -> str:
+def _said(said: Mapping[str, str], word: str, has: tuple[str, ...], both: tuple[str, ...]) -> str:
     """What an attribute says of one of the limits, else one that says it of both; empty where none does."""
-    own = (each for each in tags if each.startswith(_BEGINS[word]) and any(part in each for part in has))
-    return next((str(tags[each]) for each in (*own, *both) if each in tags), "")
+    own = (each for each in said if each.startswith(_BEGINS[word]) and any(part in each for part in has))
+    return next((said[each] for each in (*own, *both) if each in said), "")
 
 
 def _is_number(value: Any) -> bool:
@@ -322,27 +311,20 @@ def _above_the_grid(tags: Mapping[str, Any], notes: list[str]) -> tuple[Limit, L
 def _limit(value: Any, unit: str, datum: Datum) -> Limit | None:
     """A limit as a number, a text, or a mapping as openAIP has it: unit 1 feet, 6 flight level; datum 0 ground."""
     if isinstance(value, Mapping):
-        number = metres_of(value.get("value"))
-        kind, reference = value.get("unit"), value.get("referenceDatum", value.get("reference"))
-        if number is None:
-            return None
-        if kind in (6, "FL"):
-            return Limit(number * 100.0 * FOOT_M)
-        ground = reference == 0 or bool(_GROUND.search(str(reference).upper()))
-        if ground and number == 0.0:
-            return NO_BOTTOM
-        return Limit(
-            number * (FOOT_M if kind in (1, "FT", "ft") else 1.0), Datum.GROUND if ground else Datum.SEA
-        )
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        if datum is Datum.GROUND and value == 0:
-            return NO_BOTTOM
-        if value <= NO_NUMBER:
-            return None
-        if unit == "fl":
-            return Limit(value * 100.0 * FOOT_M)
-        return Limit(value * (FOOT_M if unit.startswith("f") else 1.0), datum)
-    return limit_of(str(value), unit.startswith("f"), datum)
+        reference = value.get("referenceDatum", value.get("reference"))
+        ground = reference == 0 or _GROUND.search(str(reference).upper()) is not None
+        datum = Datum.GROUND if ground else Datum.SEA
+        unit = {1: "ft", 6: "fl"}.get(value.get("unit"), str(value.get("unit"))).lower()  # type: ignore[arg-type]
+        value = metres_of(value.get("value"))
+    if isinstance(value, bool) or not isinstance(value, int | float | None):
+        return limit_of(str(value), unit.startswith("f"), datum)
+    if value is None or value <= NO_NUMBER:
+        return None
+    if unit == "fl":
+        return Limit(value * 100.0 * FOOT_M)
+    if datum is Datum.GROUND and value == 0:
+        return NO_BOTTOM
+    return Limit(value * (FOOT_M if unit.startswith("f") else 1.0), datum)
 
 
 def _first(
