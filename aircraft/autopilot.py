@@ -208,7 +208,9 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     Raises:
         ValueError: if a control has no authority or the wrong sign, or the short period is not oscillatory.
     """
-    authority = {"aileron": at.lda, "elevator": -at.mde, "rudder": -at.ndr, "throttle": at.xdt}
+    authority = {"aileron": at.lda, "elevator": -at.mde, "throttle": at.xdt}
+    if at.ndr:  # a flying wing has no rudder
+        authority["rudder"] = -at.ndr
     for name, value in authority.items():
         if not value > 0.0:
             raise ValueError(f"the {name} has no authority at trim ({value:.3g}): no gains can be derived")
@@ -224,7 +226,9 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     determinant = at.lda * at.ndr - at.ldr * at.nda
 
     def balance(rolling: float, yawing: float) -> tuple[float, float]:
-        """Aileron and rudder whose moments are the given accelerations."""
+        """Aileron and rudder whose moments are the given accelerations; without a rudder, those of roll alone."""
+        if not at.ndr:
+            return rolling / at.lda, 0.0
         return (
             (rolling * at.ndr - at.ldr * yawing) / determinant,
             (at.lda * yawing - at.nda * rolling) / determinant,
@@ -235,7 +239,7 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
     )
     aileron_r_forward, rudder_r_forward = balance(-at.lr, -at.nr)
     dutch_roll = math.sqrt(max(at.nb + at.nr * at.yb, 0.0))
-    rudder_r = pace * max(1.4 * dutch_roll + at.nr + at.yb, 0.0) / -at.ndr
+    rudder_r = pace * max(1.4 * dutch_roll + at.nr + at.yb, 0.0) / -at.ndr if at.ndr else 0.0
 
     short_period = math.sqrt(short_period2)
     pitch = pitch_pace * min(3.5, 0.315 * short_period)

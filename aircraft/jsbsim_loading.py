@@ -6,6 +6,8 @@ import functools
 import math
 import os
 import threading
+import xml.etree.ElementTree as ElementTree
+from collections import deque
 from concurrent.futures import Future, wait
 from contextlib import ExitStack
 from queue import SimpleQueue
@@ -24,7 +26,9 @@ from aircraft.properties import FOOT_M, SLUG_KG
 from aircraft.start import StartConditions
 
 REFERENCE_ALTITUDE_M = 300.0
-FULL_TRIM = 1
+LONGITUDINAL_TRIM, FULL_TRIM = 0, 1
+RUDDER_NEEDED = "rdot doesn't appear to be trimmable"
+"""What JSBSim says of an aircraft without a rudder: it is trimmed in its plane of symmetry."""
 
 SURFACES = {
     "aileron": ("fcs/left-aileron-pos-rad", "fcs/right-aileron-pos-rad"),
@@ -47,14 +51,31 @@ ADAMS_BASHFORTH_2 = 3
 
 
 class _Silence(jsbsim.FGLogger):
-    """Takes JSBSim's log and says nothing; errors come as exceptions."""
+    """Takes JSBSim's log, keeps its last errors, and says nothing."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.errors: deque[str] = deque(maxlen=4)
+        self._is_error = False
+
+    def set_level(self, level: Any) -> None:
+        """Keeps the messages that follow if they are errors."""
+        super().set_level(level)
+        self._is_error = int(level) >= ERROR_LEVEL
 
     def message(self, message: str) -> None:
-        """Drops a message."""
+        """Keeps the message of an error."""
+        if self._is_error and (text := " ".join(message.split())) and text != NO_NEWS:
+            self.errors.append(text.partition(' in file Path "')[0])
 
     def file_location(self, filename: str, line: int) -> None:
         """Drops a location."""
 
+
+ERROR_LEVEL = 4
+"""JSBSim's LogLevel::ERROR."""
+NO_NEWS = "No filename given."
+"""JSBSim logs this as an error of every model."""
 
 _SILENCE = _Silence()
 """The only one: JSBSim lets go of the logger of a thread that has ended without Python's lock, and so must not be the
@@ -121,6 +142,7 @@ os.register_at_fork(before=_STARTING.acquire, after_in_parent=_STARTING.release,
 
 
 def _load(files: ModelFiles, step_rate_hz: int) -> Any:
+    _SILENCE.errors.clear()
     fdm = jsbsim.FGFDMExec(None)
     fdm.set_debug_level(0)
     fdm.set_dt(
@@ -138,11 +160,31 @@ def _load(files: ModelFiles, step_rate_hz: int) -> Any:
             reason = " ".join(str(error).split())
             raise AircraftError(f"{files.name}: the model cannot be loaded: {reason}") from error
     if not loaded:
-        raise AircraftError(f"{files.name}: JSBSim refuses the model")
+        said = "; ".join(_SILENCE.errors)
+        raise AircraftError(f"{files.name}: JSBSim refuses the model{said and f': {said}'}")
+    _check_properties(fdm, files)
     fdm.disable_output()
     for motion in ROTATION:
         fdm[f"simulation/integrator/{motion}/rotational"] = ADAMS_BASHFORTH_2
     return fdm
+
+
+def _check_properties(fdm: Any, files: ModelFiles) -> None:
+    """Raises AircraftError if a function of the model reads a property that nothing makes.
+
+    They are made first: the process would end with the model, whose destructor reads them.
+    """
+    tags = ("property", "p", "independentVar")
+    functions = ElementTree.parse(files.model).getroot().iter("function")
+    read = {each.text for function in functions for tag in tags for each in function.iter(tag) if each.text}
+    manager = fdm.get_property_manager()
+    missing = sorted(name for text in read if not manager.get_node(name := text.strip().lstrip("-")))
+    for name in missing:
+        fdm[name] = 0.0
+    if missing:
+        raise AircraftError(
+            f"{files.name}: its functions read the property {missing[0]}, which does not exist"
+        )
 
 
 def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading_rad: float) -> None:
@@ -167,18 +209,48 @@ def trim(fdm: Any, name: str, plane: LocalPlane, start: StartConditions, heading
     for path, value in values.items():
         fdm[path] = value
     fdm["propulsion/fuel_freeze"] = 1.0  # mass and balance stay as they are trimmed
+    fault = _trim(fdm, FULL_TRIM)
+    if fault == "" and RUDDER_NEEDED in "; ".join(_SILENCE.errors):
+        fault = _trim(fdm, LONGITUDINAL_TRIM)
+    if fault:
+        raise AircraftError(f"{name}: the model cannot be started: {fault}")
+    if fault is not None:
+        raise TrimError(
+            f"{name} cannot be trimmed for level flight at {start.airspeed_mps:g} m/s, "
+            f"{start.altitude_m:g} m above sea level: {_why_not_trimmed(fdm)}"
+        )
+
+
+def _trim(fdm: Any, mode: int) -> str | None:
+    """What JSBSim says of a model that it cannot start; empty if there is no trim; None if there is.
+
+    No exception of JSBSim's leaves this: one that outlives its model ends the process.
+    """
+    _SILENCE.errors.clear()
     try:
         fdm.run_ic()
         fdm["propulsion/set-running"] = -1.0
-        fdm.do_trim(FULL_TRIM)
+        fdm.do_trim(mode)
     except jsbsim.TrimFailureError:
-        raise TrimError(
-            f"{name} cannot be trimmed for level flight at {start.airspeed_mps:g} m/s, "
-            f"{start.altitude_m:g} m above sea level"
-        ) from None
+        return ""
     except jsbsim.BaseError as error:
-        reason = " ".join(str(error).split())
-        raise AircraftError(f"{name}: the model cannot be started: {reason}") from None
+        return " ".join(str(error).split()) or "JSBSim does not say why"
+    return None
+
+
+def _why_not_trimmed(fdm: Any) -> str:
+    engines = fdm.get_propulsion().get_num_engines()
+    thrusts = [fdm.get_property_value(f"propulsion/engine[{each}]/thrust-lbs") for each in range(engines)]
+    if not all(map(math.isfinite, thrusts)):
+        return "the thrust of its propeller or engine is not a number"
+    if fdm.get_property_manager().get_node("propulsion/tank/contents-lbs") is not None:
+        if fdm.get_property_value("propulsion/total-fuel-lbs") <= 0.0:
+            return "its tanks are dry"
+        if not any(
+            fdm.get_property_value(f"propulsion/engine[{each}]/set-running") for each in range(engines)
+        ):
+            return "none of its engines runs after JSBSim's propulsion/set-running"
+    return "; ".join(_SILENCE.errors) or "JSBSim finds no trim"
 
 
 def trimmed(files: ModelFiles, airspeed_mps: float) -> Any:

@@ -6,7 +6,7 @@ Every flight begins trimmed, 300 m above the sea, in calm air. Speeds are true a
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -224,19 +224,21 @@ def middle_of_trims(files: ModelFiles) -> float:
         AircraftError: there is no such speed, or the model cannot be loaded.
     """
     runs: list[list[float]] = [[]]
+    reasons: Counter[str] = Counter()
     speed = SLOWEST_MPS
     while speed <= FASTEST_MPS:
         try:
             trimmed(files, speed)
             runs[-1].append(speed)
-        except TrimError:
+        except TrimError as error:
             runs.append([])
+            reasons[str(error).partition("level: ")[2]] += 1
         speed *= SPEED_STEP
     longest = max(runs, key=len)
     if not longest:
         raise AircraftError(
             f"{files.name} cannot be trimmed for level flight at any speed from {SLOWEST_MPS:g} to "
-            f"{FASTEST_MPS:g} m/s"
+            f"{FASTEST_MPS:g} m/s: {reasons.most_common(1)[0][0]}"
         )
     return round(math.sqrt(longest[0] * longest[-1]), SPEED_DIGITS)
 

@@ -65,3 +65,23 @@ def test_ultrastick25e_answers_a_step_as_another_model(steps: str, control: str,
             assert math.degrees(fdm[path]) == pytest.approx(
                 rows[seconds][name], abs=max(0.02 * largest, 0.15)
             )
+
+
+def test_x8_trims_where_its_authors_have_it() -> None:
+    """K. Gryte's simulator of the same coefficients: 18 m/s at sea level, elevator 0.0370 rad, throttle 0.1219."""
+    fdm = load(model_files("x8"))
+    trim(fdm, "x8", LocalPlane(45.0, 0.0), StartConditions(0.0, 0.0, 3.0, 0.0, 18.0), 0.0)
+    assert fdm["aero/alpha-rad"] == pytest.approx(0.0308, abs=2e-4)
+    assert fdm["fcs/elevator-pos-rad"] == pytest.approx(0.0370, abs=2e-4)
+    assert fdm["fcs/throttle-cmd-norm"] == pytest.approx(0.1219, abs=2e-4)
+
+
+def test_elevons_mix_pitch_and_roll() -> None:
+    fdm = load(model_files("x8"))
+    fdm.run_ic()
+    fdm["fcs/elevator-cmd-norm"], fdm["fcs/aileron-cmd-norm"] = 0.5, 0.25
+    fdm.run()
+    left, right = fdm["fcs/left-elevon-norm"], fdm["fcs/right-elevon-norm"]
+    assert (left, right) == pytest.approx((0.75, 0.25))
+    assert math.degrees(fdm["fcs/elevator-pos-rad"]) == pytest.approx(15.0, abs=0.01)
+    assert math.degrees(fdm["fcs/left-aileron-pos-rad"]) == pytest.approx(7.5, abs=0.01)

@@ -1,0 +1,76 @@
+"""Models that cannot be flown say why, in a process that goes on."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from aircraft.airframes import AircraftError, airframe
+from aircraft.model_files import OWN
+
+RUDDER = r'      <aerosurface_scale name="rudder">.*?</aerosurface_scale>\n'
+BY_RUDDER = r"\s*<product><value>-?[0-9.]+</value><property>fcs/rudder-pos-rad</property></product>"
+
+
+def aerosonde_with(folder: Path, change: tuple[str, str] = ("", ""), without: str = "") -> Path:
+    """A folder with the aerosonde's model under another name, a pattern of its XML replaced, a file left out."""
+    made = folder / "mine"
+    shutil.copytree(OWN / "aerosonde", made)
+    text = (made / "aerosonde.xml").read_text().replace('name="aerosonde"', 'name="mine"')
+    (made / "aerosonde.xml").unlink()
+    (made / "mine.xml").write_text(re.sub(*change, text, flags=re.DOTALL) if change[0] else text)
+    if without:
+        (made / without).unlink()
+    return made
+
+
+@pytest.mark.parametrize(
+    ("change", "without", "said"),
+    [
+        (("", ""), "unpowered_engine.xml", "JSBSim refuses the model: Could not open file: unpowered_engine"),
+        (("", ""), "motor.xml", "JSBSim refuses the model: Could not open file: motor"),
+        (("<input>fcs/aileron-cmd-norm<", "<input>fcs/nothing<"), "", "property fcs/nothing does not exist"),
+        (
+            ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"),
+            "",
+            "its functions read the property fcs/nothing, which does not exist",
+        ),
+        (('KG">11.0<', 'KG">400.0<'), "", "cannot be trimmed .*: JSBSim finds no trim"),
+    ],
+)
+def test_what_a_model_lacks_is_told(tmp_path: Path, change: tuple[str, str], without: str, said: str) -> None:
+    with pytest.raises(AircraftError, match=said):
+        airframe(str(aerosonde_with(tmp_path, change, without)))
+
+
+def test_an_engine_that_does_not_run_is_told() -> None:
+    with pytest.raises(AircraftError, match=r"pa28 cannot be trimmed .*: none of its engines runs"):
+        airframe("pa28")
+
+
+def test_a_missing_property_ends_with_status_2(tmp_path: Path) -> None:
+    """JSBSim ends the process when it takes such a model down (SIGABRT, 134)."""
+    folder = aerosonde_with(tmp_path, ("<property>fcs/elevator-pos-rad<", "<property>fcs/nothing<"))
+    told = subprocess.run(
+        [sys.executable, "-m", "wayproof", "envelope", str(folder)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.returncode == 2
+    assert "read the property fcs/nothing" in " ".join(told.stderr.split())
+
+
+def test_an_aircraft_without_a_rudder_is_flown(tmp_path: Path) -> None:
+    folder = aerosonde_with(tmp_path, (f"{RUDDER}|{BY_RUDDER}", ""))
+    assert "rudder-pos" not in (folder / "mine.xml").read_text()
+    frame = airframe(str(folder))
+    low, high = frame.airspeed_range_mps
+    assert low < 18.0
+    assert high > 31.0
+    assert frame.gains.rudder_r == 0.0
