@@ -26,7 +26,7 @@ PAGE_RATIO = 1.45
 """Height over width of what is kept of a page: its beginning."""
 
 RECORDINGS = {
-    "paper_circles": ("paper_circles/rolling_window/flight.rrd", 2346.0),
+    "paper_circles": ("paper_circles/improved_bug/flight.rrd", 2346.0),
     "overlay": ("paper_circles/overlay.rrd", 2500.0),
     "aerosonde_forest": ("forest/flight.rrd", 100.0),
 }
@@ -44,7 +44,14 @@ def make(out: Path, work: Path) -> Iterator[str]:
         out: folder of the pictures.
         work: an empty folder for the flights.
     """
-    flights = ["compare", "paper_circles", "--planners", "rolling_window,bug2", "--out", str(work)]
+    flights = [
+        "compare",
+        "paper_circles",
+        "--planners",
+        "bug2,improved_bug,rolling_window",
+        "--out",
+        str(work),
+    ]
     if wayproof(flights) or wayproof(["report", str(work / "paper_circles" / "bug2")]):
         yield "a flight or a report failed"
     wayproof(["fly", "aerosonde_forest", "--out", str(work / "forest"), "--quiet"])

@@ -110,9 +110,11 @@ class ImprovedBug:
     ) -> Plan:
         """The shortest route as a plan."""
         best = routes[0]
+        straight = len(routes) == 1 and len(best.nodes) == 2
+        reason = "along the guide vector" if straight else f"round obstacles, the best of {len(routes)}"
         return Plan(
             PlanStatus.FOUND,
-            f"{len(routes)} candidates of up to {self._config.steps} steps",
+            reason,
             np.array([request.position_m, *best.nodes]),
             Path(np.array([*before, *best.path.segments.tolist()])),
             partial(_picture, request.position_m, window, routes),
