@@ -87,7 +87,7 @@ METRICS: Final[tuple[Metric, ...]] = (
         digits=4,
         derived=True,
         worse="more",
-        hint="flown length over the shortest path of a point that knows the world and keeps the clearance",
+        hint="flown length over the shortest path to the goal circle for a point that knows the world and keeps clear",
     ),
     Metric(
         "min_clearance_m",

@@ -190,5 +190,10 @@ def _optimum_m(scenario: Scenario) -> float | None:
 
     world, mission = World.from_scenario(scenario), scenario.mission
     return shortest_path(
-        world.obstacles, world.bounds_m, mission.start_m, mission.goal_m, scenario.planner.clearance_m
+        world.obstacles,
+        world.bounds_m,
+        mission.start_m,
+        mission.goal_m,
+        scenario.planner.clearance_m,
+        mission.goal_radius_m,
     ).length_m

@@ -75,7 +75,12 @@ def optimum_of(scenario: Scenario) -> Optimum:
     """The shortest path of a point that knows the whole world and keeps the wanted clearance."""
     world, mission = World.from_scenario(scenario), scenario.mission
     return shortest_path(
-        world.obstacles, world.bounds_m, mission.start_m, mission.goal_m, scenario.planner.clearance_m
+        world.obstacles,
+        world.bounds_m,
+        mission.start_m,
+        mission.goal_m,
+        scenario.planner.clearance_m,
+        mission.goal_radius_m,
     )
 
 
@@ -200,7 +205,7 @@ def _turn_radius_m(scenario: Scenario, run: Run | None) -> float:
 def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> FigureScene:
     from harness.report.figures import FigureScene
 
-    mission = scenario.mission
+    mission, wind = scenario.mission, scenario.environment.wind
     return FigureScene(
         name=scenario.name,
         bounds_m=scenario.area.bounds_m,
@@ -211,6 +216,7 @@ def _scene(scenario: Scenario, optimum: Optimum, run: Run | None = None) -> Figu
         clearance_m=scenario.planner.clearance_m,
         turn_radius_m=_turn_radius_m(scenario, run),
         optimum_m=optimum.points_m,
+        wind=(wind.speed_mps, wind.from_deg) if wind else (0.0, 0.0),
         navigation_margin_m=scenario.navigation.margin_m or 0.0,
     )
 

@@ -15,10 +15,11 @@ from matplotlib import patches
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
+from matplotlib.ticker import MaxNLocator
 
 from harness.analysis.planned import PlannedRows
 from harness.analysis.smoothness import flown_lengths, flown_profile
-from harness.report.figure_style import DASHES, WIDTH_IN, colour, styled
+from harness.report.figure_style import DASHES, WIDTH_IN, colour, round_length_m, styled
 from harness.world.obstacle import Circle
 
 if TYPE_CHECKING:
@@ -34,6 +35,9 @@ CHANGING = SOLID | {"ls": "--"}
 TURN: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 9, "zorder": 8}
 NEAREST: dict[str, Any] = {"marker": "s", "mfc": "none", "mec": "0.2", "mew": 1.2, "ms": 7, "zorder": 8}
 """Marks in the colour of a flight: its tightest planned turn; where it was nearest to an obstacle, and too near."""
+
+BEHIND_TEXT: dict[str, Any] = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
+"""Box behind text that lies on a map."""
 
 LEGEND_ROW_IN = 0.19
 TALLEST_MAP_IN = 6.0
@@ -88,6 +92,7 @@ class FigureScene:
         clearance_m: wanted.
         turn_radius_m: smallest radius of the aircraft.
         optimum_m: (k, 2) the clairvoyant shortest path; empty where there is none.
+        wind: speed in m/s and where it blows from in degrees; speed 0 without wind.
         navigation_margin_m: kept beyond the clearance, for the navigation error.
     """
 
@@ -100,6 +105,7 @@ class FigureScene:
     clearance_m: float
     turn_radius_m: float
     optimum_m: FloatArray
+    wind: tuple[float, float] = (0.0, 0.0)
     navigation_margin_m: float = 0.0
 
 
@@ -162,6 +168,7 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
             # The limits are set below, and nothing is drawn beyond them: layouts need not measure thousands of these.
             drawn.set_in_layout(False)
     axes.set(xlim=(xmin, xmax), ylim=(ymin, ymax), aspect="equal", xlabel="east, km", ylabel="north, km")
+    _mark_scale_and_wind(axes, scene)
     if not ends:
         return []
     (east, north), (goal_east, goal_north) = np.array(scene.start_m) / 1e3, np.array(scene.goal_m) / 1e3
@@ -182,6 +189,39 @@ def draw_map(axes: Axes, scene: FigureScene, ends: bool = True) -> list[Any]:
             va="bottom" if low else "top", weight="bold", zorder=7,
         )  # fmt: skip
     return legend
+
+
+def _mark_scale_and_wind(axes: Axes, scene: FigureScene) -> None:
+    """Ticks, a bar of a round length, and an arrow with the wind's speed that points where it blows to."""
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(6, min_n_ticks=3))
+    bar_m = round_length_m(0.25 * (scene.bounds_m[2] - scene.bounds_m[0]))
+    label = f"{bar_m / 1e3:g} km" if bar_m >= 1e3 else f"{bar_m:g} m"
+    xmin, ymin, xmax, ymax = (edge / 1e3 for edge in scene.bounds_m)
+    right, low = xmax - 0.04 * (xmax - xmin), ymin + 0.03 * (ymax - ymin)
+    axes.plot([right - bar_m / 1e3, right], [low, low], color="black", lw=2, solid_capstyle="butt", zorder=9)
+    text = axes.annotate(
+        label, (right, low), (0, 4), textcoords="offset points", ha="right", fontsize=8, zorder=9
+    )
+    text.set_bbox(BEHIND_TEXT)
+    speed_mps, from_deg = scene.wind
+    if speed_mps <= 0.0:
+        return
+    back = math.radians(from_deg)
+    tail = (0.06 + 0.04 * math.sin(back), 0.94 + 0.04 * math.cos(back))
+    tip = (0.06 - 0.04 * math.sin(back), 0.94 - 0.04 * math.cos(back))
+    arrow = {"arrowstyle": "-|>", "color": "#0B5C8C", "lw": 1.6, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", tip, tail, "axes fraction", "axes fraction", arrowprops=arrow, zorder=9)
+    told = axes.text(
+        0.12,
+        0.94,
+        f"wind {speed_mps:.3g} m/s from {from_deg:.0f}\N{DEGREE SIGN}",
+        transform=axes.transAxes,
+        va="center",
+        fontsize=8,
+        zorder=9,
+    )
+    told.set_bbox(BEHIND_TEXT)
 
 
 def outline(obstacle: Obstacle, grown_m: float, at_s: float | None = None, **style: Any) -> patches.Patch:

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from harness.analysis.metric import number
-from harness.report.figure_style import colour, styled
+from harness.report.figure_style import colour, round_length_m, styled
 from harness.report.figures import (
+    BEHIND_TEXT,
     LEGEND_ROW_IN,
     NEAREST,
     SOLID,
@@ -41,7 +42,6 @@ CLEARANCES_SHOWN: Final = 3.0
 """The plot of the clearance about a near miss reaches so many wanted clearances up."""
 
 PLANNED_DASHES: Any = (0, (4, 2))
-BEHIND_TEXT: Final = {"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0}
 
 
 def planner_figure(scene: FigureScene, run: DrawnRun, index: int) -> Figure:
@@ -156,15 +156,8 @@ def _enlarged(
     axes.set(xlim=(east - half_km, east + half_km), ylim=(north - half_km, north + half_km), aspect="equal")
     axes.set_xticks([])
     axes.set_yticks([])
-    bar_m = _round_length_m(half_m)
+    bar_m = round_length_m(half_m)
     left, low = east - 0.9 * half_km, north - 0.88 * half_km
     axes.plot([left, left + bar_m / 1e3], [low, low], color="black", lw=2, solid_capstyle="butt")
     text = axes.annotate(f"{bar_m:g} m", (left, low), (0, 4), textcoords="offset points", fontsize=8)
     text.set_bbox(BEHIND_TEXT)
-
-
-def _round_length_m(half_m: float) -> float:
-    """A round length of about a third of a picture."""
-    third = 2 * half_m / 3
-    size = 10.0 ** np.floor(np.log10(third))
-    return float(max(step * size for step in (1, 2, 5) if step * size <= third))

@@ -31,6 +31,7 @@ class PlanRow:
         loiter: whether its last segment is a full circle, flown for ever.
         length_m: length of the path.
         max_curvature_1pm: its largest absolute curvature.
+        reason: the planner's sentence on it; empty in folders of older versions.
     """
 
     plan_index: int
@@ -43,6 +44,7 @@ class PlanRow:
     loiter: bool
     length_m: float
     max_curvature_1pm: float
+    reason: str = ""
 
 
 def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
@@ -54,6 +56,7 @@ def plans_table(plans: Sequence[AcceptedPlan]) -> pa.Table:
         "plan_index": numbers([accepted.plan_index for accepted in plans], np.int64),
         "time_s": numbers([accepted.time_s for accepted in plans]),
         "status": texts([accepted.plan.status.value for accepted in plans]),
+        "reason": texts([accepted.plan.reason for accepted in plans]),
         "compute_ms": numbers([accepted.compute_ms for accepted in plans]),
         "waypoints": lists([accepted.plan.waypoints_m for accepted in plans], 2),
         "path": lists(polylines([accepted.segments for accepted in plans]), 2),

@@ -48,8 +48,13 @@ def shortest_path(
     start_m: tuple[float, float],
     goal_m: tuple[float, float],
     clearance_m: float,
+    goal_radius_m: float = 0.0,
 ) -> Optimum:
-    """The shortest path of a point from start to goal.
+    """The shortest path of a point from start to the goal circle; no path that keeps the clearance is shorter.
+
+    Where the goal circle is free, the shortest path to its centre leads straight through it, and the one to the circle
+    is shorter by its radius. Obstacles that reach into the circle are left out for the length, which makes it a lower
+    bound; the points are those of a path round all obstacles.
 
     Args:
         obstacles: the whole world.
@@ -57,6 +62,7 @@ def shortest_path(
         start_m: (east, north).
         goal_m: (east, north).
         clearance_m: distance kept from every obstacle edge, at least 0.
+        goal_radius_m: of the circle in which the goal is reached; the points stop at its rim.
     """
     if any(each.velocity_mps != (0.0, 0.0) or each.active_s is not None for each in obstacles):
         return _none("an obstacle moves, appears or disappears: the optimum is defined for standing ones")
@@ -65,7 +71,22 @@ def shortest_path(
     if not free.all():
         end = "goal" if free[0] else "start"
         return _none(f"the {end} is outside the area or nearer than the clearance to an obstacle")
-    return _search(scene)
+    found = _search(scene)
+    if found.length_m is None or goal_radius_m <= 0.0:
+        return found
+    import shapely
+
+    east, north = np.array([goal_m]).T
+    outside = [
+        each for each in obstacles if each.shape.distance(east, north)[0] >= goal_radius_m + clearance_m
+    ]
+    length = found.length_m
+    if len(outside) < len(obstacles):
+        relaxed = TangentScene([each.shape for each in outside], bounds_m, start_m, goal_m, clearance_m)
+        length = _search(relaxed).length_m or 0.0
+    line = shapely.LineString(found.points_m).difference(shapely.Point(goal_m).buffer(goal_radius_m))
+    points = shapely.get_coordinates(shapely.get_parts(line)[:1])
+    return Optimum(max(length - goal_radius_m, 0.0), points)
 
 
 def _none(reason: str) -> Optimum:

@@ -51,6 +51,18 @@ def test_nothing_in_the_way_is_the_straight_line() -> None:
     assert found.points_m.tolist() == [list(WEST), list(EAST)]
 
 
+@pytest.mark.parametrize("reach", [0.0, 8.0, 25.0])
+def test_the_goal_circle_ends_it_and_nothing_makes_it_longer_than_a_way_there(reach: float) -> None:
+    """Round a disc of 20 m to a circle of 10 m. What stands in that circle never lengthens the bound."""
+    radius, goal_radius = 20.0, 10.0
+    whole = 2 * math.sqrt(50.0**2 - radius**2) + radius * (math.pi - 2 * math.acos(radius / 50.0))
+    near = [disc(50.0, 0.0 + 5.0 + reach, 5.0)] if reach else []
+    found = shortest_path([disc(0.0, 0.0, radius), *near], AREA, WEST, EAST, 0.0, goal_radius)
+    assert found.length_m == pytest.approx(whole - goal_radius, rel=1e-12)
+    assert math.dist(found.points_m[-1], EAST) == pytest.approx(goal_radius, abs=0.1)
+    assert shortest_path([], AREA, WEST, EAST, 0.0, 200.0).length_m == 0.0
+
+
 @pytest.mark.parametrize("clearance", [0.0, 7.0])
 def test_round_one_circle(clearance: float) -> None:
     radius = 20.0 + clearance
