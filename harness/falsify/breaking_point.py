@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from harness.falsify.folder import FALSIFIED, PICTURES, SCHEMA, SearchFolder, Trial, write_index
+from harness.falsify.folder import FALSIFIED, SCHEMA, SearchFolder, Trial, write_index
 from harness.falsify.keys import Load, Vary, scenario_at
-from harness.falsify.search import Judge, Point, Searched, Verdict, search
+from harness.falsify.search import Judge, Point, Searched, search
 from harness.files.crash import sentence
 from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
@@ -60,7 +60,6 @@ class Breaking:
         allowed: at most so many conditions were to be tried.
         conditions: how many were tried. Fewer than allowed where nothing was left to try.
         settled: whether the search did all its steps within its conditions, and narrowed down what failed.
-        evolved: conditions that were tried away from the diagonal by differential evolution.
         verdict: `found`, `not_found` or `fails_at_the_mild_end`.
         found: the flight that failed under the mildest condition of those tried.
         passes: values of the hardest condition that passed and is no harder in any key.
@@ -83,7 +82,6 @@ class Breaking:
     allowed: int
     conditions: int
     settled: bool
-    evolved: int
     verdict: Literal["found", "not_found", "fails_at_the_mild_end"]
     found: Trial | None
     passes: tuple[float, ...] | None
@@ -154,24 +152,22 @@ def falsify(
     trials: list[Trial] = []
     numbers = itertools.count()
 
-    def judge(point: Point) -> Verdict:
+    def judge(point: Point) -> bool:
         scenario = scenario_at(load, vary, point)
-        condition, margins = next(numbers), []
+        condition = next(numbers)
         values = tuple(each.value(place) for each, place in zip(vary, point, strict=True))
         for seed in range(base.seed, base.seed + seeds):
             figures = _flown(flown, scenario.model_copy(update={"seed": seed}))
             failed = figures["outcome"] != "reached" or (until == "untrackable" and not figures["trackable"])
-            margin = 0.0 if failed else _margin(scenario, figures, until)
-            trial = Trial(len(trials), condition, point, values, seed, failed, margin, **_columns(figures))
+            trial = Trial(len(trials), condition, point, values, seed, failed, **_columns(figures))
             trials.append(trial)
             folder.write(trial)
             if progress is not None:
                 told = ", ".join(f"{value:.4g}" for value in values)
                 progress(condition + 1, conditions, f"{told}: {trial.outcome}")
             if failed:
-                return Verdict(True)
-            margins.append(margin)
-        return Verdict(False, min(margins))
+                return True
+        return False
 
     with SearchFolder(out, vary) as folder:
         searched = _searched(judge, vary, conditions, tolerance, base.seed)
@@ -181,10 +177,6 @@ def falsify(
             failing = scenario_at(load, vary, result.found.displacement)
             text = dump_scenario(failing.model_copy(update={"seed": result.found.seed}))
             replace_text(out / FALSIFIED, text)
-        if len(vary) == 2:
-            from harness.falsify.figure import write_figure
-
-            write_figure(result, [out / name for name in PICTURES])
         write_index(out, result.plain())
     return result
 
@@ -214,21 +206,6 @@ def _columns(figures: Mapping[str, Any]) -> dict[str, Any]:
     return own | {"cross_track_max_m": figures.get("cross_track_m", {}).get("max")}
 
 
-def _margin(scenario: Scenario, figures: Mapping[str, Any], until: Until) -> float:
-    """How far a flight was from failing, 0 to 1: the mean of its time left, its room to obstacles and its track.
-
-    The mean, for the least of them is often the room, which a good planner keeps the same.
-    """
-    margins = [1.0 - figures["flight_time_s"] / (scenario.mission.time_limit_s or 1.0)]
-    clearance_m, wanted_m = figures["min_clearance_m"], scenario.planner.clearance_m or 1.0
-    if clearance_m is not None:
-        margins.append(clearance_m / (clearance_m + wanted_m))
-    off_m = figures["cross_track_m"]["max"]
-    if until == "untrackable" and off_m is not None:
-        margins.append(1.0 - off_m / (scenario.trackability.cross_track_m or 1.0))
-    return sum(min(max(float(each), 0.0), 1.0) for each in margins) / len(margins)
-
-
 def _breaking(
     base: Scenario,
     vary: Sequence[Vary],
@@ -255,7 +232,6 @@ def _breaking(
         allowed=allowed,
         conditions=len(searched.verdicts),
         settled=searched.settled,
-        evolved=searched.evolved,
         verdict="not_found"
         if mildest is None
         else "found"

@@ -24,7 +24,6 @@ SCHEMA: Final = "wayproof/falsify/1"
 INDEX: Final = "falsify.json"
 TRIALS: Final = "falsify.csv"
 FALSIFIED: Final = "falsified.yaml"
-PICTURES: Final = ("falsify.svg", "falsify.png")
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,6 @@ class Trial:
         values: of each key.
         seed: root seed of the flight.
         failed: whether it did what was looked for.
-        margin: where it did not, how far it was from it, from 0 to 1.
         outcome: as in `metrics.json`, or `error`.
         reason: the same as a sentence.
         trackable: whether every leg was tracked.
@@ -56,7 +54,6 @@ class Trial:
     values: tuple[float, ...]
     seed: int
     failed: bool
-    margin: float
     outcome: str
     reason: str
     trackable: bool | None = None
@@ -115,8 +112,7 @@ class SearchFolder:
         with _told(self._out):
             self._file.close()
             write_index(self._out, {"schema": SCHEMA, "complete": False})
-            for name in (FALSIFIED, *PICTURES):
-                (self._out / name).unlink(missing_ok=True)
+            (self._out / FALSIFIED).unlink(missing_ok=True)
             (self._out / (TRIALS + PARTIAL)).replace(self._out / TRIALS)
 
     def __enter__(self) -> SearchFolder:

@@ -1,16 +1,13 @@
 """The search for the mildest condition that fails: pure, seeded, and bounded by a count of conditions.
 
 A condition is a point of the unit cube: each key's displacement from its mild end (0) to its hard end (1). Its
-mildness is the largest of them. Four steps:
+mildness is the largest of them. Three steps:
 
 1. Along the diagonal, where all keys get harder together: both ends, evenly spaced points, then bisection of
    the mildest change from passing to failing. Where every key only makes it harder, no condition milder than
    the one found here fails: a failing point with largest displacement t makes (t, ..., t) fail too.
-2. With several keys, differential evolution (Storn and Price 1997) in the cube below that, for the failures
-   that this argument leaves out. It needs no gradient and no model of a yes or no, and its population is
-   seeded. What passes is ranked by how near it came to failing.
-3. With several keys, each key is taken back towards its mild end while the condition still fails.
-4. What is left of the conditions looks for failures that are milder still. With one key the widest gap between
+2. With several keys, each key is taken back towards its mild end while the condition still fails.
+3. What is left of the conditions looks for failures that are milder still. With one key the widest gap between
    two conditions below the failure is halved, so that a failing island wider than the last such gap is found;
    with several keys Sobol points fill the cube below it. A failure found here is narrowed down like the first.
 """
@@ -27,19 +24,12 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from harness.files.strict_yaml import InputError
-from harness.flight.record import FloatArray
 
 Point: TypeAlias = tuple[float, ...]
 """Displacement of each key, from 0 (mild) to 1 (hard)."""
 
 STEPS: Final = 8
 """The diagonal is cut into so many parts."""
-
-POPULATION: Final = 8
-"""Population of the differential evolution: a power of two, as Sobol points require."""
-
-NO_CONDITION: Final = 2.0
-"""The margin of a place away from the diagonal where there is no scenario: behind all that passed."""
 
 LEAST: Final = 2
 """Fewer conditions than the two ends of the diagonal make no search."""
@@ -48,20 +38,8 @@ DRAWS: Final = 64
 """The search ends after this many Sobol points in a row without a new condition: whole numbers leave no others."""
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What became of a condition.
-
-    Attributes:
-        failed: whether it made the flight fail.
-        margin: where it did not, how far it was from it, from 0 (nearly) to 1.
-    """
-
-    failed: bool
-    margin: float = 0.0
-
-
-Judge: TypeAlias = Callable[[Point], Verdict]
+Judge: TypeAlias = Callable[[Point], bool]
+"""Whether a condition makes the flight fail."""
 Snap: TypeAlias = Callable[[Point], Point]
 
 
@@ -70,21 +48,19 @@ class Searched:
     """What a search found.
 
     Attributes:
-        verdicts: of every condition tried, in order.
-        settled: whether steps 1 to 3 were done whole, and each later failure was narrowed down.
-        evolved: conditions that the differential evolution tried.
+        verdicts: whether each condition tried failed, in order.
+        settled: whether steps 1 and 2 were done whole, and each later failure was narrowed down.
         spent: whether every condition that was allowed has been tried.
     """
 
-    verdicts: Mapping[Point, Verdict]
+    verdicts: Mapping[Point, bool]
     settled: bool
-    evolved: int
     spent: bool
 
     @property
     def mildest(self) -> Point | None:
         """The mildest condition that failed; of equally mild ones, that with the smallest sum."""
-        failed = [point for point, verdict in self.verdicts.items() if verdict.failed]
+        failed = [point for point, failed in self.verdicts.items() if failed]
         return min(failed, key=lambda point: (max(point), sum(point), point), default=None)
 
     @property
@@ -93,8 +69,8 @@ class Searched:
         found = self.mildest
         below = [
             point
-            for point, verdict in self.verdicts.items()
-            if found is not None and not verdict.failed and _no_harder(point, found)
+            for point, failed in self.verdicts.items()
+            if found is not None and not failed and _no_harder(point, found)
         ]
         return max(below, key=lambda point: (sum(point), point), default=None)
 
@@ -121,8 +97,8 @@ class Searched:
     @property
     def not_monotone(self) -> tuple[tuple[Point, Point], ...]:
         """Pairs of a condition that failed and one that passed although it is no milder in any key."""
-        failed = [point for point, verdict in self.verdicts.items() if verdict.failed]
-        passed = [point for point, verdict in self.verdicts.items() if not verdict.failed]
+        failed = [point for point, failed in self.verdicts.items() if failed]
+        passed = [point for point, failed in self.verdicts.items() if not failed]
         return tuple(pair for pair in itertools.product(failed, passed) if _no_harder(*pair))
 
 
@@ -137,7 +113,7 @@ def search(
             such a place is passed over.
         conditions: at most so many are tried, at least LEAST.
         tolerance: a displacement is narrowed down to this.
-        seed: of the differential evolution.
+        seed: of the Sobol points.
         snap: the condition that is tried in place of a point, for keys that take whole or round numbers.
 
     Raises:
@@ -147,7 +123,7 @@ def search(
         raise ValueError(
             f"needs {LEAST} conditions or more and a tolerance between 0 and 1: {conditions}, {tolerance}"
         )
-    tries, evolved = _Tries(judge, snap, conditions), 0
+    tries = _Tries(judge, snap, conditions)
     with suppress(_SpentError):
         reached = _along_the_diagonal(keys, tries, tolerance)
         tries.off_the_diagonal = True
@@ -155,15 +131,10 @@ def search(
             tries.settled = True
             _between_what_passed(tries, tolerance)
         else:
-            before = len(tries.verdicts)
-            edge = 1.0 if math.isinf(reached) else reached - tolerance
-            evolution = _anywhere_below(keys, tries, edge, tolerance, seed)
-            evolved = len(tries.verdicts) - before
             _taken_back(tries, tolerance)
-            tries.settled = evolution
-            _in_the_cube_below(keys, tries, tolerance, seed)
             tries.settled = True
-    return Searched(tries.verdicts, tries.settled, evolved, tries.left == 0)
+            _in_the_cube_below(keys, tries, tolerance, seed)
+    return Searched(tries.verdicts, tries.settled, tries.left == 0)
 
 
 class _SpentError(Exception):
@@ -181,7 +152,7 @@ class _Tries:
         """As in `Searched`, so far."""
         self.off_the_diagonal = False
         """Set after step 1. From then on a place where there is no scenario is passed over; before it is an error."""
-        self.verdicts: dict[Point, Verdict] = {}
+        self.verdicts: dict[Point, bool] = {}
 
     def snapped(self, point: Point) -> Point:
         return self._snap(point)
@@ -190,27 +161,27 @@ class _Tries:
         """The new conditions among some points."""
         return {self._snap(point) for point in points} - self.verdicts.keys() - self._none
 
-    def verdict(self, point: Point) -> Verdict:
-        """Raises _SpentError where a new condition is one too many."""
+    def fails(self, point: Point) -> bool:
+        """Whether a condition fails, tried if it is new; raises _SpentError where that is one too many."""
         place = self._snap(point)
         if place not in self.verdicts:
             if self.left == 0:
                 raise _SpentError
             if place in self._none:
-                return Verdict(False, NO_CONDITION)
+                return False
             try:
-                verdict = self._judge(place)
+                failed = self._judge(place)
             except InputError:
                 if not self.off_the_diagonal:
                     raise
                 self._none.add(place)
-                return Verdict(False, NO_CONDITION)
+                return False
             self.left -= 1
-            self.verdicts[place] = verdict
+            self.verdicts[place] = failed
         return self.verdicts[place]
 
     def mildest(self) -> Point | None:
-        return Searched(self.verdicts, True, 0, False).mildest
+        return Searched(self.verdicts, True, False).mildest
 
     @contextmanager
     def narrowing(self) -> Iterator[None]:
@@ -224,7 +195,7 @@ def _along_the_diagonal(keys: int, tries: _Tries, tolerance: float) -> float:
     """Where on the diagonal it fails first: 0 at its mild end, infinity if nowhere."""
 
     def fails(along: float) -> bool:
-        return tries.verdict((along,) * keys).failed
+        return tries.fails((along,) * keys)
 
     if fails(0.0):
         return 0.0
@@ -261,44 +232,11 @@ def _bisected(
         middle = 0.5 * (passes + fails)
         if tries.snapped(at(middle)) in (tries.snapped(at(passes)), tries.snapped(at(fails))):
             break
-        if tries.verdict(at(middle)).failed:
+        if tries.fails(at(middle)):
             fails = middle
         else:
             passes = middle
     return fails
-
-
-def _anywhere_below(keys: int, tries: _Tries, edge: float, tolerance: float, seed: int) -> bool:
-    """Differential evolution in the cube from 0 to `edge`; leaves enough conditions for the last step.
-
-    Returns:
-        Whether there were conditions enough for it.
-    """
-    reserve = min(tries.left // 2, keys * (2 + math.ceil(math.log2(1.0 / tolerance))))
-    generations = (tries.left - reserve) // POPULATION
-    if edge <= 0.0:
-        return True
-    if generations < 1:
-        return False
-    from scipy.optimize import Bounds, differential_evolution
-    from scipy.stats import qmc
-
-    def objective(place: FloatArray) -> float:
-        point = tuple(float(each) for each in place)
-        verdict = tries.verdict(point)
-        return max(tries.snapped(point)) if verdict.failed else 1.0 + verdict.margin
-
-    differential_evolution(
-        objective,
-        bounds=Bounds(np.zeros(keys), np.full(keys, edge)),
-        maxiter=generations - 1,
-        init=edge * qmc.Sobol(keys, rng=np.random.default_rng(seed)).random(POPULATION),
-        rng=np.random.default_rng(seed),
-        polish=False,
-        tol=0.0,
-        updating="deferred",
-    )
-    return True
 
 
 def _taken_back(tries: _Tries, tolerance: float) -> None:
@@ -313,7 +251,7 @@ def _taken_back(tries: _Tries, tolerance: float) -> None:
             milder = tries.snapped(_with(point, key, max(0.0, point[key] - tolerance)))
             if rounds == 0:
                 point = _least(tries, point, key, tolerance)
-            elif milder != point and tries.verdict(milder).failed:
+            elif milder != point and tries.fails(milder):
                 point = _least(tries, milder, key, tolerance)
         if rounds > 0 and point == before:
             return
@@ -322,7 +260,7 @@ def _taken_back(tries: _Tries, tolerance: float) -> None:
 def _least(tries: _Tries, point: Point, key: int, tolerance: float) -> Point:
     """A condition that fails, one of its keys taken back as far as that goes."""
     mild = tries.snapped(_with(point, key, 0.0))
-    if mild == point or tries.verdict(mild).failed:
+    if mild == point or tries.fails(mild):
         return mild
     least = _bisected(tries, point, 0.0, point[key], tolerance, range(key, key + 1))
     return tries.snapped(_with(point, key, least))
@@ -340,7 +278,7 @@ def _between_what_passed(tries: _Tries, tolerance: float) -> None:
             return
         low, high = max(gaps, key=lambda gap: (gap[1] - gap[0], gap))
         middle = 0.5 * (low + high)
-        if tries.verdict((middle,)).failed:
+        if tries.fails((middle,)):
             with tries.narrowing():
                 _bisected(tries, (0.0,), low, middle, tolerance, range(1))
 
@@ -364,7 +302,7 @@ def _in_the_cube_below(keys: int, tries: _Tries, tolerance: float, seed: int) ->
             return
         point = tuple(float(each) for each in edge * points.random(1)[0])
         in_vain = 0 if tries.untried([point]) else in_vain + 1
-        if tries.verdict(point).failed:
+        if tries.fails(point):
             with tries.narrowing():
                 _taken_back(tries, tolerance)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.falsify.search import POPULATION, STEPS, Point, Searched, Verdict, search
+from harness.falsify.search import STEPS, Point, Searched, search
 from harness.files.strict_yaml import InputError
 from tests.examples import examples
 
@@ -22,9 +22,9 @@ def found(
     """A search, and the conditions that it asked for."""
     asked: list[Point] = []
 
-    def judge(point: Point) -> Verdict:
+    def judge(point: Point) -> bool:
         asked.append(point)
-        return Verdict(True) if fails(point) else Verdict(False, 1.0 - max(point) / 2)
+        return fails(point)
 
     return search(keys, judge, conditions, tolerance, seed), asked
 
@@ -149,18 +149,11 @@ def test_a_coarse_scan_leaves_conditions_to_bisect_with() -> None:
 
 @pytest.mark.parametrize("whole", [1, 4])
 def test_whole_numbers_need_no_more_conditions_than_there_are_of_them(whole: int) -> None:
-    def judge(point: Point) -> Verdict:
-        return Verdict(point[0] >= 0.8)
+    def judge(point: Point) -> bool:
+        return point[0] >= 0.8
 
     result = search(1, judge, whole + 1, 0.01, 1, snap=lambda point: (round(point[0] * whole) / whole,))
     assert (result.settled, len(result.verdicts), result.mildest) == (True, whole + 1, (1.0,))
-
-
-def test_without_conditions_for_the_evolution_it_is_not_settled() -> None:
-    result, _ = found(lambda point: False, keys=2, conditions=STEPS + 1 + POPULATION)
-    assert (result.evolved, result.settled, result.spent) == (0, False, True)
-    result, _ = found(lambda point: False, keys=2, conditions=80)
-    assert (result.evolved >= POPULATION, result.settled, result.spent) == (True, True, True)
 
 
 @pytest.mark.parametrize(("keys", "conditions"), [(2, 16), (2, 80), (3, 16), (3, 120)])
@@ -175,7 +168,7 @@ def test_with_several_keys_every_condition_is_used_or_nothing_is_left(keys: int,
     def whole(point: Point) -> Point:
         return tuple(round(place) for place in point)
 
-    corners = search(keys, lambda point: Verdict(False, 1.0), conditions, 0.01, 1, whole)
+    corners = search(keys, lambda point: False, conditions, 0.01, 1, whole)
     assert (len(corners.verdicts), corners.spent, corners.settled) == (2**keys, False, True)
 
 
@@ -206,7 +199,7 @@ def test_a_key_that_does_nothing_goes_back_to_its_mild_end() -> None:
     assert 0.6 <= result.mildest[1] <= 0.61
 
 
-def test_a_milder_failure_off_the_diagonal_is_found_by_evolution() -> None:
+def test_a_milder_failure_off_the_diagonal_is_found_by_sobol_points() -> None:
     def fails(point: Point) -> bool:
         return min(point) >= 0.9 or (point[0] > 0.25 and point[1] < 0.2)
 
@@ -214,7 +207,6 @@ def test_a_milder_failure_off_the_diagonal_is_found_by_evolution() -> None:
     assert result.mildest is not None
     assert 0.25 < result.mildest[0] <= 0.26
     assert result.mildest[1] == 0.0
-    assert result.evolved >= POPULATION
     assert result.not_monotone, "harder in the second key passes"
     again, asked_again = found(fails, keys=2, conditions=100)
     assert (again.verdicts, asked_again) == (result.verdicts, asked)
@@ -222,31 +214,24 @@ def test_a_milder_failure_off_the_diagonal_is_found_by_evolution() -> None:
 
 
 def test_places_without_a_scenario_are_passed_over_away_from_the_diagonal() -> None:
-    def judge(point: Point) -> Verdict:
+    def judge(point: Point) -> bool:
         if point[0] > point[1] + 0.3:
             raise InputError("the goal lies inside an obstacle")
-        return Verdict(True) if point[1] >= 0.7 else Verdict(False, 1.0 - max(point) / 2)
+        return point[1] >= 0.7
 
     result = search(2, judge, 60, 0.01, 1)
     assert result.mildest == pytest.approx((0.0, 0.7), abs=0.02)
-    assert result.evolved > 0
     assert all(point[0] <= point[1] + 0.3 for point in result.verdicts)
     with pytest.raises(InputError, match="inside an obstacle"):
         search(2, lambda point: judge((point[1], 0.1)), 60, 0.01, 1)
 
 
-def test_few_conditions_leave_out_the_evolution_and_say_so() -> None:
-    result, asked = found(lambda point: min(point) >= 0.5, keys=2, conditions=14)
-    assert (result.evolved, len(asked)) == (0, 14)
-    assert not result.settled
-
-
 def test_points_that_stand_for_the_same_value_are_tried_once() -> None:
     asked: list[Point] = []
 
-    def judge(point: Point) -> Verdict:
+    def judge(point: Point) -> bool:
         asked.append(point)
-        return Verdict(point[0] >= 0.5)
+        return point[0] >= 0.5
 
     result = search(1, judge, 40, 0.001, 1, snap=lambda point: (round(point[0] * 4) / 4,))
     assert sorted(asked) == [(0.0,), (0.25,), (0.5,), (0.75,), (1.0,)]
