@@ -15,7 +15,6 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from aircraft.guidance.compiled_law import CompiledLaw
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
 from aircraft.interface import GRAVITY_MPS2
@@ -358,13 +357,3 @@ def wrapped(angle_rad: float) -> float:
     if inside < -math.pi:
         return inside + 2.0 * math.pi
     return inside
-
-
-def l1_law(config: L1Config, limits: GuidanceLimits) -> CompiledLaw:
-    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
-
-    Args:
-        config: resolved.
-        limits: what may be asked of the aircraft.
-    """
-    return CompiledLaw("l1", config.parameters(), limits, L1FlightMemory())

@@ -15,7 +15,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from aircraft.guidance.compiled_law import CompiledLaw
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
 from aircraft.interface import GRAVITY_MPS2
@@ -384,15 +383,3 @@ def turning(
         return gain_1ps * airspeed_mps * (-1.0 if across < 0.0 else 1.0)
     length = math.sqrt(wanted_east * wanted_east + wanted_north * wanted_north)
     return gain_1ps * across / length if length > 0.0 else 0.0
-
-
-def npfg_law(config: NpfgConfig, limits: GuidanceLimits) -> CompiledLaw:
-    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
-
-    Args:
-        config: resolved.
-        limits: what may be asked of the aircraft.
-    """
-    return CompiledLaw(
-        "npfg", config.parameters(limits.airspeed_mps, limits.max_airspeed_mps, limits.bank_limit_rad), limits
-    )

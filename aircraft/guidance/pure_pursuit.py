@@ -12,7 +12,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from aircraft.guidance.compiled_law import CompiledLaw
 from aircraft.guidance.interface import GuidanceLimits
 from aircraft.guidance.key import key
 from aircraft.interface import GRAVITY_MPS2
@@ -110,13 +109,3 @@ def pure_pursuit(
     ahead = (east * math.sin(heading_rad) + north * math.cos(heading_rad)) / speed
     roll = math.atan(acceleration / (GRAVITY_MPS2 * max(ahead, LEAST_CRAB_COSINE)))
     return PurePursuitOutput(acceleration, curvature, roll)
-
-
-def pure_pursuit_law(config: PurePursuitConfig, limits: GuidanceLimits) -> CompiledLaw:
-    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
-
-    Args:
-        config: resolved.
-        limits: what may be asked of the aircraft.
-    """
-    return CompiledLaw("pure_pursuit", config.parameters(), limits)

@@ -13,12 +13,13 @@ from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
 from aircraft.guidance.bearing import BearingConfig, BearingLaw
+from aircraft.guidance.compiled_law import CompiledLaw
 from aircraft.guidance.interface import GuidanceLaw, GuidanceLimits
-from aircraft.guidance.l1 import L1Config, l1_law
-from aircraft.guidance.npfg import NpfgConfig, npfg_law
+from aircraft.guidance.l1 import L1Config, L1FlightMemory
+from aircraft.guidance.npfg import NpfgConfig
 from aircraft.guidance.preview import PreviewConfig, PreviewLaw
-from aircraft.guidance.pure_pursuit import PurePursuitConfig, pure_pursuit_law
-from aircraft.guidance.vector_field import VectorFieldConfig, vector_field_law
+from aircraft.guidance.pure_pursuit import PurePursuitConfig
+from aircraft.guidance.vector_field import VectorFieldConfig, VectorFieldMemory, parameters
 
 GROUP = "wayproof.guidance"
 DEFAULT_KIND = "preview"
@@ -56,6 +57,23 @@ class GuidanceKind:
         return self.make(self.config(**keys).resolved(limits), limits)
 
 
+def _npfg(config: NpfgConfig, limits: GuidanceLimits) -> CompiledLaw:
+    speeds = limits.airspeed_mps, limits.max_airspeed_mps
+    return CompiledLaw("npfg", config.parameters(*speeds, limits.bank_limit_rad), limits)
+
+
+def _l1(config: L1Config, limits: GuidanceLimits) -> CompiledLaw:
+    return CompiledLaw("l1", config.parameters(), limits, L1FlightMemory())
+
+
+def _vector_field(config: VectorFieldConfig, limits: GuidanceLimits) -> CompiledLaw:
+    return CompiledLaw("vector_field", parameters(config, limits), limits, VectorFieldMemory())
+
+
+def _pure_pursuit(config: PurePursuitConfig, limits: GuidanceLimits) -> CompiledLaw:
+    return CompiledLaw("pure_pursuit", config.parameters(), limits)
+
+
 BUILT_IN = (
     GuidanceKind(
         kind="preview",
@@ -67,25 +85,25 @@ BUILT_IN = (
         kind="npfg",
         summary="PX4's (Stastny, Siegwart): a look-ahead angle to the path, the wind triangle, curvature fed forward",
         config=NpfgConfig,
-        make=npfg_law,
+        make=_npfg,
     ),
     GuidanceKind(
         kind="l1",
         summary="ArduPilot's (Park, Deyst, How): a point on the leg ahead; lines as legs, arcs as loiter circles",
         config=L1Config,
-        make=l1_law,
+        make=_l1,
     ),
     GuidanceKind(
         kind="vector_field",
         summary="Beard and McLain: a field of courses about lines and orbits, and course hold",
         config=VectorFieldConfig,
-        make=vector_field_law,
+        make=_vector_field,
     ),
     GuidanceKind(
         kind="pure_pursuit",
         summary="Coulter: the arc to the point of the path at a look-ahead distance",
         config=PurePursuitConfig,
-        make=pure_pursuit_law,
+        make=_pure_pursuit,
     ),
     GuidanceKind(
         kind="bearing",

@@ -15,7 +15,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from aircraft.guidance.compiled_law import CompiledLaw
 from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits
 from aircraft.guidance.key import key
 from aircraft.interface import GRAVITY_MPS2
@@ -252,13 +251,3 @@ def crab_cosine(at: Motion) -> float:
         return 1.0
     ahead = east * math.sin(at.heading_rad) + north * math.cos(at.heading_rad)
     return max(ahead / speed, LEAST_CRAB_COSINE)
-
-
-def vector_field_law(config: VectorFieldConfig, limits: GuidanceLimits) -> CompiledLaw:
-    """The law for one flight; the arithmetic of an update is in `aircraft.guidance.machine_code`.
-
-    Args:
-        config: resolved.
-        limits: what may be asked of the aircraft.
-    """
-    return CompiledLaw("vector_field", parameters(config, limits), limits, VectorFieldMemory())
