@@ -143,8 +143,8 @@ class RunFolder:
                 "cpus": os.cpu_count(),
             },
         }
-        made = [each for each in (path, *path.parents) if not each.exists()]
         try:
+            made = [each for each in (path, *path.parents) if not each.exists()]
             lock = _claim(path)
             with ExitStack() as undo:
                 undo.callback(_take_back, path, made)
