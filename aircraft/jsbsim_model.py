@@ -21,7 +21,7 @@ from aircraft.properties import (
     TURBULENCE_W20_FPS,
     WIND_PROPERTIES,
 )
-from aircraft.start import Atmosphere, Gust, StartConditions, VerticalGusts
+from aircraft.start import Atmosphere, DrydenGusts, Gust, StartConditions, VerticalGusts
 
 GROUND_FT = 2.0 / FOOT_M
 """Altitude at which an aircraft is at the ground, its centre of gravity still above it."""
@@ -92,6 +92,7 @@ class JsbsimModel:
         """Of the meridian convergence where the state was last read."""
         self._gust: Gust | None = None
         self._vertical_gusts: VerticalGusts | None = None
+        self._turbulence: DrydenGusts | None = None
         self._windy = atmosphere.wind_mps > 0.0
         self._air = None if atmosphere.steady else atmosphere
         self._wind = (atmosphere.wind_east_mps / FOOT_M, atmosphere.wind_north_mps / FOOT_M)
@@ -117,7 +118,10 @@ class JsbsimModel:
             self._move_with_wind()
         self._settle()
         if atmosphere.turbulence is not None and atmosphere.intensity is not None:
-            self._stir(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
+            if ground is None:
+                self._stir(atmosphere.turbulence, atmosphere.intensity, atmosphere.seed)
+            else:
+                self._turbulence = DrydenGusts(atmosphere.intensity, atmosphere.seed)
         self._gust, self._vertical_gusts = atmosphere.gust, atmosphere.vertical_gusts
         self.engage()
 
@@ -182,13 +186,13 @@ class JsbsimModel:
         airspeed(airspeed_mps / FOOT_M)
         if self._ground is not None:
             self._lay_ground()
-        if self._windy:
+        if self._windy and self._turbulence is None:
             self._blow()
 
     def advance(self, steps: int) -> None:
         """Integrates `steps` steps of 1 / step_rate_hz."""
         run = self._fdm.run
-        if self._gust is not None or self._vertical_gusts is not None:
+        if self._gust or self._vertical_gusts or self._turbulence:
             for _ in range(steps):
                 self._blow()
                 run()
@@ -287,13 +291,24 @@ class JsbsimModel:
         return east * self._cosine + north * self._sine, north * self._cosine - east * self._sine
 
     def _blow(self) -> None:
+        """Writes the wind of now: towards true east and north, and down."""
         write_east, write_north = self._write_wind
         east_fps, north_fps = self._wind_true()
+        down_fps = 0.0
+        if self._vertical_gusts is not None:
+            down_fps -= self._vertical_gusts.up_mps(self._step / self._step_rate_hz) / FOOT_M
+        if self._turbulence is not None:
+            height_m = (self._place[2] - self._terrain_ft) * FOOT_M
+            heading, airspeed_fps = self._read[6](), self._read[9]()
+            gusts = self._turbulence.step(height_m, airspeed_fps * FOOT_M, 1.0 / self._step_rate_hz)
+            ahead, right, down = (gust / FOOT_M for gust in gusts)
+            east_fps += ahead * math.sin(heading) + right * math.cos(heading)
+            north_fps += ahead * math.cos(heading) - right * math.sin(heading)
+            down_fps += down
         write_east(east_fps)
         write_north(north_fps)
-        if self._vertical_gusts is not None:
-            up_mps = self._vertical_gusts.up_mps(self._step / self._step_rate_hz)
-            self._write_wind_down(-up_mps / FOOT_M)
+        if self._vertical_gusts is not None or self._turbulence is not None:
+            self._write_wind_down(down_fps)
 
     def _ground_m(self, east_m: float, north_m: float) -> float:
         """Height of the ground; where it is not known, as it was last."""

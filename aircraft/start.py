@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
+import numpy as np
+
 TURBULENCE_MODELS = ("tustin", "milspec")
 TURBULENCE_INTENSITIES = ("light", "moderate", "severe")
 GUST_SHAPES = ("step", "one_minus_cosine")
@@ -69,6 +71,54 @@ class VerticalGusts:
             return 0.0
         sign = -1.0 if number % 2 else 1.0
         return sign * self.speed_mps * (0.5 - 0.5 * math.cos(math.tau * since_s / self.duration_s))
+
+
+W20_MPS = {"light": 25.0 * 0.3048, "moderate": 50.0 * 0.3048, "severe": 75.0 * 0.3048}
+"""Wind at 20 ft of MIL-F-8785C: 15, 30 and 45 knots."""
+DRYDEN_FT = (10.0, 1000.0)
+"""Heights over ground between which its low-altitude model holds; outside the air is that of the nearer end."""
+
+
+class DrydenGusts:
+    """Turbulence over true ground: Dryden's spectra with the low-altitude sizes of MIL-F-8785C, section 3.7.3.
+
+    JSBSim's own takes the height above the sea for that over ground. u is a process of first order; v and w are
+    sqrt(1/2) (sqrt(3) y1 + (1 - sqrt(3)) y2), y1 one of first order and y2 that once more through its lag, which has
+    Dryden's transverse spectrum. No gusts of rotation.
+
+    Args:
+        intensity: light, moderate or severe.
+        seed: of the noise.
+    """
+
+    def __init__(self, intensity: str, seed: int) -> None:
+        self._vertical_mps = 0.1 * W20_MPS[intensity]
+        self._rng = np.random.default_rng(seed)
+        self._first = self._rng.standard_normal(3).tolist()
+        self._second = [0.5 * each for each in self._first]
+
+    def sizes(self, height_m: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """1 sigma (m/s) and length (m) of the gusts ahead, to the side and down at a height over ground."""
+        low, high = DRYDEN_FT
+        height_ft = min(max(height_m / 0.3048, low), high)
+        shape = 0.177 + 0.000823 * height_ft
+        level_mps, level_m = self._vertical_mps / shape**0.4, 0.3048 * height_ft / shape**1.2
+        return (level_mps, level_mps, self._vertical_mps), (level_m, level_m, 0.3048 * height_ft)
+
+    def step(self, height_m: float, airspeed_mps: float, seconds: float) -> tuple[float, float, float]:
+        """Gusts ahead, to the right and down (m/s) after so many seconds."""
+        sigmas, lengths = self.sizes(height_m)
+        found = []
+        for axis, noise in enumerate(self._rng.standard_normal(3).tolist()):
+            kept = math.exp(-seconds * airspeed_mps / lengths[axis])
+            before = self._first[axis]
+            self._first[axis] = kept * before + math.sqrt(1.0 - kept * kept) * noise
+            self._second[axis] = kept * self._second[axis] + (1.0 - kept) * before
+            unit = self._first[axis]
+            if axis:
+                unit = math.sqrt(0.5) * (math.sqrt(3.0) * unit + (1.0 - math.sqrt(3.0)) * self._second[axis])
+            found.append(sigmas[axis] * unit)
+        return found[0], found[1], found[2]
 
 
 ROUGHNESS_M = 0.15 * 0.3048

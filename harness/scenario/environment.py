@@ -175,7 +175,8 @@ class Turbulence(Section):
     """Continuous gusts on top of the wind."""
 
     model: Literal["tustin", "milspec"] = key(
-        "Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it.", default="tustin"
+        "Dryden gusts: Tustin's discretisation, or MIL-F-8785C as JSBSim has it; over true ground they are one.",
+        default="tustin",
     )
     intensity: Literal["none", "light", "moderate", "severe"] = key("How strong.", default="moderate")
 

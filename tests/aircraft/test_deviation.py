@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from aircraft.airframes import airframe
@@ -14,7 +16,7 @@ from aircraft.frames import LocalPlane
 from aircraft.jsbsim_loading import load, trim
 from aircraft.jsbsim_model import JsbsimModel
 from aircraft.model_files import model_files
-from aircraft.start import Atmosphere, StartConditions, VerticalGusts
+from aircraft.start import Atmosphere, DrydenGusts, StartConditions, VerticalGusts
 
 READ = ("inertia/weight-lbs", "fcs/elevator-pos-rad", "aero/alpha-deg", "forces/fwx-aero-lbs")
 PLANE = LocalPlane(45.0, 0.0)
@@ -101,3 +103,52 @@ def test_vertical_gusts_rise_and_sink_in_turn_as_one_minus_cosine() -> None:
         loads.append(model.state().load_factor)
     # At most rho V CLa S w / 2 m g, less what the aircraft gives way, nose down and upwards.
     assert 1.2 < max(loads) < 1.0 + 1.19 * 25.0 * 5.61 * 0.55 * 2.0 / (2 * 11.0 * 9.81)
+
+
+@pytest.mark.parametrize("height_m", [30.0, 150.0])
+def test_turbulence_over_ground_has_the_sizes_and_spectra_of_mil_f_8785c(height_m: float) -> None:
+    # Low altitude, moderate: sigma_w = 0.1 W20, W20 = 50 ft/s; lengths and sigma_u by height in feet (figure 10).
+    feet = height_m / 0.3048
+    shape = 0.177 + 0.000823 * feet
+    sigma_w, sigma_u = 0.1 * 50 * 0.3048, 0.1 * 50 * 0.3048 / shape**0.4
+    length_u, length_w = height_m / shape**1.2, height_m
+    gusts, airspeed, seconds = DrydenGusts("moderate", 4), 25.0, 1.0 / 60.0
+    series = np.array([gusts.step(height_m, airspeed, seconds) for _ in range(240_000)])
+    assert series.std(axis=0) == pytest.approx([sigma_u, sigma_u, sigma_w], rel=0.06)
+    # Power in bands against Dryden's spectra (one-sided, rad/s), integrated by hand over each band.
+    power = np.abs(np.fft.rfft(series, axis=0)) ** 2 * 2.0 / len(series) ** 2
+    omega = 2.0 * math.pi * np.fft.rfftfreq(len(series), seconds)
+    fine = np.linspace(0.0, 12.0, 12_001)
+
+    def ahead(w: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        t = length_u / airspeed
+        return np.asarray(sigma_u**2 * 2.0 * t / math.pi / (1.0 + (t * w) ** 2))
+
+    def down(w: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        t = length_w / airspeed
+        return np.asarray(sigma_w**2 * t / math.pi * (1.0 + 3.0 * (t * w) ** 2) / (1.0 + (t * w) ** 2) ** 2)
+
+    for axis, spectrum in ((0, ahead), (2, down)):
+        for low, high in ((0.1, 0.5), (0.5, 2.0), (2.0, 8.0)):
+            band = (fine >= low) & (fine < high)
+            expected = float(spectrum(fine[band]).sum() * (fine[1] - fine[0]))
+            found = float(power[(omega >= low) & (omega < high), axis].sum())
+            assert found == pytest.approx(expected, rel=0.2), (axis, low)
+
+
+def test_turbulence_is_that_of_the_height_over_the_true_ground() -> None:
+    def spread(ground_m: float) -> float:
+        air = Atmosphere(turbulence="tustin", intensity="moderate", seed=3)
+        begin = StartConditions(0.0, 0.0, 400.0, 0.0, 25.0)
+        model = JsbsimModel(airframe("aerosonde"), begin, PLANE, air, ground=lambda _e, _n: ground_m)
+        winds = []
+        for _ in range(1200):
+            model.state()
+            model.command(0.0, 400.0, 25.0)
+            model.advance(6)
+            winds.append(model._fdm["atmosphere/total-wind-north-fps"] * 0.3048)
+        return float(np.std(winds))
+
+    # sigma_u at 150 and 30 m over ground: 1.524 / (0.177 + 0.000823 h)^0.4 = 1.88 and 2.58 m/s
+    assert spread(250.0) == pytest.approx(1.88, rel=0.25)
+    assert spread(370.0) == pytest.approx(2.58, rel=0.2)
