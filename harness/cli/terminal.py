@@ -189,14 +189,20 @@ def bench_rows(result: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _tracked(metrics: Mapping[str, Any]) -> str:
-    """Whether all legs were tracked, and why some were not."""
+    """Whether all legs were tracked, and why some were not; of plans that are judged together, how many they are."""
     if metrics["trackable"]:
         return "yes"
     legs = metrics["trackability"]
+    plans = metrics["replans"] + 1
+    together = (
+        f" ({plans} plans; one flown for less than 5 s is judged with the next)" if plans > len(legs) else ""
+    )
     bad = [leg for leg in legs if not leg["trackable"]]
     causes = [leg["cause"] for leg in bad]
     return (
-        f"no: {len(bad)} of {len(legs)} legs, {tallied(causes, 'legs')}" if bad else "no: no plan was flown"
+        f"no: {len(bad)} of {len(legs)} legs, {tallied(causes, 'legs')}{together}"
+        if bad
+        else "no: no plan was flown"
     )
 
 

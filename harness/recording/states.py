@@ -87,9 +87,8 @@ class States:
 
 
 def mode_of(reason: str) -> str:
-    """A plan's reason without its numbers: what stays the same while the planner does the same."""
-    told = re.sub(r"\s+at\s+[\d.]+\s+k?m\b", "", reason)
-    return re.split(r"[,;:]?\s+(?:(?:at|in|of|after|by)\s+)?[-+]?\d", told)[0].strip() or reason
+    """A plan's reason, an ellipsis for each number: what stays the same while the planner does the same."""
+    return re.sub(r"[-+]?\d+(?:[.,]\d+)*", "\N{HORIZONTAL ELLIPSIS}", reason)
 
 
 def tracking_changes(legs: Sequence[Mapping[str, Any]]) -> list[Change]:

@@ -323,7 +323,7 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Calla
     }
     assert lanes["planner"] == [
         (0.0, "waiting for a plan"),
-        (1.0, "obstacle ahead, passing left"),
+        (1.0, "obstacle ahead at … km, passing left"),
         (5.1, "holding"),
     ]
     assert lanes["saturation"] == [(0.0, "bank command below its limit"), (8.0, "bank command at its limit")]
@@ -334,11 +334,11 @@ def test_states_follow_plans_bank_and_verdicts(tmp_path: Path, make_track: Calla
 @pytest.mark.parametrize(
     ("reason", "mode"),
     [
-        ("obstacle ahead at 9.8 km, passing left", "obstacle ahead, passing left"),
-        ("way to the goal in view, 56.2 km to go", "way to the goal in view"),
-        ("following a boundary, 1.3 km from the hit point", "following a boundary"),
+        ("obstacle ahead at 9.8 km, passing left", "obstacle ahead at … km, passing left"),
+        ("way to the goal in view, 56.2 km to go", "way to the goal in view, … km to go"),
+        ("following a boundary, 1.3 km from the hit point", "following a boundary, … km from the hit point"),
         ("turning away", "turning away"),
-        ("3 ways", "3 ways"),
+        ("3 ways, 1,234.5 m to go", "… ways, … m to go"),
     ],
 )
 def test_a_mode_is_a_reason_without_its_numbers(reason: str, mode: str) -> None:
