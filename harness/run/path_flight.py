@@ -1,23 +1,250 @@
-"""Flies a given path from its start to its end: the closed loop with a planner that has one answer."""
+"""What a given path is flown as: lines and arcs with altitude and airspeed along them, and the flight to its end."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import pairwise
 
-from aircraft.guidance.altitude import AltitudeGuidance
-from aircraft.guidance.mission_legs import MissionLaw
+import numpy as np
+
+from aircraft.airframe import Airframe
+from aircraft.climb import climb_rates
+from aircraft.guidance.altitude import AltitudeGuidance, VerticalProfile, flat
+from aircraft.guidance.mission_legs import HEADING_FOR_CENTRES, MissionLaw, MissionLeg, straight
 from aircraft.guidance.progress import Along, RouteProgress
 from aircraft.guidance.waypoints import WaypointLaw
 from aircraft.interface import AircraftState, Route
 from aircraft.route import route_length
+from harness.files.input_file import InputError
 from harness.flight.closed_loop import Loop, fly
 from harness.flight.observer import Observer, Progress
 from harness.flight.record import Flight, Outcome
 from harness.flight.termination import Ending
-from harness.run.path_plan import PathPlan
-from planner.interface import FloatArray, Path, Plan, PlanRequest, PlanStatus
+from harness.run_files.given_path import FloatArray, FlyBy, Tightest, fly_by
+from harness.run_files.mission.flying import Flying, Ground
+from harness.run_files.mission.route import CLIMB_SHARE, mission_route
+from harness.run_files.mission.waypoint_run import without_steps
+from harness.run_files.path_files import PathAsGiven
+from harness.scenario.guidance_keys import airframe_of
+from harness.scenario.performance import performance_of
+from harness.scenario.scenario import Scenario
+from harness.scenario.sections import ALTITUDES_M
+from harness.scenario.start import steady_wind_mps
+from harness.scenario.validation import KeyFault
+from planner.interface import Path, Plan, PlanRequest, PlanStatus
+
+BEND_SHARE = 0.25
+"""Altitudes of a drawn line that are straight to this share of the altitude threshold are one slope."""
+
+SAME_ALTITUDE_M = 1.0
+"""A path whose altitudes differ by no more is flown at that of its first point."""
+
+SPARE_BANK_DEG = 5.0
+"""Slower than where altitude is kept at less than cruise's steepest bank by this much a mission is not flown."""
+
+FREE_SHARE = 0.25
+"""Share of the cross-track threshold by which a corner may be passed off only to make its arc wider."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathPlan:
+    """A path as it is flown.
+
+    Attributes:
+        way: lines and arcs.
+        profile: altitude and airspeed along them, what the aircraft is commanded.
+        asked_mps: airspeeds that the path asks for, as those of the profile; the aircraft may not hold them.
+        frame: the aircraft.
+        marks: number and arc length of every item of a mission; none for a drawn line.
+        bends: number and arc length of the points of a drawn line at which its slope changes.
+        notes: what was assumed, a line each.
+        legs: the path leg by leg, for a law that flies to its waypoints.
+    """
+
+    way: FlyBy
+    profile: VerticalProfile
+    asked_mps: FloatArray
+    frame: Airframe
+    marks: tuple[tuple[int, float], ...] = ()
+    bends: tuple[tuple[int, float], ...] = ()
+    notes: tuple[str, ...] = ()
+    legs: tuple[MissionLeg, ...] = ()
+
+    @property
+    def climb_gain_1ps(self) -> float:
+        """Climb rate over altitude error of the aircraft's altitude loop."""
+        return self.frame.gains.altitude
+
+    @property
+    def climb_mps(self) -> Callable[[float], tuple[float, float]]:
+        """Fastest climb and descent at an airspeed."""
+        return _climb_of(self.frame)
+
+    @cached_property
+    def climb_limit_mps(self) -> float | None:
+        """What the altitude loop may ask for; None for a level path, which takes what every flight takes."""
+        if self.profile.level:
+            return None
+        return max(max(self.climb_mps(speed)) for speed in set(self.profile.airspeed_mps.tolist()))
+
+
+def planned(
+    given: PathAsGiven,
+    scenario: Scenario,
+    altitude_m: float | None,
+    ground: Ground | None,
+    corner_m: float | None = None,
+) -> PathPlan:
+    """Makes of a path what is flown.
+
+    Args:
+        given: the path.
+        scenario: aircraft, air and thresholds, and the altitude of a path without one.
+        altitude_m: all of it is flown at this altitude; None: as the path says.
+        ground: height of the ground; None where it is not known.
+        corner_m: how far off corners may be passed; None: as the path says.
+
+    Raises:
+        InputError: it cannot be made into a path: altitudes above a ground that is not known, an airspeed at which
+            the wind is too strong.
+    """
+    frame = airframe_of(scenario.aircraft)
+    wind_mps = complex(*steady_wind_mps(scenario))
+    free_m = FREE_SHARE * scenario.trackability.cross_track_m
+    speed = scenario.aircraft.airspeed_mps
+    if given.mission is None:
+        limit_m = scenario.trackability.cross_track_m if corner_m is None else corner_m
+        tightest = Tightest(frame.least_radius_m(speed), limit_m, wind_mps / speed)
+        way = fly_by(given.points_m, performance_of(scenario).turn_radius_m, free_m, tightest=tightest)
+        profile = _drawn_profile(given, way, scenario, altitude_m, ground)
+        bends = _bends(profile, BEND_SHARE * scenario.trackability.altitude_m)
+        places = way.waypoints_m[:, 0] + 1j * way.waypoints_m[:, 1]
+        ends = zip(pairwise(places.tolist()), pairwise(way.stations_m.tolist()), strict=True)
+        legs = tuple(straight(*each, None) for each in ends)
+        return PathPlan(way, profile, profile.airspeed_mps, frame, bends=bends, legs=legs)
+    flying = Flying(
+        airspeed_mps=speed,
+        airspeed_range_mps=(_slowest_turning_mps(frame), frame.airspeed_range_mps[1]),
+        turn_radius_m=_turn_radius_of(given, scenario),
+        climb_mps=_climb_of(frame),
+        free_cut_m=free_m,
+        ground=ground,
+        least_radius_m=frame.least_radius_m,
+        heads_for_centres=scenario.guidance.follow == "waypoints"
+        and scenario.guidance.kind in HEADING_FOR_CENTRES,
+        corner_m=corner_m,
+        wind_mps=wind_mps,
+    )
+    route = mission_route(given.mission, flying, given.source)
+    profile, notes = route.profile, route.notes
+    if altitude_m is not None:
+        level = np.full_like(profile.altitude_m, altitude_m)
+        profile = VerticalProfile(profile.arc_length_m, level, profile.speed_from_m, profile.airspeed_mps)
+    else:
+        profile, low = _no_lower(profile)
+        notes = (*notes, *low)
+    if altitude_m is None and ground is None and given.mission.program.above_ground:
+        items = ", ".join(map(str, given.mission.program.above_ground[:6]))
+        more = " and others" if len(given.mission.program.above_ground) > 6 else ""
+        notes = (
+            *notes,
+            f"items {items}{more}: above ground, which is taken to be as high as home everywhere",
+        )
+    loiters = [step.item for step in given.mission.program.steps if step.loiter is not None]
+    if loiters and scenario.guidance.follow == "waypoints":
+        how = (
+            "heads for its centre and then joins it"
+            if flying.heads_for_centres
+            else "joins it along a tangent"
+        )
+        notes = (*notes, f"to a loiter's circle the aircraft {how}, with the law {scenario.guidance.kind}")
+    return PathPlan(route.way, profile, route.asked_mps, frame, route.marks, notes=notes, legs=route.legs)
+
+
+def _no_lower(profile: VerticalProfile) -> tuple[VerticalProfile, tuple[str, ...]]:
+    """A profile that keeps above the lowest altitude that is simulated, and what is said of it."""
+    lowest, highest = ALTITUDES_M
+    if lowest <= profile.altitude_m.min() and profile.altitude_m.max() <= highest:
+        return profile, ()
+    told = f"altitudes below {lowest:g} m or above {highest:g} m above the sea: flown at these"
+    return dataclasses.replace(profile, altitude_m=np.clip(profile.altitude_m, lowest, highest)), (told,)
+
+
+def _drawn_profile(
+    given: PathAsGiven, way: FlyBy, scenario: Scenario, altitude_m: float | None, ground: Ground | None
+) -> VerticalProfile:
+    """Altitudes along a drawn line."""
+    speed = scenario.aircraft.airspeed_mps
+    if altitude_m is not None or not len(given.altitudes_m):
+        return flat(scenario.mission.altitude_m, speed)
+    altitudes = given.altitudes_m
+    if given.above_ground:
+        if ground is None:
+            raise InputError(
+                f"{given.source}: has altitudes above ground, and the ground is not known; give --altitude-m"
+            )
+        altitudes = altitudes + ground(*given.points_m.T)
+        if not np.isfinite(altitudes).all():
+            number = int(np.flatnonzero(~np.isfinite(altitudes))[0])
+            raise InputError(
+                f"{given.source}: point {number} is where the ground is not known; give --altitude-m"
+            )
+    if np.ptp(altitudes) <= SAME_ALTITUDE_M:
+        return flat(float(altitudes[0]), speed)
+    stations = way.stations_of(given.points_m).tolist()
+
+    def slope() -> float:
+        return CLIMB_SHARE * min(climb_rates(airframe_of(scenario.aircraft)).at(speed)) / speed
+
+    along, high = np.array(without_steps(list(zip(stations, altitudes.tolist(), strict=True)), slope)).T
+    nought = np.zeros(1)
+    return VerticalProfile(along, high, nought, nought + speed)
+
+
+def _bends(profile: VerticalProfile, tolerance_m: float) -> tuple[tuple[int, float], ...]:
+    """The points between which altitudes are straight to a tolerance, both ends left out."""
+    import shapely
+
+    if profile.level:
+        return ()
+    points = np.column_stack((profile.arc_length_m, profile.altitude_m, np.arange(len(profile.arc_length_m))))
+    simple = shapely.simplify(shapely.LineString(points), tolerance_m, preserve_topology=False)
+    kept = shapely.get_coordinates(simple, include_z=True)[1:-1]
+    return tuple((int(number), along) for along, _, number in kept.tolist())
+
+
+def _slowest_turning_mps(frame: Airframe) -> float:
+    """The slowest airspeed at which an aircraft keeps its altitude in the turns of a mission."""
+    low, _ = frame.airspeed_range_mps
+    enough = frame.level_bank_deg(frame.cruise_mps) - SPARE_BANK_DEG
+    speeds = np.linspace(low, max(frame.cruise_mps, low), 50)
+    able: list[float] = [speed for speed in speeds.tolist() if frame.level_bank_deg(speed) >= enough]
+    return round(able[0], 1)
+
+
+def _climb_of(frame: Airframe) -> Callable[[float], tuple[float, float]]:
+    """Fastest climb and descent at an airspeed; flown when it is first asked for."""
+
+    def climb_mps(airspeed_mps: float) -> tuple[float, float]:
+        return climb_rates(frame).at(airspeed_mps)
+
+    return lru_cache(maxsize=1000)(climb_mps)
+
+
+def _turn_radius_of(given: PathAsGiven, scenario: Scenario) -> Callable[[float], float]:
+    def turn_radius_m(airspeed_mps: float) -> float:
+        spec = scenario.aircraft.model_copy(update={"airspeed_mps": airspeed_mps})
+        try:
+            return performance_of(scenario.model_copy(update={"aircraft": spec})).turn_radius_m
+        except KeyFault as fault:
+            key = ".".join(map(str, fault.loc))
+            raise InputError(f"{given.source}: at {airspeed_mps:g} m/s, {key} {fault}") from fault
+
+    return lru_cache(maxsize=1000)(turn_radius_m)
 
 
 def fly_along(

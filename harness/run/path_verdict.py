@@ -24,7 +24,7 @@ from harness.world.world import World
 
 if TYPE_CHECKING:
     from harness.run.path_check import PathCheck
-    from harness.run.path_plan import PathPlan
+    from harness.run.path_flight import PathPlan
     from harness.scenario.scenario import Scenario
     from harness.world_files.expansion import FileSpec
 

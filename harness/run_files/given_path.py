@@ -40,6 +40,10 @@ FLATTEST = 1e-12
 LIMIT_SHARE = 0.9
 """Share of what a corner may be passed at by which it is cut at most, if the aircraft turns so tightly."""
 
+CAREFUL_SHARE, CAREFUL_RADII = 0.6, 1.25
+"""Of a corner's limit only this share is used if the arc is then no tighter than so many least radii: the rest of both
+is left for gusts."""
+
 WIND_SAMPLES = 9
 """The ground speed is looked up in so many directions of a turn."""
 
@@ -259,7 +263,9 @@ def _tightened(
     seen = np.conj(course) * np.asarray(tightest.wind)[..., None]
     ground_speed = seen.real + np.sqrt(np.maximum(1.0 - seen.imag**2, 0.0))
     least_m = tightest.radius_m * np.square(ground_speed).max(axis=1)
-    most_m = LIMIT_SHARE * tightest.limit_m / np.maximum(shape.furthest, FLATTEST)
+    limit_m = tightest.limit_m / np.maximum(shape.furthest, FLATTEST)
+    careful_m = np.maximum(CAREFUL_SHARE * limit_m, CAREFUL_RADII * least_m)
+    most_m = np.minimum(careful_m, LIMIT_SHARE * limit_m)
     tight: FloatArray = np.maximum(np.minimum(wanted_m, most_m), least_m)
     return tight
 

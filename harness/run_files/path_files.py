@@ -27,7 +27,6 @@ from harness.run_files.igc_path import read_igc
 from harness.run_files.map_paths import read_gpx, read_kml
 from harness.run_files.mission.flying import GivenMission
 from harness.run_files.mission.items import HOME, MissionAsRead
-from harness.run_files.mission.old_mission import read_old_mission
 from harness.run_files.mission.plan_file import read_plan
 from harness.run_files.mission.program import program
 from harness.run_files.mission.steps import Program
@@ -309,7 +308,7 @@ LINES: Final[dict[str, Callable[[str, str], PathAsRead]]] = {
 
 MISSIONS: Final[dict[str, Callable[[str, str], MissionAsRead]]] = {
     ".plan": read_plan,
-    ".mission": read_old_mission,
+    ".mission": read_plan,
     ".waypoints": read_waypoints,
     ".txt": read_waypoints,
 }

@@ -20,48 +20,99 @@ from harness.world_files.slicing import Box
 LARGEST_TURNS, LARGEST_M = 400.0, 400_000.0
 """Longest side of an area, in turn radii and in metres: of larger files a part is taken."""
 PAD_TURNS: Final = 12.0
-"""The area reaches so many turn radii beyond buildings and zones: they leave room around them."""
+"""The area reaches so many turn radii beyond buildings and zones, which leaves room around them."""
 FAR_M: Final = 50_000.0
 """An area whose middle lies farther from the origin gets an origin of its own: the plane is true to scale near it."""
 TRIES: Final = 6
 """Parts of a large file that are tried before there is said to be no room."""
-
-
-@dataclass(frozen=True)
-class PlaneArea:
-    """A part of the plane.
-
-    Attributes:
-        bounds_m: xmin, ymin, xmax, ymax.
-        notes: what is to be said of it.
-    """
-
-    bounds_m: Box
-    notes: tuple[str, ...]
-
+COUNTRY_DEG: Final = 5.0
+"""Of files that span more, the origin lies where most of them is."""
 
 Ends = tuple[tuple[float, float], tuple[float, float]]
 """Start and goal."""
+
+
+@dataclass(frozen=True)
+class Covered:
+    """What some files cover in a plane.
+
+    Attributes:
+        inside: boxes of rasters and of fences to stay inside of: nothing is known or free beyond.
+        around: boxes of all others.
+    """
+
+    inside: tuple[Box, ...]
+    around: tuple[Box, ...]
+
+    @classmethod
+    def by(cls, contents: Sequence[Contents], mappings: Sequence[Mapping]) -> Covered:
+        """What files cover; one of which nothing has a place is left out."""
+        inside: list[Box] = []
+        around: list[Box] = []
+        for each, mapping in zip(contents, mappings, strict=True):
+            raster = each.terrain or each.occupied
+            corners = corners_of(each if raster is None else replace(each, parts=()))
+            east, north = mapping.to_plane(*corners)
+            known = np.isfinite(east) & np.isfinite(north)
+            x, y = (np.sort(side[known]) for side in (east, north))
+            if not len(x):
+                continue
+            # Of a raster the largest upright rectangle within its four corners, which may lie askew.
+            first, last = (1, 2) if raster is not None else (0, -1)
+            box = (float(x[first]), float(y[first]), float(x[last]), float(y[last]))
+            fenced = any(part.keep_in for part in each.parts)
+            (inside if raster is not None or fenced else around).append(box)
+        return cls(tuple(inside), tuple(around))
+
+    def whole(self, pad_m: float) -> Box:
+        """What lies in all rasters and fences, and about the rest.
+
+        Raises:
+            WorldFileError: that is nothing.
+        """
+        boxes = list(self.inside)
+        if self.around:
+            low, high = np.min(self.around, axis=0), np.max(self.around, axis=0)
+            boxes.append((*(low[:2] - pad_m).tolist(), *(high[2:] + pad_m).tolist()))
+        box = common(boxes)
+        if box is None:
+            raise WorldFileError("nothing of these files lies in one area; must overlap")
+        return box
+
+
+def common(boxes: Sequence[Box]) -> Box | None:
+    """What lies in all of some boxes; None where nothing does."""
+    if not boxes:
+        return None
+    xmin, ymin = np.max(boxes, axis=0)[:2].tolist()
+    xmax, ymax = np.min(boxes, axis=0)[2:].tolist()
+    return (xmin, ymin, xmax, ymax) if xmin < xmax and ymin < ymax else None
 
 
 def middle_of(contents: Sequence[Contents], given: Ends | None) -> Place:
     """Origin: between start and goal, else in the middle of what the files hold."""
     if given is not None:
         latitude, longitude = np.array(given).T
-        east = float(np.mean(short_way(longitude)))
-        return Place(round(float(np.mean(latitude)), 5), round(math.remainder(east, TURN_DEG), 5))
-    latitudes, longitudes = [], []
-    for each in contents:
-        latitude, longitude = geodetic(str(each.crs), *corners_of(each))
-        latitudes.append(latitude[np.isfinite(latitude)])
-        longitudes.append(longitude[np.isfinite(latitude)])
-    latitude, longitude = np.concatenate(latitudes), short_way(np.concatenate(longitudes))
+        return _place(float(np.mean(latitude)), float(np.mean(short_way(longitude))))
+    found = np.hstack([np.stack(geodetic(str(each.crs), *corners_of(each))) for each in contents])
+    latitude, longitude = found[:, np.isfinite(found).all(axis=0)]
     if not len(latitude):
         raise WorldFileError("nothing of these files has a place on earth; their crs may be another")
-    middle = [0.5 * float(each.min() + each.max()) for each in (latitude, longitude)]
-    if max(np.ptp(latitude), np.ptp(longitude)) > 5.0:  # a country: where most of it is
-        middle = [float(np.median(each)) for each in (latitude, longitude)]
-    return Place(round(min(max(middle[0], -84.0), 84.0), 5), round(math.remainder(middle[1], TURN_DEG), 5))
+    degrees = latitude, short_way(longitude)
+    middle = [0.5 * float(each.min() + each.max()) for each in degrees]
+    if max(map(np.ptp, degrees)) > COUNTRY_DEG:
+        middle = [float(np.median(each)) for each in degrees]
+    return _place(min(max(middle[0], -84.0), 84.0), middle[1])
+
+
+def _place(latitude_deg: float, longitude_deg: float) -> Place:
+    return Place(round(latitude_deg, 5), round(math.remainder(longitude_deg, TURN_DEG), 5))
+
+
+def moved(place: Place, to_m: tuple[float, float]) -> Place:
+    """The place of a point of the plane about another place."""
+    longitude, latitude = Mapping(WGS84, place).from_plane(np.array([to_m[0]]), np.array([to_m[1]]))
+    return _place(float(latitude[0]), float(longitude[0]))
 
 
 def center_of(box: Box) -> tuple[float, float]:
@@ -69,120 +120,48 @@ def center_of(box: Box) -> tuple[float, float]:
     return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
 
 
-def moved(place: Place, to_m: tuple[float, float]) -> Place:
-    """The place of a point of the plane about another place."""
-    longitude, latitude = Mapping(WGS84, place).from_plane(np.array([to_m[0]]), np.array([to_m[1]]))
-    return Place(round(float(latitude[0]), 5), round(float(longitude[0]), 5))
-
-
-def about_origin(bounds: Box, contents: Sequence[Contents], mappings: Sequence[Mapping]) -> Box:
-    """An area of the same size about the origin, no larger than the rasters and fences there."""
-    half = (bounds[2] - bounds[0]) / 2, (bounds[3] - bounds[1]) / 2
-    boxes: list[Box] = [(-half[0], -half[1], half[0], half[1])]
-    boxes += _boxes(contents, mappings)[0]
-    return _common(boxes) or boxes[0]
-
-
-def area_about(
-    chosen: Ends | None, contents: Sequence[Contents], mappings: Sequence[Mapping], turn_radius_m: float
-) -> PlaneArea:
+def area_about(ends: Ends, covered: Covered, turn_radius_m: float) -> Box:
     """The area about a start and a goal that are given, within rasters and fences."""
-    assert chosen is not None
-    rasters, vectors = _boxes(contents, mappings)
-    _whole(rasters, vectors, 0.0)
-    (x0, y0), (x1, y1) = chosen
-    reach = max(PAD_TURNS * turn_radius_m, 0.25 * math.dist(*chosen))
-    box = (min(x0, x1) - reach, min(y0, y1) - reach, max(x0, x1) + reach, max(y0, y1) + reach)
-    if rasters:
-        box = _common([*rasters, box]) or box
-    return PlaneArea(box, ())
+    covered.whole(0.0)
+    reach = max(PAD_TURNS * turn_radius_m, 0.25 * math.dist(*ends))
+    low, high = np.min(ends, axis=0) - reach, np.max(ends, axis=0) + reach
+    box: Box = (*low.tolist(), *high.tolist())
+    return (common([*covered.inside, box]) if covered.inside else None) or box
 
 
 def areas_of(
-    contents: Sequence[Contents], mappings: Sequence[Mapping], altitude_m: float, turn_radius_m: float
-) -> list[PlaneArea]:
+    covered: Covered,
+    contents: Sequence[Contents],
+    mappings: Sequence[Mapping],
+    altitude_m: float,
+    turn_radius_m: float,
+) -> tuple[list[Box], tuple[str, ...]]:
     """The area that some files cover; or of large ones several parts, the most crowded first, the corners last.
+
+    Returns:
+        The areas, and what is to be said of them.
 
     Raises:
         WorldFileError: the files have nothing in common.
     """
     pad = PAD_TURNS * turn_radius_m
-    rasters, vectors = _boxes(contents, mappings)
-    whole = _whole(rasters, vectors, pad)
-    notes: tuple[str, ...] = ()
-    if vectors and not rasters:
-        notes = (f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn",)
-    largest = min(LARGEST_TURNS * turn_radius_m, LARGEST_M)
-    sides = whole[2] - whole[0], whole[3] - whole[1]
+    whole = covered.whole(pad)
+    sides, largest = (whole[2] - whole[0], whole[3] - whole[1]), min(LARGEST_TURNS * turn_radius_m, LARGEST_M)
     if max(sides) <= largest:
-        return [PlaneArea(whole, notes)]
-    notes = (
-        f"the files reach over {sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km; the area is a part of that",
-    )
-    half = [min(side, largest) / 2 for side in sides]
-    areas = []
+        told = f"the area reaches {pad:,.0f} m beyond what the file holds, to leave room to turn"
+        return [whole], () if covered.inside else (told,)
     foci = _foci(contents, mappings, whole, altitude_m, largest)
-    if not rasters:  # a zone larger than the area leaves room at the corners of what is about it
+    if not covered.inside:  # a zone larger than the area leaves room at the corners of what is about it
         foci += [(whole[i], whole[j]) for i in (0, 2) for j in (1, 3)]
-    for x, y in foci:
-        x, y = (min(max(v, whole[k] + half[k]), whole[k + 2] - half[k]) for k, v in enumerate((x, y)))
-        areas.append(PlaneArea((x - half[0], y - half[1], x + half[0], y + half[1]), notes))
-    return areas
-
-
-def _boxes(contents: Sequence[Contents], mappings: Sequence[Mapping]) -> tuple[list[Box], list[Box]]:
-    """What the files cover: rasters and fences to stay inside of, and all others."""
-    rasters: list[Box] = []
-    vectors: list[Box] = []
-    for each, mapping in zip(contents, mappings, strict=True):
-        box, is_raster = _extent(each, mapping)
-        if box is not None:
-            (rasters if is_raster else vectors).append(box)
-    return rasters, vectors
-
-
-def _whole(rasters: Sequence[Box], vectors: Sequence[Box], pad_m: float) -> Box:
-    """What lies in all rasters, and about the rest."""
-    boxes = list(rasters)
-    if vectors:
-        around = _joined(vectors)
-        boxes.append((around[0] - pad_m, around[1] - pad_m, around[2] + pad_m, around[3] + pad_m))
-    whole = _common(boxes)
-    if whole is None:
-        raise WorldFileError("nothing of these files lies in one area; must overlap")
-    return whole
-
-
-def _extent(contents: Contents, mapping: Mapping) -> tuple[Box | None, bool]:
-    """What a file covers, and whether it is a raster, beyond which nothing is known."""
-    raster = contents.terrain or contents.occupied
-    if raster is not None:
-        east, north = (np.sort(each) for each in mapping.to_plane(*corners_of(replace(contents, parts=()))))
-        # The largest upright rectangle within its four corners, which may lie askew.
-        return (float(east[1]), float(north[1]), float(east[2]), float(north[2])), True
-    east, north = mapping.to_plane(*corners_of(contents))
-    known = np.isfinite(east) & np.isfinite(north)
-    if not known.any():
-        return None, False
-    box = (
-        float(east[known].min()),
-        float(north[known].min()),
-        float(east[known].max()),
-        float(north[known].max()),
+    half = [min(side, largest) / 2 for side in sides]
+    areas: list[Box] = []
+    for focus in foci:
+        x, y = (min(max(v, whole[k] + half[k]), whole[k + 2] - half[k]) for k, v in enumerate(focus))
+        areas.append((x - half[0], y - half[1], x + half[0], y + half[1]))
+    told = (
+        f"the files reach over {sides[0] / 1e3:,.0f} x {sides[1] / 1e3:,.0f} km; the area is a part of that"
     )
-    return box, any(part.keep_in for part in contents.parts)
-
-
-def _common(boxes: Sequence[Box]) -> Box | None:
-    """What lies in all boxes; None where nothing does."""
-    if not boxes:
-        return None
-    box = tuple(f(each[k] for each in boxes) for k, f in enumerate((max, max, min, min)))
-    return box if box[0] < box[2] and box[1] < box[3] else None  # type: ignore[return-value]
-
-
-def _joined(boxes: Sequence[Box]) -> Box:
-    return tuple(f(each[k] for each in boxes) for k, f in enumerate((min, min, max, max)))  # type: ignore[return-value]
+    return areas, (told,)
 
 
 def _foci(
@@ -198,8 +177,7 @@ def _foci(
             points = shapely.get_coordinates(shapely.centroid(np.array(solid, dtype=object)))
             middles.append(np.column_stack(mapping.to_plane(points[:, 0], points[:, 1])))
     places = np.concatenate(middles)
-    inside = ((places >= whole[:2]) & (places <= whole[2:])).all(axis=1) & np.isfinite(places).all(axis=1)
-    places = places[inside]
+    places = places[((places >= whole[:2]) & (places <= whole[2:])).all(axis=1)]
     some = places[:: max(len(places) // 2000, 1)]
     near = np.array([(np.abs(places - each).max(axis=1) <= side_m / 3).sum() for each in some])
     found: list[tuple[float, float]] = []

@@ -15,12 +15,12 @@ import numpy as np
 
 from harness.world_files.area import (
     FAR_M,
+    Covered,
     Ends,
-    PlaneArea,
-    about_origin,
     area_about,
     areas_of,
     center_of,
+    common,
     middle_of,
     moved,
     whole_metres,
@@ -106,18 +106,19 @@ def site(
     """
     contents = _read(specs, tell)
     place = None if contents[0].crs is None else middle_of(contents, given)
-    if given is not None:
-        areas = [
-            area_about(
-                _placed_ends(given, place), contents, _mappings(contents, specs, place), craft.turn_radius_m
-            )
-        ]
+    ends = _placed_ends(given, place)
+    mappings = _mappings(contents, specs, place)
+    covered = Covered.by(contents, mappings)
+    notes: tuple[str, ...] = ()
+    if ends is not None:
+        areas = [area_about(ends, covered, craft.turn_radius_m)]
     else:
-        areas = areas_of(contents, _mappings(contents, specs, place), altitude_m, craft.turn_radius_m)
+        areas, notes = areas_of(covered, contents, mappings, altitude_m, craft.turn_radius_m)
     first: WorldFileError | None = None
     for area in areas:
         try:
-            return _in_area(area, specs, contents, place, given, altitude_m, craft, tell)
+            found = _in_area(area, specs, contents, place, ends, altitude_m, craft, tell)
+            return replace(found, notes=(*notes, *found.notes))
         except FileFault:
             raise
         except WorldFileError as error:
@@ -152,36 +153,38 @@ def _mappings(contents: Sequence[Contents], specs: Sequence[FileSpec], place: Pl
 
 
 def _in_area(
-    area: PlaneArea,
+    bounds: Box,
     specs: Sequence[FileSpec],
     contents: Sequence[Contents],
     place: Place | None,
-    given: Ends | None,
+    chosen: Ends | None,
     altitude_m: float,
     craft: Craft,
     tell: Callable[[str], None] | None,
 ) -> Site:
     """A mission in an area, or a sentence with the numbers that say why there is none."""
-    bounds = area.bounds_m
-    chosen = _placed_ends(given, place)
-    if place is not None and chosen is None and math.hypot(*center_of(bounds)) > FAR_M:
-        place = moved(place, center_of(bounds))
-        bounds = about_origin(bounds, contents, _mappings(contents, specs, place))
+    middle = center_of(bounds)
+    if place is not None and chosen is None and math.hypot(*middle) > FAR_M:
+        place = moved(
+            place, middle
+        )  # the area of the same size about it, no larger than rasters and fences there
+        half = (bounds[2] - bounds[0]) / 2, (bounds[3] - bounds[1]) / 2
+        own: Box = (-half[0], -half[1], half[0], half[1])
+        covered = Covered.by(contents, _mappings(contents, specs, place))
+        bounds = common([own, *covered.inside]) or own
     if place is None:
-        shift = (-bounds[0], -bounds[1])
-        specs = [replace(s, shift_m=(s.shift_m[0] + shift[0], s.shift_m[1] + shift[1])) for s in specs]
-        bounds = (0.0, 0.0, bounds[2] + shift[0], bounds[3] + shift[1])
+        east, north = -bounds[0], -bounds[1]
+        specs = [replace(s, shift_m=(s.shift_m[0] + east, s.shift_m[1] + north)) for s in specs]
+        bounds = (0.0, 0.0, bounds[2] + east, bounds[3] + north)
         if chosen is not None:
             (x0, y0), (x1, y1) = chosen
-            chosen = (x0 + shift[0], y0 + shift[1]), (x1 + shift[0], y1 + shift[1])
+            chosen = (x0 + east, y0 + north), (x1 + east, y1 + north)
     bounds = whole_metres(bounds)
-    found = expanded(
-        specs, place or ANY_PLACE, bounds, altitude_m, craft.turn_radius_m + craft.clearance_m, tell
-    )
-    notes = area.notes
+    room_m = craft.turn_radius_m + craft.clearance_m
+    found = expanded(specs, place or ANY_PLACE, bounds, altitude_m, room_m, tell)
+    notes: tuple[str, ...] = ()
     if chosen is None:
-        chosen, told = _ends(found, contents, specs, place, bounds, craft)
-        notes += told
+        chosen, notes = _ends(found, contents, specs, place, bounds, craft)
     start, goal = ((round(x, 1), round(y, 1)) for x, y in chosen)
     return Site(tuple(specs), place, bounds, start, goal, found, notes)
 

@@ -67,145 +67,25 @@ NAMES: Final = {
     LAND_START: "landing start",
     TAG: "jump tag",
     JUMP_TO_TAG: "jump to tag",
-    23: "land at a local place",
-    24: "take off from a local place",
-    25: "follow",
-    32: "follow",
-    33: "follow and reposition",
-    34: "orbit",
-    35: "figure of eight",
     ARC_WAYPOINT: "arc waypoint",
-    80: "region of interest",
-    81: "path planning",
-    83: "altitude wait",
-    92: "guided enable",
-    93: "delay",
-    94: "place payload",
     CONDITION_DELAY: "condition delay",
-    113: "condition change altitude",
     CONDITION_DISTANCE: "condition distance",
-    115: "condition yaw",
     CONDITION_LOCATION: "condition location",
-    176: "set mode",
-    179: "set home",
-    180: "set parameter",
-    181: "set relay",
-    182: "repeat relay",
-    183: "set servo",
-    184: "repeat servo",
-    185: "terminate flight",
-    186: "change altitude",
-    187: "set actuator",
-    188: "return path start",
-    190: "rally land",
-    191: "go around",
-    192: "reposition",
-    193: "pause or continue",
-    194: "set reverse",
-    195: "region of interest at a place",
-    196: "region of interest at the next waypoint",
-    197: "no region of interest",
-    198: "region of interest at a vehicle",
-    200: "control video",
-    201: "region of interest",
-    202: "configure camera",
-    203: "control camera",
-    204: "configure mount",
-    205: "control mount",
-    206: "camera trigger distance",
-    207: "enable fence",
-    208: "parachute",
-    210: "inverted flight",
-    211: "gripper",
-    212: "autotune",
-    214: "camera trigger interval",
-    215: "set resume repeat distance",
-    216: "sprayer",
-    217: "send script message",
-    218: "auxiliary function",
-    219: "change loiter radius",
-    220: "mount quaternion",
-    222: "guided limits",
-    223: "engine control",
-    224: "set current item",
-    530: "camera mode",
-    531: "camera zoom",
-    532: "camera focus",
-    534: "camera source",
-    5000: "fence return point",
-    5001: "corner of an inclusion fence",
-    5002: "corner of an exclusion fence",
-    5003: "circular inclusion fence",
-    5004: "circular exclusion fence",
-    5005: "circular inclusion fence about home",
-    5100: "rally point",
-    1000: "gimbal pitch and yaw",
-    1001: "gimbal configure",
-    2000: "take pictures",
-    2001: "stop taking pictures",
-    2003: "camera trigger",
-    2500: "take video",
-    2501: "stop taking video",
-    3000: "VTOL transition",
-    4501: "condition gate",
-    42600: "winch",
     SCRIPT: "script",
-    42703: "hold attitude",
-}
-"""What each is called for people."""
+    25: "follow", 32: "follow", 93: "delay", 94: "place payload", 176: "set mode", 179: "set home",
+    180: "set parameter", 183: "set servo", 192: "reposition", 201: "region of interest",
+    205: "control mount", 206: "camera trigger distance", 207: "enable fence", 208: "parachute",
+    210: "inverted flight", 211: "gripper", 214: "camera trigger interval", 2000: "take pictures",
+    2001: "stop taking pictures", 3000: "VTOL transition",
+}  # fmt: skip
+"""Plain words for the commands of ordinary missions; MAVLink's own name stands for any other."""
 
-WITHOUT_EFFECT: Final = frozenset(
-    (
-        *(
-            80,
-            115,
-            181,
-            182,
-            183,
-            184,
-            187,
-            188,
-            190,
-            195,
-            196,
-            197,
-            198,
-            200,
-            201,
-            202,
-            203,
-            204,
-            205,
-            206,
-            207,
-            211,
-            212,
-            214,
-        ),
-        *(
-            215,
-            216,
-            220,
-            223,
-            530,
-            531,
-            532,
-            534,
-            1000,
-            1001,
-            2000,
-            2001,
-            2003,
-            2500,
-            2501,
-            3000,
-            42600,
-        ),
-        *(LAND_START, TAG, JUMP, JUMP_TO_TAG),
-    )
-)
+WITHOUT_EFFECT: Final = frozenset((
+    80, 115, 181, 182, 183, 184, 187, 188, 190, 195, 196, 197, 198, 200, 201, 202, 203, 204, 205, 206, 207,
+    211, 212, 214, 215, 216, 220, 223, 530, 531, 532, 534, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000,
+    42600, JUMP, LAND_START, TAG, JUMP_TO_TAG,
+))  # fmt: skip
 """Cameras, servos, marks and the like: the path of an aeroplane is the same without them."""
-
 
 WHY_NOT: Final = {
     SCRIPT: "a script of the aircraft flies it",
@@ -215,5 +95,16 @@ WHY_NOT: Final = {
 
 
 def name_of(command: int) -> str:
-    """What a command is called, or its number."""
-    return NAMES.get(command, f"command {command}")
+    """What a command is called in plain words, else by MAVLink where pymavlink is installed, else its number."""
+    if command in NAMES:
+        return NAMES[command]
+    try:
+        from pymavlink.dialects.v20.ardupilotmega import enums
+    except ImportError:
+        return f"command {command}"
+    entry = enums["MAV_CMD"].get(command)
+    return (
+        f"command {command}"
+        if entry is None
+        else f"command {command} ({entry.name.removeprefix('MAV_CMD_')})"
+    )

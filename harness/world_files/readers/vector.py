@@ -26,6 +26,8 @@ COLLECTION: Final = 7
 """Type number of a geometry collection in shapely."""
 AREAL: Final = 2
 """Dimension of polygons in shapely."""
+POSITION: Final = re.compile(rb"[-+]?[\d.]+(?:[eE][-+]?\d+)?(?:,[-+]?[\d.]+(?:[eE][-+]?\d+)?){1,2}")
+"""A position of KML."""
 LINKED: Final = (b"<NetworkLink>", b"<GroundOverlay", b"<Model")
 """Elements of KML that name other files."""
 DATUMS: Final = {"absolute": Datum.SEA, "relativeToGround": Datum.GROUND}
@@ -92,6 +94,9 @@ def read_kml(path: Path, reading: Reading) -> Contents:
         )
     # GDAL parts positions at blanks, which some programs write after commas, too.
     text = re.sub(rb"coordinates>[^<]*", lambda found: re.sub(rb"\s*,\s*", b",", found[0]), text)
+    for block in re.findall(rb"coordinates>([^<]*)<", text):  # GDAL makes words zero
+        if not all(map(POSITION.fullmatch, block.split())):
+            raise WorldFileError("has coordinates that are not longitude,latitude[,altitude]")
     _, features = _features(text)
     notes = (
         [f"{counted(packed.others, 'further KML file')} in the archive passed over"] if packed.others else []

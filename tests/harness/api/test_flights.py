@@ -107,6 +107,9 @@ def test_a_figure_that_a_run_lacks_is_told(kept: wayproof.FlightResult, tmp_path
     metrics = json.loads((folder / "metrics.json").read_text())
     del metrics["bank_saturation_fraction"]
     (folder / "metrics.json").write_text(json.dumps(metrics))
+    manifest = json.loads((folder / "manifest.json").read_text())
+    del manifest["sha256"]["metrics.json"]
+    (folder / "manifest.json").write_text(json.dumps(manifest))
     said = re.escape(
         f"{folder / 'metrics.json'}: bank_saturation_fraction: Field required; another version of"
     )

@@ -14,9 +14,9 @@ from harness.cli.app import main
 from harness.cli.check_terminal import verdict_rows
 from harness.cli.terminal import flight_rows
 from harness.files.input_file import InputError
-from harness.run.path_check import check
 from harness.run_files.run_folder import load_run
 from harness.scenario.scenario import parse_scenario
+from wayproof import check
 
 STRIP = "x_m,y_m\n0,0\n0,2000\n60,2000\n60,0\n"
 """Two corners 60 m apart: too tight for an Aerosonde."""
@@ -328,10 +328,13 @@ def test_a_polygon_across_a_line_is_a_fence_unless_it_is_told_otherwise(
 
 def test_from_python_a_path_is_an_array_or_a_file(straight: Path) -> None:
     checked = check([(0.0, 0.0), (0.0, 1500.0)])
-    assert checked.ok
-    assert repr(checked) == "CheckedPath('yes: flown as drawn, within 10 m; 0% of a limit used at most')"
-    assert checked.metrics["digest"] == check(straight).metrics["digest"]
-    assert not check(np.array([(0.0, 0.0), (0.0, 1000.0), (60.0, 1000.0), (60.0, 0.0)])).ok
+    told = checked.metrics.check
+    assert told is not None
+    assert (told.ok, told.verdict) == (True, "yes: flown as drawn, within 10 m; 0% of a limit used at most")
+    assert checked.digest == check(straight).digest
+    strip = check(np.array([(0.0, 0.0), (0.0, 1000.0), (60.0, 1000.0), (60.0, 0.0)])).metrics.check
+    assert strip is not None
+    assert not strip.ok
     with pytest.raises(InputError, match=r"path: has the shape \(2,\); must be \(n, 2\)"):
         check([1.0, 2.0])  # type: ignore[list-item]
 

@@ -154,16 +154,6 @@ def test_altitudes_of_kml_count_from_what_their_mode_says(tmp_path: Path) -> Non
     assert read_path(path).notes == ("altitudes passed over: their altitudeMode is relativeToSeaFloor",)
 
 
-def test_a_line_of_kml_lies_as_much_higher_as_its_offset_says(tmp_path: Path) -> None:
-    path = tmp_path / "a.kml"
-    for offset, lowest in (("", 500.0), ("<gx:altitudeOffset>-40.5</gx:altitudeOffset>", 459.5)):
-        path.write_text(kml().replace("<LineString>", f"<LineString>{offset}"))
-        assert read_path(path).altitudes_m.tolist() == [lowest, lowest + 20.0, lowest + 40.0]
-    path.write_text(path.read_text().replace("-40.5", "high"))
-    with pytest.raises(InputError, match=": way: altitudeOffset: is 'high'; must be a finite number"):
-        read_path(path)
-
-
 def test_what_else_is_in_a_kml_is_told(tmp_path: Path) -> None:
     path = tmp_path / "a.kml"
     ring = "<LinearRing><coordinates>8,47 8.1,47 8.1,47.1 8,47</coordinates></LinearRing>"
@@ -243,6 +233,8 @@ def test_a_flight_of_a_logger_without_a_barometer_is_not_flown_at_the_sea(tmp_pa
     ("name", "text", "sentence"),
     [
         ("a.kml", kml(more="<Placemark><name>other</name><LineString/></Placemark>"), ": has 2 lines (way, other)"),
+        ("a.kml", kml(more="<gx:MultiTrack/>"), ": has gx:MultiTrack, which is not read"),
+        ("a.kml", kml().replace("<coord", "<gx:altitudeOffset>9</gx:altitudeOffset><coord"), ": has gx:altitudeOffset"),
         ("a.kml", kml("8,47 8.1"), ": way: point 1: is '8.1'; must be longitude,latitude[,altitude]"),
         ("a.kml", kml("8,47,5 8.1,47"), ": way: has an altitude at 1 of 2 points"),
         ("a.kml", kml("8,47,5 8.1,far,5"), ": way: point 1: is 'far'; must be a finite number"),
@@ -269,21 +261,6 @@ def test_says_what_is_wrong(name: str, text: str, sentence: str, tmp_path: Path)
     assert str(fault.value).startswith(f"{path}:")
     assert sentence in str(fault.value)
     assert len(str(fault.value).splitlines()) == 1
-
-
-def test_tracks_of_one_multi_track_are_one_path(tmp_path: Path) -> None:
-    """Google's My Tracks begins a new gx:Track after each pause; the altitudeMode is that of all."""
-    track = "<gx:Track><when>2014-04-12T14:26:16Z</when><gx:coord>8 47.0{0} 50{0}</gx:coord></gx:Track>"
-    tracks = "".join(track.format(number) for number in range(3))
-    path = tmp_path / "a.kml"
-    path.write_text(
-        '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2"><Placemark>'
-        f"<gx:MultiTrack><altitudeMode>absolute</altitudeMode>{tracks}</gx:MultiTrack></Placemark></kml>"
-    )
-    found = read_path(path)
-    assert found.altitudes_m.tolist() == [500.0, 501.0, 502.0]
-    assert found.points_m[:, 1] == pytest.approx([0.0, 1111.7, 2223.5], abs=1.0)
-    assert found.notes == ("3 segments of the track joined by straight lines",)
 
 
 def test_a_fix_that_no_glider_gets_to_is_passed_over(tmp_path: Path) -> None:

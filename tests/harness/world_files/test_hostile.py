@@ -89,6 +89,14 @@ HOSTILE: dict[str, tuple[Callable[[Path], Path], str]] = {
         lambda folder: geojson(folder / "a.json", feature({}, [["a", "b"], ["c", "d"], ["e", "f"]])),  # type: ignore[list-item]
         "rings are not lists of positions",
     ),
+    "words in KML": (
+        text(
+            "a.kml",
+            '<kml xmlns="http://www.opengis.net/kml/2.2"><Placemark><Polygon><outerBoundaryIs><LinearRing><coordinates>'
+            "8,47 8.1,far 8.1,47.1 8,47</coordinates></LinearRing></outerBoundaryIs></Polygon></Placemark></kml>",
+        ),
+        "coordinates that are not longitude,latitude",
+    ),
     "entities": (text("a.osm", BOMB), "declares XML entities"),
     "torn XML": (text("a.osm", "<osm><node id='1' lat='47'"), "is not whole XML"),
     "no building": (_no_building, "has no building"),
