@@ -119,10 +119,11 @@ def allowed_m(track: Track, tolerance_m: float, corners: Iterable[AllowedCut]) -
 def at_corner(track: Track, corner: AllowedCut) -> NDArray[np.bool_]:
     """(n,) the rows that are held against a corner's limit: those about it, and at least the one that passes it.
 
-    They reach as far as the planned path is off the corner's legs, and at least `ABOUT` limits to each side: within
-    three times the distance by which it overshoots a corner an aircraft has come back to the next leg.
+    They reach as far as the planned path is off the corner's legs and one limit more, and at least `ABOUT` limits to
+    each side: within three times the distance by which it overshoots a corner an aircraft has come back to the next
+    leg.
     """
-    reach_m = max(corner.half_m, ABOUT * corner.allowed_cut_m)
+    reach_m = max(corner.half_m + corner.allowed_cut_m, ABOUT * corner.allowed_cut_m)
     about: NDArray[np.bool_] = np.abs(track.arc_length_m - corner.arc_length_m) <= reach_m
     flown = np.flatnonzero(np.isfinite(track.arc_length_m))
     if len(flown):

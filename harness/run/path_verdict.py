@@ -40,6 +40,9 @@ LAYER_M: Final = 10.0
 MOST_LAYERS: Final = 40
 """A flight through more has deeper ones."""
 
+WIDER, MOST_WIDER = 1.05, 3.0
+"""The limit is made larger by this factor where it does not hold far enough, up to so many times what is needed."""
+
 MOST_TRIES: Final = 50
 """A corner limit that would be kept is looked for in so many steps; each makes it, and what it holds for, larger."""
 
@@ -223,10 +226,11 @@ def _sufficient_m(
     for _ in range(MOST_TRIES):
         tried = [replace(corner, allowed_cut_m=limit_m) for corner in corners]
         needed_m = off_at_corners(tried)
-        if needed_m <= limit_m:
-            within = bool((off_m <= allowed_m(track, tolerance_m, tried)).all())
-            return limit_m if within else None
-        limit_m = float(math.ceil(needed_m))
+        if needed_m <= limit_m and bool((off_m <= allowed_m(track, tolerance_m, tried)).all()):
+            return limit_m
+        limit_m = float(math.ceil(max(needed_m, WIDER * limit_m)))
+        if limit_m > MOST_WIDER * needed_m:  # it is off where no corner is
+            return None
     return None
 
 

@@ -126,6 +126,7 @@ def fly_by(
     free_cut_m: float | FloatArray,
     overshoot: bool = False,
     tightest: Tightest | None = None,
+    every: bool = False,
 ) -> FlyBy:
     """Rounds the corners of a polyline.
 
@@ -139,9 +140,10 @@ def fly_by(
         radius_m: smallest radius that the aircraft should fly, > 0; (m,) if it differs from point to point.
         free_cut_m: a corner may be passed at this distance wherever that makes its arc wider, > 0; likewise.
         overshoot: corners sharper than a right angle are flown as autopilots do, which begin to turn no earlier than
-            one radius before: past the next leg and back onto it. Every corner is then among the corners.
+            one radius before: past the next leg and back onto it.
         tightest: corners that would be cut by more than `LIMIT_SHARE` of what they may be passed at are flown more
             tightly, down to this; None: they are not.
+        every: every corner is among the corners, however little it is cut.
     """
     kept = _needed(points_m)
     least, free = (np.broadcast_to(each, len(points_m))[kept][1:-1] for each in (radius_m, free_cut_m))
@@ -189,7 +191,7 @@ def fly_by(
             arc_length_m=float(middles[i]),
             half_m=float(max(middles[i] - begun[i], begun[i] + spans[i] - middles[i])),
         )
-        for i in np.flatnonzero(overshoot | shape.back | (cut > free * (1.0 + 1e-9))).tolist()
+        for i in np.flatnonzero(every | shape.back | (cut > free * (1.0 + 1e-9))).tolist()
     )
     stations = np.concatenate(([0.0], middles, [station]))
     along = np.stack((begun, middles, begun + spans), axis=1)

@@ -56,7 +56,7 @@ def rounded(run: Sequence[Vertex], speeds_mps: FloatArray, flying: Flying) -> Fl
         least = np.array([flying.least_radius_m(speed) for speed in speeds])
         limits = np.array([corner_limit_m(vertex.acceptance_m, flying.corner_m) for vertex in run])
         tightest = Tightest(least, limits, np.asarray(flying.wind_mps / speeds_mps, dtype=np.complex128))
-    return fly_by(points, radii, free, overshoot=True, tightest=tightest)
+    return fly_by(points, radii, free, overshoot=True, tightest=tightest, every=True)
 
 
 def legs_of(run: Sequence[Vertex], stations_m: FloatArray) -> list[MissionLeg]:

@@ -68,7 +68,7 @@ class Corner:
 
 def test_a_corner_may_be_cut_by_its_own_figure(make_track: MakeTrack) -> None:
     track = make_track(401)
-    corners = [Corner(250.0, 80.0, 60.0), Corner(600.0, 80.0, 20.0), Corner(750.0, 0.5, 0.5)]
+    corners = [Corner(250.0, 80.0, 60.0), Corner(600.0, 60.0, 20.0), Corner(750.0, 0.5, 0.5)]
     allowed = allowed_m(track, 10.0, corners)
     assert sorted(set(allowed.tolist())) == [0.5, 10.0, 20.0, 60.0]
     # Three times the limit to each side, or as far as the arc is off the legs.
