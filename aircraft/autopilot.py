@@ -82,6 +82,8 @@ class Gains:
         climb, climb_integral: pitch over flight path angle error, and over its integral (1/s).
         pitch: pitch rate over pitch error, 1/s.
         pitch_bank_forward: pitch added per (1 - cos roll), rad.
+        alpha: angle of attack of the trim, rad.
+        alpha_per_load: angle of attack over load factor there, rad.
         elevator_q, elevator_q_integral: elevator over pitch rate error, s, and over its integral.
         elevator_q_forward: elevator that makes a steady pull-up rate, s.
         elevator_turn_forward: elevator against pitch damping in a turn, s.
@@ -109,6 +111,8 @@ class Gains:
     climb_integral: float
     pitch: float
     pitch_bank_forward: float
+    alpha: float
+    alpha_per_load: float
     elevator_q: float
     elevator_q_integral: float
     elevator_q_forward: float
@@ -263,6 +267,8 @@ def gains(at: Derivatives, pace: float = 1.0, pitch_pace: float = 1.0) -> Gains:
         climb_integral=0.29 * pitch,
         pitch=pitch,
         pitch_bank_forward=alpha_per_load - at.alpha_rad,
+        alpha=at.alpha_rad,
+        alpha_per_load=alpha_per_load,
         elevator_q=pitch_pace * short_period / -at.mde,
         elevator_q_integral=pitch_pace**2 * 0.64 * short_period2 / -at.mde,
         elevator_q_forward=(at.ma / at.za - at.mq) / -at.mde,

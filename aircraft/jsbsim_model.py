@@ -238,7 +238,8 @@ class JsbsimModel:
         least_deg, most_deg = frame.autopilot.pitch_limits_deg
         values["wayproof/limit/least-pitch-rad"] = math.radians(least_deg)
         values["wayproof/limit/most-pitch-rad"] = math.radians(most_deg)
-        values["wayproof/limit/most-alpha-rad"] = math.radians(frame.stall_angle_deg - ALPHA_MARGIN_DEG)
+        most_rad = math.radians(frame.stall_angle_deg - ALPHA_MARGIN_DEG)
+        values["wayproof/limit/most-lift"] = 1.0 + (most_rad - frame.gains.alpha) / frame.gains.alpha_per_load
         values["wayproof/limit/least-airspeed-fps"] = frame.least_airspeed_mps / FOOT_M
         values["wayproof/limit/most-sink-fps"] = max(
             STEEPEST_SINK * fdm["velocities/vtrue-fps"], values["wayproof/gain/climb-limit-fps"]

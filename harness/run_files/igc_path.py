@@ -45,8 +45,13 @@ def read_igc(text: str, source: str) -> PathAsRead:
     flown = right[moving[0] - 1 : moving[-1] + 1] if moving else []
     if len(flown) < 2:
         raise InputError(f"{source}: has {len(fixes)} fixes, none of them in flight; must be a flight")
-    known, kind, told = _with_altitudes(flown)
-    notes = [told]
+    known = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
+    kind, notes = "gps_alt", ["GNSS altitudes of the logger taken as above the sea"]
+    if len(known) < len(flown) and any(fix["pressure_alt"] for fix in flown):
+        known, kind = flown, "pressure_alt"
+        notes = ["pressure altitudes of the logger taken as above the sea"]
+    elif len(known) < 2:
+        known, kind, notes = flown, "", ["its logger has no altitudes"]
     counts = {
         "fixes without an altitude passed over: the logger has no barometer": len(flown) - len(known),
         "B records that cannot be read passed over": broken,
@@ -61,16 +66,6 @@ def read_igc(text: str, source: str) -> PathAsRead:
         tuple(float(fix[kind] or 0.0) for fix in known if kind),
         notes=tuple(notes),
     )
-
-
-def _with_altitudes(flown: list[Fix]) -> tuple[list[Fix], str, str]:
-    """Fixes that have an altitude, the name of the one that they have, empty for none, and what to say of it."""
-    known = [fix for fix in flown if fix["gps_alt"] not in (None, 0) and fix.get("validity") != "V"]
-    if len(known) < len(flown) and any(fix["pressure_alt"] for fix in flown):
-        return flown, "pressure_alt", "pressure altitudes of the logger taken as above the sea"
-    if len(known) < 2:
-        return flown, "", "its logger has no altitudes"
-    return known, "gps_alt", "GNSS altitudes of the logger taken as above the sea"
 
 
 def igc_fixes(text: str, source: str) -> tuple[list[Fix], int]:

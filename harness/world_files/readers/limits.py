@@ -253,37 +253,27 @@ def limits(tags: Mapping[str, Any], notes: list[str], name: str) -> tuple[Limit,
     parted = [(*_parted(key), value) for key, value in lower.items()]
     said = {key.replace("_", ""): str(value) for key, value in lower.items()}
     found: list[Limit | None] = []
-    doubts = set[str]()
+    bare = alone = False
     for names, none, word in ((_LOWER, NO_BOTTOM, "lower"), (_UPPER, NO_TOP, "upper")):
         given = next((each for known in names for each in parted if each[0] == known), None)
-        found.append(none if given is None else _side(given[2], given[1], word, said, doubts))
-    notes += [f"{name or 'a part'}: its limits name no {doubt}" for doubt in sorted(doubts, reverse=True)]
+        if given is None:
+            found.append(none)
+            continue
+        _, ends, value = given
+        unit = "ft" if ends & {"ft", "feet"} else _said(said, word, _UNITS, _BOTH_UNITS)
+        alone |= not unit and not ends & {"m", "metres", "meters"} and _is_number(value)
+        reference = " ".join(ends & {"agl", "gnd", "amsl", "msl"})
+        reference = (reference or _said(said, word, _REFERENCES, _BOTH_REFERENCES)).upper()
+        datum = Datum.GROUND if _GROUND.search(reference) else Datum.SEA
+        limit = _limit(value, (unit or "m").lower(), datum)
+        found.append(limit)
+        told = unit.upper() == "FL" or _REFERENCE.search(reference) is not None
+        bare |= not told and limit is not None and _bare(value, limit)
+    if alone:
+        notes.append(f"{name or 'a part'}: its limits name no unit; taken as metres")
+    if bare:
+        notes.append(f"{name or 'a part'}: its limits name no reference; taken as above mean sea level")
     return band_of(found[0], found[1], notes, name)
-
-
-def _side(
-    value: Any, ends: frozenset[str], word: str, said: Mapping[str, str], doubts: set[str]
-) -> Limit | None:
-    """One of the limits.
-
-    Args:
-        value: of its attribute.
-        ends: unit and reference at the end of the attribute's name.
-        word: `lower` or `upper`.
-        said: all attributes.
-        doubts: what is taken for granted is added.
-    """
-    unit = "ft" if ends & {"ft", "feet"} else _said(said, word, _UNITS, _BOTH_UNITS)
-    if not unit and not ends & {"m", "metres", "meters"} and _is_number(value):
-        doubts.add("unit; taken as metres")
-    reference = " ".join(ends & {"agl", "gnd", "amsl", "msl"})
-    reference = (reference or _said(said, word, _REFERENCES, _BOTH_REFERENCES)).upper()
-    datum = Datum.GROUND if _GROUND.search(reference) else Datum.SEA
-    limit = _limit(value, (unit or "m").lower(), datum)
-    told = unit.upper() == "FL" or _REFERENCE.search(reference) is not None
-    if not told and limit is not None and _bare(value, limit):
-        doubts.add("reference; taken as above mean sea level")
-    return limit
 
 
 def _said(said: Mapping[str, str], word: str, has: tuple[str, ...], both: tuple[str, ...]) -> str:

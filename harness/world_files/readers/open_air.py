@@ -118,25 +118,9 @@ def read(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: a coordinate or a radius cannot be read (with its line), or there is no airspace.
     """
-    lines = text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines()
-    ignored = Counter[str]()
-    spaces = _airspaces(lines, ignored)
-    notes: list[str] = []
-    each_parts = [each.parts(notes) for each in spaces]
-    if not any(each_parts):
-        raise WorldFileError("has no airspace with an area; must be OpenAir with some")
-    notes += _told(spaces, ignored)
-    if empty := sum(not each for each in each_parts):
-        notes.append(f"{counted(empty, 'airspace')} without an area passed over")
-    return Contents(
-        "openair", WGS84, tuple(part for parts in each_parts for part in parts), notes=tuple(notes)
-    )
-
-
-def _airspaces(lines: Sequence[str], ignored: Counter[str]) -> list[_Airspace]:
-    """The airspaces of a file; commands that are not known are counted."""
     spaces: list[_Airspace] = []
-    for number, line in enumerate(lines, 1):
+    ignored = Counter[str]()
+    for number, line in enumerate(text_of(read_bytes(path, MAX_TREE_BYTES)).splitlines(), 1):
         command, *more = line.partition("*")[0].split(None, 1) or ("",)
         command, rest = command.upper(), more[0].strip() if more else ""
         if command == "AC" and spaces and not spaces[-1].kind and not spaces[-1].is_drawn:
@@ -152,22 +136,25 @@ def _airspaces(lines: Sequence[str], ignored: Counter[str]) -> list[_Airspace]:
                 raise WorldFileError(f"line {number}: {error}") from error
         elif command and command not in DRAWN:
             ignored[command] += 1
-    return spaces
-
-
-def _told(spaces: Sequence[_Airspace], ignored: Counter[str]) -> list[str]:
-    """What is to be said of classes and of lines that are not read."""
+    notes: list[str] = []
+    each_parts = [each.parts(notes) for each in spaces]
+    if not any(each_parts):
+        raise WorldFileError("has no airspace with an area; must be OpenAir with some")
     classes = Counter(each.kind or "none" for each in spaces)
     told = ", ".join(f"{count} {kind[:12]}" for kind, count in classes.most_common(6))
     told += ", and others" if len(classes) > 6 else ""
-    notes = [f"airspaces of every class are solid ({told}): take out what may be flown in"]
+    notes.append(f"airspaces of every class are solid ({told}): take out what may be flown in")
     if timed := ignored.pop("AA", 0):
         notes.append(f"{counted(timed, 'time')} of activation passed over: taken as always active")
     if ignored:
         words = ", ".join(repr(word[:12]) for word, _ in ignored.most_common(4))
         lines = counted(ignored.total(), "line")
         notes.append(f"{lines} with commands that are not known passed over: {words}")
-    return notes
+    if empty := sum(not each for each in each_parts):
+        notes.append(f"{counted(empty, 'airspace')} without an area passed over")
+    return Contents(
+        "openair", WGS84, tuple(part for parts in each_parts for part in parts), notes=tuple(notes)
+    )
 
 
 def _numbers(text: str, count: int) -> Sequence[float]:

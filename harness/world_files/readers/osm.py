@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from harness.files.wording import counted
 from harness.world_files.bounded import MAX_BYTES, check_file, check_xml, read_bytes
-from harness.world_files.parts import WGS84, Contents, Reading, WorldFileError
+from harness.world_files.parts import WGS84, Contents, Part, Reading, WorldFileError
 from harness.world_files.readers import limits
 from harness.world_files.readers.lengths import lengths_of
 
@@ -69,59 +69,6 @@ def read_pbf(path: Path, reading: Reading) -> Contents:
     return _read(path, reading)
 
 
-class _Found:
-    """What a file holds.
-
-    Attributes:
-        areas: name, tags and shape of each building that osmium has put together.
-        outlines: tags of the others, and the places of their nodes that are in the file, by name.
-        others: how many points, ways and relations are high, or masts, and no building.
-        highest_m: height of the highest of those.
-    """
-
-    def __init__(self) -> None:
-        self.areas: list[tuple[str, dict[str, str], Any]] = []
-        self.outlines: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = {}
-        self.others = Counter[str]()
-        self.highest_m = 0.0
-
-    def take(self, each: Any, shape_of: Any) -> None:
-        """One object of osmium."""
-        import shapely
-
-        tags = {tag.k: tag.v for tag in each.tags}
-        if each.is_area():
-            name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
-            if is_building(tags) and each.num_rings()[0]:
-                shape = shapely.from_wkb(shape_of.create_multipolygon(each))
-                self.areas.append((name, tags, shape.geoms[0] if len(shape.geoms) == 1 else shape))
-                self.outlines.pop(name, None)
-            return
-        kind = "point" if each.is_node() else "way" if each.is_way() else "relation"
-        heights_m = lengths_of(tags.get("height")).metres
-        if is_building(tags) and kind != "point":
-            nodes = each.nodes if kind == "way" else ()
-            places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
-            self.outlines[f"{kind} {each.id}"] = tags, places  # its area comes later, or none
-        elif is_tall(tags) or heights_m:
-            self.others[kind] += 1
-            self.highest_m = max(self.highest_m, *heights_m, 0.0)
-
-    def notes(self, closed: int) -> list[str]:
-        """What is to be said of all that is not taken as it stands."""
-        notes, broken = [], len(self.outlines) - closed
-        if closed:
-            notes.append(f"{counted(closed, 'building')} with an open outline closed by a straight line")
-        if broken:
-            notes.append(f"{counted(broken, 'building')} whose outline is not there passed over")
-        kinds = [kind for kind in ("point", "way", "relation") if self.others[kind]]
-        if kinds:
-            plain = " and ".join(counted(self.others[kind], kind) for kind in kinds)
-            top = f", the highest {self.highest_m:g} m" if self.highest_m else ""
-            notes.append(f"{plain} with a height, or a mast, without an area passed over{top}")
-        return notes
-
-
 def _read(path: Path, reading: Reading) -> Contents:
     try:
         import osmium
@@ -129,21 +76,53 @@ def _read(path: Path, reading: Reading) -> Contents:
         raise WorldFileError("is OpenStreetMap, which osmium reads: pip install 'wayproof[maps]'") from error
     import shapely
 
-    keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
-    found, shape_of = _Found(), osmium.geom.WKBFactory()
+    tall_keys = osmium.filter.KeyFilter("building", "building:part", "man_made", "power", "height")
+    shape_of = osmium.geom.WKBFactory()
+    parts: list[Part] = []
+    doubts, told = limits.Doubts(), Counter[str]()
+    outlines: dict[str, tuple[dict[str, str], list[tuple[float, float]]]] = {}
+    highest_m = 0.0
     try:
-        for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(keys):
-            found.take(each, shape_of)
+        for each in osmium.FileProcessor(str(path)).with_locations().with_areas().with_filter(tall_keys):
+            tags = {tag.k: tag.v for tag in each.tags}
+            if each.is_area():
+                name = f"{'way' if each.from_way() else 'relation'} {each.orig_id()}"
+                if is_building(tags) and each.num_rings()[0]:
+                    shape = shapely.from_wkb(shape_of.create_multipolygon(each))
+                    shape = shape.geoms[0] if len(shape.geoms) == 1 else shape
+                    parts.append(limits.building(tags, shape, reading, doubts, name))
+                    outlines.pop(name, None)
+                continue
+            kind = "point" if each.is_node() else "way" if each.is_way() else "relation"
+            if is_building(tags) and kind != "point":
+                nodes = each.nodes if kind == "way" else ()
+                places = [(node.lon, node.lat) for node in nodes if node.location.valid()]
+                outlines[f"{kind} {each.id}"] = tags, places  # its area comes later, or none
+            elif is_tall(tags) or lengths_of(tags.get("height")).metres:
+                told[kind] += 1
+                highest_m = max(highest_m, *lengths_of(tags.get("height")).metres, 0.0)
     except (RuntimeError, ValueError, OSError, MemoryError) as error:
-        said = " ".join(str(error).split())[:80]
-        raise WorldFileError(f"cannot be read by osmium ({said}); it may be torn") from error
-    cut = [(name, *each) for name, each in found.outlines.items() if len(set(each[1])) >= 3]
-    areas = [*found.areas, *((name, tags, shapely.Polygon(places)) for name, tags, places in cut)]
-    if not areas:
+        raise WorldFileError(
+            f"cannot be read by osmium ({' '.join(str(error).split())[:80]}); it may be torn"
+        ) from error
+    for name, (tags, places) in outlines.items():
+        if len(set(places)) >= 3:
+            parts.append(limits.building(tags, shapely.Polygon(places), reading, doubts, name))
+            told["closed"] += 1
+        else:
+            told["broken"] += 1
+    if not parts:
         raise WorldFileError("has no building with an outline; must be an extract of OpenStreetMap with some")
-    doubts = limits.Doubts()
-    parts = tuple(limits.building(tags, shape, reading, doubts, name) for name, tags, shape in areas)
-    return Contents("osm", WGS84, parts, notes=(*doubts.notes(reading), *found.notes(len(cut))))
+    notes = doubts.notes(reading)
+    if told["closed"]:
+        notes.append(f"{counted(told['closed'], 'building')} with an open outline closed by a straight line")
+    if told["broken"]:
+        notes.append(f"{counted(told['broken'], 'building')} whose outline is not there passed over")
+    plain = [counted(told[kind], kind) for kind in ("point", "way", "relation") if told[kind]]
+    if plain:
+        top = f", the highest {highest_m:g} m" if highest_m else ""
+        notes.append(f"{' and '.join(plain)} with a height, or a mast, without an area passed over{top}")
+    return Contents("osm", WGS84, tuple(parts), notes=tuple(notes))
 
 
 def is_building(tags: Mapping[str, Any]) -> bool:
