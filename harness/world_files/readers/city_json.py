@@ -33,6 +33,8 @@ DEEPEST: Final = 5
 INSTANCE: Final = "GeometryInstance"
 """Type of a geometry that is a template of the file, put somewhere."""
 MOST_NAMED: Final = 4
+LATITUDE_FIRST: Final = "its latitudes are taken to come first"
+"""Note on a file in degrees whose axes are in the order of EPSG."""
 ROOFS: Final = ("b3_h_dak_max", "b3_h_nok", "h_dak_max")
 """Attributes of 3DBAG with the height of the roof above the datum, for buildings whose geometry is flat."""
 LOW_M: Final = 0.1
@@ -62,35 +64,43 @@ def read(path: Path, reading: Reading) -> Contents:
             raise WorldFileError("has no CityObjects; must be CityJSON")
         vertices = _vertices(content, contents[0].get("transform"))
         vertices[:, 2] *= unit_m
-        if degrees and len(vertices) and np.abs(vertices[:, 1]).max() > 90.0 >= np.abs(vertices[:, 0]).max():
+        if degrees and _latitude_first(vertices):
             vertices = vertices[:, [1, 0, 2]]
-            notes += (
-                []
-                if "its latitudes are taken to come first" in notes
-                else ["its latitudes are taken to come first"]
-            )
+            passed[LATITUDE_FIRST] = 1
         for name, each in objects.items():
-            kind = str(each.get("type", "?")) if isinstance(each, dict) else "?"
-            if not kind.startswith(SOLID):
-                passed[kind] += 1
-                continue
-            instances = sum(shape["type"] == INSTANCE for shape in _geometries(each))
-            passed[INSTANCE] += instances
-            part = _part(name, each, vertices, reading, doubts)
-            if part is not None:
-                parts.append(part)
-            elif not (each.get("children") or instances):
-                passed["building without a shape"] += 1
+            part, why = _object(name, each, vertices, reading, doubts)
+            parts += [] if part is None else [part]
+            passed.update(why)
     if not parts:
         raise WorldFileError("has no building with a shape; must have some")
+    notes += [LATITUDE_FIRST] if passed.pop(LATITUDE_FIRST, 0) else []
     notes += doubts.notes(reading)
-    if passed := +passed:
+    if passed:
         more = " and others" if len(passed) > MOST_NAMED else ""
         named = ", ".join(f"{number} {kind}" for kind, number in passed.most_common(MOST_NAMED))
         notes.append(f"passed over: {named}{more}")
     if crs is None:
         notes.append("names no coordinate reference system: its metres are taken as they are (crs)")
     return Contents("cityjson", crs, tuple(parts), notes=tuple(notes))
+
+
+def _latitude_first(vertices: FloatArray) -> bool:
+    """Whether places can only be degrees with the latitude before the longitude, as some programs write them."""
+    return len(vertices) > 0 and bool(np.abs(vertices[:, 1]).max() > 90.0 >= np.abs(vertices[:, 0]).max())
+
+
+def _object(
+    name: str, thing: Any, vertices: FloatArray, reading: Reading, doubts: limits.Doubts
+) -> tuple[Part | None, list[str]]:
+    """The part that an object is, and what of it is passed over."""
+    kind = str(thing.get("type", "?")) if isinstance(thing, dict) else "?"
+    if not kind.startswith(SOLID):
+        return None, [kind]
+    passed = [INSTANCE for shape in _geometries(thing) if shape["type"] == INSTANCE]
+    part = _part(name, thing, vertices, reading, doubts)
+    if part is None and not (thing.get("children") or passed):
+        passed.append("building without a shape")
+    return part, passed
 
 
 def _height_unit_m(crs: str, notes: list[str]) -> float:
@@ -135,37 +145,38 @@ def _part(
     """An object at its highest level of detail: its surfaces from above, between its lowest and highest vertex."""
     import shapely
 
-    areal = [
-        each
-        for each in _geometries(thing)
-        if "boundaries" in each and each["type"].endswith(("Surface", "Solid"))
-    ]
-    best = max((str(each.get("lod", "0")) for each in areal), default="")
     shapes, low, high = [], math.inf, -math.inf
-    for each in areal:
-        for surface in _surfaces(each["boundaries"]) if str(each.get("lod", "0")) == best else ():
-            rings = [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
-            if not rings or len(surface[0]) < 3:
-                continue
-            low, high = min(low, *(r[:, 2].min() for r in rings)), max(high, *(r[:, 2].max() for r in rings))
-            shape = shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]])
-            shape = (
-                shape
-                if shape.is_valid
-                else shapely.make_valid(shape, method="structure", keep_collapsed=False)
-            )
-            if shape.area > WALL * shape.length**2:
-                shapes.append(shape)
+    for surface in _best_surfaces(thing):
+        rings = [_places(ring, vertices, name) for ring in surface if len(ring) >= 3]
+        if not rings or len(surface[0]) < 3:
+            continue
+        heights = np.concatenate(rings)[:, 2]
+        low, high = min(low, float(heights.min())), max(high, float(heights.max()))
+        shape = shapely.Polygon(rings[0][:, :2], [ring[:, :2] for ring in rings[1:]])
+        if not shape.is_valid:
+            shape = shapely.make_valid(shape, method="structure", keep_collapsed=False)
+        if shape.area > WALL * shape.length**2:
+            shapes.append(shape)
     if not shapes:
         return None
     footprint = shapely.union_all(shapes)
     tags = thing.get("attributes")
     tags = tags if isinstance(tags, dict) else {}
     if high - low < LOW_M:
-        roof_m = max(metres_of(tags.get(key)) or -math.inf for key in ROOFS)
-        above_m = limits.building(tags, footprint, reading, doubts).top.height_m if roof_m <= low else 0.0
-        high = low + above_m if roof_m <= low else roof_m
-    return Part(footprint, Limit(float(low)), Limit(float(high)), name=name[:40])
+        high = max(metres_of(tags.get(key)) or -math.inf for key in ROOFS)
+        if high <= low:
+            high = low + limits.building(tags, footprint, reading, doubts).top.height_m
+    return Part(footprint, Limit(low), Limit(high), name=name[:40])
+
+
+def _best_surfaces(thing: dict[str, Any]) -> Iterator[list[list[Any]]]:
+    """Surfaces of an object at its highest level of detail."""
+    areal = [each for each in _geometries(thing) if "boundaries" in each]
+    areal = [each for each in areal if each["type"].endswith(("Surface", "Solid"))]
+    best = max((str(each.get("lod", "0")) for each in areal), default="")
+    for each in areal:
+        if str(each.get("lod", "0")) == best:
+            yield from _surfaces(each["boundaries"])
 
 
 def _places(ring: list[Any], vertices: FloatArray, name: str) -> FloatArray:
