@@ -266,8 +266,6 @@ def _cut(
     turn_room_m: float,
 ) -> Source:
     """The polygons of one file."""
-    import shapely
-
     stamp, box = spec.path.stat(), _with_margin(bounds_m)
     band = HeightBand(altitude_m - spec.vertical_clearance_m, altitude_m + spec.vertical_clearance_m)
     notes = list(contents.notes)
@@ -290,11 +288,9 @@ def _cut(
             )
         if spec.tolerance_m is None:
             tolerance_m = factor * _cell_m(raster, mapping)
-    merged = shapely.get_parts(shapely.disjoint_subset_union_all(polygons)) if polygons else []
-    grown = simplified([each for each in merged if each.geom_type == "Polygon"], tolerance_m)
-    if tolerance_m > 0 and grown:
-        grown = list(shapely.get_parts(shapely.disjoint_subset_union_all(grown)))
-    final = [_with_holes(each, spec.holes, turn_room_m) for each in _rounded(grown)]
+    final = [
+        _with_holes(each, spec.holes, turn_room_m) for each in _rounded(_outlines(polygons, tolerance_m))
+    ]
     if final:
         notes.append(f"outlines simplified by at most {tolerance_m:.3g} m, outwards only")
     else:
@@ -302,6 +298,17 @@ def _cut(
     heights = _heights(final, solids, None if contents.terrain is None else band.low_m)
     digest = _digest(_plainly(spec.path), (stamp.st_size, stamp.st_mtime_ns))
     return Source(spec, contents.kind, digest, tuple(final), tuple(heights), tuple(notes))
+
+
+def _outlines(polygons: Sequence[Any], tolerance_m: float) -> list[Any]:
+    """The union of polygons, simplified."""
+    import shapely
+
+    merged = shapely.get_parts(shapely.disjoint_subset_union_all(polygons)) if polygons else []
+    grown = simplified([each for each in merged if each.geom_type == "Polygon"], tolerance_m)
+    if tolerance_m > 0 and grown:
+        grown = list(shapely.get_parts(shapely.disjoint_subset_union_all(grown)))
+    return grown
 
 
 def _heights(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -77,8 +76,6 @@ def read_kml(path: Path, reading: Reading) -> Contents:
     Raises:
         WorldFileError: pyogrio is not installed, the file is not whole, or it has no polygon.
     """
-    import shapely
-
     data = read_bytes(path, MAX_TREE_BYTES)
     try:
         packed = (
@@ -86,7 +83,31 @@ def read_kml(path: Path, reading: Reading) -> Contents:
         )
     except InputError as error:
         raise WorldFileError(str(error)) from error
-    text = packed.data
+    text = _checked_kml(packed.data)
+    _, features = _features(text)
+    notes = (
+        [f"{counted(packed.others, 'further KML file')} in the archive passed over"] if packed.others else []
+    )
+    solid = [each for each in features if each.shape is not None]
+    parts = tuple(_kml_part(each, notes) for each in solid)
+    flat = sum((part.bottom, part.top) == (NO_BOTTOM, NO_TOP) for part in parts)
+    if flat:
+        notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
+    if len(parts) > flat:
+        notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
+    if linked := sum(text.count(each) for each in LINKED):
+        notes.append(f"{counted(linked, 'image or link')} to other files passed over")
+    if len(features) > len(solid):
+        notes.append(f"{counted(len(features) - len(solid), 'point, line or wall')} passed over")
+    return Contents("kml", reading.crs or "EPSG:4326", parts, notes=tuple(notes))
+
+
+def _checked_kml(text: bytes) -> bytes:
+    """A KML text as GDAL reads it rightly.
+
+    Raises:
+        WorldFileError: it is not whole XML, or has what GDAL would take for something else.
+    """
     check_xml(text)
     if b"altitudeOffset" in text:
         raise WorldFileError(
@@ -97,32 +118,22 @@ def read_kml(path: Path, reading: Reading) -> Contents:
     for block in re.findall(rb"coordinates>([^<]*)<", text):  # GDAL makes words zero
         if not all(map(POSITION.fullmatch, block.split())):
             raise WorldFileError("has coordinates that are not longitude,latitude[,altitude]")
-    _, features = _features(text)
-    notes = (
-        [f"{counted(packed.others, 'further KML file')} in the archive passed over"] if packed.others else []
-    )
-    solid = [each for each in features if each.shape is not None]
-    parts = list(limits.parts_of([(each.tags, each.shape) for each in solid], reading, []))
-    flat = 0
-    for index, (tags, shape) in enumerate(solid):
-        name, datum = str(tags.get("Name") or "")[:40], DATUMS.get(str(tags.get("altitudeMode")))
-        if limits.has_limits(tags):
-            parts[index] = Part(shape, *limits.limits(tags, notes, name), name=name)
-        elif datum is None:
-            parts[index], flat = Part(shape, NO_BOTTOM, NO_TOP, name=name), flat + 1
-        else:
-            top_m = float(np.nanmax(shapely.get_coordinates(shape, include_z=True)[:, 2]))
-            parts[index] = Part(shape, NO_BOTTOM, Limit(top_m, datum), name=name)
-    if flat:
-        notes.append(f"{counted(flat, 'polygon')} on the ground taken as solid at every altitude")
-    if len(parts) > flat:
-        notes.append("a polygon in the air is taken as solid from the ground up to its highest corner")
-    if linked := sum(text.count(each) for each in LINKED):
-        notes.append(f"{counted(linked, 'image or link')} to other files passed over")
-    if len(features) > len(solid):
-        notes.append(f"{counted(len(features) - len(solid), 'point, line or wall')} passed over")
-    flat_parts = [replace(part, footprint=shapely.force_2d(part.footprint)) for part in parts]
-    return Contents("kml", reading.crs or "EPSG:4326", tuple(flat_parts), notes=tuple(notes))
+    return text
+
+
+def _kml_part(feature: _Feature, notes: list[str]) -> Part:
+    """The part that a polygon of KML is."""
+    import shapely
+
+    tags, shape = feature
+    name, datum = str(tags.get("Name") or "")[:40], DATUMS.get(str(tags.get("altitudeMode")))
+    flat = shapely.force_2d(shape)
+    if limits.has_limits(tags):
+        return Part(flat, *limits.limits(tags, notes, name), name=name)
+    if datum is None:
+        return Part(flat, NO_BOTTOM, NO_TOP, name=name)
+    top_m = float(np.nanmax(shapely.get_coordinates(shape, include_z=True)[:, 2]))
+    return Part(flat, NO_BOTTOM, Limit(top_m, datum), name=name)
 
 
 def _features(source: Path | str | bytes) -> tuple[str | None, list[_Feature]]:
