@@ -30,12 +30,7 @@ def read_csv(text: str, source: str) -> PathAsRead:
     Raises:
         InputError: it is none.
     """
-    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
-    rows = csv.reader(lines)
-    try:
-        filled = [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise InputError(f"{source}: is not CSV ({error})") from error
+    filled = _rows(text, source)
     line, header = filled[0] if filled else (1, [])
     header = [name.strip().lower() for name in header]
     names = next((pair for pair in (*LOCAL, *DEGREES) if set(pair) <= set(header)), None)
@@ -52,12 +47,29 @@ def read_csv(text: str, source: str) -> PathAsRead:
             raise InputError(f"{source}:{number}: has {len(row)} cells, the header {len(header)}")
         cells = dict(zip(header, row, strict=True))
         found.append([finite(cells[name].strip(), f"{source}:{number}: {name}") for name in wanted])
-    others = [shown(name) or "one without a name" for name in header if name not in wanted]
-    more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
     return PathAsRead(
         names in LOCAL,
         tuple((row[0], row[1]) for row in found),
         tuple(row[2] for row in found if heights),
         above_ground=heights == [ABOVE_GROUND],
-        notes=(f"columns passed over: {', '.join(others[:MOST_NAMED])}{more}",) if others else (),
+        notes=_passed_over([name for name in header if name not in wanted]),
     )
+
+
+def _rows(text: str, source: str) -> list[tuple[int, list[str]]]:
+    """The rows that are neither blank nor a comment, with their lines."""
+    lines = ["" if line.lstrip().startswith("#") else line for line in text.splitlines()]
+    rows = csv.reader(lines)
+    try:
+        return [(rows.line_num, row) for row in rows if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{source}: is not CSV ({error})") from error
+
+
+def _passed_over(columns: list[str]) -> tuple[str, ...]:
+    """What is to be said of columns that are not read."""
+    if not columns:
+        return ()
+    named = ", ".join(shown(name) or "one without a name" for name in columns[:MOST_NAMED])
+    more = f" and {len(columns) - MOST_NAMED} more" if len(columns) > MOST_NAMED else ""
+    return (f"columns passed over: {named}{more}",)

@@ -56,19 +56,28 @@ def read_kml(text: str, source: str) -> PathAsRead:
         told = f" ({', '.join(name for name, _ in lines[:4])})" if lines else ""
         raise InputError(f"{source}: has {len(lines)} lines{told}; must have exactly one, the path")
     ((name, line),) = lines
-    track = _name(line) == "Track"
-    rows = [(each.text or "").split() for each in _all(line, "coord")] if track else _coordinates(line)
-    points = [_point(row, f"{source}: {name}: point {number}") for number, row in enumerate(rows)]
-    others = Counter(kind for each in root.iter() if (kind := _name(each)) in PASSED)
-    rings = sum(1 for kind in BOUNDARIES for each in _all(root, kind) for _ in _all(each, "LinearRing"))
-    others["LinearRing"] = sum(1 for _ in _all(root, "LinearRing")) - rings
-    notes = [f"{counted(count, kind)} beside the path passed over" for kind, count in (+others).items()]
-    mode = _text(line, "altitudeMode")
+    points, mode = _line_points(line, f"{source}: {name}"), _text(line, "altitudeMode")
+    notes = _others(root)
     flat = mode not in (ABSOLUTE, RELATIVE)
     if flat and any(altitude for *_, altitude in points):
         notes.append(f"altitudes passed over: their altitudeMode is {shown(mode or CLAMPED)}")
     points = [(north, east, None) for north, east, _ in points] if flat else points
     return _path(points, f"{source}: {name}", Fences(tuple(fences)), notes, mode == RELATIVE)
+
+
+def _line_points(line: Element, where: str) -> list[Point]:
+    """Points of a LineString, or of a gx:Track, which has them one an element."""
+    track = _name(line) == "Track"
+    rows = [(each.text or "").split() for each in _all(line, "coord")] if track else _coordinates(line)
+    return [_point(row, f"{where}: point {number}") for number, row in enumerate(rows)]
+
+
+def _others(root: Element) -> list[str]:
+    """What is beside the path in a KML file and no polygon."""
+    others = Counter(kind for each in root.iter() if (kind := _name(each)) in PASSED)
+    rings = sum(1 for kind in BOUNDARIES for each in _all(root, kind) for _ in _all(each, "LinearRing"))
+    others["LinearRing"] = sum(1 for _ in _all(root, "LinearRing")) - rings
+    return [f"{counted(count, kind)} beside the path passed over" for kind, count in (+others).items()]
 
 
 def read_gpx(text: str, source: str) -> PathAsRead:
