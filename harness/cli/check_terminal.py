@@ -67,7 +67,7 @@ def verdict_rows(metrics: Mapping[str, Any]) -> dict[str, str]:
     for name, figures in (("as given", check["given"]), ("as flown", metrics["smoothness"]["flown"])):
         rows[f"smoothness {name}"] = (
             f"turns {figures['heading_change_deg']:,.0f} deg, energy {figures['bending_energy_1pm']:.2g} /m, "
-            f"tightest {_radius(figures['max_curvature_1pm'])}"
+            f"{_tightest(figures['max_curvature_1pm'])}"
         )
     return rows
 
@@ -136,5 +136,5 @@ def _metres(value: float | None) -> str:
     return "-" if value is None else f"{legible(value)} m"
 
 
-def _radius(curvature_1pm: float) -> str:
-    return f"{1.0 / curvature_1pm:,.0f} m" if curvature_1pm > 1e-9 else "straight"
+def _tightest(curvature_1pm: float) -> str:
+    return f"tightest {1.0 / curvature_1pm:,.0f} m" if curvature_1pm > 1e-9 else "no turn"

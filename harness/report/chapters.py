@@ -138,7 +138,7 @@ def run_chapter(scenario: Scenario, flight: ReportedFlight, optimum: Optimum) ->
         from harness.report.path_figure import path_figure
 
         path = path_figure(scene, drawn, flight.run.plans[0].waypoints_m, metrics)
-        caption = f"The path of {scene.name} as given, and the track that was flown over it."
+        caption = f"The path of {scene.name} as given, and the track that was flown over it; enlarged: the worst place."
     else:
         from harness.report.planner_figure import planner_figure
 

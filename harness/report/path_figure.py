@@ -11,8 +11,9 @@ from matplotlib import patches
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from harness.report.figure_style import colour, styled
+from harness.report.figure_style import colour, round_length_m, styled
 from harness.report.figures import LEGEND_ROW_IN, DrawnRun, FigureScene, draw_map, map_height_in, thinned
+from harness.report.planner_figure import CLOSE_UP_IN
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,6 +44,10 @@ FENCES: Mapping[str, dict[str, Any]] = {
     "inclusion": {"ec": "#009E73", "fc": "none", "lw": 1.2, "ls": "--"},
 }
 POINT: dict[str, Any] = {"marker": "o", "color": "0.25", "ms": 2.5, "zorder": 6}
+WORST: dict[str, Any] = {"marker": "o", "mfc": "none", "mec": "#A8201A", "ms": 9, "zorder": 8}
+WORST_SHOWN = 3.0
+"""The enlargement of the worst place reaches so many times what it is off, or what is allowed, to each side."""
+
 MOST_POINTS = 300
 """Most points of a path that are marked; a path with more is a sampled curve, and none is marked."""
 
@@ -76,8 +81,11 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
     kinds = list(dict.fromkeys(fence["kind"] for fence in check["fences"]))
     lines = math.ceil((2 + len(marks) + len(kinds)) / 2)
     scene = _about(scene, np.concatenate((given_m, flown)))
-    with styled(map_height_in(scene) + LEGEND_ROW_IN * (lines + 1)) as figure:
-        axes = figure.add_subplot()
+    heights_in = [map_height_in(scene), CLOSE_UP_IN]
+    with styled(sum(heights_in) + LEGEND_ROW_IN * (lines + 1)) as figure:
+        rows = figure.add_gridspec(2, 1, height_ratios=heights_in)
+        axes = figure.add_subplot(rows[0])
+        _draw_worst(figure.add_subplot(rows[1]), run, given_m, check["worst"])
         draw_map(axes, scene, ends=False)
         legend: list[Any] = [*axes.plot(*given_m.T / 1e3, label="as given", **GIVEN)]
         legend += axes.plot(*flown.T / 1e3, color=colour(0), lw=1.5, zorder=5, label="flown")
@@ -90,6 +98,28 @@ def path_figure(scene: FigureScene, run: DrawnRun, given_m: FloatArray, metrics:
         axes.set_title(f"{scene.name}: {'as given' if check['ok'] else 'not as given'}")
         figure.legend(handles=legend, loc="outside lower center", ncols=2, frameon=False)
     return figure
+
+
+def _draw_worst(axes: Axes, run: DrawnRun, given_m: FloatArray, worst: Mapping[str, Any]) -> None:
+    """The place where the track is furthest off the path in relation to what is allowed there, enlarged."""
+    middle = np.array((worst["east_m"], worst["north_m"]))
+    half_m = WORST_SHOWN * max(worst["off_m"], worst["allowed_m"])
+    axes.plot(*given_m.T / 1e3, **GIVEN)
+    axes.plot(run.track.east_m / 1e3, run.track.north_m / 1e3, color=colour(0), lw=1.5, zorder=5)
+    axes.plot(*middle / 1e3, **WORST)
+    (east, north), half_km = middle / 1e3, half_m / 1e3
+    axes.set(
+        xlim=(east - 2 * half_km, east + 2 * half_km), ylim=(north - half_km, north + half_km), aspect="equal"
+    )
+    axes.set_xticks([])
+    axes.set_yticks([])
+    bar_km = round_length_m(half_m) / 1e3
+    left, low = east - 1.9 * half_km, north - 0.88 * half_km
+    axes.plot([left, left + bar_km], [low, low], color="black", lw=2, solid_capstyle="butt")
+    axes.annotate(f"{1e3 * bar_km:g} m", (left, low), (0, 4), textcoords="offset points", fontsize=8)
+    axes.set_title(
+        f"worst place: {worst['off_m']:.3g} m off at {worst['time_s']:.0f} s, {worst['allowed_m']:.3g} m allowed"
+    )
 
 
 def _corners(corners: Sequence[Mapping[str, Any]], *, kept: bool) -> list[tuple[float, float]]:

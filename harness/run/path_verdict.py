@@ -167,7 +167,7 @@ def verdict(
         faults.append("turn radius too tight")
     worst = told["worst"]
     if worst["off_m"] > worst["allowed_m"] or off:
-        faults.append(_how_far(worst))
+        faults.append(_how_far(worst, "waypoint" if told["drawn"] else "item"))
         enough_m = told["corner_m_that_would_do"]
         if enough_m is not None:
             faults.append(f"--corner-m {enough_m:g} would be yes")
@@ -182,9 +182,9 @@ def verdict(
     return True, f"yes: flown {how}, within {tolerance_m:.3g} m; {used:.0%} of a limit used at most"
 
 
-def _how_far(worst: Mapping[str, Any]) -> str:
+def _how_far(worst: Mapping[str, Any], noun: str) -> str:
     """How far off the worst place is."""
-    where = "" if worst["waypoint"] is None else f" at {worst['waypoint']}"
+    where = "" if worst["waypoint"] is None else f" at {noun} {worst['waypoint']}"
     return f"{worst['off_m']:.3g} m off{where} where {worst['allowed_m']:.3g} m are allowed"
 
 
