@@ -102,3 +102,23 @@ def test_what_lies_beyond_a_corner_counts_and_a_no_names_the_limit_that_would_be
     worst = metrics["check"]["worst"]
     place = (worst["east_m"], worst["north_m"])
     assert worst["off_m"] == pytest.approx(off_polyline_m(np.array([place]), SQUARE[:3])[0], abs=0.5)
+
+
+@pytest.mark.flights
+@pytest.mark.parametrize("navigation", ["perfect", "rtk"])
+def test_a_path_with_room_in_hand_is_yes_whatever_the_seed_of_the_gusts(navigation: str) -> None:
+    """A corner of 60 deg that may be cut by 25 m: an arc of 97 m, half as wide again as the least, takes 15 m."""
+    turn = math.radians(60.0)
+    path = [(0.0, 0.0), (0.0, 1200.0), (1200.0 * math.sin(turn), 1200.0 + 1200.0 * math.cos(turn))]
+    used = []
+    for seed in range(1, 13):
+        settings = {
+            "trackability.cross_track_m": "25",
+            "seed": str(seed),
+            "navigation.kind": navigation,
+            "environment.turbulence.intensity": "light",
+        }
+        metrics, _ = flown(path, wind=(5.0, 230.0), settings=settings)
+        assert metrics["check"]["ok"], (seed, metrics["check"]["verdict"])
+        used.append(metrics["check"]["limit_used"]["off_path"])
+    assert max(used) < 0.8
