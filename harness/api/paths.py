@@ -29,6 +29,7 @@ def check(
     airspeed_mps: float | None = None,
     altitude_m: float | None = None,
     wind: tuple[float, float] | None = None,
+    tolerance_m: float | None = None,
     corner_m: float | None = None,
     settings: Mapping[str, str] | None = None,
     out: str | Path | None = None,
@@ -43,12 +44,14 @@ def check(
         path: a file that `wayproof check` takes, or points (n, 2): east and north in metres; a third column is the
             altitude.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
-        scenario: gives obstacles, bounds, environment, seed and altitude; None: an empty world in calm air.
+        scenario: gives obstacles, bounds, environment, seed, altitude and written limits; None: an empty world in calm
+            air.
         airspeed_mps: true airspeed; None: the aircraft's cruising speed.
         altitude_m: above mean sea level; None: the path's, else the scenario's, else 300 m.
         wind: speed (m/s) and the direction it blows from (degrees); None: the scenario's, else calm.
+        tolerance_m: largest distance from the path; None: a tenth of the clearance where that is written, else 10 m.
         corner_m: largest distance from corners; None: for a drawn path the cross-track limit, for a mission the
-            acceptance radius in the file, else the clearance.
+            acceptance radius in the file, else 90 m.
         settings: further keys of a scenario, by key path; values as YAML.
         out: the run folder to write; None: no folder.
         recording: whether to record the flight for rerun.
@@ -64,6 +67,8 @@ def check(
         sections["aircraft"]["airspeed_mps"] = airspeed_mps
     if wind is not None:
         sections["environment"]["wind"] = {"speed_mps": wind[0], "from_deg": wind[1]}
+    if tolerance_m is not None:
+        sections["trackability"] = {"cross_track_m": tolerance_m}
     keep = out is not None or recording
     with as_input_errors(), TemporaryDirectory(prefix="wayproof-world-") as kept:
         world = _world(scenario, Path(kept))

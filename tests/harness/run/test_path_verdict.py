@@ -55,7 +55,7 @@ def test_a_missions_corners_have_one_limit_whoever_flies(law: str, tmp_path: Pat
 )
 def test_a_corner_is_rounded_as_the_aircraft_can_turn(tolerance_m: float, radius_m: float, ok: bool) -> None:
     """An arc of R cuts a right angle by (sqrt 2 - 1) R: by 0.9 of the limit, or by 26 m at the bank limit of 45 deg."""
-    metrics, track = flown(SQUARE_CORNER, settings={"trackability.cross_track_m": str(tolerance_m)})
+    metrics, track = flown(SQUARE_CORNER, tolerance_m=tolerance_m)
     (corner,) = metrics["check"]["corners"]
     assert corner["radius_m"] == pytest.approx(radius_m, rel=0.005)
     assert corner["cut_m"] == pytest.approx((math.sqrt(2.0) - 1.0) * corner["radius_m"])
