@@ -17,6 +17,8 @@ from aircraft.card_cache import cached, figure
 from aircraft.climb import climb_rates
 from aircraft.envelope import performance
 from aircraft.guidance.interface import UPDATE_RATE_HZ
+from aircraft.guidance.margins import law_margins
+from aircraft.guidance.registry import installed_kinds
 from aircraft.interface import GRAVITY_MPS2
 from aircraft.start import Atmosphere
 from harness.bench.tracking import ALTITUDE_M, course, fly_course
@@ -50,7 +52,8 @@ def envelope_card(
 
     Returns:
         `aircraft`, `mass_kg`, `airspeed_range_mps`, `cruise_mps`, `bank_limit_deg`, `roll_rate_dps`, `verified`,
-        and `at`: for each airspeed `airspeed_mps`, `roll_in_s`, `level_bank_deg`, `climb_mps` and `descent_mps` (see
+        `laws`: the `gain` and `delay_s` that each law bears on a straight line (see `aircraft.guidance.margins`), and
+        `at`: for each airspeed `airspeed_mps`, `roll_in_s`, `level_bank_deg`, `climb_mps` and `descent_mps` (see
         `aircraft.climb`), `turns` (see `flown_turn`) and `tracked` (see `tightest`).
 
     Raises:
@@ -77,6 +80,10 @@ def envelope_card(
         "bank_limit_deg": frame.bank_limit_deg,
         "roll_rate_dps": frame.roll_rate_dps,
         "verified": frame.verified,
+        "laws": {
+            name: law_margins(kind, frame.guidance_limits())._asdict()
+            for name, kind in installed_kinds().items()
+        },
         "at": pages,
     }
 

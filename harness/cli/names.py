@@ -132,7 +132,7 @@ def _print_aircraft() -> None:
         say(f"{many} flown for the figures, once; the whole fleet takes a minute", err=True)
         with step_bar() as report:
             faults = _survey(new, report)
-    say(_row(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "verified"), "what"))
+    say(_row(_AIRCRAFT_ROW.format("name", "mass kg", "speed m/s", "cruise", "turn m", "tested"), "what"))
     for name in names:
         fault = faults.get(name)
         say(f"{name:10} cannot be flown: {fault}" if fault else _aircraft_row(name))

@@ -218,6 +218,11 @@ def envelope_tables(card: Mapping[str, Any]) -> list[tuple[str, Sequence[str], l
     tables: list[tuple[str, Sequence[str], list[Sequence[str]]]] = [
         (card["aircraft"], ("", ""), list(facts.items()))
     ]
+    margins: list[Sequence[str]] = [
+        (name, f"{law['gain']:.1f}", f"{law['delay_s']:.2f}") for name, law in card["laws"].items()
+    ]
+    heads = ("law on a line", "gain margin", "delay margin s")
+    tables.append(("guidance at cruise, calm air", heads, margins))
     for page in card["at"]:
         title = (
             f"turns at {page['airspeed_mps']:g} m/s; 90 % of 30 deg in {page['roll_in_s']:g} s; speed and altitude "

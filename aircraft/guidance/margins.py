@@ -1,0 +1,75 @@
+"""Gain and delay margins of guidance laws on a straight line, from the open loop of the cross-track error.
+
+A law is made linear about the line, phi = k_e e + k_chi chi, by its answers to small offsets. With e'' = g phi, chi =
+e' / V and the roll R behind its command the open loop is L(s) = -g (k_e + k_chi s / V) R(s) / s^2. R is a delay and,
+but for `preview`, whose command leads by it, a first-order lag. Source of the method: any text on control, such as
+Franklin, Powell and Emami-Naeini, chapter 6.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from aircraft.guidance.interface import UPDATE_RATE_HZ, GuidanceLimits
+from aircraft.guidance.registry import DEFAULT_KIND, GuidanceKind
+from aircraft.interface import GRAVITY_MPS2, AircraftState, Route
+
+LINE_M = 1e5
+OFFSET_M, TURN_RAD = 0.01, 1e-4
+FREQUENCIES_RADPS = np.logspace(-2.5, 2.0, 20_000)
+
+
+class LawMargins(NamedTuple):
+    """How far a law is from swinging on a straight line in calm air."""
+
+    gain: float
+    """The loop may be stronger by this factor."""
+    delay_s: float
+    """The state may be older by this."""
+
+
+def law_margins(kind: GuidanceKind, limits: GuidanceLimits) -> LawMargins:
+    """Margins of a law at its defaults.
+
+    Args:
+        kind: the law.
+        limits: of the aircraft at an airspeed.
+    """
+    speed = limits.airspeed_mps
+
+    def roll_rad(off_m: float, course_rad: float) -> float:
+        law = kind.law(limits)
+        law.follow(Route(np.array([[0.0, 0.0, 0.0, 1.0, 0.0, LINE_M]])), 0.5 * LINE_M)
+        state = AircraftState(
+            time_s=0.0,
+            east_m=off_m,
+            north_m=0.5 * LINE_M,
+            up_m=300.0,
+            velocity_east_mps=speed * math.sin(course_rad),
+            velocity_north_mps=speed * math.cos(course_rad),
+            velocity_up_mps=0.0,
+            heading_rad=course_rad % math.tau,
+            roll_rad=0.0,
+            pitch_rad=0.0,
+            airspeed_mps=speed,
+            load_factor=1.0,
+        )
+        for _ in range(3):  # a command that leads has come to rest
+            output = law.update(state)
+        return output.roll_command_rad
+
+    per_m = (roll_rad(OFFSET_M, 0.0) - roll_rad(-OFFSET_M, 0.0)) / (2.0 * OFFSET_M)
+    per_rad = (roll_rad(0.0, TURN_RAD) - roll_rad(0.0, -TURN_RAD)) / (2.0 * TURN_RAD)
+    s = 1j * FREQUENCIES_RADPS
+    lag_s = 0.0 if kind.kind == DEFAULT_KIND else limits.roll_lag_s
+    roll = np.exp(-s * (limits.roll_delay_s + 0.5 / UPDATE_RATE_HZ)) / (1.0 + lag_s * s)
+    loop = -GRAVITY_MPS2 * (per_m + per_rad * s / speed) * roll / s**2
+    size, phase = np.abs(loop), np.unwrap(np.angle(loop))
+    phase -= math.tau * round((phase[0] + math.pi) / math.tau)  # two integrators: it begins at -pi
+    crossing = int(np.argmax(size < 1.0))
+    turned = np.flatnonzero((phase[:-1] > -math.pi) & (phase[1:] <= -math.pi))
+    gain = 1.0 / float(size[turned[-1]]) if len(turned) else math.inf
+    return LawMargins(gain, float(phase[crossing] + math.pi) / float(FREQUENCIES_RADPS[crossing]))
