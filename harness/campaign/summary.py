@@ -43,6 +43,9 @@ from harness.flight.record import FloatArray
 BY_DEFAULT: Final = 3
 """Without a choice, tables are made of every two of so many varied keys, the first ones."""
 
+WORST_OUTCOMES: Final = ("collision", "lost_control", "out_of_bounds")
+"""Outcomes of which a campaign without any says how frequent they may still be."""
+
 CURVE_POINTS: Final = 201
 
 
@@ -129,6 +132,19 @@ class Summary:
     named: tuple[WorstRun, ...]
     duels: tuple[Duel, ...]
     planned: int | None = None
+
+    @property
+    def never(self) -> str:
+        """Which of the worst outcomes no run had, and how frequent each may still be; empty where each was had.
+
+        The upper bound is that of Clopper and Pearson (1934) for none of n: 1 - (1 - confidence)^(1 / n).
+        """
+        runs = self.total.runs
+        none = [name.replace("_", " ") for name in WORST_OUTCOMES if name not in self.outcomes]
+        if not runs or not none:
+            return ""
+        most = f"{100.0 * (1.0 - (1.0 - CONFIDENCE) ** (1.0 / runs)):.3g} %"
+        return f"{', '.join(none)}: 0 of {runs}, each less frequent than {most} at {100 * CONFIDENCE:.0f} % confidence"
 
     @property
     def missing(self) -> int:

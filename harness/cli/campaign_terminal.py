@@ -195,6 +195,8 @@ def print_summary(summary: Summary, all_tables: bool = False) -> None:
         else counted(summary.total.runs, "run")
     )
     console.print(f"{plain(summary.name)}: {runs}" + (f": {ended}" if ended else ""))
+    if summary.never:
+        console.print(plain(summary.never), highlight=False)
     if summary.missing:
         are, them = ("is missing", "it") if summary.missing == 1 else ("are missing", "them")
         console.print(f"[bold yellow]not complete[/]: {summary.missing} {are}, --resume flies {them}")

@@ -751,3 +751,17 @@ def test_the_legend_lies_within_the_figure(names: tuple[str, ...]) -> None:
     (legend,) = figure.legends
     box, whole = legend.get_window_extent(), figure.bbox
     assert whole.x0 <= box.x0 < box.x1 <= whole.x1
+
+
+def test_what_never_happened_has_an_upper_bound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of 0 of 286, Clopper and Pearson's bound at 95 % is 1.04 %: 0.98959^286 = 0.05."""
+    folder = campaign(
+        tmp_path / "c", [row(run, "collision" if run == 9 else "reached") for run in range(286)]
+    )
+    summary = summarise(folder)
+    assert (
+        summary.never
+        == "lost control, out of bounds: 0 of 286, each less frequent than 1.04 % at 95 % confidence"
+    )
+    print_summary(summary)
+    assert "0 of 286" in capsys.readouterr().out
