@@ -49,7 +49,7 @@ def compare(
     """
     import pyarrow as pa
 
-    from harness.comparison.comparison import fly_and_compare
+    from harness.comparison.comparison import Setup, fly_and_compare
     from harness.scenario.given import GUIDANCE, PLANNER, is_source
 
     given = [scenarios] if isinstance(scenarios, Scenario | str | Path) else scenarios
@@ -64,12 +64,14 @@ def compare(
         compared = fly_and_compare(
             [each.with_(keys) for each in loaded for keys in chosen],
             Path(out),
-            recording=recording,
-            kinematic=kinematic,
-            workers=workers or os.cpu_count() or 1,
-            command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds}{of_laws})"),
-            sources=[each for each in planners if is_source(each)],
-            law_sources=[each for each in guidance or () if is_source(each)],
+            Setup(
+                recording=recording,
+                kinematic=kinematic,
+                workers=workers or os.cpu_count() or 1,
+                command=in_python(f"wayproof.compare({[each.name for each in loaded]}, {kinds}{of_laws})"),
+                sources=tuple(each for each in planners if is_source(each)),
+                law_sources=tuple(each for each in guidance or () if is_source(each)),
+            ),
         )
     return ComparisonResult(pa.Table.from_pylist([asdict(row) for row in compared.rows]), Path(out))
 

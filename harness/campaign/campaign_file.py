@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, Strict, ValidationError, model_vali
 
 from harness.campaign.sampling import Distribution, Sampler
 from harness.files import strict_yaml
-from harness.files.strict_yaml import InputError, Loc, Node, fault_line, node_of
+from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node, fault_line, node_of
 from harness.scenario.files_resolved import file_beside
 from harness.scenario.generators.generators import WorldSpec
 from harness.scenario.resolving import model_or_folder
@@ -200,13 +200,20 @@ class CampaignFile:
         return cls(_validated(root, source), source, root, bases)
 
 
-def load_campaign(path: Path) -> CampaignFile:
+def load_campaign(
+    path: Path, planners: Sequence[str] = (), settings: Sequence[tuple[str, str]] = ()
+) -> CampaignFile:
     """Reads a campaign file and the scenario files that it names; the scenarios themselves are not checked.
+
+    Args:
+        path: the file.
+        planners: kinds that fly in place of those that the file names.
+        settings: keys that are added to `set`, and their values as YAML; `seed` replaces that of the campaign.
 
     Raises:
         InputError: a file cannot be read or is not a campaign; a line of its text names file, line and key.
     """
-    source, root = str(path), strict_yaml.read(path)
+    source, root = str(path), _with_options(strict_yaml.read(path), planners, settings)
     root = _with_folders(_with_world_files(root, path.parent), path.parent)
     campaign = _validated(root, source)
     if not campaign.scenarios:
@@ -223,6 +230,16 @@ def load_campaign(path: Path) -> CampaignFile:
                 raise _fault(source, root, loc, f"is a second scenario called {base.name}; rename one")
             bases[base.name] = base
     return CampaignFile(campaign, source, root, tuple(bases.values()))
+
+
+def _with_options(root: Node, planners: Sequence[str], settings: Sequence[tuple[str, str]]) -> Node:
+    """A campaign's keys with what a command line replaces."""
+    if planners:
+        root = strict_yaml.replaced(root, ("planners",), node_of(tuple(planners), COMMAND_LINE))
+    for name, text in settings:
+        value = strict_yaml.parse(text, f"command line: {name}").moved(COMMAND_LINE)
+        root = strict_yaml.replaced(root, ("seed",) if name == "seed" else ("set", name), value)
+    return root
 
 
 def is_campaign(path: Path) -> bool:

@@ -33,7 +33,7 @@ class Job:
         run: its number.
         packed: the scenario to fly (`harness.scenario.scenario.packed`).
         folder: the run folder, if it is kept.
-        recordings: when it is kept.
+        recordings: when it is kept; `folders`: always, without recordings.
         optimum: whether to compute the shortest path of the world.
         again: the command line that flies it again.
         varied: the keys that the campaign varies and their values in this run, for the recording's properties.
@@ -41,12 +41,14 @@ class Job:
         path: a pickled `PathCheck`, if a given path is flown in place of what a planner finds; `packed` is empty then.
         planners: planners that the process has to import, as FILE.py:NAME or MODULE:NAME.
         laws: guidance laws that it has to import, likewise.
+        kinematic: a point that follows the plans exactly flies in place of the aircraft.
+        identity: of the recording among others; empty: as `fly_to_folder` has it.
     """
 
     run: int
     packed: bytes
     folder: Path
-    recordings: Literal["all", "thin", "failures", "none"]
+    recordings: Literal["all", "thin", "failures", "none", "folders"]
     optimum: bool
     again: str = ""
     varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
@@ -54,6 +56,8 @@ class Job:
     path: bytes | None = None
     planners: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
+    kinematic: bool = False
+    identity: str = ""
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,8 @@ def failed(run: int, reason: str, error: str) -> Answer:
 
 def _flown(job: Job, scenario: Scenario, check: PathCheck | None) -> dict[str, Any]:
     kept = _kept(job, scenario) if check is None else _kept_path(job, check)
+    if job.recordings == "folders":
+        return kept(recording=False)
     if job.recordings in ("all", "thin"):
         try:
             return kept(thin=job.recordings == "thin")
@@ -154,14 +160,15 @@ def _measured(scenario: Scenario, check: PathCheck | None) -> dict[str, Any]:
 
 def _kept(job: Job, scenario: Scenario) -> Callable[..., dict[str, Any]]:
     """Flies a scenario into the job's run folder."""
-    from harness.run.scenario_flight import fly_to_folder
+    from harness.run.scenario_flight import fly_to_folder, kinematic_loop, make_loop
 
     return partial(
         fly_to_folder,
         scenario,
         job.folder,
         recording=True,
-        identity=f"run {job.run}",
+        make=kinematic_loop if job.kinematic else make_loop,
+        identity=job.identity or None,
         varied=job.varied,
         command=job.again or None,
     )

@@ -75,9 +75,18 @@ class _Place(NamedTuple):
 
 
 class CampaignRuns:
-    """All runs of a campaign."""
+    """All runs of a campaign.
 
-    def __init__(self, file: CampaignFile) -> None:
+    Args:
+        file: the campaign.
+        planners: planners that who flies has to import, as FILE.py:NAME or MODULE:NAME.
+        laws: guidance laws, likewise.
+    """
+
+    def __init__(
+        self, file: CampaignFile, planners: tuple[str, ...] = (), laws: tuple[str, ...] = ()
+    ) -> None:
+        self._sources = planners, laws
         self.file, self.campaign = file, file.campaign
         campaign = file.campaign
         grids = [range(len(values)) for values in campaign.grid.values()]
@@ -223,6 +232,9 @@ class CampaignRuns:
             self.campaign.optimum,
             self.again(number, folder),
             {name: value for name, value in self.run(number).varied.items() if value is not None},
+            planners=self._sources[0],
+            laws=self._sources[1],
+            identity=f"run {number}",
         )
 
     def again(self, number: int, folder: Path) -> str:

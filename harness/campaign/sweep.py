@@ -59,42 +59,68 @@ def fly_missing(
         OSError: the folder, or a run folder in it, cannot be written; or who flies has gone.
     """
     left: list[int] = []
-    jobs = _jobs(runs, folder)
+    tables_due = time.monotonic()
+
+    def over(run: int, answer: Answer | None) -> None:
+        if answer is None or answer.row["outcome"] == ERROR:
+            # What a crash has left is no whole run folder.
+            shutil.rmtree(folder.path / RUNS / str(run), ignore_errors=True)
+        if answer is None:
+            left.append(run)
+            return
+        folder.append(run, _row(runs, answer), answer.times, answer.held)
+        if progress is not None:
+            progress(answer)
+
+    def write_at_times() -> None:
+        nonlocal tables_due
+        if time.monotonic() >= tables_due:
+            begun = time.monotonic()
+            folder.write_tables()
+            took_s = time.monotonic() - begun
+            tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
+
+    try:
+        fly_jobs(_jobs(runs, folder), workers, over, write_at_times, enough)
+    finally:
+        folder.write_tables()
+    return sorted(left)
+
+
+def fly_jobs(
+    jobs: Iterator[Job],
+    workers: Workers,
+    over: Callable[[int, Answer | None], None],
+    between: Callable[[], None] = lambda: None,
+    enough: Callable[[], bool] = lambda: False,
+) -> None:
+    """Hands out jobs until none is left.
+
+    Args:
+        jobs: made when it is their turn.
+        workers: who flies.
+        over: told of every job that is over, by its number; None where the machine kept it from its end.
+        between: called after every look.
+        enough: asked before every look; what still flies is given up then.
+
+    Raises:
+        OSError: a run folder cannot be written; or who flies has gone.
+    """
     ahead = next(jobs, None)
     flying: dict[Future[Answer], int] = {}
-    tables_due = time.monotonic()
     # An interrupt that is raised inside `concurrent.futures` leaves a future locked, and who ends the workers waits for
     # it without end.
     with held_back() as let_interrupt_through:
-        try:
-            while (ahead is not None or flying) and not enough():
-                let_interrupt_through()
-                while ahead is not None and workers.free() > 0:
-                    flying[workers.start(ahead)] = ahead.run
-                    ahead = next(jobs, None)
-                if not flying:
-                    _sleep(LOOK_S, let_interrupt_through)
-                for future in wait(flying, timeout=INTERRUPT_S, return_when=FIRST_COMPLETED).done:
-                    run = flying.pop(future)
-                    answer = _answer(future)
-                    if answer is None:
-                        left.append(run)
-                        shutil.rmtree(folder.path / RUNS / str(run), ignore_errors=True)
-                        continue
-                    if answer.row["outcome"] == ERROR:
-                        # What a crash has left is no whole run folder.
-                        shutil.rmtree(folder.path / RUNS / str(answer.run), ignore_errors=True)
-                    folder.append(answer.run, _row(runs, answer), answer.times, answer.held)
-                    if progress is not None:
-                        progress(answer)
-                if time.monotonic() >= tables_due:
-                    begun = time.monotonic()
-                    folder.write_tables()
-                    took_s = time.monotonic() - begun
-                    tables_due = time.monotonic() + max(TABLES_EVERY_S, took_s / TABLES_SHARE)
-        finally:
-            folder.write_tables()
-    return sorted(left)
+        while (ahead is not None or flying) and not enough():
+            let_interrupt_through()
+            while ahead is not None and workers.free() > 0:
+                flying[workers.start(ahead)] = ahead.run
+                ahead = next(jobs, None)
+            if not flying:
+                _sleep(LOOK_S, let_interrupt_through)
+            for future in wait(flying, timeout=INTERRUPT_S, return_when=FIRST_COMPLETED).done:
+                over(flying.pop(future), _answer(future))
+            between()
 
 
 def _sleep(seconds: float, let_interrupt_through: Callable[[], None]) -> None:

@@ -77,11 +77,17 @@ class Days(CampaignRuns):
     Attributes:
         claim: what is claimed of each.
         vary: what is drawn, by key path.
-        sources: planners, and guidance laws, that who flies has to import, as FILE.py:NAME or MODULE:NAME.
     """
 
     def __init__(
-        self, base: Base, vary: Mapping[str, Mapping[str, Any]], *, claim: Claim, seed: int, most: int
+        self,
+        base: Base,
+        vary: Mapping[str, Mapping[str, Any]],
+        *,
+        claim: Claim,
+        seed: int,
+        most: int,
+        sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
     ) -> None:
         """Makes the days; nothing is flown.
 
@@ -91,6 +97,7 @@ class Days(CampaignRuns):
             claim: what is claimed of each day.
             seed: root seed of all draws.
             most: number of days that may be flown.
+            sources: planners and guidance laws, as `CampaignRuns` takes them.
 
         Raises:
             InputError: a key or a distribution is none.
@@ -110,10 +117,9 @@ class Days(CampaignRuns):
             campaign = Campaign.model_validate(plain)
         except ValidationError as error:
             raise input_error(error, Campaign, root, "command line") from error
-        super().__init__(CampaignFile(campaign, "command line", root, (base,)))
+        super().__init__(CampaignFile(campaign, "command line", root, (base,)), *sources)
         self.claim: Claim = claim
         self.vary = vary
-        self.sources: tuple[tuple[str, ...], tuple[str, ...]] = (), ()
 
     def flown(self, number: int) -> Scenario:
         """The scenario of day `number`, complete."""
@@ -121,8 +127,7 @@ class Days(CampaignRuns):
 
     def job(self, number: int, folder: Path) -> Job:
         """Day `number` as it is handed to who flies it."""
-        planners, laws = self.sources
-        return replace(super().job(number, folder), claim=self.claim, planners=planners, laws=laws)
+        return replace(super().job(number, folder), claim=self.claim)
 
     def plain(self) -> dict[str, Any]:
         """All that says what is flown, and what is claimed."""

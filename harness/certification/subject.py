@@ -86,6 +86,7 @@ class Asked:
         vary: as `Days` takes it.
         claim: what is claimed of each day; None: `reached`, of a path `as-given`.
         most: number of days that may be flown.
+        sources: planners and guidance laws, as `CampaignRuns` takes them.
     """
 
     subject: Scenario | str | Path | Sequence[Sequence[float]]
@@ -93,10 +94,11 @@ class Asked:
     vary: Mapping[str, Mapping[str, Any]]
     claim: Claim | None
     most: int
+    sources: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def terms(self, default: Claim, seed: int) -> dict[str, Any]:
         """What `Days` is told besides."""
-        return {"claim": self.claim or default, "seed": seed, "most": self.most}
+        return {"claim": self.claim or default, "seed": seed, "most": self.most, "sources": self.sources}
 
 
 def days_of(asked: Asked, world: Path | None = None) -> Days:

@@ -17,10 +17,11 @@ import typer
 
 from harness.cli.certify import certify
 from harness.cli.check import check
+from harness.cli.compare import compare
 from harness.cli.envelope import envelope
 from harness.cli.export import export
 from harness.cli.falsify import falsify
-from harness.cli.flights import bench, compare, fly
+from harness.cli.flights import bench, fly
 from harness.cli.formats import schema, validate
 from harness.cli.names import list_names
 from harness.cli.options import BAD_INPUT, FAILED, Command, Group, flag

@@ -30,6 +30,7 @@ from harness.cli.options import (
     flag,
     print_json,
     settings_of,
+    sources,
     told_apart,
 )
 from harness.cli.standard_output import say
@@ -126,9 +127,10 @@ def certify(
         raise typer.BadParameter(str(error), param_hint="--vary") from error
     if claim is not None and claim not in CLAIMS:
         raise typer.BadParameter(f"{claim[:60]!r} is not {', '.join(CLAIMS)}", param_hint="--claim")
-    asked = Asked(subject, [*options, *replaced], drawn, claim, runs or MOST_RUNS)
+    asked = Asked(
+        subject, [*options, *replaced], drawn, claim, runs or MOST_RUNS, (sources(planner), sources(guidance))
+    )
     days = days_of(asked, None if world is None else scenario_path(world))
-    days.sources = _sources(planner), _sources(guidance)
     days.check()
     apart = told_apart([*asked.settings, *((key, str(each)) for key, each in drawn.items())], named=())
     folder = out or Path("runs") / days.campaign.name / f"certify-{days.claim}{apart}"
@@ -154,12 +156,6 @@ def certify(
             first = folder / "runs" / str(certificate.failing_runs[0])
             say(f"view: {shlex.join(['wayproof', 'view', str(first)])}")
     return 0 if certificate.verdict == "shown" else FAILED
-
-
-def _sources(name: str | None) -> tuple[str, ...]:
-    from harness.scenario.given import is_source
-
-    return (name,) if name is not None and is_source(name) else ()
 
 
 def _fly(

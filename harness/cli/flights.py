@@ -1,9 +1,7 @@
-"""The commands that fly: `fly`, `compare`, `bench`."""
+"""The commands `fly` and `bench`."""
 
 from __future__ import annotations
 
-import os
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
@@ -19,6 +17,9 @@ from harness.cli.options import (
     PlannerOption,
     SeedOption,
     SettingsOption,
+    TurbulenceOption,
+    WindOption,
+    air,
     bad_input,
     chosen,
     flag,
@@ -54,6 +55,8 @@ def fly(
     aircraft: AircraftOption = None,
     guidance: GuidanceOption = None,
     conditions: ConditionsOption = None,
+    wind: WindOption = None,
+    turbulence: TurbulenceOption = None,
     seed: SeedOption = None,
     settings: SettingsOption = None,
     results: Annotated[
@@ -90,8 +93,13 @@ def fly(
         raise typer.BadParameter("there is nothing to view with --no-recording; leave one of them out")
     watch = Watch(live, web, speed)
     watch.check()
-    options = chosen(planner, aircraft, seed, guidance, conditions)
-    replaced = [*chosen(guidance=guidance, conditions=conditions), *settings_of(settings, options)]
+    weather = air(wind, turbulence)
+    options = [*chosen(planner, aircraft, seed, guidance, conditions), *weather]
+    replaced = [
+        *chosen(guidance=guidance, conditions=conditions),
+        *weather,
+        *settings_of(settings, options),
+    ]
     given = [*chosen(planner, aircraft, seed), *replaced]
     loaded, digest = _asked(scenario, results, run, given)
     if results is not None:
@@ -154,79 +162,6 @@ def _asked(
     assert results is not None
     assert run is not None
     return flown_run(results, run, overrides)
-
-
-def compare(
-    scenarios: Annotated[list[str], typer.Argument(metavar="SCENARIO...", help="Files or shipped names.")],
-    planners: Annotated[str, typer.Option(metavar="A,B,...", help="Kinds of planners, in order.")],
-    guidance: Annotated[
-        str | None, typer.Option(metavar="X,Y,...", help="Kinds of guidance laws. Default: the scenario's.")
-    ] = None,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="The comparison's folder.")] = Path(
-        "runs/comparison"
-    ),
-    conditions: ConditionsOption = None,
-    kinematic: Annotated[
-        bool, flag("--kinematic", "Fly a point that follows every plan exactly, not the aircraft.")
-    ] = False,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
-    ] = None,
-    no_recording: Annotated[bool, flag("--no-recording", "Write no recordings and no overlay.")] = False,
-    as_json: Annotated[bool, flag("--json", "Print comparison.json, and nothing else.")] = False,
-) -> int:
-    """Flies every planner (under every guidance law) through every scenario: table, figures, report, overlays.
-
-    For example: wayproof compare paper_circles --planners rolling_window,bug2
-
-    Exit status:
-
-    0 every planner reached every goal
-
-    1 one did not, or the software failed in a flight
-
-    2 bad input or usage, nothing flown
-    """
-    named = [kind.strip() for kind in planners.split(",")]
-    laws = [law.strip() for law in guidance.split(",")] if guidance is not None else [None]
-    replaced = [chosen(kind, guidance=law, conditions=conditions) for kind in named for law in laws]
-    loaded = [load(scenario, each) for scenario in scenarios for each in replaced]
-
-    from aircraft.airframes import AircraftError
-    from harness.cli.compare_terminal import comparison_bar, print_comparison
-    from harness.comparison.comparison import INDEX, SCHEMA, fly_and_compare
-    from harness.files.errors import RunFolderError, WriteError
-    from harness.run_files.run_folder import OVERLAY
-    from harness.scenario.given import is_source
-
-    try:
-        with comparison_bar(loaded) as report:
-            comparison = fly_and_compare(
-                loaded,
-                out,
-                recording=not no_recording,
-                kinematic=kinematic,
-                workers=workers or os.cpu_count() or 1,
-                progress=report,
-                sources=[kind for kind in named if is_source(kind)],
-                law_sources=[law for law in laws if law is not None and is_source(law)],
-            )
-    except (RunFolderError, AircraftError) as error:
-        raise bad_input(error) from error
-    except OSError as error:
-        raise WriteError.of("the comparison", out, error) from error
-    except KeyboardInterrupt:
-        tell_interrupted("comparison", out, INDEX, SCHEMA)
-        raise
-    if as_json:
-        print_json(comparison.plain())
-    else:
-        print_comparison(comparison.rows)
-        say(f"report: {out / 'report.html'}")
-        overlays = [out / each.name / OVERLAY for each in loaded]
-        for overlay in [each for each in overlays if each.is_file()][:1]:
-            say(f"view: {shlex.join(['wayproof', 'view', str(overlay)])}")
-    return 0 if comparison.all_reached else FAILED
 
 
 def bench(

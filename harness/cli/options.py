@@ -216,6 +216,13 @@ def planner_kind(text: str) -> str:
     return _kind(text, PLANNER, "--planner")
 
 
+def sources(*names: str | None) -> tuple[str, ...]:
+    """Those of some names that are FILE.py:NAME or MODULE:NAME: a process that flies has to import them too."""
+    from harness.scenario.given import is_source
+
+    return tuple(name for name in names if name is not None and is_source(name))
+
+
 def law_kind(text: str) -> str:
     """The kind that --guidance means, likewise."""
     from harness.scenario.given import GUIDANCE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.cli.options import FAILED, bad_input, flag, print_json
+from harness.cli.options import (
+    FAILED,
+    ConditionsOption,
+    JsonOption,
+    SettingsOption,
+    TurbulenceOption,
+    WindOption,
+    WorkersOption,
+    air,
+    bad_input,
+    chosen,
+    flag,
+    planner_kind,
+    print_json,
+    settings_of,
+    sources,
+)
 from harness.cli.standard_output import say
 
 if TYPE_CHECKING:
@@ -33,9 +50,21 @@ def sweep(
             metavar="CAMPAIGN", help="A campaign file, or a shipped one's name.", autocompletion=_campaigns
         ),
     ],
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Flights at a time. Default: one a processor.")
+    planners: Annotated[
+        str | None,
+        typer.Option(
+            "--planners",
+            "--planner",
+            metavar="A,B,...",
+            help="Replaces planners: kinds, or FILE.py:NAME, MODULE:NAME.",
+        ),
     ] = None,
+    conditions: ConditionsOption = None,
+    wind: WindOption = None,
+    turbulence: TurbulenceOption = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Replaces the campaign's seed.")] = None,
+    settings: SettingsOption = None,
+    workers: WorkersOption = None,
     scheduler: Annotated[
         str | None,
         typer.Option(
@@ -53,7 +82,7 @@ def sweep(
     resume: Annotated[bool, flag("--resume", "Fly only the runs missing in DIR.")] = False,
     dry_run: Annotated[bool, flag("--dry-run", "Print the runs; fly and write nothing.")] = False,
     quiet: Annotated[bool, flag("--quiet", "Print nothing but errors.")] = False,
-    as_json: Annotated[bool, flag("--json", "Print the result as JSON, and nothing else.")] = False,
+    as_json: JsonOption = False,
 ) -> int:
     """Flies a campaign: many flights on all processors or a cluster, one row each in results.parquet.
 
@@ -80,7 +109,10 @@ def sweep(
     from harness.cli.campaign_terminal import print_summary
     from harness.scenario.shipped import campaign_path
 
-    runs = checked(campaign_path(campaign))
+    named = [each.strip() for each in planners.split(",")] if planners else []
+    options = [*chosen(seed=seed, conditions=conditions), *air(wind, turbulence)]
+    fixed = [*options, *settings_of(settings, options)]
+    runs = checked(campaign_path(campaign), named, fixed)
     if dry_run:
         _print_runs(runs, as_json)
         return 0
@@ -103,15 +135,18 @@ def _warn(text: str) -> None:
     say(f"wayproof: {text}", err=True)
 
 
-def checked(path: Path) -> CampaignRuns:
-    """The runs of a campaign file, every scenario of them made once."""
+def checked(
+    path: Path, planners: Sequence[str] = (), settings: Sequence[tuple[str, str]] = ()
+) -> CampaignRuns:
+    """The runs of a campaign file, every scenario of them made once; the rest as `load_campaign` takes it."""
     from harness.campaign.campaign_file import is_scenario, load_campaign
     from harness.campaign.runs import CampaignRuns
     from harness.cli.campaign_terminal import check_bar
     from harness.files.strict_yaml import InputError
 
     try:
-        runs = CampaignRuns(load_campaign(path))
+        kinds = [planner_kind(each) for each in planners]
+        runs = CampaignRuns(load_campaign(path, kinds, settings), sources(*planners))
     except InputError as error:
         if is_scenario(path):
             use = shlex.join(["wayproof", "fly", str(path)])

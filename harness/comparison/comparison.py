@@ -10,15 +10,17 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from harness.analysis.metric import ERROR
 from harness.analysis.rows import Row, to_csv, to_markdown
-from harness.comparison.flights import ComparedAnswer, ComparedFlight, Progress, fly_all
+from harness.campaign.flight import Answer, Job
+from harness.campaign.sweep import fly_jobs
+from harness.campaign.workers import local_workers
 from harness.files.errors import RunFolderError
 from harness.files.folder_lock import FolderLock
 from harness.files.input_file import read_index
@@ -26,7 +28,7 @@ from harness.files.strict_yaml import InputError
 from harness.files.whole_file import replace_text
 from harness.report.chapters import ReportedFlight, chapter, entry, optimum_of
 from harness.run_files.run_folder import OVERLAY, RECORDING, REPORT, load_run
-from harness.scenario.scenario import Scenario
+from harness.scenario.scenario import Scenario, packed
 from harness.world.optimum import Optimum
 
 if TYPE_CHECKING:
@@ -69,75 +71,117 @@ class Comparison:
         }
 
 
+@dataclass(frozen=True)
+class Setup:
+    """How a comparison is flown.
+
+    Attributes:
+        recording: whether to write recordings and overlays.
+        kinematic: a point that follows the plans exactly flies in place of the aircraft.
+        workers: flights at the same time; they change nothing but the time it takes.
+        command: what the report says was called; default: the command line.
+        sources: planners among them that are given as FILE.py:NAME or MODULE:NAME.
+        law_sources: guidance laws among them that are given likewise.
+        shielded: of each flight, whether its planner was put under the shield and is called so; empty: of none.
+    """
+
+    recording: bool = True
+    kinematic: bool = False
+    workers: int = 1
+    command: str | None = None
+    sources: tuple[str, ...] = ()
+    law_sources: tuple[str, ...] = ()
+    shielded: tuple[bool, ...] = ()
+
+    def planner(self, number: int, scenario: Scenario) -> str:
+        """What the planner of a flight is called."""
+        shielded = bool(self.shielded) and self.shielded[number]
+        return f"{scenario.planner.kind}+shield" if shielded else scenario.planner.kind
+
+
 def fly_and_compare(
     scenarios: Sequence[Scenario],
     out: Path,
-    *,
-    recording: bool = True,
-    kinematic: bool = False,
-    workers: int = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    sources: Sequence[str] = (),
-    law_sources: Sequence[str] = (),
+    setup: Setup,
+    progress: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Flies scenarios that differ in name or planner and writes the folder of the comparison.
 
     Args:
         scenarios: one a flight, those of one name together; each names its planner.
         out: the folder.
-        recording: whether to write recordings and overlays.
-        kinematic: a point that follows the plans exactly flies instead of the aircraft.
-        workers: flights at the same time.
-        progress: told of every flight, by its index, as it goes on.
-        command: what the report says was called; default: the command line.
-        sources: planners among them that are given as FILE.py:NAME or MODULE:NAME.
-        law_sources: guidance laws among them that are given likewise.
+        setup: how they are flown.
+        progress: told of every flight that is over how it ended.
 
     Raises:
         InputError: a scenario is there twice with the same planner and guidance, or is called as a file of the
             comparison is.
         RunFolderError: the folder holds something else or cannot be written.
     """
+    planners = [setup.planner(number, each) for number, each in enumerate(scenarios)]
+    laws = _laws(scenarios)
+    names = [f"{each}-{law}" if law else each for each, law in zip(planners, laws, strict=True)]
+    _check(scenarios, names)
     jobs = [
-        ComparedFlight(
-            each,
-            out / each.name / _folder_of(each, scenarios),
-            recording,
-            kinematic,
-            tuple(sources),
-            tuple(law_sources),
+        Job(
+            number,
+            packed(each),
+            (out / each.name / names[number]).resolve(),
+            "all" if setup.recording else "folders",
+            optimum=False,
+            again=setup.command or "",
+            planners=setup.sources,
+            laws=setup.law_sources,
+            kinematic=setup.kinematic,
         )
-        for each in _distinct(scenarios)
+        for number, each in enumerate(scenarios)
     ]
-    called = command or shlex.join(["wayproof", *sys.argv[1:]])
-    begun = Comparison(called, _now(), {}, kinematic, ())
+    begun = Comparison(setup.command or _called(), _now(), {}, setup.kinematic, ())
     lock = _claim(out, begun)
     try:
-        return _compared(jobs, scenarios, out, begun, workers, progress)
+        return _compared(jobs, scenarios, planners, out, begun, setup.workers, progress)
     finally:
         lock.release()
 
 
+def _called() -> str:
+    return shlex.join(["wayproof", *sys.argv[1:]])
+
+
 def _compared(
-    jobs: Sequence[ComparedFlight],
+    jobs: Sequence[Job],
     scenarios: Sequence[Scenario],
+    planners: Sequence[str],
     out: Path,
     begun: Comparison,
     workers: int,
-    progress: Progress | None,
+    progress: Callable[[str], None] | None,
 ) -> Comparison:
     """Flies and writes everything, the folder being ours."""
-    kinematic = begun.kinematic
-    answers = fly_all(jobs, workers, progress)
+    reasons: dict[int, str] = {}
+
+    def over(number: int, answer: Answer | None) -> None:
+        outcome = ERROR if answer is None else answer.row["outcome"]
+        if answer is None:
+            reasons[number] = "the process that flew it died, or had no memory, each time that it was tried"
+        elif outcome == ERROR:
+            reasons[number] = answer.row["reason"]
+        if progress is not None:
+            progress(f"{scenarios[number].name}, {planners[number]}: {outcome}")
+
+    with local_workers(min(workers, len(jobs))) as flyers:
+        fly_jobs(iter(jobs), flyers, over)
     by_name = _by_name(scenarios)
     optima = {name: optimum_of(own[0]) for name, own in by_name.items()}
     laws = _laws(scenarios)
-    entries = [_entry(job, answer, optima, law) for job, answer, law in zip(jobs, answers, laws, strict=True)]
+    entries = [
+        _entry(each, jobs[number], planners[number], reasons.get(number), optima[each.name], laws[number])
+        for number, each in enumerate(scenarios)
+    ]
     runs = [each.run for each in entries if each.run]
     named = runs[0].manifest["versions"] if runs else {}
     versions = {name: version for name, version in named.items() if version}
-    done = Comparison(begun.command, begun.started_utc, versions, kinematic, tuple(e.row for e in entries))
+    done = replace(begun, versions=versions, rows=tuple(each.row for each in entries))
     chapters = []
     for name, own in by_name.items():
         flights = [each for each in entries if each.row.scenario == name]
@@ -166,25 +210,21 @@ def _laws(scenarios: Sequence[Scenario]) -> list[str]:
     return kinds if len(set(kinds)) > 1 else ["" for _ in kinds]
 
 
-def _folder_of(scenario: Scenario, scenarios: Sequence[Scenario]) -> str:
-    """Name of a flight's run folder among those of its scenario."""
-    law = scenario.guidance.kind if any(_laws(scenarios)) else ""
-    return f"{scenario.planner.kind}-{law}" if law else scenario.planner.kind
-
-
-def _distinct(scenarios: Sequence[Scenario]) -> Sequence[Scenario]:
+def _check(scenarios: Sequence[Scenario], names: Sequence[str]) -> None:
+    """Refuses two flights of one name, and a scenario that is called as a file of the comparison is."""
     seen = set()
-    for each in scenarios:
-        name, kind, law = flight = each.name, each.planner.kind, each.guidance.kind
-        if flight in seen:
-            under = f" under {law}" if any(_laws(scenarios)) else ""
+    for each, called in zip(scenarios, names, strict=True):
+        if (each.name, called) in seen:
+            under = f" under {each.guidance.kind}" if any(_laws(scenarios)) else ""
             raise InputError(
-                f"wayproof: {kind} is to fly {name} twice{under}; leave one out or rename the scenario"
+                f"wayproof: {each.planner.kind} is to fly {each.name} twice{under}; leave one out or rename the "
+                "scenario"
             )
-        if name in (INDEX, CSV, MARKDOWN, REPORT):
-            raise InputError(f"wayproof: a scenario is called {name}, as a file of the comparison; rename it")
-        seen.add(flight)
-    return scenarios
+        if each.name in (INDEX, CSV, MARKDOWN, REPORT):
+            raise InputError(
+                f"wayproof: a scenario is called {each.name}, as a file of the comparison; rename it"
+            )
+        seen.add((each.name, called))
 
 
 def _claim(out: Path, begun: Comparison) -> FolderLock:
@@ -212,13 +252,14 @@ def _write_index(out: Path, comparison: Comparison, *, complete: bool) -> None:
 
 
 def _entry(
-    job: ComparedFlight, answer: ComparedAnswer, optima: Mapping[str, Optimum], law: str
+    scenario: Scenario, job: Job, planner: str, crash: str | None, optimum: Optimum, law: str
 ) -> ReportedFlight:
-    name, planner = job.scenario.name, job.scenario.planner.kind
-    if answer.crash:
-        row = Row(name, planner, ERROR, answer.crash, optimum_m=optima[name].length_m, guidance=law)
-        return ReportedFlight(row)
-    return entry(job.scenario, load_run(job.folder), optima[name], job.kinematic, law)
+    if crash is not None:
+        return ReportedFlight(
+            Row(scenario.name, planner, ERROR, crash, optimum_m=optimum.length_m, guidance=law)
+        )
+    found = entry(scenario, load_run(job.folder), optimum, job.kinematic, law)
+    return replace(found, row=replace(found.row, planner=planner))
 
 
 def _overlay(folder: Path, entries: Sequence[ReportedFlight]) -> None:

@@ -510,7 +510,8 @@ def test_shipped_campaigns_are_valid_and_named_after_their_files(name: str) -> N
     assert is_campaign(path)
     runs = CampaignRuns(load_campaign(path))
     assert runs.campaign.name == name
-    assert f"{len(runs)} flights" in second
+    comment = path.read_text().partition("schema:")[0]
+    assert f"{len(runs)} flights" in comment
     for number in {*range(0, len(runs), 37), len(runs) - 1}:
         runs.scenario(number)
 

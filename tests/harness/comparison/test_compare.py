@@ -24,7 +24,7 @@ from harness.analysis.metric import number
 from harness.analysis.planned import PlannedRows, planned_rows
 from harness.analysis.rows import Row, row_of, to_csv, to_markdown
 from harness.cli.app import main
-from harness.cli.compare_terminal import print_comparison
+from harness.cli.compare import print_comparison
 from harness.flight.record import AcceptedPlan, Track
 from harness.report import figure_style, figures
 from harness.report.page import Chapter, report_html
@@ -162,7 +162,7 @@ def test_an_error_is_a_row_and_the_others_fly_on(flown: Path) -> None:
     rows = rows_of(flown)
     assert [row["planner"] for row in rows] == ["rolling_window", "corner", "dies", "raises"]
     assert [row["outcome"] for row in rows] == ["reached", "reached", "error", "error"]
-    assert rows[2]["reason"] == "its process ended with exit status 7 before the flight did"
+    assert rows[2]["reason"].startswith("the process that flew it died")
     told = "ValueError: <script>alert(1)</script> | *not* to be run"
     assert rows[3]["reason"] == f"the planner raises cannot be made: {told}"
     assert rows[3]["flown_length_m"] is None
@@ -407,7 +407,7 @@ def test_an_interrupt_ends_all_flights_and_leaves_an_incomplete_comparison(place
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert said.splitlines() == [f"wayproof: interrupted; the comparison in {out} is marked incomplete"]
+    assert said.splitlines()[-1] == f"wayproof: interrupted; the comparison in {out} is marked incomplete"
     assert json.loads((out / "comparison.json").read_text())["complete"] is False
     assert (
         json.loads((out / "paper_circles" / "rolling_window" / "manifest.json").read_text())["complete"]
