@@ -259,7 +259,8 @@ def _entry(
             Row(scenario.name, planner, ERROR, crash, optimum_m=optimum.length_m, guidance=law)
         )
     found = entry(scenario, load_run(job.folder), optimum, job.kinematic, law)
-    return replace(found, row=replace(found.row, planner=planner))
+    row = found.row
+    return replace(found, row=Row(row.scenario, planner, reason=row.reason, guidance=law, **row.figures))
 
 
 def _overlay(folder: Path, entries: Sequence[ReportedFlight]) -> None:

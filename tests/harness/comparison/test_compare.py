@@ -173,7 +173,7 @@ def test_figures_are_those_of_the_runs(flown: Path) -> None:
     for row in rows_of(flown)[:2]:
         said = load_run(flown / "ring" / row["planner"]).metrics
         assert row["digest"] == said["digest"]
-        assert row["cross_track_max_m"] == said["cross_track_m"]["max"]
+        assert row["total_system_error_max_m"] == said["total_system_error_m"]["max"]
         assert row["planned_heading_change_deg"] == said["smoothness"]["planned"]["heading_change_deg"]
         assert row["planner_max_ms"] == said["compute_ms"]["max"]
         assert row["optimum_m"] == pytest.approx(OPTIMUM_M, rel=1e-9)
@@ -205,7 +205,7 @@ def test_a_corner_is_tighter_than_the_aircraft_and_is_not_tracked(flown: Path) -
     # 90 degrees in one second of flight.
     assert corner["tightest_turn"] == pytest.approx(math.pi / 2 / 25.0 * corner["turn_radius_m"], rel=1e-2)
     assert corner["trackable"] is False
-    assert corner["cross_track_max_m"] > 10.0
+    assert corner["total_system_error_max_m"] > 10.0
 
 
 @pytest.mark.flights
