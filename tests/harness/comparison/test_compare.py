@@ -288,7 +288,7 @@ def test_a_point_flies_every_plan_exactly_with_any_number_of_workers(
     assert answers[0] == answers[1]
     ring, drift = answers[0]
     assert (ring["scenario"], drift["scenario"]) == ("ring", "drift")
-    assert ring["cross_track_max_m"] == 0.0
+    assert ring["total_system_error_max_m"] == 0.0
     assert ring["trackable"] is None
     # The flight ends at the edge of the goal circle, at the first look inside it.
     assert ring["flown_length_m"] == pytest.approx(2400.0 + 2400.0 - 60.0, abs=3.0)
