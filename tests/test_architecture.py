@@ -143,7 +143,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("api",),
         ("cli",),
         ("certification", "comparison"),
-        ("bench", "campaign", "falsify", "replay"),
+        ("bench", "campaign", "falsify", "replays"),
         ("learning", "report", "watching"),
         ("run",),
         ("recording",),

@@ -16,11 +16,11 @@ import numpy as np
 import pyarrow.parquet as pq
 
 from harness.flight.record import FloatArray
-from harness.replay.flown import FlownFlight
-from harness.replay.page import rows_of
-from harness.replay.replay import Replay, replay
-from harness.replay.replay_figure import replay_figure
-from harness.replay.wind import fit_wind
+from harness.replays.flown import FlownFlight
+from harness.replays.page import rows_of
+from harness.replays.replay import Replay, replay
+from harness.replays.replay_figure import replay_figure
+from harness.replays.wind import fit_wind
 from harness.report.figure_style import svg
 
 HERE = Path(__file__).parents[1] / "aircraft"

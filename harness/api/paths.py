@@ -16,7 +16,7 @@ from harness.scenario.shipped import scenario_path
 if TYPE_CHECKING:
     import numpy as np
 
-    from harness.replay.replay import Replay
+    from harness.replays.replay import Replay
 
     Points = Sequence[Sequence[float]] | np.ndarray[Any, Any]
 
@@ -123,7 +123,7 @@ def replay(
     Raises:
         InputError: log, mission, aircraft or folder cannot be used; nothing was flown.
     """
-    from harness.replay.replay import replay as flown_anew
+    from harness.replays.replay import replay as flown_anew
 
     with as_input_errors():
         return flown_anew(

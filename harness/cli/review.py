@@ -258,8 +258,8 @@ def replay(
     from aircraft.airframes import AircraftError
     from harness.cli.terminal import print_grid
     from harness.files.errors import RunFolderError, WriteError
-    from harness.replay.page import rows_of
-    from harness.replay.replay import replay as flown_anew
+    from harness.replays.page import rows_of
+    from harness.replays.replay import replay as flown_anew
 
     options = chosen(guidance=guidance)
     overrides = [*options, *settings_of(settings, options)]

@@ -15,11 +15,11 @@ from harness.files.errors import RunFolderError
 from harness.files.input_file import InputError
 from harness.files.whole_file import replace_text
 from harness.flight.record import FloatArray
-from harness.replay.flown import FlownFlight, read_flown
-from harness.replay.measures import Side, legs_of
-from harness.replay.mission import FlownMission, Origin, read_mission
-from harness.replay.simulated import Asked, fly_anew, scenario_for
-from harness.replay.wind import FittedWind, fit_wind, fit_windows
+from harness.replays.flown import FlownFlight, read_flown
+from harness.replays.measures import Side, legs_of
+from harness.replays.mission import FlownMission, Origin, read_mission
+from harness.replays.simulated import Asked, fly_anew, scenario_for
+from harness.replays.wind import FittedWind, fit_wind, fit_windows
 
 INDEX: Final = "replay.json"
 SIMULATED: Final = "simulated"
@@ -63,10 +63,10 @@ def replay(
     """Flies the mission of a log with the simulated aircraft in the wind that the log shows.
 
     Args:
-        log: as `harness.replay.flown.read_flown` takes it.
+        log: as `harness.replays.flown.read_flown` takes it.
         aircraft: a name that `wayproof list aircraft` prints, or a folder.
         out: folder to write.
-        mission: as `harness.replay.mission.read_mission` takes it; None: corners are told from the log.
+        mission: as `harness.replays.mission.read_mission` takes it; None: corners are told from the log.
         overrides: keys of the simulated flight's scenario to replace, `guidance.kind` for one, as
             `harness.scenario.scenario.load_scenario` takes them.
         windows: the wind changes as the log shows it; else it is steady.
@@ -138,9 +138,10 @@ def _laps(legs: FloatArray, asked: Asked) -> FloatArray:
 def _asked(flight: FlownFlight, mission: FlownMission, winds: list[FittedWind], wind: FittedWind) -> Asked:
     """Where it begins, and with which airspeed and height."""
     airspeed, commanded = flight.airspeed_mps, mission.airspeed_mps
-    through = np.hypot(flight["ve_mps"] - wind.east_mps, flight["vn_mps"] - wind.north_mps)
-    if commanded is None:
-        commanded = float(np.nanmedian(through if airspeed is None else airspeed))
+    if airspeed is None:
+        commanded = wind.airspeed_mps
+    elif commanded is None:
+        commanded = float(np.nanmedian(airspeed))
     elif "airspeed_tas_mps" in flight and "airspeed_ias_mps" in flight:
         commanded *= float(np.nanmedian(flight["airspeed_tas_mps"] / flight["airspeed_ias_mps"]))
     if mission.height_m is not None and "baro_height_m" in flight:
@@ -190,7 +191,7 @@ def _compared(sides: Mapping[str, Side]) -> dict[str, Any]:
 
 def _write(found: Replay, sides: Mapping[str, Side], recording: bool) -> None:
     """Writes the recording of both, the page and, last, the index."""
-    from harness.replay.page import replay_html
+    from harness.replays.page import replay_html
 
     if recording:
         from harness.recording.tracks import write_tracks

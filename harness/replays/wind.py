@@ -14,7 +14,7 @@ import numpy as np
 
 from harness.files.input_file import InputError
 from harness.flight.record import FloatArray
-from harness.replay.flown import FlownFlight
+from harness.replays.flown import FlownFlight
 
 STEPS = 50
 LEAST_TURN_DEG = 90.0

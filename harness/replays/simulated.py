@@ -16,9 +16,9 @@ from harness.files.input_file import InputError
 from harness.flight.closed_loop import Loop
 from harness.flight.record import FloatArray, Outcome
 from harness.flight.termination import Ending
-from harness.replay.flown import FlownFlight
-from harness.replay.mission import FlownMission
-from harness.replay.wind import FittedWind
+from harness.replays.flown import FlownFlight
+from harness.replays.mission import FlownMission
+from harness.replays.wind import FittedWind
 from harness.run.path_flight import GivenPath
 from harness.run.scenario_flight import fly_to_folder, make_loop
 from harness.run_files.run_folder import load_run

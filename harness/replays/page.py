@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from harness.replay.replay_figure import replay_figure
+from harness.replays.replay_figure import replay_figure
 from harness.report.page import Picture, rendered
 
 if TYPE_CHECKING:
-    from harness.replay.replay import Replay
+    from harness.replays.replay import Replay
 
 FIGURES = {
     "outside_p95_m": "outside the corners, p95, m",

@@ -96,6 +96,20 @@ def test_thor_is_flown_as_near_as_asked_and_its_own_figures_are_found(
     assert again.digest == wayproof.fly(again.scenario).digest or again.outcome == "reached"
 
 
+@needs_flown
+def test_a_log_of_positions_alone_shows_the_same_wind_and_laps(tmp_path: Path) -> None:
+    table = pq.read_table(FLOWN / "thor75.parquet", columns=["time_s", "east_m", "north_m", "up_m", "lap"])
+    pq.write_table(table, tmp_path / "log.parquet")
+    mission = FLOWN / "thor75.json"
+    told = wayproof.replay(tmp_path / "log.parquet", "ultrastick25e", mission, out=tmp_path / "out").told
+    fitted = json.loads(mission.read_text())["all_laps_of_this_file"]["wind_fit"]
+    assert told["wind"]["speed_mps"] == pytest.approx(fitted["speed_mps"], abs=0.3)
+    assert told["wind"]["from_deg"] == pytest.approx(fitted["from_deg"], abs=3.0)
+    assert told["simulated"]["lap_mean_s"] == pytest.approx(told["flown"]["lap_mean_s"], rel=0.03)
+    assert told["distance_between_m"]["p50"] < 3.0
+    assert told["notes"] == ["velocity over the ground: from the positions"]
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
