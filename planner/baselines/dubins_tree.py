@@ -25,10 +25,10 @@ from planner.geometry.clearance import first_breach
 from planner.geometry.curves import SHORTEST_M, Point, Pose, Segment, along
 from planner.geometry.joining import branch_off, stuck
 from planner.geometry.margin import MARGIN_KEY, margin_of
+from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.kernels.fans import too_near
 from planner.memory import ObstacleMemory
-from planner.rolling_window.route_optimisation import Terrain
 
 GOAL_COURSES = 8
 """The goal may be reached on this many courses."""

@@ -12,11 +12,11 @@ from planner.geometry.course import Course
 from planner.geometry.curves import Point, Pose, place_on
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanPicture, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
-from planner.rolling_window.certificate import Certified, Certifier, hold_centre
-from planner.rolling_window.committed_plan import CommittedPlan
 from planner.rolling_window.local_planning import LocalPlanning, Start
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.window import guide_vector
+from planner.shield.certificate import Certified, Certifier, hold_centre
+from planner.shield.committed_plan import CommittedPlan
 
 PROGRESS = 0.25
 """A new plan leads on if it gains at least this share of the hold radius along its course, and ends in a hold at least
@@ -62,7 +62,7 @@ class Commitment:
         """
         certifier = self._certifier(1.5 * request.seen.spacing_m)
         turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        terrain = self._local.terrain(turn_keeps)
+        terrain = self._local.room.terrain(turn_keeps)
         certified = certifier.certify(course.path, request.seen, terrain, cut_m)
         if certified is None or not self._leads_on(certified.loiter_entry_m, course):
             certified = self._to_goal(certifier, course, request.seen, cut_m) or certified
@@ -134,7 +134,7 @@ class Commitment:
 
     def _certifier(self, spacing_m: float) -> Certifier:
         mission = self._mission
-        return Certifier(self._local.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
+        return Certifier(self._local.room.holds, mission.clearance_m, mission.sensor_range_m, spacing_m)
 
 
 def explanation(position: Point, goal: Point, nodes: Sequence[Point]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from planner.geometry.joining import LEAD_S as LEAD_S
 from planner.geometry.margin import MARGIN_KEY, margin_of
 from planner.interface import Mission
-from planner.rolling_window.certificate import least_sensor_range_m
+from planner.shield.certificate import least_sensor_range_m
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from planner.geometry.curves import Point
+from planner.geometry.terrain import Tally
 from planner.interface import FloatArray
 from planner.kernels.wave import close_cells, spread_wave
-from planner.rolling_window.window import Tally
 
 CELLS = 5.0
 """The distance that is kept from edge points is so many cells long."""

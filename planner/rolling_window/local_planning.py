@@ -10,15 +10,17 @@ import numpy as np
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Limits, Point, Pose, Segment, onward_in_turn
+from planner.geometry.terrain import PLACE, Tally, Terrain
 from planner.interface import FloatArray, Mission, Path
 from planner.kernels.segments import to_nearer
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
 from planner.rolling_window.pose_search import search_poses
-from planner.rolling_window.route_optimisation import FlyableRoute, Terrain, optimise
+from planner.rolling_window.route_optimisation import FlyableRoute, optimise
 from planner.rolling_window.trail import Trail
-from planner.rolling_window.window import PLACE, Tally, Window
+from planner.rolling_window.window import Window
+from planner.shield.room import Room
 
 SEARCH_SHARE, PATH_SHARE = 0.7, 0.4
 """Shares of the margin. Straight steps keep the first beyond the clearance, the curve through them the second;
@@ -113,12 +115,8 @@ class LocalPlanning:
         self.trail = Trail(TRAIL_CLEARANCES * mission.clearance_m)
         self._hug_m = LEAST_HUG * mission.clearance_m
         self._tight = Attempt(mission.clearance_m, LEAST_MARGIN * margin_m)
-        self.limits, self.holds = Limits.of(mission), Limits.of_holds(mission)
-
-    @property
-    def path_keeps_m(self) -> float:
-        """What paths keep from every edge point where there is room."""
-        return self._mission.clearance_m + PATH_SHARE * self._margin_m
+        self.limits = Limits.of(mission)
+        self.room = Room(mission, memory, mission.clearance_m + PATH_SHARE * margin_m, self.tally)
 
     @property
     def least_keeps_m(self) -> float:
@@ -174,7 +172,7 @@ class LocalPlanning:
         """
         start, _ = now()
         points = self._memory.points_m
-        room = self._room(start, points)
+        room = self._room_m(start, points)
         keep = np.minimum(attempt.distance_m + SEARCH_SHARE * attempt.margin_m, room)
         labels = self._memory.labels.copy()
         window = Window(start.pose[:2], points, labels, self._memory.cell_m, keep, self.tally)
@@ -266,17 +264,12 @@ class LocalPlanning:
             yield
         return None
 
-    def terrain(self, keep_m: float, standing: bool = False) -> Terrain:
-        """Where a curve may lie that keeps one distance from all edge points, or from those that were seen to stand."""
-        points = self._memory.genuine_m if standing else self._memory.points_m
-        return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m, self.tally)
-
     def _terrain(self, start: Start, attempt: Attempt, points: FloatArray) -> Terrain:
         keep = self._mission.clearance_m + PATH_SHARE * attempt.margin_m
-        room = self._room(start, points)
+        room = self._room_m(start, points)
         return Terrain(points, np.minimum(keep, room), self._mission.bounds_m, self.tally)
 
-    def _room(self, start: Start, points: FloatArray) -> FloatArray:
+    def _room_m(self, start: Start, points: FloatArray) -> FloatArray:
         """(m,) distance of each point to the nearer of start and goal: more than that cannot be kept from it."""
         return to_nearer(points, *start.pose[:2], *self._mission.goal_m) - 1e-3
 

@@ -38,12 +38,8 @@ from planner.plan_checks import start_tolerance_m
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proofs
 from planner.rolling_window.commitment import Commitment
-from planner.rolling_window.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
 from planner.rolling_window.config import LEAD_S, RollingWindowConfig
 from planner.rolling_window.dead_ends import GivingUp
-from planner.rolling_window.encounters import encounters
-from planner.rolling_window.escape import Escapes, left_of, room_m
-from planner.rolling_window.evasion import Threats
 from planner.rolling_window.local_planning import LocalPlanning, Start
 from planner.rolling_window.rolling_search import (
     WORK_WHILE_CUT,
@@ -53,6 +49,10 @@ from planner.rolling_window.rolling_search import (
     RollingStep,
     Work,
 )
+from planner.shield.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
+from planner.shield.encounters import encounters
+from planner.shield.escape import Escapes, left_of, room_m
+from planner.shield.evasion import Threats
 
 BROKEN_SHARE = 0.99
 """Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
@@ -129,11 +129,11 @@ class RollingWindow:
         self._commitment = Commitment(mission, memory, self._local, least_m)
         self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
         self._giving_up = GivingUp(mission, memory)
-        self._escapes = Escapes(mission, memory, self._local)
+        self._escapes = Escapes(mission, memory, self._local.room)
         self._monitor = PlanMonitor(
             MonitorLimits.of(
                 mission,
-                keep_m=0.5 * (mission.clearance_m + self._local.path_keeps_m),
+                keep_m=0.5 * (mission.clearance_m + self._local.room.path_keeps_m),
                 turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
                 urgent_m=least_m + 6.0 * mission.turn_radius_m + 3.0 * mission.ground_speed_mps,
                 lead_m=self._lead_m,

@@ -14,9 +14,10 @@ from collections.abc import Callable, Generator
 import numpy as np
 
 from planner.geometry.curves import Limits, Point, Pose, Segment, turns_onto
+from planner.geometry.terrain import Terrain
 from planner.interface import Path
 from planner.paper.step_model import step
-from planner.rolling_window.route_optimisation import FlyableRoute, Terrain
+from planner.rolling_window.route_optimisation import FlyableRoute
 
 EXPANSIONS = 1000
 """Poses looked at before the search gives up."""

@@ -12,18 +12,18 @@ from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.barrier import Proof
 from planner.rolling_window.commitment import Commitment
-from planner.rolling_window.committed_plan import CommittedPlan, PlanMonitor
 from planner.rolling_window.dead_ends import GivingUp
-from planner.rolling_window.escape import room_m
-from planner.rolling_window.evasion import Threats
 from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.shield.committed_plan import CommittedPlan, PlanMonitor
+from planner.shield.escape import room_m
+from planner.shield.evasion import Threats
 
 BETTER = 0.005
 """A course that still serves is dropped only for one that is shorter by this share of what is left to fly."""
 
 
 class Work(NamedTuple):
-    """How much is searched before the planner answers, as `planner.rolling_window.window.Tally` counts it: about 1 us.
+    """How much is searched before the planner answers, as `planner.geometry.terrain.Tally` counts it: about 1 us.
 
     Attributes:
         first: when a search begins.

@@ -2,55 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 
-from planner.geometry.clearance import first_breach, inside_bounds
 from planner.geometry.curves import Limits, Point, Pose, fillet
-from planner.interface import FloatArray, Path
-from planner.kernels.buckets import Buckets, bucketed
+from planner.geometry.terrain import PLACE, Terrain
+from planner.interface import Path
 from planner.kernels.fans import shortcuts
-from planner.rolling_window.window import PLACE, Tally
-
-SQUARE = 3.0
-"""Side of the squares in which edge points near a line are looked for, as a multiple of the distance kept."""
 
 MOST_LEFT_OUT = 6
 """It is tried to leave out one of so many corners at most, from the first on."""
-
-
-@dataclass(frozen=True, eq=False)
-class Terrain:
-    """Where a curve may lie.
-
-    Attributes:
-        points_m: (m, 2) edge points.
-        keep_m: (m,) distance to be kept from each.
-        bounds_m: xmin, ymin, xmax, ymax: area that must not be left.
-        tally: work is counted here.
-    """
-
-    points_m: FloatArray
-    keep_m: FloatArray
-    bounds_m: tuple[float, float, float, float]
-    tally: Tally = field(default_factory=Tally)
-
-    def admits(self, path: Path) -> bool:
-        """Whether a path keeps its distance and stays inside."""
-        if not inside_bounds(path, self.bounds_m):
-            return False
-        self.tally.add(1, PLACE, len(self.points_m) * len(path.segments))
-        return math.isinf(first_breach(path, self.points_m, self.keep_m))
-
-    @cached_property
-    def squares(self) -> Buckets:
-        """The edge points by squares."""
-        side_m = SQUARE * max(float(self.keep_m.max(initial=0.0)), 1.0)
-        return bucketed(self.points_m, self.keep_m, side_m)[1]
 
 
 @dataclass(frozen=True)

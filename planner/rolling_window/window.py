@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planner.geometry.curves import Point
+from planner.geometry.terrain import HUGGED, PLACE, TANGENT, Tally
 from planner.interface import FloatArray, IntArray
 from planner.kernels.buckets import Buckets, Cells, bucketed, cells_of, gathered
 from planner.kernels.fans import entered, fan_edges
@@ -28,24 +29,6 @@ MOST_HIDING = 12
 
 BUCKET_CELLS = 4
 """Side, in cells, of the squares in which edge points near a line are looked for."""
-
-CALL, TANGENT, PLACE, HUGGED = 14.0, 0.04, 0.0016, 0.006
-"""Work in about microseconds: of one question, and of each point that it lays tangents at, compares with a line, or
-looks at for how long a step hugs it."""
-
-
-class Tally:
-    """Work done so far, counted by what was looked at and never timed: one is about a microsecond on an ordinary core.
-
-    Counted work makes a search that is cut short end at the same place in every run.
-    """
-
-    def __init__(self) -> None:
-        self.done = 0.0
-
-    def add(self, calls: float, each: float = 0.0, count: int = 0) -> None:
-        """Counts questions, and what each of so many points or pairs adds to them."""
-        self.done += CALL * calls + each * count
 
 
 def guide_vector(position: Point, goal: Point) -> tuple[float, float, float]:

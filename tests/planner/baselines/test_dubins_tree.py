@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from planner.baselines import dubins_tree
 from planner.baselines.dubins_tree import ROLLS, DubinsTree, DubinsTreeConfig, dubins, is_free
 from planner.geometry.curves import Pose, along
+from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Path, Plan, PlanRequest, PlanStatus
-from planner.rolling_window.route_optimisation import Terrain
 
 MakePoints = Callable[..., FloatArray]
 

@@ -12,13 +12,14 @@ import pytest
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose
+from planner.geometry.terrain import Tally
 from planner.interface import BoolArray, FloatArray, MapView, Mission, MovingEdges, Path
 from planner.memory import ObstacleMemory
 from planner.rolling_window.anytime_search import AnytimeSearch
 from planner.rolling_window.local_planning import Attempt, LocalPlanning, Now, Start
 from planner.rolling_window.multi_step_search import Candidate
 from planner.rolling_window.route_optimisation import FlyableRoute
-from planner.rolling_window.window import Tally, Window
+from planner.rolling_window.window import Window
 
 MakePoints = Callable[..., FloatArray]
 Known = Callable[[FloatArray], MapView]

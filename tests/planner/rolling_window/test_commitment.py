@@ -14,8 +14,8 @@ from planner.geometry.curves import Pose
 from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.commitment import Commitment
-from planner.rolling_window.committed_plan import CommittedPlan
 from planner.rolling_window.local_planning import LocalPlanning, Start
+from planner.shield.committed_plan import CommittedPlan
 
 Known = Callable[[FloatArray], MapView]
 MakePoints = Callable[..., FloatArray]

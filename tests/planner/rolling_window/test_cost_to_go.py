@@ -12,10 +12,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Point
+from planner.geometry.terrain import Tally
 from planner.interface import FloatArray
 from planner.rolling_window import cost_to_go
 from planner.rolling_window.cost_to_go import CostToGo
-from planner.rolling_window.window import Tally
 from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]

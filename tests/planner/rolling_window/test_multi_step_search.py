@@ -14,11 +14,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Point
+from planner.geometry.terrain import Tally
 from planner.interface import FloatArray, MovingEdges
 from planner.memory import ObstacleMemory
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.multi_step_search import Candidate, search_candidates
-from planner.rolling_window.window import Tally, Window
+from planner.rolling_window.window import Window
 from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]

@@ -13,11 +13,11 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Limits, Point, Pose, end_of, sample
+from planner.geometry.terrain import Tally, Terrain
 from planner.interface import FloatArray, Path
 from planner.rolling_window.cost_to_go import CostToGo
 from planner.rolling_window.pose_search import AWAY, search_poses
-from planner.rolling_window.route_optimisation import FlyableRoute, Terrain, optimise
-from planner.rolling_window.window import Tally
+from planner.rolling_window.route_optimisation import FlyableRoute, optimise
 from tests.examples import examples
 
 MakePoints = Callable[..., FloatArray]

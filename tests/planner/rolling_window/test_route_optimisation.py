@@ -13,8 +13,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from planner.geometry.curves import Limits, Point, Pose, end_of, sample
+from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Path
-from planner.rolling_window.route_optimisation import Terrain, optimise, shortcut
+from planner.rolling_window.route_optimisation import optimise, shortcut
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]

@@ -13,9 +13,7 @@ import pytest
 from planner.geometry.curves import on_loiter
 from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Plan, PlanStatus
 from planner.memory import ObstacleMemory
-from planner.rolling_window.certificate import CertificateBroken
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
-from planner.rolling_window.escape import Escape
 from planner.rolling_window.planner import (
     NO_BETTER,
     NO_WAY_ON,
@@ -24,6 +22,8 @@ from planner.rolling_window.planner import (
     RollingWindow,
     Situation,
 )
+from planner.shield.certificate import CertificateBroken
+from planner.shield.escape import Escape
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,
     SPACING,

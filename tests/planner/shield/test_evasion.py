@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from planner.geometry.curves import Limits, onward, pose_at, sample
 from planner.geometry.path_samples import poses_at
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path, Plan, PlanStatus
-from planner.rolling_window.encounters import EARLIEST, LATEST
-from planner.rolling_window.escape import CLEARER, EVADING_S, LOITER_SHARES
-from planner.rolling_window.evasion import (
+from planner.rolling_window.planner import RollingWindow
+from planner.shield.encounters import EARLIEST, LATEST
+from planner.shield.escape import CLEARER, EVADING_S, LOITER_SHARES
+from planner.shield.evasion import (
     AHEAD_S,
     LATER,
     UNKNOWN_MPS,
@@ -27,7 +28,6 @@ from planner.rolling_window.evasion import (
     far_side,
     rolled_out,
 )
-from planner.rolling_window.planner import RollingWindow
 from tests.examples import examples
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,

@@ -8,8 +8,8 @@ import numpy as np
 
 from planner.geometry.clearance import first_breach
 from planner.geometry.curves import Limits, Pose, Segment, between, full_turn, place_on
+from planner.geometry.terrain import Terrain
 from planner.interface import Path
-from planner.rolling_window.route_optimisation import Terrain
 
 
 def divert_to_loiter(path: Path, from_m: float, to_m: float, limits: Limits, terrain: Terrain) -> Path | None:

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from planner.geometry.curves import Limits, along, between, end_of, pose_at, sample
 from planner.geometry.path_samples import poses_at
+from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MovingEdges, Path
-from planner.rolling_window.certificate import DISC, Certified, Certifier, disc_radius_m, least_sensor_range_m
-from planner.rolling_window.route_optimisation import Terrain
+from planner.shield.certificate import DISC, Certified, Certifier, disc_radius_m, least_sensor_range_m
 from tests.examples import examples
 
 AssertFlyable = Callable[[Path, float], None]

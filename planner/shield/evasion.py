@@ -22,7 +22,7 @@ from planner.geometry.path_samples import poses_at
 from planner.interface import FloatArray, Mission, Path, PlanRequest
 from planner.kernels.buckets import Buckets, bucketed
 from planner.kernels.room import near_place, room_along
-from planner.rolling_window.encounters import EARLIEST, LATEST
+from planner.shield.encounters import EARLIEST, LATEST
 
 AHEAD_S = 30.0
 """What moves is taken to keep its velocity for so many seconds; ways are judged as far ahead."""

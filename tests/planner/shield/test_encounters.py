@@ -11,7 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner.interface import FloatArray, Mission, MovingEdges, PlanRequest
-from planner.rolling_window.encounters import (
+from planner.shield.encounters import (
     EARLIEST,
     FASTEST,
     LATER_S,

@@ -29,8 +29,8 @@ from planner.geometry.curves import (
     place_on,
 )
 from planner.geometry.path_samples import places_along, poses_at, turn_centres
+from planner.geometry.terrain import Terrain
 from planner.interface import BoolArray, FloatArray, MapView, Path
-from planner.rolling_window.route_optimisation import Terrain
 
 DISC, BEYOND = 1.04, 0.5
 """The certified disc is so many times as large as the turn, for tracking error and rolling in, and reaches beyond it

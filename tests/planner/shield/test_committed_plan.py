@@ -11,7 +11,7 @@ import pytest
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, pose_at
 from planner.interface import FloatArray, Mission, Path, Plan, PlanStatus
-from planner.rolling_window.committed_plan import CUT, UNHURRIED, CommittedPlan, MonitorLimits, PlanMonitor
+from planner.shield.committed_plan import CUT, UNHURRIED, CommittedPlan, MonitorLimits, PlanMonitor
 
 STRAIGHT = Path(np.array([(0.0, 0.0, 1.0, 0.0, 0.0, 9000.0)]))
 TURN = (2000.0, 0.0, 1.0, 0.0, 0.01, 2.0 * math.pi * 100.0)

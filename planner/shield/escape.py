@@ -16,15 +16,15 @@ from planner.geometry.clearance import behind
 from planner.geometry.course import Course
 from planner.geometry.curves import Point, Segment, onward, place_on, sample
 from planner.geometry.path_samples import places_along
+from planner.geometry.terrain import Terrain
 from planner.interface import MapView, Mission, NoWayToBegin, Path, Plan, PlanRequest, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.plan_checks import start_tolerance_m
-from planner.rolling_window.certificate import CertificateBroken, Certifier
-from planner.rolling_window.committed_plan import CommittedPlan
-from planner.rolling_window.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
-from planner.rolling_window.local_planning import LocalPlanning
-from planner.rolling_window.loiter import divert_to_loiter
-from planner.rolling_window.route_optimisation import Terrain
+from planner.shield.certificate import CertificateBroken, Certifier
+from planner.shield.committed_plan import CommittedPlan
+from planner.shield.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out, step_along_m
+from planner.shield.loiter import divert_to_loiter
+from planner.shield.room import Room
 
 LOITER_SHARES = (1.0, 0.5, 0.25)
 """Shares of the distance that paths keep from edge points. A turn is looked for with one share after the other."""
@@ -88,12 +88,12 @@ class Escapes:
     Args:
         mission: goal and limits.
         memory: the edge points.
-        local: limits of curves, and the distances that paths keep.
+        room: limits of curves, and the distances that paths keep.
     """
 
-    def __init__(self, mission: Mission, memory: ObstacleMemory, local: LocalPlanning) -> None:
-        self._mission, self._memory, self._local = mission, memory, local
-        self._certifier = Certifier(local.holds, mission.clearance_m, math.inf, step_along_m(mission))
+    def __init__(self, mission: Mission, memory: ObstacleMemory, room: Room) -> None:
+        self._mission, self._memory, self._room = mission, memory, room
+        self._certifier = Certifier(room.holds, mission.clearance_m, math.inf, step_along_m(mission))
         self._began_m: Point | None = None  # where the aircraft was when it had no plan for the first time
         self._began_hidden = False  # the first turn led behind something: nothing was certain of it
 
@@ -113,13 +113,13 @@ class Escapes:
         self._began_m = self._began_m or request.position_m
         onward_m = self._mission.sensor_range_m
         ahead = Path(np.array([(*request.position_m, *request.direction, 0.0, onward_m)]))
-        ways = list(rolled_out([(*request.position_m, *request.direction, 0.0, lead_m)], self._local.limits))
+        ways = list(rolled_out([(*request.position_m, *request.direction, 0.0, lead_m)], self._room.limits))
         least = self._standing(LOITER_SHARES[-1])
-        if divert_to_loiter(ahead, 0.0, onward_m, self._local.holds, least) is None and not any(
+        if divert_to_loiter(ahead, 0.0, onward_m, self._room.holds, least) is None and not any(
             map(least.admits, ways)
         ):
             raise NoWayToBegin(NO_ROOM)
-        pieces = math.ceil(onward_m / (0.25 * self._local.holds.radius_m))
+        pieces = math.ceil(onward_m / (0.25 * self._room.holds.radius_m))
         if not request.seen.seen_free(places_along(ahead, onward_m, pieces)).any():
             if math.dist(self._began_m, request.position_m) > BLIND * self._mission.clearance_m:
                 raise NoWayToBegin(NOT_SEEN)
@@ -127,7 +127,7 @@ class Escapes:
         hidden_too: Path | None = None
         for share in LOITER_SHARES:
             standing = self._standing(share)
-            turn = divert_to_loiter(ahead, 0.0, lead_m, self._local.holds, standing)
+            turn = divert_to_loiter(ahead, 0.0, lead_m, self._room.holds, standing)
             for way in [turn, *ways] if turn is not None else ways:
                 if not self._best([_Option(way, way)], standing, None, threats, share)[0]:
                     continue
@@ -183,11 +183,11 @@ class Escapes:
             if nearer is not None:
                 yield _Option(nearer.path, None, "", nearer)
             yield _Option(left, committed.left(here), GOES_ON)
-            turn = divert_to_loiter(path, from_m, to_m, self._local.holds, terrain)
+            turn = divert_to_loiter(path, from_m, to_m, self._room.holds, terrain)
             if turn is not None:
                 yield _Option(turn, None, TURNING_AWAY)
             if threats is not None:
-                ways.extend(() if ways else rolled_out(prefix, self._local.limits))
+                ways.extend(() if ways else rolled_out(prefix, self._room.limits))
                 yield from (_Option(way, way, IN_THE_WAY) for way in ways)
 
         # What hides behind something that moves or has appeared is no better than that: space seen to be free first.
@@ -209,8 +209,8 @@ class Escapes:
         if certain and not self._began_hidden:
             raise CertificateBroken(request.time_s)
         threats = threats or self._near(request)
-        more_than_m = threats.room_m(left) + CLEARER * self._local.path_keeps_m
-        ways = ways or list(rolled_out(prefix, self._local.limits))
+        more_than_m = threats.room_m(left) + CLEARER * self._room.path_keeps_m
+        ways = ways or list(rolled_out(prefix, self._room.limits))
         clear = clearest(ways, self._mission.bounds_m, threats, more_than_m)
         if clear is not None:
             return self._away(request, clear, IN_THE_WAY)
@@ -233,7 +233,7 @@ class Escapes:
         Returns:
             Of those in space that was `seen` to be free; of all. Without `seen` they are the same.
         """
-        keeps_m = self._local.path_keeps_m
+        keeps_m = self._room.path_keeps_m
         best: list[_Option | None] = [None, None]
         least_m = [share * keeps_m] * 2
         for each in options:
@@ -250,7 +250,7 @@ class Escapes:
 
     def _standing(self, share: float) -> Terrain:
         """Where a curve keeps a share of what is wanted from what stands: what was only refused is in nobody's way."""
-        return self._local.terrain(share * self._local.path_keeps_m, standing=True)
+        return self._room.terrain(share * self._room.path_keeps_m, standing=True)
 
     def _near(self, request: PlanRequest) -> Threats:
         return Threats.about(request, self._memory.genuine_m, self._mission)

@@ -10,9 +10,9 @@ import pytest
 import shapely
 
 from planner.geometry.curves import Limits, end_of, pose_at, sample
+from planner.geometry.terrain import Terrain
 from planner.interface import FloatArray, Path
-from planner.rolling_window.loiter import divert_to_loiter
-from planner.rolling_window.route_optimisation import Terrain
+from planner.shield.loiter import divert_to_loiter
 
 MakePoints = Callable[..., FloatArray]
 AssertFlyable = Callable[[Path, float], None]

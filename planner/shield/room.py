@@ -1,0 +1,36 @@
+"""Where curves may lie: the distances that are kept from what is remembered, and the area."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planner.geometry.curves import Limits
+from planner.geometry.terrain import Tally, Terrain
+from planner.interface import Mission
+from planner.memory import ObstacleMemory
+
+
+class Room:
+    """The space of one flight.
+
+    Args:
+        mission: limits and the area.
+        memory: the edge points.
+        path_keeps_m: what paths keep from every edge point where there is room.
+        tally: work is counted here.
+
+    Attributes:
+        limits: of turns.
+        holds: of the full turns that plans end in.
+        path_keeps_m: as above.
+    """
+
+    def __init__(self, mission: Mission, memory: ObstacleMemory, path_keeps_m: float, tally: Tally) -> None:
+        self._mission, self._memory, self._tally = mission, memory, tally
+        self.path_keeps_m = path_keeps_m
+        self.limits, self.holds = Limits.of(mission), Limits.of_holds(mission)
+
+    def terrain(self, keep_m: float, standing: bool = False) -> Terrain:
+        """Where a curve may lie that keeps one distance from all edge points, or from those that were seen to stand."""
+        points = self._memory.genuine_m if standing else self._memory.points_m
+        return Terrain(points, np.full(len(points), keep_m), self._mission.bounds_m, self._tally)
