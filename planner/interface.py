@@ -213,6 +213,18 @@ class Path:
         return float(np.abs(self.segments[:, 4]).max(initial=0.0))
 
 
+class Refused(NamedTuple):
+    """Why the shield does not fly the path that a planner gave last.
+
+    Attributes:
+        place_m: (east, north) up to where it was certified.
+        reason: a sentence.
+    """
+
+    place_m: tuple[float, float]
+    reason: str
+
+
 class PlanRequest(NamedTuple):
     """One question to a planner.
 
@@ -224,6 +236,7 @@ class PlanRequest(NamedTuple):
         flown: the plan in effect, None before the first.
         arc_length_m: distance of the aircraft along `flown.path`, from its start.
         scanned: a scan has come in since the last request.
+        refused: why the shield refused the planner's last path; None without a shield, and while it is flown.
     """
 
     time_s: float
@@ -233,6 +246,7 @@ class PlanRequest(NamedTuple):
     flown: Plan | None = None
     arc_length_m: float = 0.0
     scanned: bool = True
+    refused: Refused | None = None
 
 
 @dataclass(frozen=True, eq=False)

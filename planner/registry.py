@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any
 
@@ -37,6 +37,7 @@ class PlannerKind:
             None is derived: `config.resolved(mission)` returns the config with no None left and raises
             ValueError, with a sentence, where keys contradict each other.
         make: the planner for one flight, from a resolved config.
+        bare: the same without the shield, where `make` has one built in.
         point: its paths are those of a point that can turn on the spot: their direction jumps at joints.
         needs: an optional package without which `config.resolved` raises ValueError.
     """
@@ -45,6 +46,7 @@ class PlannerKind:
     summary: str
     config: type[Any]
     make: Callable[[Any, Mission], Planner]
+    bare: Callable[[Any, Mission], Planner] | None = None
     point: bool = False
     needs: str | None = None
 
@@ -55,6 +57,7 @@ BUILT_IN = (
         summary="improved BUG: rolling window, fan sectors, n-best multi-step search, route optimisation",
         config=rolling_window_config.RollingWindowConfig,
         make=rolling_window.RollingWindow,
+        bare=partial(rolling_window.RollingWindow, shielded=False),
     ),
     PlannerKind(
         kind="improved_bug",

@@ -162,6 +162,7 @@ LAYERS: dict[str, tuple[tuple[str, ...], ...]] = {
         ("baselines",),
         ("rolling_window",),
         ("paper",),
+        ("shield",),
         ("memory", "world_stability"),
         ("obstacle_labels",),
         ("geometry",),

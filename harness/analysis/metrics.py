@@ -92,6 +92,7 @@ def metrics(flight: Flight, limits: FlightLimits, given: AsGiven | None = None) 
         "findings": [dataclasses.asdict(each) for each in findings(flight, limits)],
         **{metric.path: metric.of(flight, limits) for metric in METRICS if metric.of is not None},
         "replans": max(len(flight.plans) - 1, 0),
+        "shield": dataclasses.asdict(flight.shield) if flight.shield else None,
         "plan_delay_s": percentiles([plan.delay_s for plan in flight.plans if math.isfinite(plan.delay_s)]),
         "lost_returns": lost_returns(flight.lost_returns),
         "compute_ms": percentiles(flight.compute_ms),

@@ -80,6 +80,20 @@ class LostReturns(Figures):
     max: float | None = None
 
 
+class ShieldFigures(Figures):
+    """What a shield did.
+
+    Attributes:
+        interventions: how often the aircraft came from the planner's path onto the backup.
+        time_on_backup_s: time on the backup.
+        refused_plans: paths of the planner of which no part that gets on could be certified.
+    """
+
+    interventions: int
+    time_on_backup_s: float
+    refused_plans: int
+
+
 class PathFigures(Figures):
     """How smooth a path is; `harness.analysis.smoothness` defines each figure.
 
@@ -218,6 +232,7 @@ class Metrics(Figures):
         bank_reversals_per_min: how often a minute the bank command goes from one side to the other.
         plan_contradictions: plans that lead to the other side of the course than the one before.
         replans: plans accepted after the first.
+        shield: what the planner's shield did; None without one.
         plan_delay_s: from the latest scan that a plan could use until the plan took effect.
         lost_returns: share of the returns that the sensor lost.
         compute_ms: processor times of the planner's searches.
@@ -255,6 +270,7 @@ class Metrics(Figures):
     bank_reversals_per_min: float | None = None
     plan_contradictions: int | None = None
     replans: int
+    shield: ShieldFigures | None = None
     plan_delay_s: Delays = Delays()
     lost_returns: LostReturns = LostReturns()
     compute_ms: Percentiles

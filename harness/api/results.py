@@ -113,7 +113,7 @@ class FlightResult:
         """The planner's kind; for a checked path the word that stands for it."""
         from harness.run_files.given_path import GIVEN
 
-        return GIVEN if self.metrics.check is not None else self.scenario.planner.kind
+        return GIVEN if self.metrics.check is not None else self.scenario.planner.label
 
     def _repr_html_(self) -> str:
         return flight_html(repr(self)[len("FlightResult(") : -1], self.metrics.to_dict())

@@ -125,7 +125,7 @@ class CampaignRuns:
     @cached_property
     def planners(self) -> list[str]:
         """The kinds of planners that fly."""
-        named = [each.kind for each in self.campaign.planners]
+        named = [each.label for each in self.campaign.planners]
         return named or [base.word(("planner", "kind"), DEFAULT_PLANNER) for base in self.file.bases]
 
     @cached_property

@@ -154,7 +154,7 @@ def _certificate(days: Days, out: Path, tally: Tally, terms: Terms, command: str
         method=found.method,
         most_runs=len(days),
         subject=days.campaign.name,
-        planner="given" if isinstance(days, PathDays) else first.planner.kind,
+        planner="given" if isinstance(days, PathDays) else first.planner.label,
         aircraft=Path(first.aircraft.model).name,
         conditions=getattr(first, "conditions", None),
         seed=days.campaign.seed,

@@ -131,7 +131,7 @@ def _print_flight(scenario: Scenario, metrics: dict[str, Any], folder: Path, as_
     from harness.scenario.conditions import told
     from harness.world.motion_assumptions import scenario_outside_assumptions
 
-    title = f"{scenario.name}: {scenario.planner.kind}, {scenario.aircraft.model}{_law(scenario)}"
+    title = f"{scenario.name}: {scenario.planner.label}, {scenario.aircraft.model}{_law(scenario)}"
     outside = scenario_outside_assumptions(scenario)
     more = f" (and {len(outside) - 1} more: `wayproof validate` names them)" if len(outside) > 1 else ""
     not_covered = {"not covered": plain(outside[0] + more)} if outside else {}
@@ -248,7 +248,7 @@ def bench_tracking(name: str, seeds: int, as_json: bool, guidance: str = "previe
 
 def _default_folder(scenario: Scenario, apart: str = "") -> Path:
     model = Path(scenario.aircraft.model).name
-    planner = scenario.planner.kind.replace(":", "-")
+    planner = scenario.planner.label.replace(":", "-")
     return Path("runs") / scenario.name / f"{planner}-{model}-{scenario.seed}{apart}"
 
 

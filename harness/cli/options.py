@@ -212,8 +212,10 @@ def _turbulence(text: str | None) -> dict[str, str] | None:
 def planner_kind(text: str) -> str:
     """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
     from harness.scenario.given import PLANNER
+    from harness.scenario.sections import SHIELDED
 
-    return _kind(text, PLANNER, "--planner")
+    shielded = SHIELDED if text.endswith(SHIELDED) else ""
+    return _kind(text.removesuffix(SHIELDED), PLANNER, "--planner") + shielded
 
 
 def sources(*names: str | None) -> tuple[str, ...]:

@@ -224,7 +224,7 @@ def _breaking(
     example = (values(pairs[0][0]), values(pairs[0][1])) if pairs else None
     return Breaking(
         scenario=base.name,
-        planner=base.planner.kind,
+        planner=base.planner.label,
         aircraft=Path(base.aircraft.model).name,
         until=until,
         vary=tuple(vary),

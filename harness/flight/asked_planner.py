@@ -11,6 +11,7 @@ from harness.files.printing import PrintingAside
 from harness.mapping.read_only_map import ReadOnlyMap
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest
 from planner.plan_checks import WrongAnswerError, checked_plan
+from planner.shield.intervention_log import ShieldReport
 
 
 class PlannerFailedError(RuntimeError):
@@ -52,6 +53,12 @@ class AskedPlanner:
         """Processor time of the planner's thread for the last answer: what else the machine does is not in it."""
         self.wall_ms = math.nan
         """Wall-clock time for the same."""
+
+    @property
+    def shield(self) -> ShieldReport | None:
+        """What the planner's shield did so far; None without one."""
+        report = getattr(self._planner, "report", None)
+        return report if isinstance(report, ShieldReport) else None
 
     def plan(self, request: PlanRequest) -> Answer:
         """The answer to a request; its `flown` is the `own` of the answer in effect.

@@ -14,6 +14,7 @@ from harness.flight.observer import Caution, Observer
 from harness.flight.record import AcceptedPlan, Outcome
 from harness.flight.termination import Ending
 from planner.interface import MapView, Mission, Plan, Planner, PlanRequest, PlanStatus
+from planner.shield.intervention_log import ShieldReport
 
 LATE_S = 1e-9
 """A plan or a scan whose time has come but for this has come: times are sums of floats."""
@@ -52,6 +53,11 @@ class Plans:
         self._in_vain: set[str] = set()  # all that was told of why nothing was found since the last plan
         self._stuck = ""  # the last of it
         self._arc_length_m, self._loiters_from_m = 0.0, math.inf
+
+    @property
+    def shield(self) -> ShieldReport | None:
+        """What the planner's shield did so far; None without one."""
+        return self._planner.shield
 
     @property
     def status_label(self) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.interface import Plan
+from planner.shield.intervention_log import ShieldReport
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -278,6 +279,7 @@ class Flight:
         contact_m: clearance at a contact between the last two rows; +inf without.
         lost_returns: (k, 2) of each scan of a sensor that has imperfections, how many beams met something, and how many
             of those returned nothing; k = 0 for a perfect sensor, None without one.
+        shield: what the planner's shield did; None without one.
     """
 
     track: Track
@@ -291,3 +293,4 @@ class Flight:
     contact_m: float = math.inf
     compute_wall_ms: tuple[float, ...] = ()
     lost_returns: IntArray | None = None
+    shield: ShieldReport | None = None

@@ -62,7 +62,7 @@ def run_properties(scenario: Scenario, metrics: Mapping[str, Any]) -> dict[str, 
         "severity": severity(metrics["outcome"], metrics["trackable"] or allowed, ratio),
         "clearance_ratio": ratio,
         "scenario": scenario.name,
-        "planner": scenario.planner.kind,
+        "planner": scenario.planner.label,
         "aircraft": scenario.aircraft.model,
         "seed": str(scenario.seed),  # may be larger than 64 bits
         "wind_mps": wind.speed_mps if wind else 0.0,

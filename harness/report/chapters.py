@@ -60,7 +60,7 @@ def entry(
     planned = planned_rows(run.track, run.plans)
     row = row_of(
         scenario.name,
-        GIVEN if "check" in run.metrics else scenario.planner.kind,
+        GIVEN if "check" in run.metrics else scenario.planner.label,
         run.metrics,
         optimum_m=optimum.length_m,
         turn_radius_m=_turn_radius_m(scenario, run),

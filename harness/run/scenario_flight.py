@@ -256,7 +256,7 @@ def scene_of(scenario: Scenario, loop: Loop, text: str, pilot: str | None = None
 
     wind = scenario.environment.wind
     return Scene(
-        f"{scenario.name}, {pilot or scenario.planner.kind}, {scenario.aircraft.model}, seed {scenario.seed}",
+        f"{scenario.name}, {pilot or scenario.planner.label}, {scenario.aircraft.model}, seed {scenario.seed}",
         loop.mission,
         scenario.mission.start_m,
         flight_limits(scenario, planned=pilot is None),

@@ -11,6 +11,7 @@ from harness.scenario import own_keys
 from harness.scenario.sections import PlannerSpec
 from planner.compiled import compile_all
 from planner.registry import installed_kinds, planner_kinds
+from planner.shield.shield import Shield
 
 if TYPE_CHECKING:
     from planner.interface import Mission, Planner
@@ -33,7 +34,9 @@ def resolved(spec: PlannerSpec, mission: Mission, as_flown: bool = False) -> Pla
     with PrintingAside():
         kind = own_keys.named_kind("planner", spec, planner_kinds())
         config = own_keys.resolved_config("planner", spec, kind, PlannerSpec.model_fields, mission)
-        return spec.model_copy(update={each.name: getattr(config, each.name) for each in fields(kind.config)})
+        chosen = getattr(spec, "shield", None) or ("none" if kind.bare is None else "loiter")
+        own = {each.name: getattr(config, each.name) for each in fields(kind.config)}
+        return spec.model_copy(update={"shield": chosen, **own})
 
 
 def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
@@ -48,7 +51,10 @@ def planner_of(spec: PlannerSpec, mission: Mission) -> Planner:
         raise PlannerError(f"the planner {spec.kind} is not here; give it anew (planner=, or --planner)")
     try:
         with PrintingAside():
-            return kind.make(kind.config(**spec.own), mission)
+            if spec.shield == "none":
+                return (kind.bare or kind.make)(kind.config(**spec.own), mission)
+            planner = kind.make(kind.config(**spec.own), mission)
+            return planner if kind.bare is not None else Shield(planner, mission)
     except KeyboardInterrupt:
         raise
     except BaseException as error:

@@ -34,11 +34,18 @@ class Commitment:
         memory: what is remembered.
         local: limits of curves, and where they may lie.
         least_m: a plan that leaves its course for a turn before this arc length leads nowhere.
+        shielded: what is put into effect is certified; else it is the whole course.
     """
 
     def __init__(
-        self, mission: Mission, memory: ObstacleMemory, local: LocalPlanning, least_m: float
+        self,
+        mission: Mission,
+        memory: ObstacleMemory,
+        local: LocalPlanning,
+        least_m: float,
+        shielded: bool = True,
     ) -> None:
+        self._shielded = shielded
         self._mission, self._memory, self._local, self._least_m = mission, memory, local, least_m
 
     def commit(
@@ -60,12 +67,9 @@ class Commitment:
             cut_m: arc length at which it comes too near to something.
             wants_more_time: as the plan has it.
         """
-        certifier = self._certifier(1.5 * request.seen.spacing_m)
-        turn_keeps = self._mission.clearance_m + self._mission.tracking_error_m
-        terrain = self._local.room.terrain(turn_keeps)
-        certified = certifier.certify(course.path, request.seen, terrain, cut_m)
-        if certified is None or not self._leads_on(certified.loiter_entry_m, course):
-            certified = self._to_goal(certifier, course, request.seen, cut_m) or certified
+        certified: Certified | None = Certified(course.path, course.path.length_m)
+        if self._shielded:
+            certified = self._certified(request.seen, course, cut_m)
         if certified is None:
             return None
         goal, nodes, met = self._mission.goal_m, course.nodes, self._memory.met_m
@@ -78,6 +82,15 @@ class Commitment:
             wants_more_time=wants_more_time,
         )
         return CommittedPlan(plan, certified.path, course, certified.loiter_entry_m)
+
+    def _certified(self, seen: MapView, course: Course, cut_m: float) -> Certified | None:
+        """The part of a course that is certified."""
+        certifier = self._certifier(1.5 * seen.spacing_m)
+        terrain = self._local.room.terrain(self._mission.clearance_m + self._mission.tracking_error_m)
+        certified = certifier.certify(course.path, seen, terrain, cut_m)
+        if certified is None or not self._leads_on(certified.loiter_entry_m, course):
+            certified = self._to_goal(certifier, course, seen, cut_m) or certified
+        return certified
 
     def leads_on(self, found: CommittedPlan, start: Start, effective: CommittedPlan | None) -> bool:
         """Whether a certified plan gets anywhere: to the goal, or along its course to a hold elsewhere.

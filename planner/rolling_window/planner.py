@@ -27,8 +27,6 @@ radius can be moved at the clearance, within the area.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from enum import Enum
 
 from planner.geometry.course import Course
 from planner.geometry.curves import Pose, Segment, along, on_loiter, place_on
@@ -49,55 +47,18 @@ from planner.rolling_window.rolling_search import (
     RollingStep,
     Work,
 )
+from planner.rolling_window.situation import PlanningState, Situation
 from planner.shield.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
 from planner.shield.encounters import encounters
-from planner.shield.escape import Escapes, left_of, room_m
+from planner.shield.escape import BROKEN_SHARE, Escapes, left_of, room_m
 from planner.shield.evasion import Threats
-
-BROKEN_SHARE = 0.99
-"""Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
+from planner.shield.intervention_log import InterventionLog, ShieldReport
 
 KEPT = Plan(PlanStatus.KEPT, "the plan in effect serves")
 NO_BETTER = "the plan in effect serves as well as any other"
 THINKING_ON = "thinking on; the plan in effect goes on"
+NO_WAY_BARE = "no way is found"
 NO_WAY_ON = "no way on can be seen to be safe; the plan in effect goes on"
-
-
-class PlanningState(Enum):
-    """What the planner is doing about the plan in effect."""
-
-    FOLLOWING = "following"
-    """The committed plan leads on; the window rolls as it is due."""
-    LOITERING = "loitering"
-    """The aircraft is in the turn that the committed plan ends with, and the search for a way on goes on."""
-    ESCAPING = "escaping"
-    """No certified plan is in effect, as before the first, or it is broken: what keeps clear longest is flown."""
-    GIVING_UP = "giving up"
-    """A search found no way: a place is given up, or what was given up is tried again, with more effort."""
-    PROVING = "proving"
-    """The edge points seen leave no way: the goal is unreachable."""
-
-
-@dataclass(frozen=True, eq=False)
-class Situation:
-    """A request, and where the aircraft is on the plan in effect.
-
-    Attributes:
-        request: what was asked.
-        plan: the committed plan in effect; None without one.
-        here_m: arc length of the aircraft on its path, whole turns of the loiter taken off.
-    """
-
-    request: PlanRequest
-    plan: CommittedPlan | None
-    here_m: float = 0.0
-
-    @property
-    def ahead(self) -> Course | None:
-        """What is left of the course in effect; None without one, and in the loiter, which has left it."""
-        if self.plan is None or self.plan.holds(self.here_m):
-            return None
-        return self.plan.course.ahead(self.here_m)
 
 
 class RollingWindow:
@@ -106,15 +67,18 @@ class RollingWindow:
     Args:
         config: its keys.
         mission: goal and limits.
+        shielded: it commits only to what is certified. Else it flies whole courses, and nothing where it has none.
 
     Attributes:
         state: what it did at the last request.
     """
 
-    def __init__(self, config: RollingWindowConfig, mission: Mission) -> None:
+    def __init__(self, config: RollingWindowConfig, mission: Mission, shielded: bool = True) -> None:
         config = config.resolved(mission)
         assert config.margin_m is not None
         assert config.rolling_step_m is not None
+        self._shielded = shielded
+        self._log = InterventionLog()
         self._mission, self._rolling_step_m = mission, config.rolling_step_m
         self._memory = memory = ObstacleMemory(mission.clearance_m)
         self._local = LocalPlanning(
@@ -126,7 +90,7 @@ class RollingWindow:
         )
         self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
         least_m = self._lead_m + 2.0 * mission.turn_radius_m
-        self._commitment = Commitment(mission, memory, self._local, least_m)
+        self._commitment = Commitment(mission, memory, self._local, least_m, shielded)
         self._proofs = Proofs(mission, memory, self._local.least_keeps_m)
         self._giving_up = GivingUp(mission, memory)
         self._escapes = Escapes(mission, memory, self._local.room)
@@ -152,8 +116,29 @@ class RollingWindow:
         self._threats: Threats | None = None  # while something moves or has just appeared
         self.state = PlanningState.ESCAPING
 
+    @property
+    def report(self) -> ShieldReport | None:
+        """What the shield did so far; None without it."""
+        return self._log.report if self._shielded else None
+
+    @property
+    def backup(self) -> str:
+        """Why the aircraft is on the backup; empty while it flies the course."""
+        return self._log.backup
+
     def plan(self, request: PlanRequest) -> Plan:
         """Keeps the plan in effect while it serves; rolls the window and searches where it does not."""
+        answer = self._planned(request)
+        on_course = self.state is PlanningState.FOLLOWING or (
+            self._monitor.plan is None and answer.status is not PlanStatus.FOUND
+        )
+        # While nothing new is told, what was told last is why.
+        told = answer.reason if answer.status is not PlanStatus.KEPT else self._log.backup
+        self._log.note(request.time_s, "" if on_course else told or NO_WAY_ON)
+        self._log.refused_plans = self._search.refused
+        return answer
+
+    def _planned(self, request: PlanRequest) -> Plan:
         fresh_m = self._take_in(request)
         plan = self._monitor.plan
         if plan is None:
@@ -312,6 +297,8 @@ class RollingWindow:
     def _escape(self, now: Situation) -> Plan:
         """Any state -> ESCAPING: nothing is certified; a turn that keeps clear is flown, or what does so longest."""
         self.state = PlanningState.ESCAPING
+        if not self._shielded:
+            return Plan(PlanStatus.NO_PATH, NO_WAY_BARE)
         if now.plan is None:
             escape = self._escapes.at_start(now.request, self._threats, self._lead_m)
         else:

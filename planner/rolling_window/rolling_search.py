@@ -82,6 +82,7 @@ class RollingSearch:
         known: how many edge points the last search that ended began with.
         gone: how many edge points had been let go of when the last search began.
         anew: a search is to be made though the course in effect serves: a way may have become free.
+        refused: how many courses have been found that no part of could be certified and led on.
         nearer: a certified plan that the last search found but that would come too near to what moves.
     """
 
@@ -103,6 +104,7 @@ class RollingSearch:
         self.known = 0
         self.gone = 0
         self.anew = False
+        self.refused = 0
         self.nearer: CommittedPlan | None = None
 
     @property
@@ -146,6 +148,7 @@ class RollingSearch:
                 if keeps_m > nearest_m:  # what moves may come to what is free now
                     nearest_m, self.nearer = keeps_m, found
             search.stuck = search.stuck or course
+            self.refused += 1
         if search.done:
             self.running, self.known, self.anew = None, search.known, False
         return None

@@ -26,6 +26,9 @@ from planner.shield.evasion import AHEAD_S, LATER, Threats, clearest, rolled_out
 from planner.shield.loiter import divert_to_loiter
 from planner.shield.room import Room
 
+BROKEN_SHARE = 0.99
+"""Share of the clearance: an edge point seen nearer than that to a certified turn breaks the certificate."""
+
 LOITER_SHARES = (1.0, 0.5, 0.25)
 """Shares of the distance that paths keep from edge points. A turn is looked for with one share after the other."""
 

@@ -18,9 +18,9 @@ from harness.scenario.scenario import load_scenario
 from harness.scenario.shipped import scenario_path
 
 HELD = {
-    "aerosonde_forest": "4e474ed7e206cadfcfba7a62946e7518b1872a1175077d62a44baac5433a5f5f",
-    "polygon_town": "ea45567a713aa7318639d53a5704a0261d0b37ac714e45593b8e6074dc0a6a65",
-    "one_of_everything": "f9a3b2c5a614f40606e7863f2c8d700d9dc2521980709b8b50d50f43bdfd1299",
+    "aerosonde_forest": "6c59aba0901510e17063edcddcc997ec95b04f4402ad93099b50428c8196a1d4",
+    "polygon_town": "d6dbad733b31a96f5d6c1aac1163b5bd7cdb01ac28280523883acb91fade1304",
+    "one_of_everything": "1dbe2475e7563c5a16dd6a1af5b5bfd23bccdd6669f6d4a71e4a8d4387510e67",
 }
 """SHA-256 of the first minute of each."""
 

@@ -482,7 +482,7 @@ def test_every_key_with_a_value_has_its_unit_default_and_range() -> None:
         "nodata",
         "unknown",
     }
-    words |= {"conditions", "changes", "heights", "sha256", "notes", "follow"}
+    words |= {"conditions", "changes", "heights", "sha256", "notes", "follow", "shield"}
     assert len(values) > 40
     for name, key in values:
         switch = key.get("type") == "boolean"

@@ -238,7 +238,7 @@ def test_where_something_has_appeared_what_is_flown_keeps_away_to_the_end_of_its
         return float(shapely.distance(line, shapely.points(places)).min())
 
     flown = Path(np.array(onward(plan.path, 25.0, plan.path.length_m - 25.0)))
-    least_m = LOITER_SHARES[-1] * pilot._local.path_keeps_m
+    least_m = LOITER_SHARES[-1] * pilot._local.room.path_keeps_m
     ways = rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits)
     if max(room_m(flown), *(room_m(way) for way in ways)) > least_m + 0.05:
         assert room_m(answer.path or flown) > least_m - 0.05
@@ -301,7 +301,7 @@ def test_where_all_that_is_wanted_cannot_be_kept_the_clearest_way_is_flown(
     assert plan.path is not None
     flown = answer.path or Path(np.array(onward(plan.path, 25.0, AHEAD_S * SPEED)))
     ways = rolled_out(onward(plan.path, 25.0, pilot._lead_m), pilot._local.limits)
-    keeps_m = pilot._local.path_keeps_m
+    keeps_m = pilot._local.room.path_keeps_m
     best_m = max(near.room_m(way, later=0.5 * LATER) for way in ways)
     assert 0.5 * keeps_m < best_m < keeps_m
     assert near.room_m(flown) > best_m - CLEARER * keeps_m

@@ -1,0 +1,47 @@
+"""The states of the planner, and what a request finds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from planner.geometry.course import Course
+from planner.interface import PlanRequest
+from planner.shield.committed_plan import CommittedPlan
+
+
+class PlanningState(Enum):
+    """What the planner is doing about the plan in effect."""
+
+    FOLLOWING = "following"
+    """The committed plan leads on; the window rolls as it is due."""
+    LOITERING = "loitering"
+    """The aircraft is in the turn that the committed plan ends with, and the search for a way on goes on."""
+    ESCAPING = "escaping"
+    """No certified plan is in effect, as before the first, or it is broken: what keeps clear longest is flown."""
+    GIVING_UP = "giving up"
+    """A search found no way: a place is given up, or what was given up is tried again, with more effort."""
+    PROVING = "proving"
+    """The edge points seen leave no way: the goal is unreachable."""
+
+
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """A request, and where the aircraft is on the plan in effect.
+
+    Attributes:
+        request: what was asked.
+        plan: the committed plan in effect; None without one.
+        here_m: arc length of the aircraft on its path, whole turns of the loiter taken off.
+    """
+
+    request: PlanRequest
+    plan: CommittedPlan | None
+    here_m: float = 0.0
+
+    @property
+    def ahead(self) -> Course | None:
+        """What is left of the course in effect; None without one, and in the loiter, which has left it."""
+        if self.plan is None or self.plan.holds(self.here_m):
+            return None
+        return self.plan.course.ahead(self.here_m)

@@ -1,0 +1,349 @@
+"""The shield: any planner's path is flown only as far as a turn from there has been seen to be free.
+
+The inner planner is asked as ever. What it answers is made flyable (`planner.shield.tracking`), cut where it comes too
+near to something or leaves the area, and certified (`planner.shield.certificate`): the longest part that ends in a full
+turn seen to be free is flown. Where no part of it gets on, the certified plan in effect goes on, into its turn, and the
+planner is told why (`PlanRequest.refused`). What a planner raises, and an answer that no aircraft could fly, are
+refused as well.
+
+The same idea: gatekeeper (D. R. Agrawal, R. Chen, D. Panagou, arXiv 2211.14361), model predictive shielding (O.
+Bastani, arXiv 1905.10691), backup control barrier functions (T. Gurriet et al., "A scalable safety critical control
+framework for nonlinear systems", IEEE Access 8, 2020). A nominal path is committed to only together
+with a certified backup.
+
+Safe does not mean that it converges: a planner that is caught in a trap stays in its turn there, and the reason says
+so.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.geometry.clearance import first_breach
+from planner.geometry.course import Course
+from planner.geometry.curves import Point, Pose, Segment, along, between, on_loiter, place_on
+from planner.geometry.terrain import Tally
+from planner.interface import (
+    FloatArray,
+    Mission,
+    NoWayToBegin,
+    Path,
+    Plan,
+    Planner,
+    PlanRequest,
+    PlanStatus,
+    Refused,
+)
+from planner.memory import ObstacleMemory
+from planner.plan_checks import WrongAnswerError, checked_plan
+from planner.shield.certificate import Certified, Certifier, hold_centre
+from planner.shield.committed_plan import CommittedPlan, MonitorLimits, PlanMonitor
+from planner.shield.encounters import encounters
+from planner.shield.escape import BROKEN_SHARE, Escapes, left_of, room_m
+from planner.shield.evasion import Threats
+from planner.shield.intervention_log import InterventionLog, ShieldReport
+from planner.shield.room import Room
+from planner.shield.tracking import MOST_RADII, Tracked, can_be_flown, tracked
+
+LEAD_S = 1.0
+"""A new plan leaves the one in effect this much flying time ahead, so that guidance has seen the joint coming."""
+
+PROGRESS = 0.25
+"""A part of a path gets on if it gains at least this share of the hold radius along the planner's path."""
+
+GOES_ON = "the certified plan in effect goes on"
+
+
+@dataclass(frozen=True, eq=False)
+class Adopted:
+    """A path of the inner planner, and how far along it has been certified.
+
+    Attributes:
+        plan: the planner's answer.
+        certified_m: arc length of its path beside the turn that the plan in effect ends with.
+    """
+
+    plan: Plan
+    certified_m: float = 0.0
+
+
+class Shield:
+    """A planner with a certified backup, for one flight.
+
+    Args:
+        inner: the planner.
+        mission: goal and limits.
+    """
+
+    def __init__(self, inner: Planner, mission: Mission) -> None:
+        self._inner, self._mission = inner, mission
+        self._memory = memory = ObstacleMemory(mission.clearance_m)
+        self._room = Room(mission, memory, mission.clearance_m, Tally())
+        self._escapes = Escapes(mission, memory, self._room)
+        self._lead_m = mission.ground_speed_mps * (LEAD_S + mission.compute_latency_s)
+        self._monitor = PlanMonitor(
+            MonitorLimits.of(
+                mission,
+                keep_m=BROKEN_SHARE * mission.clearance_m,
+                turn_keeps_m=BROKEN_SHARE * mission.clearance_m,
+                urgent_m=math.inf,
+                lead_m=self._lead_m,
+                step_m=mission.sensor_range_m,
+            )
+        )
+        self._adopted: Adopted | None = None  # what the plan in effect comes from
+        self._proposed: Adopted | None = None
+        self._refused: Refused | None = None
+        self._threats: Threats | None = None
+        self._ever_changed = False
+        self._log = InterventionLog()
+
+    @property
+    def report(self) -> ShieldReport:
+        """What the shield did so far."""
+        return self._log.report
+
+    @property
+    def backup(self) -> str:
+        """Why the aircraft is on the backup; empty while it flies the planner's path."""
+        return self._log.backup
+
+    def plan(self, request: PlanRequest) -> Plan:
+        """The longest part of the inner planner's path that is certified, or the backup."""
+        fresh_m = self._take_in(request)
+        effective, here_m = self._monitor.plan, request.arc_length_m
+        if effective is not None:
+            here_m = on_loiter(effective.path, here_m)
+            self._monitor.look(effective, here_m, request.position_m, fresh_m)
+            if self._threats is not None:
+                least_m = BROKEN_SHARE * self._mission.clearance_m
+                left = left_of(effective, here_m, self._mission)
+                self._monitor.broken |= room_m(left, self._threats, least_m) < least_m
+        answer = self._asked(request, here_m)
+        found = self._certified(request, here_m, answer)
+        if found is not None:
+            self._log.note(request.time_s, "")
+            self._monitor.proposed = found
+            return found.plan
+        return self._backup(request, here_m, answer)
+
+    def _take_in(self, request: PlanRequest) -> FloatArray:
+        """Takes in what was seen since the last request; returns (k, 2) edge points that have come in."""
+        met = encounters(request, self._mission) if request.seen.moving else []
+        self._ever_changed |= bool(request.seen.moving) or math.isfinite(request.seen.last_contradiction_s)
+        fresh_m = self._memory.take_in(request.seen, met)
+        self._threats = self._escapes.threats(request)
+        if self._monitor.take_effect(request.flown, self._memory.standing_m, self._memory.cleared):
+            self._adopted = self._proposed
+        plan = self._monitor.plan
+        if plan is not None and plan.over(request.arc_length_m):
+            self._monitor.plan = self._adopted = None
+        return fresh_m
+
+    def _asked(self, request: PlanRequest, here_m: float) -> Plan:
+        """The inner planner's answer, checked; a refusal where it raised, or where nobody could fly its answer."""
+        flown, arc_length_m = None, 0.0
+        effective, adopted = self._monitor.plan, self._adopted
+        if adopted is not None and effective is not None and not effective.holds(here_m):
+            flown = adopted.plan
+            assert flown.path is not None
+            arc_length_m = _nearest_m(flown.path, request.position_m, adopted.certified_m)
+        told = request._replace(flown=flown, arc_length_m=arc_length_m, refused=self._refused)
+        try:
+            return checked_plan(self._inner.plan(told), request.position_m, self._mission)
+        except KeyboardInterrupt:
+            raise
+        except NoWayToBegin as error:
+            return Plan(PlanStatus.NO_PATH, str(error))
+        except WrongAnswerError as error:
+            reason = str(error)
+        except BaseException as error:  # whatever an inner planner raises, the certified plan can be flown
+            reason = f"the inner planner raised {type(error).__name__}: {error}"[:300]
+        self._refuse(request.position_m, reason)
+        return Plan(PlanStatus.NO_PATH, reason)
+
+    def _refuse(self, place: Point, reason: str) -> None:
+        self._log.refused_plans += 1
+        self._refused = Refused(place, reason)
+
+    def _certified(self, request: PlanRequest, here_m: float, answer: Plan) -> CommittedPlan | None:
+        """A new committed plan along a new path, or further along the one that is flown; None without one."""
+        if answer.status is PlanStatus.FOUND:
+            return self._committed(request, here_m, Adopted(answer), new=True)
+        effective = self._monitor.plan
+        if self._adopted is None or not request.scanned or effective is None or effective.course.to_goal:
+            return None
+        return self._committed(request, here_m, self._adopted, new=False)
+
+    def _committed(
+        self, request: PlanRequest, here_m: float, adopted: Adopted, *, new: bool
+    ) -> CommittedPlan | None:
+        """As much of an inner path as is certified and gets on."""
+        effective, mission = self._monitor.plan, self._mission
+        inner = adopted.plan.path
+        assert inner is not None
+        prefix, pose, curvature = self._start(request, here_m)
+        from_m = 0.0 if new else _nearest_m(inner, pose[:2], adopted.certified_m)
+        track = self._flyable(request, prefix, pose, curvature, inner, from_m, new)
+        if track is None:
+            self._not_taken(request.position_m, "the path ends behind the aircraft", new)
+            return None
+        way = track.path
+        keeps = np.minimum(
+            mission.clearance_m, np.hypot(*(self._memory.points_m - way.segments[0, :2]).T) - 1e-3
+        )
+        cut_m = min(first_breach(way, self._memory.points_m, keeps), first_exit_m(way, mission.bounds_m))
+        certifier = Certifier(
+            self._room.holds, mission.clearance_m, mission.sensor_range_m, 1.5 * request.seen.spacing_m
+        )
+        terrain = self._room.terrain(mission.clearance_m + mission.tracking_error_m)
+        found = certifier.certify(way, request.seen, terrain, cut_m)
+        gets_on = found is not None and self._gets_on(found, track, adopted, new)
+        if not gets_on:
+            certified, found = found, self._to_goal(certifier, request, way, cut_m)
+            if (
+                found is None
+                and certified is not None
+                and effective is not None
+                and not effective.holds(here_m)
+            ):
+                return None  # the plan in effect leads as far
+        if found is None or room_m(found.path, self._threats) < mission.clearance_m:
+            free_m = min(certifier.seen_free_to_m(way, request.seen), cut_m)
+            why = (
+                "comes too near to something or leaves the area"
+                if cut_m <= free_m
+                else "has not been seen to be free"
+            )
+            self._not_taken(place_on(way, free_m)[0][:2], f"the path {why} {free_m:.0f} m ahead", new)
+            return None
+        if not new and effective is not None and self._monitor.broken:
+            return None
+        self._refused = None if new else self._refused
+        plan = replace(adopted.plan, path=found.path, status=PlanStatus.FOUND)
+        course = Course(
+            found.path,
+            (place_on(way, found.loiter_entry_m)[0][:2],),
+            self._memory.known,
+            True,
+            not found.path.loiter,
+        )
+        self._proposed = Adopted(adopted.plan, track.station_m(found.loiter_entry_m))
+        return CommittedPlan(plan, found.path, course, found.loiter_entry_m)
+
+    def _start(self, request: PlanRequest, here_m: float) -> tuple[list[Segment], Pose, float]:
+        """What of the plan in effect is flown in any case, and the pose and curvature where a new one leaves it."""
+        prefix: list[Segment] = [(*request.position_m, *request.direction, 0.0, self._lead_m)]
+        effective = self._monitor.plan
+        if effective is not None:
+            pose = Pose(*request.position_m, *request.direction)
+            prefix = effective.onward_from(pose, here_m, self._lead_m, self._mission.off_path_m) or prefix
+        last = prefix[-1]
+        return prefix, along(last, last[5]), last[4]
+
+    def _flyable(
+        self,
+        request: PlanRequest,
+        prefix: list[Segment],
+        pose: Pose,
+        curvature: float,
+        inner: Path,
+        from_m: float,
+        new: bool,
+    ) -> Tracked | None:
+        """The inner path as it is, where it can be flown from the aircraft on; else a track of it."""
+        here = Pose(*request.position_m, *request.direction)
+        if new and not inner.loiter and can_be_flown(inner, here, self._room.limits):
+            ends = np.concatenate(((0.0,), np.cumsum(inner.segments[:, 5])))
+            return Tracked(inner, ends)
+        most_m = min(MOST_RADII * self._room.limits.radius_m, self._mission.sensor_range_m)
+        track = tracked(pose, curvature, inner, from_m, self._room.limits, most_m)
+        if track is None:
+            return None
+        stations = np.concatenate((np.full(len(prefix), track.stations_m[0]), track.stations_m))
+        return Tracked(Path(np.array([*prefix, *track.path.segments.tolist()])), stations)
+
+    def _gets_on(self, found: Certified, track: Tracked, adopted: Adopted, new: bool) -> bool:
+        """Whether a certified part gains along the planner's path, and ends in another turn than that in effect."""
+        least_m = PROGRESS * self._room.holds.radius_m
+        effective = self._monitor.plan
+        if effective is not None and effective.path.loiter:
+            circle = hold_centre(effective.path.segments[-1])
+            if math.dist(hold_centre(found.path.segments[-1]), circle) < least_m:
+                return False
+        gained_m = track.station_m(found.loiter_entry_m) - (
+            track.stations_m[0] if new else adopted.certified_m
+        )
+        return bool(gained_m >= least_m)
+
+    def _to_goal(
+        self, certifier: Certifier, request: PlanRequest, way: Path, cut_m: float
+    ) -> Certified | None:
+        """The way up to where the flight is over, where it leads into the goal circle and is seen to be free."""
+        mission = self._mission
+        inside_m = mission.goal_radius_m - mission.tracking_error_m
+        step_m = 0.1 * max(inside_m, 1.0)
+        for i in range(int(min(way.length_m, cut_m) / step_m) + 1):
+            if math.dist(place_on(way, i * step_m)[0][:2], mission.goal_m) <= inside_m:
+                flown = Path(
+                    np.array(between(way, 0.0, i * step_m + mission.tracking_error_m) or way.segments)
+                )
+                return certifier.certify_up_to(i * step_m, flown, request.seen, mission.bounds_m)
+        return None
+
+    def _not_taken(self, place: Point, reason: str, new: bool) -> None:
+        if new:
+            self._refuse(place, reason)
+
+    def _backup(self, request: PlanRequest, here_m: float, answer: Plan) -> Plan:
+        """What is flown where the planner has nothing that is certified: the plan in effect, or an escape."""
+        effective, time_s = self._monitor.plan, request.time_s
+        why = self._refused.reason if self._refused is not None else answer.reason
+        if effective is None:
+            escape = self._escapes.at_start(request, self._threats, self._lead_m)
+            self._monitor.proposed, self._proposed = escape.committed, None
+            return escape.plan
+        if self._monitor.broken:
+            escape = self._escapes.from_plan(
+                request,
+                self._threats,
+                effective,
+                here_m,
+                until_m=min(self._monitor.cut_m, effective.loiter_entry_m),
+                prefix=self._start(request, here_m)[0],
+                certain=not (self._memory.ever_cleared or self._ever_changed),
+            )
+            self._monitor.broken = escape.broken
+            if escape.committed is not None:
+                self._monitor.proposed, self._proposed = escape.committed, None
+            self._log.note(time_s, escape.plan.reason)
+            return escape.plan
+        if not effective.holds(here_m) or not effective.path.loiter:
+            self._log.note(time_s, "")
+            return Plan(PlanStatus.KEPT, GOES_ON)
+        self._log.note(time_s, why)
+        if answer.status is PlanStatus.UNREACHABLE and self._refused is None:
+            return answer
+        return Plan(PlanStatus.NO_PATH, f"stuck in the turn since {self._log.since_s:.0f} s: {why}")
+
+
+def first_exit_m(path: Path, bounds_m: tuple[float, float, float, float]) -> float:
+    """Arc length before which a path stays in an area, to a hundredth of its length; infinite where it never leaves."""
+    xmin, ymin, xmax, ymax = bounds_m
+    count = 100
+    for i in range(count + 1):
+        east, north = place_on(path, path.length_m * i / count)[0][:2]
+        if not (xmin <= east <= xmax and ymin <= north <= ymax):
+            return path.length_m * max(i - 1, 0) / count
+    return math.inf
+
+
+def _nearest_m(path: Path, place: Point, before_m: float) -> float:
+    """Arc length of the place of a path that is nearest to a place, not beyond `before_m`."""
+    count = 200
+    end_m = min(path.length_m, before_m)
+    stations = [end_m * i / count for i in range(count + 1)]
+    return min(stations, key=lambda each: math.dist(place_on(path, each)[0][:2], place))

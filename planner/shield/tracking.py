@@ -1,0 +1,116 @@
+"""The path of a planner as an aircraft can fly it: pursuit at the turn radius with a limited change of curvature.
+
+A path may have corners, or begin beside the aircraft. What is certified has to be what is flown: so the path is
+tracked first, by pure pursuit (R. C. Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-
+92-01, 1992), and the track is certified.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.geometry.curves import Limits, Pose, Segment, along, sample
+from planner.interface import FloatArray, Path
+
+STEP_SHARE = 1.0 / 12.0
+"""Length of a step of the track over the turn radius."""
+
+AHEAD_SHARE = 0.6
+"""The track aims at the place of the path so many turn radii ahead of the nearest one."""
+
+SMOOTH_RAD, SMOOTH_M = math.radians(2.0), 1.0
+"""A path whose joints turn and jump by no more than this can be flown as it is."""
+
+MOST_RADII = 30.0
+"""No more of a path is tracked than so many turn radii, and no less than what is seen."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """A path that can be flown, and how far along the planner's path it has come at each of its segments.
+
+    Attributes:
+        path: what is flown.
+        stations_m: (n + 1,) arc length of the planner's path, at the beginning of each segment and at the end.
+    """
+
+    path: Path
+    stations_m: FloatArray
+
+    def station_m(self, arc_length_m: float) -> float:
+        """Arc length of the planner's path beside a place of the track."""
+        ends = np.concatenate(((0.0,), np.cumsum(self.path.segments[:, 5])))
+        return float(np.interp(arc_length_m, ends, self.stations_m))
+
+
+def tracked(
+    pose: Pose, curvature: float, path: Path, from_m: float, limits: Limits, most_m: float
+) -> Tracked | None:
+    """A track of a path from a pose on, at most so long; None where the path ends behind the pose.
+
+    Args:
+        pose: where the track begins.
+        curvature: there, 1/m.
+        path: the planner's path.
+        from_m: arc length of the path before which the pose is not beside it.
+        limits: smallest radius and room to roll.
+        most_m: the track is no longer than this.
+    """
+    step_m, ahead_m = STEP_SHARE * limits.radius_m, AHEAD_SHARE * limits.radius_m
+    places = sample(path, step_m)
+    stations = np.concatenate(((0.0,), np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
+    stations *= path.length_m / max(float(stations[-1]), 1e-9)
+    rows = places.tolist()
+    at = stations.tolist()
+    last = len(rows) - 1
+    i = min(int(np.searchsorted(stations, from_m)), last)
+    near = np.hypot(places[i:, 0] - pose.east_m, places[i:, 1] - pose.north_m)
+    within = stations[i:] <= from_m + 2.0 * limits.radius_m
+    i += int(np.argmin(np.where(within, near, math.inf)))
+    most_bend = 1.0 / limits.radius_m
+    most_change = most_bend * min(1.0, step_m / max(limits.roll_m, step_m))
+    out: list[Segment] = []
+    passed = [at[i]]
+    flown_m = 0.0
+    while flown_m < most_m and i < last:
+        j = i
+        while j < last and at[j] < at[i] + ahead_m:
+            j += 1
+        east, north = rows[j][0] - pose.east_m, rows[j][1] - pose.north_m
+        aside = pose.tangent_east * north - pose.tangent_north * east
+        forward = pose.tangent_east * east + pose.tangent_north * north
+        square = max(east * east + north * north, 1e-9)
+        wanted = 2.0 * aside / square if forward > 0.0 else math.copysign(most_bend, aside)
+        wanted = min(max(wanted, -most_bend), most_bend)
+        curvature = min(max(wanted, curvature - most_change), curvature + most_change)
+        curvature = min(max(curvature, -most_bend), most_bend)
+        segment: Segment = (*pose, curvature, step_m)
+        out.append(segment)
+        pose = along(segment, step_m)
+        flown_m += step_m
+        while i < last and _nearer(rows[i + 1], rows[i], pose):
+            i += 1
+        passed.append(at[i])
+    return Tracked(Path(np.array(out)), np.array(passed)) if out else None
+
+
+def _nearer(place: list[float], than: list[float], pose: Pose) -> bool:
+    return math.dist(place, pose[:2]) <= math.dist(than, pose[:2])
+
+
+def can_be_flown(path: Path, pose: Pose, limits: Limits) -> bool:
+    """Whether a path has no corner and no turn that is too tight, and begins at a pose."""
+    rows = path.segments
+    if np.abs(rows[:, 4]).max(initial=0.0) > (1.0 + 1e-6) / limits.radius_m:
+        return False
+    here: Pose = pose
+    for row in rows.tolist():
+        turn = abs(here.tangent_east * row[3] - here.tangent_north * row[2])
+        ahead = here.tangent_east * row[2] + here.tangent_north * row[3]
+        if math.dist(here[:2], row[:2]) > SMOOTH_M or turn > math.sin(SMOOTH_RAD) or ahead < 0.0:
+            return False
+        here = along(row, row[5])
+    return True

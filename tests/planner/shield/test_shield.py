@@ -1,0 +1,80 @@
+"""What the shield does with one answer of a planner."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from planner.geometry.curves import sample
+from planner.interface import FloatArray, MapView, Mission, Path, Plan, PlanRequest, PlanStatus
+from planner.shield import shield as shield_module
+from planner.shield.shield import Shield, first_exit_m
+
+Known = Callable[[FloatArray], MapView]
+MISSION = Mission(
+    goal_m=(3000.0, 0.0),
+    goal_radius_m=50.0,
+    clearance_m=40.0,
+    sensor_range_m=3000.0,
+    speed_mps=25.0,
+    turn_radius_m=100.0,
+    roll_in_s=1.0,
+    tracking_error_m=1.0,
+    bounds_m=(-500.0, -1000.0, 4000.0, 400.0),
+)
+OUT_AND_BACK = ((0.0, 0.0), (600.0, 0.0), (600.0, 900.0), (1400.0, 900.0), (1400.0, -500.0))
+"""North out of the area, and back in."""
+
+
+class Once:
+    """A planner with one path; remembers what it is told."""
+
+    def __init__(self, *points_m: tuple[float, float]) -> None:
+        self.points_m = points_m
+        self.told: list[PlanRequest] = []
+
+    def plan(self, request: PlanRequest) -> Plan:
+        self.told.append(request)
+        return Plan(PlanStatus.FOUND, "once", np.array(self.points_m), Path.through(self.points_m))
+
+
+def answer(inner: Once, seen: MapView) -> Plan:
+    return Shield(inner, MISSION).plan(PlanRequest(0.0, (0.0, 0.0), (1.0, 0.0), seen))
+
+
+def test_a_way_that_leaves_the_area_is_flown_only_as_far_as_a_turn_inside(
+    known: Known, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = known(np.zeros((0, 2)))
+    path = answer(Once(*OUT_AND_BACK), free).path
+    assert path is not None
+    assert path.loiter
+    assert sample(path, 5.0)[:, 1].max() <= 400.0
+    monkeypatch.setattr(shield_module, "first_exit_m", lambda *_: math.inf)  # the turn alone does not tell
+    path = answer(Once(*OUT_AND_BACK), free).path
+    assert path is not None
+    assert sample(path, 5.0)[:, 1].max() > 800.0
+
+
+def test_first_exit() -> None:
+    path = Path.through([(0.0, 0.0), (1000.0, 0.0)])
+    assert first_exit_m(path, (-1.0, -1.0, 2000.0, 1.0)) == math.inf
+    assert first_exit_m(path, (-1.0, -1.0, 355.0, 1.0)) == pytest.approx(350.0)
+
+
+def test_a_refused_planner_is_told_where_and_why(known: Known) -> None:
+    wall = np.array([(100.0, y) for y in np.arange(-300.0, 301.0, 20.0)])
+    inner = Once((0.0, 0.0), (3000.0, 0.0))
+    shield = Shield(inner, MISSION)
+    request = PlanRequest(0.0, (0.0, 0.0), (0.0, 1.0), known(wall))
+    shield.plan(request)
+    assert inner.told[0].refused is None
+    shield.plan(request._replace(time_s=0.5))
+    refused = inner.told[1].refused
+    assert refused is not None
+    assert "too near to something" in refused.reason
+    assert math.hypot(*refused.place_m) < 300.0
+    assert shield.report.refused_plans == 2
