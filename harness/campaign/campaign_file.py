@@ -15,8 +15,9 @@ from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, InputError, Loc, Node, fault_line, node_of
 from harness.scenario.files_resolved import file_beside
 from harness.scenario.generators.generators import WorldSpec
+from harness.scenario.planner_section import PlannerSpec
 from harness.scenario.resolving import model_or_folder
-from harness.scenario.sections import AircraftSpec, PlannerSpec, Section, key
+from harness.scenario.sections import AircraftSpec, Section, key
 from harness.scenario.shipped import shipped_scenarios
 from harness.scenario.validation import NAME_PATTERN, KeyFault, input_error, shown
 

@@ -212,7 +212,7 @@ def _turbulence(text: str | None) -> dict[str, str] | None:
 def planner_kind(text: str) -> str:
     """The kind that --planner means: FILE.py:NAME and MODULE:NAME are imported, and known by their name then."""
     from harness.scenario.given import PLANNER
-    from harness.scenario.sections import SHIELDED
+    from harness.scenario.planner_section import SHIELDED
 
     shielded = SHIELDED if text.endswith(SHIELDED) else ""
     return _kind(text.removesuffix(SHIELDED), PLANNER, "--planner") + shielded

@@ -11,13 +11,13 @@ from aircraft.interface import STEP_RATE_HZ
 from harness.scenario.environment import Environment, GroundSpec, SourceSpec
 from harness.scenario.navigation import Navigation
 from harness.scenario.obstacles import Obstacle
+from harness.scenario.planner_section import PlannerSpec
 from harness.scenario.sections import (
     MAX_COORDINATE_M,
     AircraftSpec,
     Area,
     GuidanceSpec,
     MissionSpec,
-    PlannerSpec,
     Section,
     Sensor,
     UncertaintySpec,

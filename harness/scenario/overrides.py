@@ -10,7 +10,8 @@ import numpy as np
 
 from harness.files import strict_yaml
 from harness.files.strict_yaml import COMMAND_LINE, IN_PYTHON, InputError, Loc, Node, loc_of, node_of
-from harness.scenario.sections import GuidanceSpec, PlannerSpec, Section
+from harness.scenario.planner_section import PlannerSpec
+from harness.scenario.sections import GuidanceSpec, Section
 
 OWN_KEYS: Final[Mapping[Loc, type[Section]]] = {
     ("planner", "kind"): PlannerSpec,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from harness.files.crash import PlannerError, sentence
 from harness.files.printing import PrintingAside
 from harness.scenario import own_keys
-from harness.scenario.sections import PlannerSpec
+from harness.scenario.planner_section import PlannerSpec
 from planner.compiled import compile_all
 from planner.registry import installed_kinds, planner_kinds
 from planner.shield.shield import Shield

@@ -11,7 +11,7 @@ import pytest
 import wayproof
 from planner.interface import Mission, Path, Plan, PlanRequest, PlanStatus
 from planner.shield import shield as shield_module
-from planner.shield.certificate import Certifier
+from planner.shield.certificate import Certified, Certifier
 
 WORLD = {
     "area.bounds_m": [0, 0, 5000, 3000],
@@ -134,7 +134,7 @@ def test_without_a_part_of_the_shield_a_planner_does_harm(part: str, monkeypatch
     if part == "turn":  # all that is certified is flown, with nowhere to turn at its end
 
         def without_a_turn(self: Certifier, path: Path, *_: object) -> object:
-            return shield_module.Certified(path, path.length_m)
+            return Certified(path, path.length_m)
 
         monkeypatch.setattr(Certifier, "certify", without_a_turn)
         assert flown(Inner).outcome in ("collision", "planner_failed")

@@ -12,7 +12,8 @@ import pytest
 from planner.geometry.curves import Pose, end_of
 from planner.interface import BoolArray, FloatArray, Mission, MovingEdges, Plan, PlanStatus
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, RETRY_S
-from planner.rolling_window.planner import RollingWindow, Situation
+from planner.rolling_window.planner import RollingWindow
+from planner.rolling_window.situation import Situation
 from planner.world_stability import SETTLED_S
 from tests.planner.rolling_window.test_rolling_window import (
     MISSION,

@@ -14,14 +14,8 @@ from planner.geometry.curves import on_loiter
 from planner.interface import BoolArray, FloatArray, Mission, NoWayToBegin, Plan, PlanStatus
 from planner.memory import ObstacleMemory
 from planner.rolling_window.dead_ends import MOST_EFFORT, MOST_RETRIES, GivingUp
-from planner.rolling_window.planner import (
-    NO_BETTER,
-    NO_WAY_ON,
-    THINKING_ON,
-    PlanningState,
-    RollingWindow,
-    Situation,
-)
+from planner.rolling_window.planner import NO_BETTER, NO_WAY_ON, THINKING_ON, RollingWindow
+from planner.rolling_window.situation import PlanningState, Situation
 from planner.shield.certificate import CertificateBroken
 from planner.shield.escape import Escape
 from tests.planner.rolling_window.test_rolling_window import (
