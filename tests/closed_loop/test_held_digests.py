@@ -20,7 +20,7 @@ from harness.scenario.shipped import scenario_path
 HELD = {
     "aerosonde_forest": "6c59aba0901510e17063edcddcc997ec95b04f4402ad93099b50428c8196a1d4",
     "polygon_town": "d6dbad733b31a96f5d6c1aac1163b5bd7cdb01ac28280523883acb91fade1304",
-    "one_of_everything": "1dbe2475e7563c5a16dd6a1af5b5bfd23bccdd6669f6d4a71e4a8d4387510e67",
+    "one_of_everything": "c79da4b35fb4024592252ee9d825a011a976986d1d784d596c4d8baa681aca60",
 }
 """SHA-256 of the first minute of each."""
 
