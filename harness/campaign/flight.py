@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import errno
-import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache, partial
@@ -38,7 +37,7 @@ class Job:
         again: the command line that flies it again.
         varied: the keys that the campaign varies and their values in this run, for the recording's properties.
         claim: a run is a failure where this does not hold of it.
-        path: a pickled `PathCheck`, if a given path is flown in place of what a planner finds; `packed` is empty then.
+        path: a check, if a given path is flown in place of what a planner finds; `packed` is empty then.
         planners: planners that the process has to import, as FILE.py:NAME or MODULE:NAME.
         laws: guidance laws that it has to import, likewise.
         kinematic: a point that follows the plans exactly flies in place of the aircraft.
@@ -53,7 +52,7 @@ class Job:
     again: str = ""
     varied: Mapping[str, str | float | int | bool] = field(default_factory=dict)
     claim: Claim = "reached"
-    path: bytes | None = None
+    path: PathCheck | None = None
     planners: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
     kinematic: bool = False
@@ -94,9 +93,8 @@ def fly_job(job: Job) -> Answer:
             _imported(source, PLANNER)
         for source in job.laws:
             _imported(source, GUIDANCE)
-        check = None if job.path is None else pickle.loads(job.path)
-        scenario = unpacked(job.packed) if check is None else check.scenario
-        metrics = _flown(job, scenario, check)
+        scenario = unpacked(job.packed) if job.path is None else job.path.scenario
+        metrics = _flown(job, scenario, job.path)
         optimum_m = _optimum_m(scenario) if job.optimum else None
         cells = metric_cells(metrics, scenario.planner.clearance_m, optimum_m)
     except (WriteError, RunFolderError):

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import math
-import pickle
 import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -201,7 +200,7 @@ class PathDays(Days):
 
     def job(self, number: int, folder: Path) -> Job:
         """Day `number` as it is handed to who flies it."""
-        return replace(super().job(number, folder), path=pickle.dumps(self.path(number)))
+        return replace(super().job(number, folder), path=self.path(number))
 
     def again(self, number: int, folder: Path) -> str:
         """The command that flies day `number` again."""

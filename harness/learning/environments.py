@@ -77,7 +77,7 @@ class WaypointsEnv(gymnasium.Env[Observation, Action]):
         if not 1 <= self._beams <= rays:
             raise ValueError(f"beams is {beams}; must be from 1 to the {rays} rays of the scenario's sensor")
         self.render_mode = render_mode
-        self._mission = mission_of(self._own)
+        self._mission = replace(mission_of(self._own), bounds_m=self._own.area.bounds_m)
         limits = airframe(self._own.aircraft.model).guidance_limits(self._own.aircraft.airspeed_mps)
         self._bank_limit_rad = limits.bank_limit_rad
         if self._updates * self._own.sensor.rate_hz < UPDATE_RATE_HZ:

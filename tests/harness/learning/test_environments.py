@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -132,7 +133,7 @@ def test_a_scan_is_observed_when_it_is_available() -> None:
 def test_the_state_is_what_it_says() -> None:
     from aircraft.interface import AircraftState
 
-    mission = mission_of(near())
+    mission = replace(mission_of(near()), bounds_m=(0.0, 0.0, 6000.0, 6000.0))
     east = AircraftState(0.0, 2700.0, 600.0, 300.0, 25.0, 0.0, 0.0, 0.0, -0.3, 0.0, 25.0, 1.0)
     seen = dict(zip(STATE, state_of(east, mission, 0.6).tolist(), strict=True))
     values = list(seen.values())
