@@ -110,14 +110,14 @@ def test_a_drawn_line_is_to_be_flown_as_drawn(check: Check) -> None:
 
 
 def test_a_path_that_leads_back_and_by_where_it_began(check: Check) -> None:
-    """What is told of a corner is told of when the aircraft came to it, and as its leg has it."""
+    """Back onto the line it came on an aircraft has to turn: twice the least radius of 63.7 m beside the line."""
     flown = check(np.array([(0.0, 0.0), (0.0, 2000.0), (0.0, 0.0), (3000.0, 0.0)]))
     assert causes(flown) == {"turn radius too tight"}
     back, square = flown["check"]["corners"]
-    assert (back["radius_m"], back["cut_m"], flown["trackability"][0]["corner_cut_m"]) == (0.0, 0.0, 0.0)
-    assert back["flown_cut_m"] < 5.0
-    assert square["flown_cut_m"] == pytest.approx(flown["trackability"][1]["corner_cut_m"], abs=4.0)
-    assert flown["planned_length_m"] == pytest.approx(7000.0 - 2.0 * 63.7 + math.pi / 2.0 * 63.7, abs=2.0)
+    assert (back["kept"], back["turn_deg"]) == (False, -180.0)
+    assert back["most_off_m"] == pytest.approx(2.0 * 63.7, abs=5.0)
+    # A corner of 90 degrees is cut by (sqrt(2) - 1) R.
+    assert square["flown_cut_m"] == pytest.approx((math.sqrt(2.0) - 1.0) * 63.7, abs=4.5)
 
 
 def test_a_straight_path_is_as_long_as_it_is(check: Check) -> None:

@@ -117,12 +117,15 @@ def test_the_plan_keeps_the_margin_beyond_the_clearance(scenario: Scenario) -> N
 def test_the_plan_keeps_the_margin_from_the_border_of_the_area(scenario: Scenario) -> None:
     given = scenario.with_({"navigation.margin_m": 30.0})
     xmin, ymin, xmax, ymax = given.area.bounds_m
-    assert mission_of(given).bounds_m == (xmin + 30.0, ymin + 30.0, xmax - 30.0, ymax - 30.0)
+    inset_m = 30.0 + mission_of(given).tracking_error_m
+    assert mission_of(given).bounds_m == (xmin + inset_m, ymin + inset_m, xmax - inset_m, ymax - inset_m)
     east, north = xmin + 10.0, ymax - 20.0
     near = given.with_({"mission.start_m": [east, ymin + 200.0], "mission.goal_m": [xmax - 200.0, north]})
-    assert mission_of(near).bounds_m == (east, ymin + 30.0, xmax - 30.0, north)
+    assert mission_of(near).bounds_m == (east, ymin + inset_m, xmax - inset_m, north)
     exact = near.with_({"navigation": {"kind": "perfect"}})
-    assert mission_of(exact).bounds_m == exact.area.bounds_m
+    inset_m = mission_of(exact).tracking_error_m
+    assert 0.0 < inset_m < 1.0
+    assert mission_of(exact).bounds_m == (xmin, ymin + inset_m, xmax - inset_m, ymax)
 
 
 class Jumping:

@@ -28,6 +28,7 @@ LIMITS = FlightLimits(
     max_cross_track_m=20.0,
 )
 KEYS = {
+    "shield",
     "outcome",
     "reason",
     "flown_length_m",

@@ -73,7 +73,7 @@ def test_a_claim_that_is_just_true_is_rarely_decided_at_any_look(rate: float) ->
     assert max(wrong.values()) <= MOST_MISSED * REPETITIONS
 
 
-@pytest.mark.parametrize("rate", [1e-1, 1e-2, 1e-3])
+@pytest.mark.parametrize("rate", [1e-1, 1e-2, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_bounds_at_the_day_that_decides_cover_the_rate(rate: float) -> None:
     rng = np.random.default_rng(round(7 / rate))
     missed = np.zeros(2, dtype=int)
