@@ -95,7 +95,7 @@ def python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
 @pytest.mark.flights
 def test_the_first_command_flies_the_papers_scenario_and_prints_what_readme_shows(tmp_path: Path) -> None:
     arguments = FLY.removeprefix(f"{SET_UP}-e . && .venv/bin/wayproof ")
-    assert arguments == "fly scenarios/paper_circles.yaml"
+    assert arguments == "fly scenarios/paper_circles.yaml --conditions typical"
     flown = wayproof(arguments, tmp_path)
     assert (flown.returncode, said(flown)) == (0, [])
     (shown,) = (block for block in blocks("text") if "run folder:" in block)
