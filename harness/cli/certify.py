@@ -158,6 +158,20 @@ def certify(
     return 0 if certificate.verdict == "shown" else FAILED
 
 
+def fly_path_days(days: Days, folder: Path, *, silent: bool) -> None:
+    """Flies a given path on a fixed number of days, and prints how often it was flown as given."""
+    from harness.certification.certification import Terms
+    from harness.certification.certification import certify as fly_days
+    from harness.cli.terminal import print_table
+
+    days.check()
+    workers, resume = os.cpu_count() or 1, (folder / "campaign.json").exists()
+    found = _fly(fly_days, days, folder, workers, Terms(), resume=resume, bar=days_bar, silent=silent)
+    if not silent:
+        print_table(f"{found.subject}: {found.runs} days", certificate_rows(found))
+        say(f"certificate: {folder / 'certificate.json'}")
+
+
 def _fly(
     fly_days: Any,
     days: Days,

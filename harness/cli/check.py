@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -92,6 +93,12 @@ def check(
         list[str] | None,
         typer.Option("--set", metavar="KEY.PATH=VALUE", help="Any key of a scenario; can be repeated."),
     ] = None,
+    days: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N", min=1, help="Fly it on N days of its conditions too: DIR/days, as `certify` does."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="The run folder. Default: its own in runs/check."),
@@ -130,15 +137,19 @@ def check(
     }
     overrides = chosen(seed=seed, guidance=guidance, conditions=conditions)
     replaced = settings_of(settings, [*overrides, *chosen(aircraft=aircraft)])
-    check = asked(
-        given,
-        sections,
-        [*overrides, *replaced],
-        world=world,
-        altitude_m=altitude_m,
-        corner_m=corner_m,
-        name=_name(path),
-    )
+
+    def on_day(day: Sequence[tuple[str, str]]) -> PathCheck:
+        return asked(
+            given,
+            sections,
+            [*overrides, *replaced, *day],
+            world=world,
+            altitude_m=altitude_m,
+            corner_m=corner_m,
+            name=_name(path),
+        )
+
+    check = on_day(())
     numbers = {
         "airspeed_mps": airspeed_mps,
         "altitude_m": altitude_m,
@@ -174,6 +185,16 @@ def check(
         day = ("conditions", plain(told(check.scenario)))
         print_table(f"{path.name}: {aircraft}, {speed_mps:g} m/s", dict([verdict, day, *rows]))
         say(f"run folder: {folder}")
+    if days is not None:
+        from harness.certification.days import PathDays
+        from harness.cli.certify import fly_path_days
+
+        content = f"{path.read_bytes().hex()} {differs} {replaced} {world and world.read_text()}"
+        words_again = ["wayproof", "check", str(path), "--aircraft", aircraft]
+        drawn = PathDays(
+            on_day, content, words_again, {}, claim="as-given", seed=check.scenario.seed, most=days
+        )
+        fly_path_days(drawn, folder / "days", silent=quiet or as_json)
     return 0 if flown.ok else FAILED
 
 

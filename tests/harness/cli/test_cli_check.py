@@ -351,3 +351,15 @@ def test_errors_have_their_unit_where_those_of_a_flight_have_it(
         figures = rows[row].partition(",")[0]
         assert figures.count(" m") == 1 + figures.count(" max")
     assert rows["off the path given"].startswith("p95 987 / max 1,234 m, allowed ")
+
+
+@pytest.mark.flights
+def test_days_are_flown_beside_the_check_and_counted(tmp_path: Path) -> None:
+    """Three of three: with confidence 0.95 at least the cube root of 0.05 (Clopper and Pearson)."""
+    path = tmp_path / "line.csv"
+    path.write_text("x_m,y_m\n0,0\n1500,0\n")
+    run = ["check", str(path), "--aircraft", "aerosonde", "--conditions", "typical", "--quiet"]
+    assert main([*run, "--days", "3", "--out", str(tmp_path / "run")]) == 0
+    certificate = json.loads((tmp_path / "run" / "days" / "certificate.json").read_text())
+    assert (certificate["runs"], certificate["held"]) == (3, 3)
+    assert certificate["probability_lower"] == pytest.approx(0.05 ** (1 / 3), rel=1e-4)
