@@ -187,7 +187,7 @@ def test_a_path_is_checked_as_shown_and_the_same_mission_planned_is_trackable(tm
     (shown,) = (block for block in blocks("text") if block.startswith("my_path.csv"))
     names = [line[:20].strip() for line in shown.splitlines()]
     assert [line[:20].strip() for line in checked.stdout.splitlines()][: len(names)] == names
-    assert "no: turn radius too tight (2 legs)" in checked.stdout
+    assert "no: turn radius too tight (3 legs)" in checked.stdout
 
     assert wayproof("fly my_world.yaml --no-recording --quiet", tmp_path).returncode == 0
     run = "runs/my_world/rolling_window-aerosonde-1"
@@ -250,11 +250,11 @@ def test_ones_own_law_in_a_file_is_compared_on_the_command_line_and_in_python(tm
     assert (flown.returncode, said(flown)) == (0, [])
     rows = json.loads(flown.stdout)["rows"]
     assert [row["outcome"] for row in rows] == ["reached", "reached"]
-    assert rows[0]["cross_track_max_m"] < rows[1]["cross_track_max_m"]
+    assert rows[0]["total_system_error_max_m"] < rows[1]["total_system_error_max_m"]
     call = f"compare('my_world.yaml', ['rolling_window'], 'in_python', guidance={laws.split(',')})"
     ran = python(f"import wayproof\nprint(wayproof.{call}.table.to_pylist())", tmp_path)
     assert (ran.returncode, said(ran)) == (0, [])
-    assert repr(rows[1]["cross_track_max_m"]) in ran.stdout
+    assert repr(rows[1]["total_system_error_max_m"]) in ran.stdout
     measured = wayproof("bench tracking --guidance my_law.py:LAW --seeds 1 --json", tmp_path)
     assert measured.stderr == ""
     assert measured.returncode in (0, 1)

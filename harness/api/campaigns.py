@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -73,7 +72,7 @@ def compare(
                 law_sources=tuple(each for each in guidance or () if is_source(each)),
             ),
         )
-    return ComparisonResult(pa.Table.from_pylist([asdict(row) for row in compared.rows]), Path(out))
+    return ComparisonResult(pa.Table.from_pylist([row.plain() for row in compared.rows]), Path(out))
 
 
 def _named(names: Sequence[str], part: LoopPart, argument: str) -> list[str]:

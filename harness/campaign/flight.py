@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 from harness.analysis.claims import Claim, holds
 from harness.campaign.results import ERROR, metric_cells, time_cells
-from harness.files.crash import sentence, trace
+from harness.files.crash import PlannerError, sentence, trace
 from harness.files.errors import RunFolderError, WriteError
 from harness.scenario.given import GUIDANCE, PLANNER, LoopPart, registered_source
 from harness.scenario.scenario import Scenario, unpacked
@@ -101,6 +101,10 @@ def fly_job(job: Job) -> Answer:
         raise
     except MemoryError:
         raise NoMemoryError from None
+    except PlannerError as error:  # whatever its constructor raised is its own
+        if isinstance(error.__cause__, MemoryError):
+            raise NoMemoryError from None
+        return failed(job.run, sentence(error), trace(error))
     except Exception as error:
         if isinstance(error.__cause__, MemoryError):
             raise NoMemoryError from None

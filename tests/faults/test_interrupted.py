@@ -79,7 +79,10 @@ def test_a_full_disk(size: int, tmp_path: Path) -> None:
     """No file may grow beyond some bytes, which a write finds out as it would a full disk."""
     status, out, err = run(tmp_path, *FLY, file_bytes=size)
     assert (status, out) == (1, "")
-    assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
+    assert (
+        err
+        == "wayproof: cannot write the run in run (track.parquet: File too large); it is marked incomplete\n"
+    )
     with pytest.raises(RunFolderError, match="incomplete"):
         load_run(tmp_path / "run")
     assert run_here(tmp_path, *FLY, *SHORT, "--quiet")[0] == 1
@@ -90,14 +93,19 @@ def test_a_full_disk(size: int, tmp_path: Path) -> None:
 def test_a_disk_that_is_full_for_the_track_alone(tmp_path: Path) -> None:
     status, _, err = run(tmp_path, *FLY, "--no-recording", file_bytes=60_000)
     assert status == 1
-    assert err == "wayproof: cannot write the run in run (File too large); it is marked incomplete\n"
+    assert (
+        err
+        == "wayproof: cannot write the run in run (track.parquet: File too large); it is marked incomplete\n"
+    )
 
 
 @pytest.mark.flights
 def test_a_disk_that_is_full_for_a_report(a_run: Path, tmp_path: Path) -> None:
     shutil.copytree(a_run, tmp_path / "run")
     status, _, err = run(tmp_path, "report", "run", file_bytes=20_000)
-    assert (status, err) == (2, "wayproof: cannot write the report in run: File too large\n")
+    assert status == 2
+    assert err.startswith("wayproof: cannot write the report in run: ")
+    assert err.endswith(": File too large\n")
     assert not (tmp_path / "run" / "report.html").exists()
     assert run_here(tmp_path, "report", "run")[0] == 0
 

@@ -47,7 +47,7 @@ def results(place: Path) -> bytes:
 @pytest.mark.parametrize(
     ("size", "status", "said"),
     [
-        (100, 2, "wayproof: cannot write the campaign out: File too large\n"),
+        (100, 2, "wayproof: cannot write the campaign out: campaign.json: File too large\n"),
         (4_000, 1, "--resume goes on\n"),
         (100_000, 1, "--resume goes on\n"),
     ],
@@ -70,10 +70,10 @@ def test_a_full_disk(size: int, status: int, said: str, place: Path, unbroken: b
 def test_a_disk_that_is_full_for_the_summary_alone(place: Path, whole: Path, unbroken: bytes) -> None:
     shutil.copytree(whole, place / "out")
     (place / "out" / "summary.html").unlink()
-    status, out, err = run(place, *SWEEP, "--resume", file_bytes=25_000)
+    status, out, err = run(place, *SWEEP, "--resume", file_bytes=60_000)
     assert (status, out) == (1, "")
     assert err == (
-        "wayproof: cannot write the summary in out: File too large; the results are whole, and "
+        "wayproof: cannot write the summary in out: summary.html: File too large; the results are whole, and "
         "`wayproof report out` makes it from them\n"
     )
     assert not list((place / "out").glob("summary.html*"))

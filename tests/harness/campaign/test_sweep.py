@@ -179,7 +179,7 @@ def test_results_have_a_row_a_run_and_every_metric(unbroken: Path) -> None:
     for first, second in zip(rows[::2], rows[1::2], strict=True):
         assert first["seed"] == second["seed"]
         assert [first[name] for name in varied] == [second[name] for name in varied]
-    assert all(row["optimum_m"] > 1414 and 0.9 < row["length_ratio"] < 2 for row in rows)
+    assert all(row["optimum_m"] > 1300 and 0.9 < row["length_ratio"] < 2 for row in rows)
     times = rows_of(unbroken, "timings")
     assert [list(row) for row in times] == [list(TIMES)] * 8
     assert all(row["wall_s"] > 0 and row["compute_ms.max"] > 0 for row in times)
