@@ -20,7 +20,7 @@ from harness.scenario.shipped import scenario_path
 HELD = {
     "aerosonde_forest": "6c59aba0901510e17063edcddcc997ec95b04f4402ad93099b50428c8196a1d4",
     "polygon_town": "d6dbad733b31a96f5d6c1aac1163b5bd7cdb01ac28280523883acb91fade1304",
-    "one_of_everything": "c79da4b35fb4024592252ee9d825a011a976986d1d784d596c4d8baa681aca60",
+    "one_of_everything": "39e00b6a78725a31877ea10aaf8d17ad3b858b030dedbbd94f971c332daa746b",
 }
 """SHA-256 of the first minute of each."""
 
